@@ -1,0 +1,13 @@
+//! The wire protocol: generated from `swarm/v1/*.proto`, and nothing else.
+
+/// Package `swarm.v1`.
+#[allow(missing_docs, clippy::all)]
+pub mod v1 {
+    tonic::include_proto!("swarm.v1");
+}
+
+/// Version of the worker protocol. Coordinator and worker must agree.
+pub const PROTOCOL_VERSION: u32 = 1;
+
+/// The encoded descriptors of the package, for gRPC reflection.
+pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/swarm.v1.bin"));

@@ -1,0 +1,46 @@
+//! The experiment file as types, with every default filled in.
+//!
+//! Reading one is [`ExperimentConfig::from_json`]: strict, and it reports every
+//! problem of a file at once. Serialising one gives the *canonical form*: all
+//! keys present in a fixed order, and itself a valid experiment file that reads
+//! back to an equal value. Workers get it, digests hash it.
+//!
+//! Lengths are centimetres, times environment steps, angles radians, unless a
+//! field says otherwise.
+
+mod algorithm;
+mod problem;
+mod topology;
+mod world;
+
+use serde::Serialize;
+
+pub use algorithm::*;
+pub use problem::{ConfigError, Problem};
+pub use topology::*;
+pub use world::*;
+
+/// Maps whose order carries meaning (order of inputs, of segments, of robots).
+pub type NamedMap<T> = indexmap::IndexMap<String, T>;
+
+/// A whole experiment: network, evolution, world.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExperimentConfig {
+    /// Name for display; does not influence the run.
+    pub name: String,
+    /// Master seed of all randomness.
+    pub seed: u64,
+    /// The neural network's structure.
+    pub topology: TopologyConfig,
+    /// What evolves, how, and how it is judged.
+    pub algorithm: AlgorithmConfig,
+    /// Arena, robots, lights, ground areas.
+    pub world: WorldConfig,
+}
+
+impl ExperimentConfig {
+    /// The canonical form, as compact JSON.
+    pub fn to_canonical_json(&self) -> String {
+        serde_json::to_string(self).expect("plain data with string keys serialises")
+    }
+}

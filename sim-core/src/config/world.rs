@@ -1,0 +1,362 @@
+//! `world`: the arena and what is in it.
+
+use serde::Serialize;
+
+use super::{NamedMap, SensorQuery};
+
+/// A flat torus and its objects.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WorldConfig {
+    /// Height H (y axis), cm.
+    pub height: f64,
+    /// Width W (x axis), cm.
+    pub width: f64,
+    /// Robots, lights, ground areas; their order numbers the robots.
+    pub objects: NamedMap<ObjectConfig>,
+}
+
+/// One kind of object.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum ObjectConfig {
+    /// A swarm of equal robots.
+    Robot(RobotConfig),
+    /// Point lights.
+    LightSource(LightSourceConfig),
+    /// Coloured discs on the ground.
+    GroundArea(GroundAreaConfig),
+}
+
+/// A swarm of equal robots.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotConfig {
+    /// Number of robots.
+    pub num_instances: u32,
+    /// What decides their actions.
+    pub controller: RobotController,
+    /// What they perceive.
+    pub sensors: SensorsConfig,
+    /// What they can do.
+    pub actuators: ActuatorsConfig,
+    /// Where they start.
+    pub initializers: RobotInitializers,
+    /// What goes wrong.
+    pub perturbations: PerturbationsConfig,
+    /// Switches.
+    pub params: RobotParams,
+}
+
+/// Controllers of robots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotController {
+    /// The network of `topology`.
+    NeuralController,
+    /// Braitenberg vehicle 2b: light-sensor halves to crossed wheels.
+    BraitenbergLightFollower,
+}
+
+/// Switches of a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct RobotParams {
+    /// Whether its controller may evolve; default true.
+    pub trainable: bool,
+}
+
+/// Sensors; absent ones are not mounted.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct SensorsConfig {
+    /// Frames of other robots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wireless_receiver: Option<WirelessReceiverConfig>,
+    /// Lights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_sensor: Option<LightSensorConfig>,
+    /// Other robots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_sensor: Option<DistanceSensorConfig>,
+    /// Ground areas.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground_sensor: Option<GroundSensorConfig>,
+}
+
+/// Receiver of the wireless link (section 3.3).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WirelessReceiverConfig {
+    /// Sectors; default 4.
+    pub n_sectors: u32,
+    /// Reach, cm; default 100.
+    pub range: f64,
+    /// Components of a message, M; default 2.
+    pub msg_length: u32,
+    /// A frame of this many hops is not accepted any more; default 10.
+    pub max_hops: u32,
+    /// Decay of the strength per cm; default 0.05.
+    pub decay_rho: f64,
+    /// Decay of the strength per radian; default 1.
+    pub decay_phi: f64,
+}
+
+/// Light sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightSensorConfig {
+    /// Sectors; default 6.
+    pub n_sectors: u32,
+    /// Reach, cm; default 80. The light's own range bounds it too.
+    pub range: f64,
+    /// Colour it sees; default "red".
+    pub color: String,
+    /// Decay per cm; default 0.05.
+    pub decay_rho: f64,
+    /// Decay per radian; default 1.
+    pub decay_phi: f64,
+    /// Variance of the Gaussian noise; default 0.1.
+    pub noise_variance: f64,
+}
+
+/// Distance sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DistanceSensorConfig {
+    /// Sectors; default 4.
+    pub n_sectors: u32,
+    /// Reach, cm; default 60.
+    pub range: f64,
+    /// Decay per cm; default 0.05.
+    pub decay_rho: f64,
+    /// Decay per radian; default 1.
+    pub decay_phi: f64,
+    /// Variance of the Gaussian noise; default 0.1.
+    pub noise_variance: f64,
+}
+
+/// Ground sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroundSensorConfig {
+    /// Colour it sees; default "black".
+    pub color: String,
+}
+
+/// Actuators; absent ones are not mounted.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ActuatorsConfig {
+    /// Differential drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheel_actuator: Option<WheelActuatorConfig>,
+    /// LED.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub led_actuator: Option<LedActuatorConfig>,
+    /// Emitter of the wireless link.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wireless_transmitter: Option<WirelessTransmitterConfig>,
+}
+
+/// Differential drive (section 3.2.1).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WheelActuatorConfig {
+    /// Wheel speed at action 1, cm/s; default 10.
+    pub max_speed: f64,
+    /// Distance between the wheels L_w, cm; default 11.
+    pub axle_length: f64,
+    /// Duration of an environment step dk, s; default 0.33.
+    pub step_duration: f64,
+}
+
+/// LED.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LedActuatorConfig {}
+
+/// Emitter of the wireless link (section 3.3).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WirelessTransmitterConfig {
+    /// Reach, cm; default 100. A frame is heard within the smaller of the
+    /// emitter's and the receiver's reach.
+    pub range: f64,
+    /// Components of a message, M; default 2. Equals the receiver's.
+    pub msg_length: u32,
+    /// Whether messages are quantised; default true.
+    pub quantize: bool,
+    /// Number of lattice points K^M of the quantiser, M*; default 16.
+    pub n_symbols: u32,
+    /// Inverse temperature of the quantiser; default 100.
+    pub beta: f64,
+}
+
+/// Start of a robot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotInitializers {
+    /// Positions.
+    pub positions: Initializer,
+    /// Headings.
+    pub orientations: Initializer,
+}
+
+/// Draws start values (section 5 of the simulation's specification).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "name", content = "params", rename_all = "snake_case")]
+pub enum Initializer {
+    /// Given values, one per object; a single one serves all.
+    Fixed {
+        /// Positions `[x, y]`, or headings `[theta]`.
+        values: Vec<Vec<f64>>,
+    },
+    /// Independent uniform components.
+    RandomUniform {
+        /// Lower bound, inclusive.
+        low: f64,
+        /// Upper bound, exclusive.
+        high: f64,
+        /// Components: 2 for positions, 1 for headings.
+        size: u32,
+    },
+    /// Uniform on a circle.
+    RandomCircumference {
+        /// Radius, cm.
+        radius: f64,
+        /// Centre, cm.
+        center: [f64; 2],
+    },
+    /// A connected, compact random geometric graph.
+    RandomGraph {
+        /// Distance from the centre at which steps turn tangential, cm.
+        max_rad: f64,
+        /// First robot, and centre, cm.
+        initial_pos: [f64; 2],
+    },
+}
+
+/// Perturbations of a swarm; absent ones do not happen.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct PerturbationsConfig {
+    /// Fault of a long-standing leader.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leader_failure: Option<LeaderFailureConfig>,
+    /// Zeroed stimuli.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stimuli_inhibition: Option<StimuliInhibitionConfig>,
+    /// Redrawn positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topology_switch: Option<TopologySwitchConfig>,
+    /// Robots that turn by themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncontrollable_rotation: Option<UncontrollableRotationConfig>,
+}
+
+/// A robot that has been sole leader too long becomes faulty.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeaderFailureConfig {
+    /// Consecutive steps of sole leadership; default 50.
+    pub time_to_failure: u32,
+}
+
+/// Some robots, drawn anew each trial, lose a stimulus.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StimuliInhibitionConfig {
+    /// Which reading becomes zero.
+    pub stimuli: InhibitedStimulus,
+    /// How many robots.
+    pub affected_robots: u32,
+}
+
+/// What `stimuli_inhibition` zeroes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum InhibitedStimulus {
+    /// One reading.
+    Reading(SensorQuery),
+    /// Every reading of the receiver.
+    Receiver(WholeReceiver),
+}
+
+/// Serialises as `"wireless_receiver"`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum WholeReceiver {
+    /// All of the receiver's readings.
+    #[serde(rename = "wireless_receiver")]
+    WirelessReceiver,
+}
+
+/// Positions are redrawn while neural state is kept.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TopologySwitchConfig {
+    /// Period, steps; default 200.
+    pub every: u32,
+}
+
+/// Some robots turn to a target heading and hold it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UncontrollableRotationConfig {
+    /// How many robots, drawn anew each trial.
+    pub affected_robots: u32,
+    /// First affected step; default 200.
+    pub start: u32,
+    /// Target headings, radians, in order.
+    pub targets: Vec<f64>,
+    /// Step at which the next target applies; default 600.
+    pub switch_at: u32,
+}
+
+/// Point lights.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightSourceConfig {
+    /// Number of lights.
+    pub num_instances: u32,
+    /// How they move.
+    pub controller: LightController,
+    /// Where they start.
+    pub initializers: PositionInitializers,
+    /// Physical properties.
+    pub params: LightParams,
+}
+
+/// How a light moves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "name", content = "params", rename_all = "snake_case")]
+pub enum LightController {
+    /// Stands still.
+    Static {},
+    /// Circles the centre of the world (Eq. 5.7-5.8).
+    LightOrbitController {},
+    /// Drifts to random targets (Eq. 6.4).
+    LightRndPosController {
+        /// Period at which the target is redrawn, steps; default 50.
+        every: u32,
+        /// alpha: share of the way to the target covered per step; default 0.03.
+        step: f64,
+    },
+}
+
+/// Start of a light or ground area.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PositionInitializers {
+    /// Positions.
+    pub positions: Initializer,
+}
+
+/// Physical properties of a light.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightParams {
+    /// Reach, cm; default 80.
+    pub range: f64,
+    /// Colour; default "red".
+    pub color: String,
+}
+
+/// Coloured discs on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroundAreaConfig {
+    /// Number of discs.
+    pub num_instances: u32,
+    /// Where they are.
+    pub initializers: PositionInitializers,
+    /// Physical properties.
+    pub params: GroundAreaParams,
+}
+
+/// Physical properties of a ground area.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroundAreaParams {
+    /// Radius, cm; default 100.
+    pub range: f64,
+    /// Colour; default "black".
+    pub color: String,
+}

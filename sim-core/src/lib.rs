@@ -1,0 +1,16 @@
+//! The simulation of swarms of robots, as a pure function:
+//! (experiment, genotype, trial addresses) -> fitness of each trial.
+//!
+//! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
+//! same inputs give the same bits on every machine.
+
+pub mod config;
+mod experiment;
+pub mod random;
+
+pub use experiment::{EvaluateError, Experiment};
+
+/// Identifies the function that this crate computes. Raise the number after the
+/// version whenever any fitness bit may change: coordinator and workers work
+/// together only if they agree on it.
+pub const FINGERPRINT: &str = concat!("sim-core ", env!("CARGO_PKG_VERSION"), " format 1");
