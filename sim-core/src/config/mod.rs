@@ -39,6 +39,16 @@ pub struct ExperimentConfig {
 }
 
 impl ExperimentConfig {
+    /// Reads an experiment file. Returns the configuration and the warnings
+    /// (keys that are accepted and ignored), or every problem of the file.
+    /// `default_name` names an experiment whose file gives no name.
+    pub fn from_json(
+        _text: &str,
+        _default_name: &str,
+    ) -> Result<(Self, Vec<Problem>), ConfigError> {
+        todo!()
+    }
+
     /// The canonical form, as compact JSON.
     pub fn to_canonical_json(&self) -> String {
         serde_json::to_string(self).expect("plain data with string keys serialises")
