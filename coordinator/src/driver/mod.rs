@@ -14,7 +14,7 @@ use tokio::{
     time::MissedTickBehavior,
 };
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info, warn};
+use tracing::{debug, error, info, warn};
 
 use crate::{
     clock,
@@ -212,7 +212,7 @@ impl Driver {
                     self.engine.on_draining(now, id);
                 }
             },
-            Event::WorkerLeft { worker, reason } => self.forget_worker(worker, &reason),
+            Event::WorkerLeft { worker, reason } => self.on_worker_left(worker, &reason),
             Event::ExperimentReady(runnable) => self.start(*runnable),
             Event::CancelRequested { experiment, reply } => self.cancel(experiment, reply),
         }
@@ -248,6 +248,7 @@ impl Driver {
                 self.send(worker, ToWorker::Spec(experiment, spec));
             }
             Command::SendItems { worker, experiment, generation, items } => {
+                debug!(%worker, %experiment, generation, items = items.len(), "items assigned");
                 let item_len = size_of_val(items[0].genotype.as_slice()).max(1);
                 for items in items.chunks((BATCH_LEN / item_len).max(1)) {
                     self.send(worker, ToWorker::Items(experiment, generation, items.to_vec()));
@@ -256,13 +257,14 @@ impl Driver {
             Command::SendEnd { worker, experiment } => {
                 self.send(worker, ToWorker::End(experiment));
             }
-            Command::Disconnect { worker, reason } => {
+            Command::Disconnect { worker, reason, n_items_requeued } => {
                 self.send(worker, ToWorker::Dropped(reason.clone()));
-                self.forget_worker(worker, &reason);
+                self.forget_worker(worker, &reason, n_items_requeued);
             }
             Command::FinishGeneration { experiment, judged } => {
                 let Some(running) = self.experiments.get_mut(&experiment) else { return };
                 let Some(asked) = running.asked.take() else { return };
+                debug!(%experiment, generation = judged.generation, "generation judged");
                 let advance = Advance {
                     store: self.store.clone(),
                     shutdown: self.shutdown.clone(),
@@ -351,21 +353,25 @@ impl Driver {
     fn send(&mut self, id: WorkerId, message: ToWorker) {
         let Some(worker) = self.workers.get(&id) else { return };
         if worker.link.outbox.try_send(message).is_err() {
-            self.forget_worker(id, "it does not read what it is sent");
+            self.on_worker_left(id, "it does not read what it is sent");
         }
     }
 
-    fn forget_worker(&mut self, id: WorkerId, reason: &str) {
-        let Some(worker) = self.workers.remove(&id) else { return };
-        worker.link.dropped.cancel();
-        self.engine.on_worker_left(clock::now(), id);
-        let fleet = self.engine.fleet_size();
-        let (n_workers, n_slots) = (fleet.n_workers, fleet.n_slots);
-        let name = worker.name;
-        if worker.is_draining {
-            info!(worker = %id, name, workers = n_workers, total_slots = n_slots, "worker left");
+    fn on_worker_left(&mut self, id: WorkerId, reason: &str) {
+        let n_items_requeued = self.engine.on_worker_left(clock::now(), id);
+        self.forget_worker(id, reason, n_items_requeued);
+    }
+
+    fn forget_worker(&mut self, id: WorkerId, reason: &str, items_requeued: usize) {
+        let Some(ConnectedWorker { name, link, is_draining }) = self.workers.remove(&id) else {
+            return;
+        };
+        link.dropped.cancel();
+        let workers = self.engine.fleet_size().n_workers;
+        if is_draining {
+            info!(worker = %id, name, items_requeued, workers, "worker left");
         } else {
-            warn!(worker = %id, name, reason, workers = n_workers, total_slots = n_slots, "worker lost");
+            warn!(worker = %id, name, reason, items_requeued, workers, "worker lost");
         }
     }
 }

@@ -65,6 +65,12 @@ impl GenerationInProgress {
         self.trial_fitness[task.individual as usize][trials].copy_from_slice(&fitness);
     }
 
+    /// Trials whose fitness is not known.
+    #[cfg(test)]
+    pub fn n_trials_left(&self) -> usize {
+        self.n_trials_left
+    }
+
     /// Whether all fitness is known.
     pub fn is_judged(&self) -> bool {
         self.n_trials_left == 0

@@ -100,6 +100,8 @@ pub enum Command {
         worker: WorkerId,
         /// For the log and for the worker.
         reason: String,
+        /// Items that it held and that others will get.
+        n_items_requeued: usize,
     },
     /// A generation is judged.
     FinishGeneration {
@@ -203,10 +205,12 @@ impl Engine {
         id
     }
 
-    /// A worker's stream has ended. Its work goes to others.
-    pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) {
-        self.forget_worker(now, id);
+    /// A worker's stream has ended. Its work goes to others; returns how many
+    /// items that are.
+    pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
+        let n_items_requeued = self.forget_worker(now, id);
         self.assign();
+        n_items_requeued
     }
 
     /// A worker is alive.
@@ -274,9 +278,7 @@ impl Engine {
             .map(|(&id, _)| id)
             .collect();
         for id in silent {
-            self.forget_worker(now, id);
-            let reason = format!("silent for {} s", lease.as_secs_f64());
-            self.commands.push_back(Command::Disconnect { worker: id, reason });
+            self.disconnect(now, id, format!("silent for {} s", lease.as_secs_f64()));
         }
         self.assign();
     }
@@ -291,8 +293,7 @@ impl Engine {
             && fitness.len() != n_trials
         {
             let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
-            self.forget_worker(now, id);
-            self.commands.push_back(Command::Disconnect { worker: id, reason });
+            self.disconnect(now, id, reason);
             return;
         }
         let (experiment_id, task) = self.take_assignment(id, result.id);
@@ -398,19 +399,26 @@ impl Engine {
         (assignment.experiment, assignment.task)
     }
 
-    fn forget_worker(&mut self, now: Instant, id: WorkerId) {
-        let Some(worker) = self.workers.remove(&id) else { return };
+    fn disconnect(&mut self, now: Instant, id: WorkerId, reason: String) {
+        let n_items_requeued = self.forget_worker(now, id);
+        self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
+    }
+
+    fn forget_worker(&mut self, now: Instant, id: WorkerId) -> usize {
+        let Some(worker) = self.workers.remove(&id) else { return 0 };
         self.available.remove(&(worker.load(), id));
         self.fleet_time.set_slots(now, |n_slots| n_slots - worker.n_slots);
         // Only what it was computing can have taken it down: its oldest items,
         // one per slot. A worker that said goodbye was not taken down.
         let n_suspects = if worker.is_draining { 0 } else { worker.n_slots };
         let blame = format!("its worker \"{}\" was lost", worker.name);
+        let n_items = worker.in_flight.len();
         // Later items first, so that the earliest ends up at the queue's front.
         for (age_rank, (_, assignment)) in worker.in_flight.into_iter().enumerate().rev() {
             let blame = (age_rank < n_suspects).then_some(blame.as_str());
             self.retry(assignment.experiment, assignment.task, blame);
         }
+        n_items
     }
 
     fn forget_experiment(&mut self, id: ExperimentId) {

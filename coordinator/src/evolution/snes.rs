@@ -65,3 +65,17 @@ impl Snes {
         }
     }
 }
+
+#[cfg(test)]
+impl Snes {
+    /// Mean and standard deviation per gene.
+    pub fn distribution(&self) -> (&[f64], &[f64]) {
+        (&self.mu, &self.sigma)
+    }
+
+    /// Replaces the distribution.
+    pub fn set_distribution(&mut self, mu: &[f64], sigma: &[f64]) {
+        self.mu = mu.to_vec();
+        self.sigma = sigma.to_vec();
+    }
+}
