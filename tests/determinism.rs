@@ -59,7 +59,8 @@ fn another_seed_gives_other_bits() {
 
 #[test]
 fn experiments_that_share_a_fleet_do_not_influence_each_other() {
-    let (first, second) = (Experiment::small(3), Experiment::small(3).edit(|e| e["seed"] = 8.into()));
+    let (first, second) =
+        (Experiment::small(3), Experiment::small(3).edit(|e| e["seed"] = 8.into()));
     let alone = [run_embedded(&first, 2, &[]), run_embedded(&second, 2, &[])];
 
     let coordinator = CoordinatorProcess::start();

@@ -29,14 +29,19 @@ pub struct CoordinatorProcess {
 impl CoordinatorProcess {
     /// Starts a coordinator.
     pub fn start() -> Self {
+        Self::start_with(&[])
+    }
+
+    /// Starts a coordinator with more arguments.
+    pub fn start_with(args: &[&str]) -> Self {
         let data_dir = tempfile::tempdir().expect("a temporary directory");
-        let (process, address) = spawn("127.0.0.1:0", data_dir.path());
+        let (process, address) = spawn("127.0.0.1:0", data_dir.path(), args);
         Self { process, address, data_dir }
     }
 
     /// Starts a killed coordinator again: same data, same address.
     pub fn restart(&mut self) {
-        (self.process, self.address) = spawn(&self.address, self.data_dir.path());
+        (self.process, self.address) = spawn(&self.address, self.data_dir.path(), &[]);
     }
 
     /// Its URL.
@@ -88,12 +93,13 @@ impl CoordinatorProcess {
     }
 }
 
-fn spawn(listen: &str, data_dir: &Path) -> (LoggingProcess, String) {
+fn spawn(listen: &str, data_dir: &Path, args: &[&str]) -> (LoggingProcess, String) {
     let mut command = Command::new(binary("coordinator"));
     command
         .args(["--listen", listen, "--log-format", "json"])
         .args(["--log-level", "info,coordinator=debug", "--data-dir"])
         .arg(data_dir)
+        .args(args)
         .stdout(Stdio::null());
     let process = LoggingProcess::spawn(command, Source::Stderr);
     let line = process.wait_for("address", |line| line["message"] == LISTENS);

@@ -11,4 +11,4 @@ mod process;
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
 pub use fleet::{CoordinatorProcess, Watch, WorkerProcess};
-pub use process::{LogLine, LoggingProcess, Outcome, swarmctl};
+pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};

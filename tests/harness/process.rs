@@ -176,3 +176,10 @@ pub fn swarmctl<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>) -> Outcome {
     command.args(["--output", "json"]).args(args);
     Outcome::of(&mut command)
 }
+
+/// Starts `swarmctl --output json ARGS`.
+pub fn swarmctl_process<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>) -> LoggingProcess {
+    let mut command = Command::new(binary("swarmctl"));
+    command.args(["--output", "json"]).args(args);
+    LoggingProcess::spawn(command, Source::Stdout)
+}
