@@ -17,7 +17,7 @@ fn run_embedded(experiment: &Experiment, n_workers: usize, extra: &[&str]) -> Ve
 fn timeless(lines: &[Value]) -> Vec<Value> {
     let mut lines = lines.to_vec();
     for line in &mut lines {
-        for key in ["duration_ms", "workers", "idle_share"] {
+        for key in ["duration_ms", "workers", "idle_share", "champion_file"] {
             line.as_object_mut().unwrap().remove(key);
         }
     }

@@ -16,6 +16,9 @@ use crate::binary;
 /// Only a program that hangs takes so long.
 const DEADLINE: Duration = Duration::from_secs(120);
 
+/// Why the lock of the lines may be trusted.
+const POISONED: &str = "only a failed test poisons the lock";
+
 /// A line of a JSON log.
 pub type LogLine = Value;
 
@@ -56,12 +59,12 @@ impl LoggingProcess {
             for line in BufReader::new(reader).lines().map_while(Result::ok) {
                 // Not JSON: a panic's text, say. Show it with the test's output.
                 match serde_json::from_str(&line) {
-                    Ok(value) => sink.read.lock().unwrap().0.push(value),
+                    Ok(value) => sink.read.lock().expect(POISONED).0.push(value),
                     Err(_) => eprintln!("{line}"),
                 }
                 sink.changed.notify_all();
             }
-            sink.read.lock().unwrap().1 = true;
+            sink.read.lock().expect(POISONED).1 = true;
             sink.changed.notify_all();
         });
         Self { child, lines }
@@ -81,7 +84,7 @@ impl LoggingProcess {
         is_it: impl Fn(&LogLine) -> bool,
     ) -> (usize, LogLine) {
         let mut next = n_seen;
-        let mut read = self.lines.read.lock().unwrap();
+        let mut read = self.lines.read.lock().expect(POISONED);
         loop {
             while let Some(line) = read.0.get(next) {
                 next += 1;
@@ -90,7 +93,7 @@ impl LoggingProcess {
                 }
             }
             assert!(!read.1, "the process ended without {what}; it said {:#?}", read.0);
-            let (guard, timeout) = self.lines.changed.wait_timeout(read, DEADLINE).unwrap();
+            let (guard, timeout) = self.lines.changed.wait_timeout(read, DEADLINE).expect(POISONED);
             assert!(!timeout.timed_out(), "no {what} in time; it said {:#?}", guard.0);
             read = guard;
         }
@@ -98,7 +101,7 @@ impl LoggingProcess {
 
     /// All lines so far.
     pub fn lines(&self) -> Vec<LogLine> {
-        self.lines.read.lock().unwrap().0.clone()
+        self.lines.read.lock().expect(POISONED).0.clone()
     }
 
     /// SIGKILL. Returns when the process is gone and all its lines are read.
@@ -119,9 +122,9 @@ impl LoggingProcess {
     /// Waits for the process to end and for its last line.
     pub fn wait(&mut self) -> ExitStatus {
         let status = self.child.wait().expect("a child can be waited for");
-        let mut read = self.lines.read.lock().unwrap();
+        let mut read = self.lines.read.lock().expect(POISONED);
         while !read.1 {
-            read = self.lines.changed.wait(read).unwrap();
+            read = self.lines.changed.wait(read).expect(POISONED);
         }
         status
     }
