@@ -1,0 +1,19 @@
+//! The wireless link between robots (section 3.3 of the thesis).
+
+mod frame;
+mod hearing;
+mod quantisation;
+
+pub(crate) use frame::{Ether, Origin};
+pub(crate) use hearing::{Antenna, Hearing, Receiver};
+pub(crate) use quantisation::Quantiser;
+
+/// What a robot does with its transmitter.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Emits its own message.
+    #[default]
+    Send,
+    /// Passes on the frame that it received.
+    Relay,
+}

@@ -1,0 +1,5 @@
+//! What goes wrong with a swarm.
+
+mod leader_failure;
+
+pub(crate) use leader_failure::LeaderFailure;
