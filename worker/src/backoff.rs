@@ -6,8 +6,9 @@
 
 use std::time::Duration;
 
-#[derive(Debug)]
-pub(crate) struct Backoff {
+/// The delays of one series of attempts.
+#[derive(Debug, Clone)]
+pub struct Backoff {
     min: Duration,
     max: Duration,
     bound: Duration,
@@ -15,19 +16,19 @@ pub(crate) struct Backoff {
 
 impl Backoff {
     /// Delays up to `min` at first and up to `max` at last.
-    pub(crate) fn new(min: Duration, max: Duration) -> Self {
+    pub fn new(min: Duration, max: Duration) -> Self {
         Self { min, max, bound: min }
     }
 
     /// The next delay; `uniform` is a random number in \[0, 1).
-    pub(crate) fn next_delay(&mut self, uniform: f64) -> Duration {
+    pub fn next_delay(&mut self, uniform: f64) -> Duration {
         let delay = self.bound.mul_f64(uniform);
         self.bound = self.bound.saturating_mul(2).min(self.max);
         delay
     }
 
     /// Starts over after a success.
-    pub(crate) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         self.bound = self.min;
     }
 }

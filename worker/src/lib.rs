@@ -14,8 +14,8 @@ use tokio_util::sync::CancellationToken;
 use tonic::transport::Endpoint;
 use tracing::{info, warn};
 
+pub use crate::backoff::Backoff;
 use crate::{
-    backoff::Backoff,
     pool::{Evaluator, Pool},
     session::{Ended, OpenError, Session},
 };
