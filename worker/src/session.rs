@@ -245,19 +245,17 @@ fn refusal(status: Status) -> OpenError {
 }
 
 fn describe(status: &Status) -> String {
-    let cause = status.source().map(with_causes);
-    let text =
-        if status.message().is_empty() { status.code().description() } else { status.message() };
-    match cause {
-        Some(cause) if !text.contains(&cause) => format!("{text}: {cause}"),
-        _ => text.into(),
-    }
+    let message = status.message();
+    let text = if message.is_empty() { status.code().description() } else { message };
+    append_causes(text.into(), status.source())
 }
 
 /// An error and its causes, each said once.
 pub(crate) fn with_causes(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
+    append_causes(error.to_string(), error.source())
+}
+
+fn append_causes(mut text: String, mut source: Option<&dyn Error>) -> String {
     while let Some(cause) = source {
         let cause_text = cause.to_string();
         if !text.contains(&cause_text) {
