@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use indicatif::{FormattedDuration, ProgressBar, ProgressStyle};
+use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use swarm_proto::v1::{Experiment, GenerationSummary};
 
 use crate::{args::OutputFormat, error::Error, json, text};
@@ -83,7 +83,8 @@ impl Progress {
             self.bar.set_length(experiment.generations);
             self.bar.set_prefix(experiment.name.clone());
             self.bar.set_message("waiting for the first generation");
-            self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.bar.tick();
         }
     }
 
@@ -99,8 +100,8 @@ impl Progress {
                 let done = summary.generation + 1;
                 let eta = remaining(&self.durations_ms, self.generations.saturating_sub(done));
                 let fitness = text::fitness(summary);
-                self.bar.set_message(format!("{fitness}  ETA {}", FormattedDuration(eta)));
                 self.bar.set_position(done);
+                self.bar.set_message(format!("{fitness}  ETA {}", FormattedDuration(eta)));
                 Ok(())
             }
             OutputFormat::Text => self.print(&text::generation(summary, self.generations)),
