@@ -16,6 +16,9 @@ use crate::{
 /// Largest file that is read.
 const BYTES_MAX: u64 = 1 << 20;
 
+/// Longest default name that the protocol carries.
+const NAME_BYTES_MAX: usize = 128;
+
 /// The text of an experiment file.
 #[derive(Debug)]
 pub struct ExperimentFile {
@@ -41,11 +44,13 @@ impl ExperimentFile {
 
     /// The request to submit it; `request_id` makes it safe to repeat.
     pub fn request(&self, args: &ExperimentArgs, request_id: String) -> SubmitExperimentRequest {
-        let stem = self.path.file_stem().unwrap_or_default();
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= NAME_BYTES_MAX;
+        let name = stem.char_indices().take_while(fits).map(|(_, c)| c).collect();
         SubmitExperimentRequest {
             request_id,
             config_json: self.text.clone(),
-            default_name: stem.to_string_lossy().into_owned(),
+            default_name: name,
             seed: args.seed,
             generations: args.generations,
             resume_unfinished: false,
@@ -92,6 +97,16 @@ mod tests {
         assert_eq!(request.config_json, "{ \"seed\": 1 } // ü");
         assert_eq!(request.default_name, "leader.selection");
         assert_eq!((request.generations, request.seed), (Some(3), None));
+    }
+
+    #[test]
+    fn a_long_file_name_gives_a_shorter_default_name() {
+        let file = ExperimentFile {
+            path: format!("x{}.json", "ü".repeat(100)).into(),
+            text: String::new(),
+        };
+        let request = file.request(&args(&file.path), String::new());
+        assert_eq!(request.default_name, format!("x{}", "ü".repeat(63)));
     }
 
     #[test]

@@ -74,11 +74,8 @@ async fn evolve(
     };
     let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
     let experiment = present(response.experiment)?;
-    let remarks = file.warnings(&response.warnings).into_iter().chain(remarks(
-        &experiment,
-        &unfinished,
-        args.experiment.generations,
-    ));
+    let remarks =
+        file.warnings(&response.warnings).into_iter().chain(remarks(&experiment, &unfinished));
     for remark in remarks {
         progress.remark(&remark);
     }
@@ -109,11 +106,7 @@ async fn evolve(
 }
 
 /// What is going on beside, or otherwise than, what was asked for.
-fn remarks(
-    experiment: &Experiment,
-    unfinished: &[Experiment],
-    generations: Option<u64>,
-) -> Vec<String> {
+fn remarks(experiment: &Experiment, unfinished: &[Experiment]) -> Vec<String> {
     let mut remarks = Vec::new();
     let (this, others): (Vec<_>, Vec<_>) =
         unfinished.iter().partition(|other| other.id == experiment.id);
@@ -124,10 +117,6 @@ fn remarks(
             this.generations_done,
             this.generations
         ));
-        if generations.is_some_and(|generations| generations != experiment.generations) {
-            let text = "it keeps the number of generations that it was submitted with";
-            remarks.push(text.into());
-        }
     }
     for other in others {
         remarks.push(format!(
@@ -197,17 +186,16 @@ mod tests {
 
     #[test]
     fn a_new_experiment_alone_needs_no_remark() {
-        assert!(remarks(&experiment(3, "a"), &[], Some(40)).is_empty());
+        assert!(remarks(&experiment(3, "a"), &[]).is_empty());
     }
 
     #[test]
     fn continuing_is_said_and_so_is_company() {
         let unfinished = [experiment(2, "b"), experiment(3, "a")];
-        let lines = remarks(&experiment(3, "a"), &unfinished, Some(50));
+        let lines = remarks(&experiment(3, "a"), &unfinished);
         assert_eq!(lines[0], "continuing experiment 3 (a), 12 of 40 generations done");
-        assert!(lines[1].contains("keeps the number of generations"));
-        assert!(lines[2].contains("experiment 2 (b)"));
-        assert_eq!(lines.len(), 3);
+        assert!(lines[1].contains("experiment 2 (b)"));
+        assert_eq!(lines.len(), 2);
     }
 
     #[test]
