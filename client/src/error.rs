@@ -18,14 +18,10 @@ pub enum Error {
         /// The coordinator's words.
         problems: String,
     },
-    /// The data directory of `run` is of no use.
-    #[error("cannot run in {}: {source}", data_dir.display())]
-    Start {
-        /// The data directory.
-        data_dir: PathBuf,
-        /// Why.
-        source: coordinator::StartError,
-    },
+    /// The coordinator of `run` does not start, which is the data directory's
+    /// fault.
+    #[error(transparent)]
+    Start(#[from] coordinator::StartError),
     /// No such experiment, or no champion.
     #[error("{0}")]
     NotFound(String),
@@ -75,7 +71,7 @@ impl Error {
         match self {
             Self::OutputClosed => 0,
             Self::Write { .. } | Self::Internal(_) => 1,
-            Self::Input(_) | Self::Config { .. } | Self::Start { .. } => 2,
+            Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
             Self::NotFound(_) => 3,
             Self::Unreachable { .. } => 4,
             Self::Ended { .. } => 5,

@@ -21,9 +21,8 @@ impl Fleet {
     /// Starts a coordinator on a free port and workers of one slot each.
     pub async fn start(data_dir: &Path, n_workers: usize) -> Result<Self, Error> {
         let listen = (Ipv4Addr::LOCALHOST, 0).into();
-        let coordinator = Coordinator::start(CoordinatorConfig::new(listen, data_dir.into()))
-            .await
-            .map_err(|source| Error::Start { data_dir: data_dir.into(), source })?;
+        let config = CoordinatorConfig::new(listen, data_dir.into());
+        let coordinator = Coordinator::start(config).await?;
         let mut fleet =
             Self { coordinator, workers: JoinSet::new(), shutdown: CancellationToken::new() };
         for i in 1..=n_workers {
