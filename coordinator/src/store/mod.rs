@@ -126,6 +126,8 @@ impl Store {
         })?;
         let mut connection = Connection::open(directory.join(DATABASE_FILE))?;
         connection.busy_timeout(Duration::from_secs(5))?;
+        // First, because it refuses a database that must stay as it is.
+        schema::check_version(&connection)?;
         connection.pragma_update(None, "journal_mode", "WAL")?;
         connection.pragma_update(None, "synchronous", "FULL")?;
         connection.pragma_update(None, "foreign_keys", true)?;

@@ -71,18 +71,24 @@ const MIGRATIONS: &[&str] = &["
 "];
 
 /// The version that this code writes.
-pub const VERSION: i64 = MIGRATIONS.len() as i64;
+const VERSION: i64 = MIGRATIONS.len() as i64;
 
-/// Brings a database to [`VERSION`]; a newer one is refused untouched.
-pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
+/// The version of a database; refuses a newer one than this code knows.
+pub fn check_version(connection: &Connection) -> Result<usize, StoreError> {
     let found: i64 = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
-    if found > VERSION {
-        return Err(StoreError::Newer { found, supported: VERSION });
+    match usize::try_from(found) {
+        Ok(version) if version <= MIGRATIONS.len() => Ok(version),
+        _ => Err(StoreError::Newer { found, supported: VERSION }),
     }
-    for (version, statements) in (1..).zip(MIGRATIONS).skip(found.max(0) as usize) {
+}
+
+/// Brings a database to [`VERSION`].
+pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
+    let found = check_version(connection)?;
+    for (version, statements) in MIGRATIONS.iter().enumerate().skip(found) {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         transaction.execute_batch(statements)?;
-        transaction.pragma_update(None, "user_version", version as i64)?;
+        transaction.pragma_update(None, "user_version", version as i64 + 1)?;
         transaction.commit()?;
     }
     Ok(())
