@@ -129,7 +129,12 @@ impl Fleet {
     /// Lets every worker compute until nothing is left.
     fn run(&mut self) {
         let ids: Vec<WorkerId> = self.workers.keys().copied().collect();
-        while ids.iter().fold(false, |worked, &id| self.step(id) || worked) {}
+        loop {
+            let n_steps = ids.iter().filter(|&&id| self.step(id)).count();
+            if n_steps == 0 {
+                return;
+            }
+        }
     }
 
     fn assert_judged(&self, n_individuals: usize, n_trials: u32) {
