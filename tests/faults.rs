@@ -145,7 +145,9 @@ fn a_worker_told_to_stop_finishes_its_item_and_leaves() {
     let coordinator = CoordinatorProcess::start();
     let mut worker = WorkerProcess::start(&coordinator, "polite");
     let id = coordinator.submit(&Experiment::small(GENERATIONS).path());
-    wait_for_assignment(&coordinator, 0);
+    // The second assignment answers a result: the worker is at work.
+    let (n_seen, _) = wait_for_assignment(&coordinator, 0);
+    coordinator.process.find(n_seen, "another assignment", |l| l["message"] == "items assigned");
     worker.process.signal("TERM");
     assert_eq!(worker.process.wait().code(), Some(0));
     let left = coordinator.process.wait_for("farewell", |line| line["message"] == "worker left");

@@ -26,6 +26,18 @@ pub struct Submission {
     pub generations: Option<u64>,
 }
 
+/// A submission that has passed all checks.
+#[derive(Debug)]
+pub struct Checked {
+    /// For the store.
+    pub new: NewExperiment,
+    /// Before its first generation.
+    pub evolution: Evolution,
+    /// What the file says and nobody heeds, and what keeps its default; one
+    /// line each.
+    pub warnings: Vec<String>,
+}
+
 /// An experiment that can run.
 #[derive(Debug)]
 pub struct Runnable {
@@ -41,7 +53,7 @@ pub struct Runnable {
 
 impl Submission {
     /// Checks everything about a submission; it can run if this succeeds.
-    pub fn check(self) -> Result<(NewExperiment, Evolution), ConfigError> {
+    pub fn check(self) -> Result<Checked, ConfigError> {
         let (mut config, warnings) =
             ExperimentConfig::from_json(&self.config_json, &self.default_name)?;
         if self.seed.is_some() || self.generations.is_some() {
@@ -60,10 +72,9 @@ impl Submission {
             config_digest: Digest::of_config(&config),
             genotype_len: experiment.genotype_len(),
             checkpoint: checkpoint_json(&evolution),
-            warnings,
             config,
         };
-        Ok((new, evolution))
+        Ok(Checked { new, evolution, warnings })
     }
 }
 

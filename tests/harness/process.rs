@@ -17,7 +17,7 @@ use crate::binary;
 const DEADLINE: Duration = Duration::from_secs(120);
 
 /// Why the lock of the lines may be trusted.
-const POISONED: &str = "only a failed test poisons the lock";
+const POISONED: &str = "nothing panics while it holds the lines";
 
 /// A line of a JSON log.
 pub type LogLine = Value;
@@ -92,10 +92,18 @@ impl LoggingProcess {
                     return (next, line.clone());
                 }
             }
-            assert!(!read.1, "the process ended without {what}; it said {:#?}", read.0);
-            let (guard, timeout) = self.lines.changed.wait_timeout(read, DEADLINE).expect(POISONED);
-            assert!(!timeout.timed_out(), "no {what} in time; it said {:#?}", guard.0);
+            let is_over = read.1;
+            let (guard, timeout) = self
+                .lines
+                .changed
+                .wait_timeout_while(read, DEADLINE, |read| read.0.len() == next && !read.1)
+                .expect(POISONED);
             read = guard;
+            if is_over || timeout.timed_out() {
+                let lines = read.0.clone();
+                drop(read);
+                panic!("no {what}; the process said {lines:#?}");
+            }
         }
     }
 

@@ -156,9 +156,9 @@ fn log_generation(id: ExperimentId, config: &ExperimentConfig, generation: &Gene
         name = config.name,
         generation = generation.generation,
         generations = config.algorithm.generations,
-        best = generation.statistics.best,
-        mean = generation.statistics.mean,
-        min = generation.statistics.min,
+        best = readable(generation.statistics.best),
+        mean = readable(generation.statistics.mean),
+        min = readable(generation.statistics.min),
         episodes_per_s = (generation.episodes as f64 / seconds).round(),
         workers = generation.workers,
         idle_percent = (generation.idle_share * 1000.0).round() / 10.0,
@@ -166,4 +166,9 @@ fn log_generation(id: ExperimentId, config: &ExperimentConfig, generation: &Gene
         digest = &generation.digest[..16],
         "generation"
     );
+}
+
+/// Six decimals: the store has all of them.
+fn readable(fitness: f64) -> f64 {
+    (fitness * 1e6).round() / 1e6
 }

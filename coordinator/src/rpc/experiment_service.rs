@@ -24,7 +24,7 @@ use crate::{
     ids::ExperimentId,
     shared_store::SharedStore,
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
-    submission::{Runnable, Submission},
+    submission::{Checked, Runnable, Submission},
 };
 
 use super::{convert, shutting_down, store_status};
@@ -78,14 +78,13 @@ impl ExperimentService for Experiments {
             generations: request.generations,
         };
         // Compiling is work for a CPU, not for the I/O threads.
-        let (new, evolution) = task::spawn_blocking(move || submission.check())
+        let Checked { new, evolution, warnings } = task::spawn_blocking(move || submission.check())
             .await
             .map_err(|_| {
                 Status::internal("checking the configuration panicked; please report this")
             })?
             .map_err(|error| Status::invalid_argument(problems(&error)))?;
 
-        let warnings = new.warnings.clone();
         let (stored, new) = self
             .store
             .try_write(move |store| match place(store, &new, resume_unfinished)? {

@@ -172,9 +172,6 @@ impl Store {
         )?;
         let state = ExperimentState::Running;
         add_state_event(&transaction, id, now_ms, state, "submitted")?;
-        for warning in &new.warnings {
-            add_notice(&transaction, id, now_ms, warning)?;
-        }
         transaction.commit()?;
         Ok((id, true))
     }

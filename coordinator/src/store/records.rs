@@ -52,8 +52,6 @@ pub struct NewExperiment {
     pub genotype_len: usize,
     /// Evolution before its first generation, as JSON.
     pub checkpoint: String,
-    /// What the file says and nobody heeds.
-    pub warnings: Vec<String>,
 }
 
 /// An experiment as it stands.
