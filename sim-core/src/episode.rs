@@ -3,12 +3,12 @@
 
 use std::ops::Range;
 
-use crate::controllers::{Controller, NeuralController};
+use crate::config::RobotController;
+use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
 use crate::experiment::{EvaluateError, Experiment};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
 use crate::trial::Trial;
-use crate::world::RobotGroup;
 
 /// Simulates one episode per trial and returns their fitness, in order.
 pub(crate) fn run(
@@ -19,12 +19,12 @@ pub(crate) fn run(
 ) -> Result<Vec<f64>, EvaluateError> {
     let trials = trials.map(|trial| Trial::new(experiment, generation, trial));
     let mut trials = trials.collect::<Result<Vec<_>, _>>()?;
-    let groups = experiment.world.groups.iter();
+    let groups = 0..experiment.world.groups.len();
     let mut brains: Vec<Brain<'_>> =
         groups.map(|group| Brain::new(experiment, group, phenotype, trials.len())).collect();
     for step in 0..experiment.n_steps {
         for trial in &mut trials {
-            trial.sense();
+            trial.sense(step)?;
         }
         for brain in &mut brains {
             brain.step(&mut trials);
@@ -39,7 +39,8 @@ pub(crate) fn run(
 /// The controller of a group of robots, and its stimuli; one lane per trial and
 /// robot, trial by trial.
 struct Brain<'a> {
-    group: &'a RobotGroup,
+    group: usize,
+    n_robots: usize,
     controller: Box<dyn Controller + 'a>,
     stimuli: Lanes,
 }
@@ -47,27 +48,36 @@ struct Brain<'a> {
 impl<'a> Brain<'a> {
     fn new(
         experiment: &'a Experiment,
-        group: &'a RobotGroup,
+        group_index: usize,
         phenotype: &Phenotype,
         n_trials: usize,
     ) -> Self {
+        let group = &experiment.world.groups[group_index];
         let n_lanes = n_trials * group.robots.len();
-        let network = &experiment.network;
+        let n_inputs = group.stimuli.last().map_or(0, |(_, inputs)| inputs.end);
+        let controller: Box<dyn Controller> = match group.controller {
+            RobotController::NeuralController => {
+                Box::new(NeuralController::new(&experiment.network, phenotype, n_lanes))
+            }
+            RobotController::BraitenbergLightFollower => {
+                Box::new(BraitenbergLightFollower::new(n_inputs, n_lanes))
+            }
+        };
         Self {
-            group,
-            controller: Box::new(NeuralController::new(network, phenotype, n_lanes)),
-            stimuli: Lanes::new(network.n_inputs(), n_lanes),
+            group: group_index,
+            n_robots: group.robots.len(),
+            controller,
+            stimuli: Lanes::new(n_inputs, n_lanes),
         }
     }
 
     fn step(&mut self, trials: &mut [Trial<'_>]) {
-        let n_robots = self.group.robots.len();
         for (index, trial) in trials.iter().enumerate() {
-            trial.stimulate(self.group, index * n_robots, &mut self.stimuli);
+            trial.stimulate(self.group, index * self.n_robots, &mut self.stimuli);
         }
         self.controller.perceive(&self.stimuli);
         for (index, trial) in trials.iter_mut().enumerate() {
-            trial.decide(self.group, index * n_robots, &mut *self.controller);
+            trial.decide(self.group, index * self.n_robots, &mut *self.controller);
         }
     }
 }

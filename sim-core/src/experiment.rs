@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use crate::config::{ConfigError, ExperimentConfig, FitnessFunction};
 use crate::episode;
-use crate::fitness;
 use crate::genotype::Codec;
 use crate::network::Network;
 use crate::problems::Problems;
@@ -72,15 +71,12 @@ pub enum EvaluateError {
 }
 
 impl Experiment {
-    /// Compiles a configuration. The reader has checked it already; what only
-    /// compiling can find (an initialiser that cannot be met, say) is reported
-    /// in the same way.
+    /// Compiles a configuration that the reader of experiment files accepts. What
+    /// only compiling can find (an initialiser that cannot be met, say) is
+    /// reported in the same way.
     pub fn compile(config: &ExperimentConfig) -> Result<Self, ConfigError> {
         let mut problems = Problems::default();
         let algorithm = &config.algorithm;
-        if !fitness::is_supported(algorithm.fitness_function) {
-            problems.add("algorithm.fitness_function", "not supported");
-        }
         let network = Network::compile(&config.topology, &mut problems);
         let codec = Codec::compile(config, &network, &mut problems);
         let world =
@@ -165,6 +161,7 @@ impl Experiment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{GenotypeQuery, SynapseSelector};
     use crate::testing::{experiment_a, genotype, robot};
 
     #[test]
@@ -237,14 +234,15 @@ mod tests {
         let mut config = experiment_a();
         config.algorithm.evolvable_object = "robotB".into();
         config.topology.synapses[0].pre = vec!["nobody".into()];
-        config.algorithm.populations[0].min_vals[2] = -3.0;
+        config.algorithm.populations[0].objects[1] =
+            GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()));
         let error = Experiment::compile(&config).unwrap_err();
         let paths: Vec<&str> = error.problems.iter().map(|problem| &*problem.path).collect();
         assert_eq!(
             paths,
             [
                 "topology.synapses.I1-H1",
-                "algorithm.populations.p4.objects[2]",
+                "algorithm.populations.p4.objects[1]",
                 "algorithm.evolvable_object",
             ]
         );

@@ -11,9 +11,6 @@ use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::random::{Purpose, Stream};
 
-/// Largest magnitude of a decoded value: sums of products stay finite.
-const MAX_MAGNITUDE: f64 = 1e9;
-
 /// What each gene means.
 #[derive(Debug, Clone)]
 pub(crate) struct Codec {
@@ -44,42 +41,28 @@ enum Parameter {
 }
 
 impl Codec {
-    /// Resolves the queries of all populations, in their order; notes queries
-    /// that name nothing, overlap, or make the network unstable.
+    /// Resolves the queries of all populations, in their order; notes queries that
+    /// cover nothing.
     pub fn compile(config: &ExperimentConfig, network: &Network, problems: &mut Problems) -> Self {
         let mut coverage = Coverage::new(network);
         let mut genes = Vec::new();
         let mut segments = Vec::new();
         for (name, population) in &config.algorithm.populations {
             let first = genes.len();
-            let path = format!("algorithm.populations.{name}");
-            let n_queries = population.objects.len();
-            if population.max_vals.len() != n_queries || population.min_vals.len() != n_queries {
-                problems.add(path, "max_vals and min_vals need one value per entry of objects");
-                continue;
-            }
             let bounds = population.min_vals.iter().zip(&population.max_vals);
             for (index, (query, (&low, &high))) in population.objects.iter().zip(bounds).enumerate()
             {
-                let path = format!("{path}.objects[{index}]");
-                if let Err(message) = check_bounds(query, low, high, network.dt) {
-                    problems.add(&path, message);
-                }
-                let parameters = match select(query, network) {
-                    Ok(parameters) => parameters,
-                    Err(message) => {
-                        problems.add(path, message);
-                        continue;
-                    }
-                };
+                let parameters = select(query, network);
                 if parameters.is_empty() {
-                    problems.add(&path, format!("{query} covers no parameter"));
-                }
-                if !parameters.iter().all(|&parameter| coverage.add(parameter)) {
-                    problems.add(path, format!("{query} overlaps an earlier query"));
+                    // The name may be unknown, or chance has left out all synapses.
+                    let path = format!("algorithm.populations.{name}.objects[{index}]");
+                    problems.add(path, format!("`{query}` covers nothing that can evolve"));
                 }
                 let span = high - low;
-                genes.extend(parameters.into_iter().map(|parameter| Gene { parameter, low, span }));
+                for parameter in parameters {
+                    *coverage.of(parameter) = true;
+                    genes.push(Gene { parameter, low, span });
+                }
             }
             segments.push(first..genes.len());
         }
@@ -126,90 +109,50 @@ fn tau(exponent: f64) -> f64 {
     2.0 * libm::pow(10.0, exponent)
 }
 
-/// Whether every value that a query can decode to keeps the network finite.
-fn check_bounds(query: &GenotypeQuery, low: f64, high: f64, dt: f64) -> Result<(), String> {
-    if !(low.abs() <= MAX_MAGNITUDE && high.abs() <= MAX_MAGNITUDE && low < high) {
-        return Err(format!(
-            "min_vals and max_vals must lie within +-{MAX_MAGNITUDE:e}, the maximum above the minimum"
-        ));
-    }
-    if matches!(query, GenotypeQuery::Neurons(NeuronParameter::Tau, _)) {
-        check_tau(tau(low), dt)?;
-        if !tau(high).is_finite() {
-            return Err(format!("tau = 2 * 10^{high} is beyond all numbers"));
-        }
-    }
-    Ok(())
-}
-
-/// Euler steps beyond twice a neuron's time constant diverge.
-fn check_tau(tau: f64, dt: f64) -> Result<(), String> {
-    if dt <= 2.0 * tau {
-        return Ok(());
-    }
-    Err(format!("tau can be {tau} s, less than half of topology.dt = {dt} s: unstable"))
-}
-
 /// The parameters that a query covers, in genotype order.
-fn select(query: &GenotypeQuery, network: &Network) -> Result<Vec<Parameter>, String> {
+fn select(query: &GenotypeQuery, network: &Network) -> Vec<Parameter> {
     match query {
         GenotypeQuery::Weights(selector) => select_weights(selector, network),
         GenotypeQuery::Neurons(parameter, selector) => {
             let neurons = match selector {
                 EnsembleSelector::All => 0..network.n_neurons(),
-                EnsembleSelector::Named(name) => match network.ensembles.get(name) {
-                    Some(ensemble) => ensemble.neurons.clone(),
-                    None => return Err(format!("no ensemble is named {name:?}")),
-                },
+                EnsembleSelector::Named(name) => {
+                    network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
+                }
             };
-            Ok(neurons.map(|neuron| Parameter::Neuron(*parameter, neuron)).collect())
+            neurons.map(|neuron| Parameter::Neuron(*parameter, neuron)).collect()
         }
     }
 }
 
-fn select_weights(selector: &SynapseSelector, network: &Network) -> Result<Vec<Parameter>, String> {
-    let is_motor = |neuron: usize| {
-        let ensemble = network.ensembles.values().find(|e| e.neurons.contains(&neuron));
-        ensemble.is_some_and(|ensemble| ensemble.motor)
+/// A name is that of a group of synapses, a stimulus or an ensemble; the reader of
+/// experiment files sees to it that it is not several of them.
+fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Parameter> {
+    let is_motor = |neuron: &usize| {
+        let mut ensembles = network.ensembles.values();
+        ensembles.any(|ensemble| ensemble.motor && ensemble.neurons.contains(neuron))
     };
-    let trainable = network.groups.values().filter(|group| group.trainable);
-    let trainable = trainable.flat_map(|group| group.synapses.clone());
-    let with_source = |wanted: &dyn Fn(Source) -> bool| {
-        let synapses = trainable.filter(|&synapse| wanted(network.synapses[synapse].pre));
-        Ok(synapses.map(Parameter::Weight).collect())
-    };
-    match selector {
-        SynapseSelector::All => with_source(&|_| true),
-        SynapseSelector::Sensory => with_source(&|pre| matches!(pre, Source::Input(_))),
-        SynapseSelector::Hidden => {
-            with_source(&|pre| matches!(pre, Source::Neuron(neuron) if !is_motor(neuron)))
-        }
-        SynapseSelector::Motor => {
-            with_source(&|pre| matches!(pre, Source::Neuron(neuron) if is_motor(neuron)))
-        }
-        SynapseSelector::Named(name) => {
-            let stimulus = network.stimuli.get(name);
-            let ensemble = network.ensembles.get(name);
-            match (network.groups.get(name), stimulus, ensemble) {
-                (Some(group), None, None) => {
-                    let synapses = if group.trainable { group.synapses.clone() } else { 0..0 };
-                    Ok(synapses.map(Parameter::Weight).collect())
+    let trainable = network.groups.iter().filter(|(_, group)| group.trainable);
+    let selected = trainable.flat_map(|(group_name, group)| {
+        group.synapses.clone().filter(move |&synapse| {
+            let pre = network.synapses[synapse].pre;
+            match (selector, pre) {
+                (SynapseSelector::All, _) => true,
+                (SynapseSelector::Sensory, pre) => matches!(pre, Source::Input(_)),
+                (SynapseSelector::Hidden, Source::Neuron(neuron)) => !is_motor(&neuron),
+                (SynapseSelector::Motor, Source::Neuron(neuron)) => is_motor(&neuron),
+                (SynapseSelector::Hidden | SynapseSelector::Motor, Source::Input(_)) => false,
+                (SynapseSelector::Named(name), _) if name == group_name => true,
+                (SynapseSelector::Named(name), Source::Input(input)) => {
+                    network.stimuli.get(name).is_some_and(|s| s.inputs.contains(&input))
                 }
-                (None, Some(stimulus), _) => with_source(
-                    &|pre| matches!(pre, Source::Input(input) if stimulus.inputs.contains(&input)),
-                ),
-                (None, None, Some(ensemble)) => with_source(
-                    &|pre| matches!(pre, Source::Neuron(neuron) if ensemble.neurons.contains(&neuron)),
-                ),
-                (Some(_), _, _) => Err(format!(
-                    "{name:?} names a group of synapses and also an ensemble or a stimulus"
-                )),
-                (None, None, None) => {
-                    Err(format!("no ensemble, stimulus or group of synapses is named {name:?}"))
+                (SynapseSelector::Named(name), Source::Neuron(neuron)) => {
+                    network.ensembles.get(name).is_some_and(|e| e.neurons.contains(&neuron))
                 }
             }
-        }
-    }
+        })
+    });
+    selected.map(Parameter::Weight).collect()
 }
 
 /// Values of what the genotype does not cover.
@@ -229,13 +172,12 @@ fn defaults(
     let mut phenotype = Phenotype { weights, tau: vec![], gain: vec![], bias: vec![] };
     for (name, ensemble) in &network.ensembles {
         let params = ensemble.defaults;
-        let path = format!("topology.ensembles.{name}.params");
-        if let Err(message) = check_tau(params.tau, network.dt) {
-            problems.add(&path, message);
-        }
-        let values = [params.tau, params.gain, params.bias];
-        if !values.iter().all(|value| value.abs() <= MAX_MAGNITUDE) {
-            problems.add(path, format!("values must lie within +-{MAX_MAGNITUDE:e}"));
+        // Euler steps beyond twice the time constant diverge.
+        if network.dt > 2.0 * params.tau
+            && coverage.tau[ensemble.neurons.clone()].iter().any(|covered| !covered)
+        {
+            let message = format!("{} s is less than half of topology.dt: unstable", params.tau);
+            problems.add(format!("topology.ensembles.{name}.params.tau"), message);
         }
         for _ in ensemble.neurons.clone() {
             phenotype.tau.push(params.tau);
@@ -273,15 +215,14 @@ impl Coverage {
         }
     }
 
-    /// Covers a value; false if it was covered already.
-    fn add(&mut self, parameter: Parameter) -> bool {
-        let covered = match parameter {
+    /// Whether a value is covered.
+    fn of(&mut self, parameter: Parameter) -> &mut bool {
+        match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
             Parameter::Neuron(NeuronParameter::Bias, neuron) => &mut self.bias[neuron],
             Parameter::Neuron(NeuronParameter::Tau, neuron) => &mut self.tau[neuron],
             Parameter::Neuron(NeuronParameter::Gain, neuron) => &mut self.gain[neuron],
-        };
-        !std::mem::replace(covered, true)
+        }
     }
 
     /// What is not covered, except what the experiment declares untrainable.
@@ -428,25 +369,22 @@ mod tests {
         for query in [named("H3"), bias("H3"), bias("I1")] {
             assert!(compile(&with_queries(&[query])).2.check().is_err());
         }
-        let mut ambiguous = with_queries(&[named("H1")]);
-        ambiguous.topology.synapses[0].trainable = true;
-        let group = ambiguous.topology.synapses.shift_remove_index(0).unwrap().1;
-        ambiguous.topology.synapses.insert("H1".into(), group);
-        assert!(compile(&ambiguous).2.check().is_err());
     }
 
     #[test]
-    fn what_overlaps_is_empty_or_diverges_is_refused() {
-        let overlap = with_queries(&[weights(SynapseSelector::All), named("H1")]);
-        assert!(compile(&overlap).2.check().is_err());
+    fn queries_that_cover_nothing_and_time_constants_that_diverge_are_problems() {
         let mut empty = with_queries(&[named("I1-H1")]);
         empty.topology.synapses[0].trainable = false;
         assert!(compile(&empty).2.check().is_err());
-        let tau = GenotypeQuery::Neurons(NeuronParameter::Tau, EnsembleSelector::All);
-        assert!(compile(&with_queries(&[tau])).2.check().is_err(), "tau = 0.002 s, dt = 0.1 s");
-        let mut slow = experiment_a();
-        slow.topology.ensembles[0].params.tau = 0.04;
-        assert!(compile(&slow).2.check().is_err());
+        empty.topology.synapses[0].trainable = true;
+        empty.topology.synapses[0].p = 1e-9;
+        assert!(compile(&empty).2.check().is_err());
+        let mut fast = with_queries(&[named("I1-H1")]);
+        fast.topology.ensembles[0].params.tau = 0.04;
+        assert!(compile(&fast).2.check().is_err());
+        let mut covered = experiment_a();
+        covered.topology.ensembles[0].params.tau = 0.04;
+        assert!(compile(&covered).2.check().is_ok());
     }
 
     #[test]

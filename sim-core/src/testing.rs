@@ -1,4 +1,4 @@
-//! Configurations for tests: experiment A of the thesis, to be varied.
+//! Configurations for tests: the experiments of the thesis, to be varied.
 
 use crate::config::*;
 
@@ -34,6 +34,76 @@ pub(crate) fn experiment_a() -> ExperimentConfig {
     }
 }
 
+/// Experiment B (borderline identification).
+pub(crate) fn experiment_b() -> ExperimentConfig {
+    let mut config = experiment_a();
+    config.algorithm.fitness_function = FitnessFunction::IdentifyBorderline;
+    let robot = robot(&mut config);
+    robot.num_instances = 20;
+    robot.perturbations.leader_failure = None;
+    config
+}
+
+/// Experiment C (orientation consensus).
+pub(crate) fn experiment_c() -> ExperimentConfig {
+    let mut config = experiment_a();
+    config.topology = topology(
+        &[
+            ("I1", 2, SensorQuery::ReceiverMessage),
+            ("I2", 2, SensorQuery::ReceiverSendingDirection),
+            ("I3", 2, SensorQuery::ReceiverReceivingDirection),
+            ("I4", 1, SensorQuery::ReceiverState),
+        ],
+        ("OUT_WHEEL", 1, ActuatorQuery::Wheels),
+    );
+    config.algorithm.fitness_function = FitnessFunction::OrientationConsensus;
+    config.algorithm.evaluation_steps = 600;
+    let robot = robot(&mut config);
+    robot.perturbations.leader_failure = None;
+    robot.actuators.led_actuator = None;
+    robot.actuators.wheel_actuator = Some(wheels());
+    config
+}
+
+/// Experiment D (light follower), with the sensor noise of Table 3.2.
+pub(crate) fn experiment_d() -> ExperimentConfig {
+    let mut config = experiment_a();
+    config.topology = topology(
+        &[
+            ("I1", 2, SensorQuery::ReceiverMessage),
+            ("I2", 2, SensorQuery::ReceiverReceivingDirection),
+            ("I3", 1, SensorQuery::ReceiverState),
+            ("I4", 1, SensorQuery::ReceiverSignal),
+            ("I5", 6, SensorQuery::Light),
+        ],
+        ("OUT_WHEEL", 2, ActuatorQuery::Wheels),
+    );
+    config.algorithm.fitness_function = FitnessFunction::GotoLight;
+    config.algorithm.evaluation_steps = 1000;
+    let robot = robot(&mut config);
+    robot.sensors.light_sensor = Some(light_sensor());
+    robot.actuators.led_actuator = None;
+    robot.actuators.wheel_actuator = Some(wheels());
+    robot.initializers.positions = Initializer::RandomUniform { low: 400.0, high: 600.0, size: 2 };
+    robot.perturbations = PerturbationsConfig {
+        stimuli_inhibition: Some(StimuliInhibitionConfig {
+            stimuli: InhibitedStimulus::Reading(SensorQuery::Light),
+            affected_robots: 8,
+        }),
+        ..Default::default()
+    };
+    let light = LightSourceConfig {
+        num_instances: 1,
+        controller: LightController::LightOrbitController {},
+        initializers: PositionInitializers {
+            positions: Initializer::RandomCircumference { radius: 1.0, center: [500.0, 500.0] },
+        },
+        params: LightParams { range: 80.0, color: "red".into() },
+    };
+    config.world.objects.insert("light".into(), ObjectConfig::LightSource(light));
+    config
+}
+
 /// Network of the thesis: stimuli to H1, H1 to H2 and to the motor, H2 to message
 /// and mode, with feedback.
 fn topology(
@@ -42,6 +112,16 @@ fn topology(
 ) -> TopologyConfig {
     let ensemble =
         |n| EnsembleConfig { n, activation: Activation::Sigmoid, params: NeuronParams::default() };
+    let wheels = actuator == ActuatorQuery::Wheels;
+    let motor_ensemble = EnsembleConfig {
+        activation: if wheels { Activation::Tanh } else { Activation::Sigmoid },
+        ..ensemble(n_motor)
+    };
+    let motor_decoding = if wheels {
+        DecodingConfig::IdentityDecoding {}
+    } else {
+        DecodingConfig::ThresholdDecoding { stochastic: true }
+    };
     let output = |ensemble: &str, actuator| OutputConfig { ensemble: ensemble.into(), actuator };
     let group = |pre: &str, post: &str, p| {
         let group = SynapseGroupConfig {
@@ -81,7 +161,7 @@ fn topology(
             ("H2".into(), ensemble(10)),
             ("OUT_COMM".into(), ensemble(2)),
             ("OUT_STATE".into(), ensemble(1)),
-            (motor.into(), ensemble(n_motor)),
+            (motor.into(), motor_ensemble),
         ]
         .into(),
         outputs: [
@@ -93,7 +173,7 @@ fn topology(
         synapses,
         decoding: [
             ("message".into(), DecodingConfig::IdentityDecoding {}),
-            ("motor".into(), DecodingConfig::ThresholdDecoding { stochastic: true }),
+            ("motor".into(), motor_decoding),
             ("mode".into(), DecodingConfig::ThresholdDecoding { stochastic: false }),
         ]
         .into(),
@@ -169,7 +249,35 @@ pub(crate) fn transmitter() -> WirelessTransmitterConfig {
     }
 }
 
-/// The only robots of a configuration.
+/// The wheels of the thesis.
+pub(crate) fn wheels() -> WheelActuatorConfig {
+    WheelActuatorConfig { max_speed: 10.0, axle_length: 11.0, step_duration: 0.33 }
+}
+
+/// The light sensor of Table 3.2.
+pub(crate) fn light_sensor() -> LightSensorConfig {
+    LightSensorConfig {
+        n_sectors: 6,
+        range: 80.0,
+        color: "red".into(),
+        decay_rho: 0.05,
+        decay_phi: 1.0,
+        noise_variance: 0.1,
+    }
+}
+
+/// The distance sensor of Table 3.2.
+pub(crate) fn distance_sensor() -> DistanceSensorConfig {
+    DistanceSensorConfig {
+        n_sectors: 4,
+        range: 60.0,
+        decay_rho: 0.05,
+        decay_phi: 1.0,
+        noise_variance: 0.1,
+    }
+}
+
+/// The first robots of a configuration.
 pub(crate) fn robot(config: &mut ExperimentConfig) -> &mut RobotConfig {
     match config.world.objects.values_mut().next() {
         Some(ObjectConfig::Robot(robot)) => robot,

@@ -74,6 +74,11 @@ pub(crate) struct Torus {
 }
 
 impl Torus {
+    /// The middle of the world (W/2, H/2).
+    pub fn center(&self) -> Vec2 {
+        Vec2 { x: 0.5 * self.width, y: 0.5 * self.height }
+    }
+
     /// The same position with coordinates in \[0, width) x \[0, height).
     pub fn wrap(&self, position: Vec2) -> Vec2 {
         Vec2 { x: wrap(position.x, self.width), y: wrap(position.y, self.height) }
@@ -87,6 +92,19 @@ impl Torus {
     /// Length of the shortest way between two positions.
     pub fn distance(&self, a: Vec2, b: Vec2) -> f64 {
         self.displacement(a, b).norm()
+    }
+
+    /// Centre of mass of positions: the mean of the shortest ways from the first
+    /// one. It is that of the plane for what extends over less than half the
+    /// world. The origin without positions.
+    pub fn centroid(&self, positions: &[Vec2]) -> Vec2 {
+        let Some(&first) = positions.first() else { return Vec2::default() };
+        let sum = positions.iter().fold(Vec2::default(), |sum, &position| {
+            let way = self.displacement(first, position);
+            Vec2 { x: sum.x + way.x, y: sum.y + way.y }
+        });
+        let n = positions.len() as f64;
+        self.wrap(Vec2 { x: first.x + sum.x / n, y: first.y + sum.y / n })
     }
 }
 
@@ -157,6 +175,13 @@ mod tests {
     fn the_shortest_way_crosses_the_seam() {
         let d = TORUS.displacement(Vec2::new(990.0, 5.0), Vec2::new(10.0, 595.0));
         assert_eq!((d.x, d.y), (20.0, -10.0));
+    }
+
+    #[test]
+    fn the_centroid_of_a_swarm_on_the_seam_is_on_the_seam() {
+        let swarm = [Vec2::new(990.0, 0.0), Vec2::new(20.0, 590.0), Vec2::new(20.0, 580.0)];
+        let centroid = TORUS.centroid(&swarm);
+        assert!(TORUS.distance(centroid, Vec2::new(10.0, 590.0)) < 1e-9, "{centroid:?}");
     }
 
     #[test]

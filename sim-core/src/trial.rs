@@ -1,17 +1,18 @@
 //! One trial of an experiment: the phases of its environment steps, except what
 //! controllers do.
 
-use crate::communication::{Ether, Hearing, Mode, Origin};
-use crate::config::SensorQuery;
+use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
 use crate::experiment::{EvaluateError, Experiment};
 use crate::fitness::{self, Fitness, Moment};
 use crate::lanes::Lanes;
-use crate::perturbations::LeaderFailure;
+use crate::lights::LightPath;
+use crate::perturbations::Perturbations;
 use crate::random::{Purpose, Stream};
-use crate::swarm::{Received, Swarm};
-use crate::torus::{Vec2, sector_angle};
-use crate::world::{RobotGroup, World};
+use crate::senses::Senses;
+use crate::swarm::Swarm;
+use crate::torus::{Torus, Vec2};
+use crate::world::{Fixtures, Site, World};
 
 /// Steps at the start of an episode in which every robot sends.
 const N_FIRST_STEPS_SENDING: u32 = 10;
@@ -19,24 +20,79 @@ const N_FIRST_STEPS_SENDING: u32 = 10;
 /// State of a trial.
 pub(crate) struct Trial<'a> {
     world: &'a World,
+    address: Address,
     swarm: Swarm,
-    ether: Ether,
-    hearing: Hearing,
-    streams: Streams,
-    /// Per group of robots.
-    leader_failures: Vec<Option<LeaderFailure>>,
+    radio: Radio,
+    lights: Vec<Vec2>,
+    light_paths: Vec<LightPath>,
+    areas: Vec<Vec2>,
+    /// What each group of robots has beside the swarm's state.
+    groups: Vec<Group>,
+    /// Stochastic decoding, per robot.
+    decoding: Vec<Stream>,
+    /// Noise of sensors, per robot.
+    noise: Vec<Stream>,
+    /// Whether a robot changed its place or heading in this step, by itself or not.
+    moved: bool,
     fitness: Box<dyn Fitness>,
     fitness_sum: f64,
     n_judged_steps: u32,
-    /// Scratch of the quantiser.
-    weights: Vec<f64>,
 }
 
-/// Random streams per robot.
-struct Streams {
-    reception: Vec<Stream>,
-    quantisation: Vec<Stream>,
-    decoding: Vec<Stream>,
+/// What belongs to a group of robots.
+struct Group {
+    senses: Senses,
+    perturbations: Perturbations,
+    /// Start positions, and those after each switch of the topology.
+    positions: Stream,
+}
+
+/// Which trial it is.
+#[derive(Debug, Clone, Copy)]
+struct Address {
+    seed: u64,
+    generation: u64,
+    trial: u32,
+}
+
+impl Address {
+    fn stream(self, purpose: Purpose, number: usize) -> Stream {
+        Stream::new(self.seed, self.generation, self.trial.into(), purpose, number as u64)
+    }
+
+    /// One stream for each of `n` robots, or lights.
+    fn streams(self, purpose: Purpose, n: usize) -> Vec<Stream> {
+        (0..n).map(|number| self.stream(purpose, number)).collect()
+    }
+
+    /// Draws the positions of an object's instances.
+    fn place(
+        self,
+        site: &Site,
+        torus: &Torus,
+        stream: &mut Stream,
+    ) -> Result<Vec<Vec2>, EvaluateError> {
+        site.positions.draw(torus, stream).map_err(|unplaceable| EvaluateError::Unplaceable {
+            object: site.name.clone(),
+            index: unplaceable.index,
+            generation: self.generation,
+            trial: self.trial,
+        })
+    }
+
+    /// Draws the positions of lights or ground areas.
+    fn place_fixtures(
+        self,
+        fixtures: &[Fixtures],
+        torus: &Torus,
+    ) -> Result<Vec<Vec2>, EvaluateError> {
+        let mut positions = Vec::new();
+        for Fixtures { site, .. } in fixtures {
+            let mut stream = self.stream(Purpose::Positions, site.object);
+            positions.extend(self.place(site, torus, &mut stream)?);
+        }
+        Ok(positions)
+    }
 }
 
 impl<'a> Trial<'a> {
@@ -47,112 +103,153 @@ impl<'a> Trial<'a> {
         trial: u32,
     ) -> Result<Self, EvaluateError> {
         let world = &experiment.world;
-        let stream = |purpose, number| {
-            Stream::new(experiment.seed, generation, u64::from(trial), purpose, number)
-        };
-        let per_robot =
-            |purpose| (0..world.n_robots() as u64).map(|robot| stream(purpose, robot)).collect();
+        let address = Address { seed: experiment.seed, generation, trial };
         let mut positions = Vec::with_capacity(world.n_robots());
         let mut headings = Vec::with_capacity(world.n_robots());
+        let mut groups = Vec::with_capacity(world.groups.len());
         for group in &world.groups {
-            let mut start = stream(Purpose::Positions, group.object);
-            let start = group.positions.draw(&world.torus, &mut start);
-            positions.extend(start.map_err(|unplaceable| EvaluateError::Unplaceable {
-                object: group.name.clone(),
-                index: unplaceable.index,
-                generation,
-                trial,
-            })?);
-            headings.extend(group.headings.draw(&mut stream(Purpose::Orientations, group.object)));
+            let mut stream = address.stream(Purpose::Positions, group.site.object);
+            positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
+            let mut orientations = address.stream(Purpose::Orientations, group.site.object);
+            headings.extend(group.headings.draw(&mut orientations));
+            groups.push(Group {
+                senses: Senses::new(group),
+                perturbations: Perturbations::new(
+                    &group.perturbations,
+                    group.robots.len(),
+                    |number| address.stream(Purpose::Perturbation, number),
+                ),
+                positions: stream,
+            });
         }
-        let leader_failures = world.groups.iter().map(|group| {
-            let config = group.perturbations.leader_failure.as_ref()?;
-            Some(LeaderFailure::new(config.time_to_failure, group.robots.len()))
+        let lights = address.place_fixtures(&world.lights, &world.torus)?;
+        let areas = address.place_fixtures(&world.areas, &world.torus)?;
+        let controllers = world.lights.iter().zip(&world.light_controllers);
+        let controllers = controllers
+            .flat_map(|(lights, controller)| lights.members.clone().map(move |_| controller));
+        let paths = controllers.zip(&lights).enumerate().map(|(light, (controller, &position))| {
+            let stream = address.stream(Purpose::LightMovement, light);
+            LightPath::new(controller, position, &world.torus, stream)
         });
+        let light_paths = paths.collect();
+        let n_robots = world.n_robots();
         let swarm = Swarm::new(positions, headings, world.message_len);
-        let mut hearing = Hearing::new(&world.antennas);
-        hearing.update(&world.torus, &world.antennas, &swarm.positions, &swarm.headings);
+        let mut radio = Radio::new(
+            world,
+            address.streams(Purpose::Reception, n_robots),
+            address.streams(Purpose::Quantisation, n_robots),
+        );
+        radio.relocate(world, &swarm);
         Ok(Self {
             world,
+            address,
             swarm,
-            ether: Ether::new(world.n_robots(), world.message_len),
-            hearing,
-            streams: Streams {
-                reception: per_robot(Purpose::Reception),
-                quantisation: per_robot(Purpose::Quantisation),
-                decoding: per_robot(Purpose::Decoding),
-            },
-            leader_failures: leader_failures.collect(),
-            fitness: fitness::new(experiment.fitness),
+            radio,
+            lights,
+            light_paths,
+            areas,
+            groups,
+            decoding: address.streams(Purpose::Decoding, n_robots),
+            noise: address.streams(Purpose::SensorNoise, n_robots),
+            moved: true,
+            fitness: fitness::new(experiment.fitness, world),
             fitness_sum: 0.0,
             n_judged_steps: 0,
-            weights: Vec::new(),
         })
     }
 
-    /// First half of a step: every robot senses, from positions and headings now
-    /// and from the frames on the air.
-    pub fn sense(&mut self) {
-        for robot in 0..self.world.n_robots() {
-            self.receive(robot);
+    /// Start of a step: every robot senses, from positions and headings now and
+    /// from the frames that are on the air.
+    pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
+        // Robots whose topology switches find themselves elsewhere.
+        for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
+            if state.perturbations.switches_topology(step) {
+                let torus = &self.world.torus;
+                let positions = self.address.place(&group.site, torus, &mut state.positions)?;
+                self.swarm.positions[group.robots.clone()].copy_from_slice(&positions);
+                self.moved = true;
+            }
         }
+        // Who hears whom changes only when somebody moves.
+        if self.moved {
+            self.radio.relocate(self.world, &self.swarm);
+        }
+        self.radio.receive(self.world, &mut self.swarm);
+        for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
+            let (swarm, noise) = (&self.swarm, &mut self.noise);
+            state.senses.update(self.world, group, swarm, &self.lights, &self.areas, noise);
+        }
+        Ok(())
     }
 
-    /// Fills in a group's stimuli, `[input][lane]`, from lane `first_lane` on.
-    pub fn stimulate(&self, group: &RobotGroup, first_lane: usize, stimuli: &mut Lanes) {
-        for (lane, robot) in (first_lane..).zip(group.robots.clone()) {
+    /// Fills in the stimuli of a group, `[input][lane]`, from `first_lane` on.
+    /// Inhibited stimuli are zero.
+    pub fn stimulate(&self, group: usize, first_lane: usize, stimuli: &mut Lanes) {
+        let state = &self.groups[group];
+        let group = &self.world.groups[group];
+        for (index, robot) in group.robots.clone().enumerate() {
             for (query, inputs) in &group.stimuli {
-                self.read(*query, robot, |index, value| {
-                    stimuli.set(inputs.start + index, lane, value);
-                });
+                let inhibited = state.perturbations.inhibits(index, *query);
+                let reading = state.senses.reading(*query, &self.swarm, index, robot);
+                for (input, &value) in inputs.clone().zip(reading.values()) {
+                    let value = if inhibited { 0.0 } else { value };
+                    stimuli.set(input, first_lane + index, value);
+                }
             }
         }
     }
 
     /// Takes a group's actions from its controller.
-    pub fn decide(
-        &mut self,
-        group: &RobotGroup,
-        first_lane: usize,
-        controller: &mut dyn Controller,
-    ) {
-        for (lane, robot) in (first_lane..).zip(group.robots.clone()) {
+    pub fn decide(&mut self, group: usize, first_lane: usize, controller: &mut dyn Controller) {
+        let robots = self.world.groups[group].robots.clone();
+        for (lane, robot) in (first_lane..).zip(robots) {
             let mut action = self.swarm.fresh_action(robot);
-            controller.act(lane, &mut self.streams.decoding[robot], &mut action);
+            controller.act(lane, &mut self.decoding[robot], &mut action);
         }
     }
 
-    /// Second half of a step: actions take effect and are judged.
+    /// Rest of a step: actions take effect and are judged.
     pub fn act(&mut self, step: u32) {
+        let world = self.world;
         // Nobody relays before there is something to relay.
         if step < N_FIRST_STEPS_SENDING {
             self.swarm.modes.fill(Mode::Send);
         }
         // Perturbations rewrite actions.
-        for (group, failure) in self.world.groups.iter().zip(&mut self.leader_failures) {
-            if let Some(failure) = failure {
-                let robots = group.robots.clone();
-                failure
-                    .rewrite(&mut self.swarm.leds[robots.clone()], &mut self.swarm.modes[robots]);
-            }
+        for (group, state) in world.groups.iter().zip(&mut self.groups) {
+            state.perturbations.rewrite(step, group, &mut self.swarm);
         }
+        // Wheels turn.
+        self.drive();
         // Every transmitter puts its frame on the air.
-        let world = self.world;
         for group in &world.groups {
             for robot in group.robots.clone() {
-                self.emit(group, robot);
+                self.radio.emit(world, &mut self.swarm, group.quantiser.as_ref(), robot);
             }
         }
-        // Fitness of the step.
-        let judged = self.world.groups[self.world.evolvable].robots.clone();
-        let moment = Moment { leds: &self.swarm.leds[judged] };
-        if let Some(fitness) = self.fitness.step(&moment) {
+        // The step is judged.
+        let judged = world.judged();
+        let fitness = self.fitness.step(&Moment {
+            torus: &world.torus,
+            step,
+            moved: self.moved,
+            positions: &self.swarm.positions[judged.clone()],
+            headings: &self.swarm.headings[judged.clone()],
+            wheels: &self.swarm.wheels[judged.clone()],
+            leds: &self.swarm.leds[judged],
+            lights: &self.lights,
+        });
+        if let Some(fitness) = fitness {
             self.fitness_sum += fitness;
             self.n_judged_steps += 1;
         }
+        // Lights move.
+        for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
+            *position = path.advance(*position, step, &world.torus);
+        }
     }
 
-    /// Mean fitness over the steps that count.
+    /// Mean fitness over the steps that count; 0 without any.
     pub fn fitness(&self) -> f64 {
         if self.n_judged_steps == 0 {
             0.0
@@ -161,87 +258,20 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Chooses among the frames in the robot's sectors.
-    fn receive(&mut self, robot: usize) {
-        let Some(receiver) = self.world.antennas[robot].receiver else { return };
-        let ether = &self.ether;
-        let accepted =
-            |origin: &&Origin| origin.originator != robot && origin.hops < receiver.max_hops;
-        let mut valid = self.hearing.of(robot).iter().enumerate().filter_map(|(sector, heard)| {
-            let heard = heard.as_ref()?;
-            ether.origin(heard.emitter).filter(accepted).map(|origin| (sector, heard, origin))
-        });
-        let u = self.streams.reception[robot].uniform();
-        let count = valid.clone().count();
-        let chosen = valid.nth(((u * count as f64) as usize).min(count.saturating_sub(1)));
-        let message = self.swarm.message_range(robot);
-        let message = &mut self.swarm.received_messages[message];
-        let Some((sector, heard, origin)) = chosen else {
-            self.swarm.received[robot] = None;
-            message.fill(0.0);
-            return;
-        };
-        message.copy_from_slice(ether.message(heard.emitter));
-        // The first to hear a frame sees the direction in which it was sent.
-        let sending_direction =
-            if origin.hops == 1 { heard.sending_direction } else { origin.sending_direction };
-        self.swarm.received[robot] = Some(Received {
-            sector,
-            signal: heard.strength,
-            receiving_direction: Vec2::unit(sector_angle(sector, receiver.n_sectors)),
-            origin: Origin { sending_direction, ..*origin },
-        });
-    }
-
-    /// Hands a robot's reading to `set`, value by value.
-    fn read(&self, query: SensorQuery, robot: usize, mut set: impl FnMut(usize, f64)) {
-        let received = self.swarm.received[robot].as_ref();
-        let mut direction = |direction: Option<Vec2>| {
-            let direction = direction.unwrap_or_default();
-            set(0, direction.x);
-            set(1, direction.y);
-        };
-        match query {
-            SensorQuery::ReceiverMessage => {
-                let message = &self.swarm.received_messages[self.swarm.message_range(robot)];
-                for (index, &value) in message.iter().enumerate() {
-                    set(index, value);
-                }
-            }
-            SensorQuery::ReceiverReceivingDirection => {
-                direction(received.map(|received| received.receiving_direction));
-            }
-            SensorQuery::ReceiverSendingDirection => {
-                direction(received.map(|received| received.origin.sending_direction));
-            }
-            SensorQuery::ReceiverSignal => set(0, received.map_or(0.0, |r| r.signal)),
-            SensorQuery::ReceiverState => {
-                set(0, f64::from(self.swarm.modes[robot] == Mode::Send));
-            }
-            SensorQuery::Light | SensorQuery::Distance | SensorQuery::Ground => {}
-        }
-    }
-
-    /// Puts a robot's frame on the air.
-    fn emit(&mut self, group: &RobotGroup, robot: usize) {
-        if self.world.antennas[robot].emits_within.is_none() {
-            return;
-        }
-        let range = self.swarm.message_range(robot);
-        if let Some(quantiser) = &group.quantiser {
-            let u = self.streams.quantisation[robot].uniform();
-            quantiser.quantise(&mut self.swarm.messages[range.clone()], u, &mut self.weights);
-        }
-        match self.swarm.modes[robot] {
-            Mode::Send => {
-                let origin =
-                    Origin { originator: robot, hops: 1, sending_direction: Vec2::default() };
-                self.ether.emit(robot, Some(origin), &self.swarm.messages[range]);
-            }
-            Mode::Relay => {
-                let origin = self.swarm.received[robot]
-                    .map(|Received { origin, .. }| Origin { hops: origin.hops + 1, ..origin });
-                self.ether.emit(robot, origin, &self.swarm.received_messages[range]);
+    /// Moves all robots by their wheels.
+    fn drive(&mut self) {
+        self.moved = false;
+        let swarm = &mut self.swarm;
+        for group in &self.world.groups {
+            let Some(drive) = &group.drive else { continue };
+            for robot in group.robots.clone().filter(|&robot| swarm.wheels[robot] != [0.0; 2]) {
+                (swarm.positions[robot], swarm.headings[robot]) = drive.advance(
+                    &self.world.torus,
+                    swarm.positions[robot],
+                    swarm.headings[robot],
+                    swarm.wheels[robot],
+                );
+                self.moved = true;
             }
         }
     }
@@ -250,7 +280,8 @@ impl<'a> Trial<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{ExperimentConfig, Initializer};
+    use crate::communication::Origin;
+    use crate::config::{ExperimentConfig, Initializer, SensorQuery};
     use crate::testing::{experiment_a, robot};
 
     /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
@@ -268,7 +299,7 @@ mod tests {
 
     /// One step in which robots act as `modes` and `message` say.
     fn step(trial: &mut Trial<'_>, modes: &[Mode], message: [f64; 2]) {
-        trial.sense();
+        trial.sense(N_FIRST_STEPS_SENDING).unwrap();
         trial.swarm.modes.copy_from_slice(modes);
         for own in trial.swarm.messages.chunks_exact_mut(2) {
             own.copy_from_slice(&message);
@@ -309,7 +340,7 @@ mod tests {
         let experiment = Experiment::compile(&line(2)).unwrap();
         let mut trial = Trial::new(&experiment, 0, 0).unwrap();
         for step in 0..12 {
-            trial.sense();
+            trial.sense(step).unwrap();
             // On the air: the frames of step - 1.
             let heard = (1..=10).contains(&step);
             assert_eq!(trial.swarm.received[0].is_some(), heard, "step {step}");
@@ -323,11 +354,9 @@ mod tests {
         let experiment = Experiment::compile(&line(2)).unwrap();
         let mut trial = Trial::new(&experiment, 0, 0).unwrap();
         let read = |trial: &Trial<'_>, query| {
-            let mut values = Vec::new();
-            trial.read(query, 0, |_, value| values.push(value));
-            values
+            trial.groups[0].senses.reading(query, &trial.swarm, 0, 0).values().to_vec()
         };
-        trial.sense();
+        trial.sense(0).unwrap();
         assert_eq!(read(&trial, SensorQuery::ReceiverState), [1.0]);
         assert_eq!(read(&trial, SensorQuery::ReceiverMessage), [0.0; 2]);
         assert_eq!(read(&trial, SensorQuery::ReceiverSignal), [0.0]);
@@ -336,7 +365,7 @@ mod tests {
         trial.swarm.messages.copy_from_slice(&[0.0, 0.0, 1.0, 0.0]);
         trial.act(0);
         trial.swarm.modes[0] = Mode::Relay;
-        trial.sense();
+        trial.sense(1).unwrap();
         assert_eq!(read(&trial, SensorQuery::ReceiverState), [0.0]);
         assert_eq!(read(&trial, SensorQuery::ReceiverMessage), [1.0, 0.0]);
         assert_eq!(read(&trial, SensorQuery::ReceiverSignal), [libm::exp(-4.5)]);

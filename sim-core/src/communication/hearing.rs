@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use crate::sensors::Decay;
 use crate::torus::{Torus, Vec2, angular_difference, sector_angle, wrap_angle};
 
 /// A border between sectors belongs to both in spite of rounding, radians.
@@ -24,10 +25,8 @@ pub(crate) struct Receiver {
     pub n_sectors: usize,
     /// Reach, cm.
     pub range: f64,
-    /// Decay of the strength per cm.
-    pub decay_rho: f64,
-    /// Decay of the strength per radian.
-    pub decay_phi: f64,
+    /// Fading of the strength.
+    pub decay: Decay,
     /// Frames of so many hops are not accepted.
     pub max_hops: u32,
 }
@@ -37,7 +36,7 @@ pub(crate) struct Receiver {
 pub(crate) struct Heard {
     /// The robot that is heard.
     pub emitter: usize,
-    /// exp(-decay_rho * rho - decay_phi * phi)
+    /// How strongly.
     pub strength: f64,
     /// Direction from the emitter to the listener, as the emitter's sector
     /// that faces it: (cos, sin) in the emitter's own frame.
@@ -100,7 +99,7 @@ impl Hearing {
                     if phi > PI / receiver.n_sectors as f64 + BORDER {
                         continue;
                     }
-                    let strength = libm::exp(-receiver.decay_rho * rho - receiver.decay_phi * phi);
+                    let strength = receiver.decay.strength(rho, phi);
                     if strongest.is_none_or(|heard| strength > heard.strength) {
                         let sending_direction = facing(sending, n_sending);
                         *strongest = Some(Heard { emitter, strength, sending_direction });
@@ -137,8 +136,7 @@ mod tests {
         receiver: Some(Receiver {
             n_sectors: 4,
             range: 100.0,
-            decay_rho: 0.05,
-            decay_phi: 1.0,
+            decay: Decay { rho: 0.05, phi: 1.0 },
             max_hops: 10,
         }),
     };

@@ -3,10 +3,12 @@
 mod frame;
 mod hearing;
 mod quantisation;
+mod radio;
 
-pub(crate) use frame::{Ether, Origin};
-pub(crate) use hearing::{Antenna, Hearing, Receiver};
+pub(crate) use frame::Origin;
+pub(crate) use hearing::{Antenna, Receiver};
 pub(crate) use quantisation::Quantiser;
+pub(crate) use radio::Radio;
 
 /// What a robot does with its transmitter.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -1,7 +1,9 @@
 //! What decides robots' actions.
 
+mod braitenberg;
 mod neural;
 
+pub(crate) use braitenberg::BraitenbergLightFollower;
 pub(crate) use neural::NeuralController;
 
 use crate::communication::Mode;

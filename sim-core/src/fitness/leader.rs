@@ -28,8 +28,9 @@ mod tests {
 
     fn mean(steps: impl Iterator<Item = [u32; 3]>) -> f64 {
         let mut fitness = IdentifyLeader::default();
-        let values: Vec<f64> =
-            steps.map(|leds| fitness.step(&Moment { leds: &leds }).unwrap()).collect();
+        let values: Vec<f64> = steps
+            .map(|leds| fitness.step(&Moment { leds: &leds, ..Moment::EMPTY }).unwrap())
+            .collect();
         values.iter().sum::<f64>() / values.len() as f64
     }
 

@@ -31,14 +31,12 @@ pub(crate) enum Positions {
 impl Positions {
     /// From the configuration, for `n` objects; or what is wrong with it.
     pub fn new(config: &Initializer, n: usize) -> Result<Self, String> {
-        check_magnitudes(config)?;
         Ok(match config {
             Initializer::Fixed { values } => {
                 let positions = fixed(values, n)?;
                 Self::Fixed(positions.map(|[x, y]| Vec2::new(x, y)).collect())
             }
-            Initializer::RandomUniform { low, high, size } => {
-                check_size(*size, 2)?;
+            Initializer::RandomUniform { low, high, .. } => {
                 Self::Uniform { low: *low, high: *high, n }
             }
             Initializer::RandomCircumference { radius, center: [x, y] } => {
@@ -91,13 +89,11 @@ pub(crate) enum Headings {
 impl Headings {
     /// From the configuration, for `n` robots; or what is wrong with it.
     pub fn new(config: &Initializer, n: usize) -> Result<Self, String> {
-        check_magnitudes(config)?;
         Ok(match config {
             Initializer::Fixed { values } => {
                 Self::Fixed(fixed(values, n)?.map(|[theta]| theta).collect())
             }
-            Initializer::RandomUniform { low, high, size } => {
-                check_size(*size, 1)?;
+            Initializer::RandomUniform { low, high, .. } => {
                 Self::Uniform { low: *low, high: *high, n }
             }
             Initializer::RandomCircumference { .. } | Initializer::RandomGraph { .. } => {
@@ -129,33 +125,6 @@ fn fixed<const N: usize>(
         return Err(format!("{} values for {n} objects: give 1 or {n}", values.len()));
     }
     Ok(values.into_iter().cycle().take(n))
-}
-
-/// Refuses numbers whose sums or quotients could leave the numbers.
-fn check_magnitudes(config: &Initializer) -> Result<(), String> {
-    const MAX: f64 = 1e9;
-    let bounded = |value: &f64| value.abs() <= MAX;
-    let all_bounded = match config {
-        Initializer::Fixed { values } => values.iter().flatten().all(bounded),
-        Initializer::RandomUniform { low, high, .. } => [low, high].into_iter().all(bounded),
-        Initializer::RandomCircumference { radius, center } => {
-            bounded(radius) && center.iter().all(bounded)
-        }
-        Initializer::RandomGraph { max_rad, initial_pos } => {
-            if *max_rad < 1.0 / MAX {
-                return Err("max_rad must be positive".into());
-            }
-            initial_pos.iter().all(bounded)
-        }
-    };
-    if all_bounded { Ok(()) } else { Err(format!("values must lie within +-{MAX:e}")) }
-}
-
-fn check_size(actual: u32, expected: u32) -> Result<(), String> {
-    if actual == expected {
-        return Ok(());
-    }
-    Err(format!("size is {actual}, but there are {expected} component(s) to draw"))
 }
 
 #[cfg(test)]
@@ -206,8 +175,6 @@ mod tests {
         let three = Initializer::Fixed { values: vec![vec![1.0, 2.0]; 3] };
         assert!(Positions::new(&three, 2).is_err());
         assert!(Headings::new(&three, 3).is_err());
-        let scalar = Initializer::RandomUniform { low: 0.0, high: 1.0, size: 1 };
-        assert!(Positions::new(&scalar, 2).is_err());
         let circle = Initializer::RandomCircumference { radius: 1.0, center: [0.0, 0.0] };
         assert!(Headings::new(&circle, 2).is_err());
     }

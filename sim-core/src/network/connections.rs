@@ -1,6 +1,5 @@
 //! Which synapses exist: drawn once per experiment from `topology.seed`.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 use indexmap::IndexMap;
@@ -48,7 +47,6 @@ pub(super) fn draw(
 ) -> (IndexMap<String, SynapseGroup>, Vec<Synapse>) {
     let mut groups = IndexMap::new();
     let mut synapses = Vec::new();
-    let mut connected = BTreeSet::new();
     for (index, (group_name, group)) in config.synapses.iter().enumerate() {
         let path = || format!("topology.synapses.{group_name}");
         let mut stream = Stream::new(config.seed, 0, 0, Purpose::Connections, index as u64);
@@ -67,10 +65,6 @@ pub(super) fn draw(
                     problems.add(path(), format!("no ensemble is named {post_name:?}"));
                     continue;
                 };
-                if !connected.insert((pre_name, post_name)) {
-                    problems
-                        .add(path(), format!("{pre_name:?} to {post_name:?} is connected already"));
-                }
                 for post in ensemble.neurons.clone() {
                     let drawn = sources.iter().filter(|_| stream.bernoulli(group.p));
                     synapses.extend(drawn.map(|&pre| Synapse { pre, post }));
@@ -118,12 +112,11 @@ mod tests {
     }
 
     #[test]
-    fn unknown_and_repeated_connections_are_problems() {
+    fn unknown_names_are_problems() {
         let mut config = experiment_a().topology;
         assert_eq!(problems_of(&config), 0);
         config.synapses[0].pre.push("H3".into());
         config.synapses[1].post.push("I1".into());
-        config.synapses[2].pre.push("I1".into());
-        assert_eq!(problems_of(&config), 3);
+        assert_eq!(problems_of(&config), 2);
     }
 }

@@ -202,20 +202,20 @@ mod tests {
         problems.check().unwrap();
         let genotype = crate::testing::genotype(codec.genotype_len(), 5);
         let phenotype = codec.decode(&genotype);
-        let n_lanes = 11;
+        let (n_lanes, n_inputs) = (11, 5);
         let mut ctrnn = Ctrnn::new(&network, &phenotype, n_lanes);
         let mut v = vec![vec![0.0; network.n_neurons()]; n_lanes];
-        let mut stimuli = Lanes::new(network.n_inputs(), n_lanes);
+        let mut stimuli = Lanes::new(n_inputs, n_lanes);
         for step in 0..5 {
             let value = |lane: usize, input: usize| libm::sin((lane + 3 * input + 7 * step) as f64);
             for lane in 0..n_lanes {
-                for input in 0..network.n_inputs() {
+                for input in 0..n_inputs {
                     stimuli.set(input, lane, value(lane, input));
                 }
             }
             ctrnn.step(&stimuli);
             for (lane, v) in v.iter_mut().enumerate() {
-                let phi: Vec<f64> = (0..network.n_inputs()).map(|i| value(lane, i)).collect();
+                let phi: Vec<f64> = (0..n_inputs).map(|i| value(lane, i)).collect();
                 let u = reference(&network, &phenotype, &phi, v);
                 for (neuron, u) in u.into_iter().enumerate() {
                     let difference = (ctrnn.activity().get(neuron, lane) - u).abs();

@@ -36,8 +36,7 @@ pub(crate) enum Decoder {
     Softmax,
 }
 
-/// Outputs in the order of the configuration; notes decodings that make no
-/// sense for their actuator.
+/// Outputs in the order of the configuration.
 pub(super) fn compile(
     config: &TopologyConfig,
     ensembles: &IndexMap<String, Ensemble>,
@@ -60,39 +59,10 @@ pub(super) fn compile(
                 continue;
             }
         };
-        if outputs.iter().any(|other| other.actuator == output.actuator) {
-            problems.add(path.clone(), "another output drives the same actuator");
-        }
-        if let Err(message) = check(output.actuator, ensemble.neurons.len(), decoder) {
-            problems.add(path, message);
-        }
         let neurons = ensemble.neurons.clone();
         outputs.push(Output { actuator: output.actuator, neurons, decoder });
     }
     outputs
-}
-
-fn check(actuator: ActuatorQuery, n: usize, decoder: Decoder) -> Result<(), &'static str> {
-    match (actuator, decoder) {
-        (ActuatorQuery::Message | ActuatorQuery::Wheels, Decoder::Softmax) => {
-            Err("this actuator takes real values, SoftmaxDecoding gives a category")
-        }
-        (ActuatorQuery::Wheels, _) if n != 1 && n != 2 => {
-            Err("wheels are driven by 1 neuron (rotation in place) or 2 (right, left)")
-        }
-        (ActuatorQuery::Led | ActuatorQuery::Mode, Decoder::Identity) => {
-            Err("this actuator takes a category: use ThresholdDecoding or SoftmaxDecoding")
-        }
-        (ActuatorQuery::Led | ActuatorQuery::Mode, Decoder::Threshold | Decoder::Bernoulli)
-            if n != 1 =>
-        {
-            Err("ThresholdDecoding gives one category per neuron, this actuator takes one")
-        }
-        (ActuatorQuery::Mode, Decoder::Softmax) if n != 2 => {
-            Err("there are two modes: SoftmaxDecoding needs 2 neurons")
-        }
-        _ => Ok(()),
-    }
 }
 
 impl Output {
@@ -226,19 +196,5 @@ mod tests {
             let led = decode(ActuatorQuery::Led, Decoder::Softmax, &activities, &mut s).1;
             assert_eq!(led, u32::from(draws.uniform() > 1.0 / 3.0));
         }
-    }
-
-    #[test]
-    fn decodings_that_make_no_sense_are_refused() {
-        for (actuator, n, decoder) in [
-            (ActuatorQuery::Message, 2, Decoder::Softmax),
-            (ActuatorQuery::Wheels, 3, Decoder::Identity),
-            (ActuatorQuery::Led, 1, Decoder::Identity),
-            (ActuatorQuery::Led, 2, Decoder::Threshold),
-            (ActuatorQuery::Mode, 3, Decoder::Softmax),
-        ] {
-            assert!(check(actuator, n, decoder).is_err(), "{actuator:?} {n} {decoder:?}");
-        }
-        assert!(check(ActuatorQuery::Led, 3, Decoder::Softmax).is_ok());
     }
 }

@@ -69,7 +69,7 @@ pub(crate) struct Phenotype {
 }
 
 impl Network {
-    /// Draws the connections; notes what cannot be simulated.
+    /// Draws the connections; notes names that nothing has.
     pub fn compile(config: &TopologyConfig, problems: &mut Problems) -> Self {
         let mut n_inputs = 0;
         let stimuli = config.stimuli.iter().map(|(name, stimulus)| {
@@ -92,12 +92,6 @@ impl Network {
             (name.clone(), ensemble)
         });
         let ensembles: IndexMap<_, _> = ensembles.collect();
-        for name in ensembles.keys().filter(|name| stimuli.contains_key(*name)) {
-            problems.add(
-                format!("topology.ensembles.{name}"),
-                "a stimulus has the same name; synapses could not tell them apart",
-            );
-        }
         let outputs = decoding::compile(config, &ensembles, problems);
         let (groups, synapses) = connections::draw(config, &stimuli, &ensembles, problems);
         Self {
@@ -109,11 +103,6 @@ impl Network {
             synapses,
             outputs,
         }
-    }
-
-    /// Number of inputs of the network.
-    pub fn n_inputs(&self) -> usize {
-        self.stimuli.values().last().map_or(0, |stimulus| stimulus.inputs.end)
     }
 
     /// Number of neurons.

@@ -6,7 +6,7 @@ use crate::leadership::Leadership;
 
 /// Faults among the robots of one object, in one trial.
 #[derive(Debug, Clone)]
-pub(crate) struct LeaderFailure {
+pub(super) struct LeaderFailure {
     time_to_failure: u32,
     leadership: Leadership,
     faulty: Vec<bool>,
