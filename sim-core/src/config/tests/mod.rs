@@ -1,5 +1,7 @@
 //! Tests of the reader.
 
+mod generated;
+mod generator;
 mod hostile;
 mod problems;
 mod reference;
