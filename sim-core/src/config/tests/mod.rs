@@ -5,6 +5,7 @@ mod generator;
 mod hostile;
 mod problems;
 mod reference;
+mod shipped;
 mod values;
 
 use super::{ConfigError, ExperimentConfig, Problem};
