@@ -2,17 +2,25 @@
 
 use std::cell::RefCell;
 use std::fmt::{self, Write as _};
+use std::iter;
+use std::rc::Rc;
 
 use jsonc_parser::ast::Value;
 use jsonc_parser::common::Ranged as _;
 
 use crate::config::{ConfigError, Problem, limits};
 
-/// A place in the file, from the root.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::config) struct Path(Vec<Segment>);
+/// A place in the file, from the root. Cheap to extend: every value that is
+/// read has one.
+#[derive(Clone, Default)]
+pub(in crate::config) struct Path(Option<Rc<Step>>);
 
-#[derive(Debug, Clone, PartialEq)]
+struct Step {
+    parent: Path,
+    segment: Segment,
+}
+
+#[derive(Clone, PartialEq)]
 enum Segment {
     Key(String),
     Index(usize),
@@ -36,27 +44,31 @@ impl Path {
     }
 
     fn join(&self, segment: Segment) -> Self {
-        let mut segments = Vec::with_capacity(self.0.len() + 1);
-        segments.extend_from_slice(&self.0);
-        segments.push(segment);
-        Self(segments)
+        Self(Some(Rc::new(Step { parent: self.clone(), segment })))
+    }
+
+    fn segments(&self) -> Vec<&Segment> {
+        let steps = iter::successors(self.0.as_deref(), |step| step.parent.0.as_deref());
+        let mut segments: Vec<_> = steps.map(|step| &step.segment).collect();
+        segments.reverse();
+        segments
     }
 
     /// Whether one of the two contains the other.
     fn overlaps(&self, other: &Self) -> bool {
-        self.0.iter().zip(&other.0).all(|(a, b)| a == b)
+        self.segments().into_iter().zip(other.segments()).all(|(a, b)| a == b)
     }
 }
 
 impl<const N: usize> From<[&str; N]> for Path {
     fn from(keys: [&str; N]) -> Self {
-        Self(keys.map(|key| Segment::Key(key.to_owned())).into())
+        keys.into_iter().fold(Self::default(), |path, key| path.key(key))
     }
 }
 
 impl fmt::Display for Path {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, segment) in self.0.iter().enumerate() {
+        for (i, segment) in self.segments().into_iter().enumerate() {
             match segment {
                 Segment::Key(key) if i == 0 => write!(f, "{}", Excerpt(key))?,
                 Segment::Key(key) => write!(f, ".{}", Excerpt(key))?,
@@ -142,7 +154,7 @@ impl<'a> Report<'a> {
     pub(in crate::config) fn problem(&self, path: &Path, message: impl Message) {
         if self.has_room() {
             let (shown, offset) = self.locate(path);
-            self.add(shown, offset, message.text());
+            self.add(&shown, offset, message.text());
             self.remarks.borrow_mut().broken.push(path.clone());
         }
     }
@@ -150,7 +162,7 @@ impl<'a> Report<'a> {
     /// Reports what is wrong with the text at `offset`, which is about `path`.
     pub(in crate::config) fn problem_at(&self, path: &Path, offset: usize, message: impl Message) {
         if self.has_room() {
-            self.add(path.to_string(), offset, message.text());
+            self.add(path, offset, message.text());
         }
     }
 
@@ -164,7 +176,7 @@ impl<'a> Report<'a> {
         };
         if !follows && self.has_room() {
             let (shown, offset) = self.locate(path);
-            self.add(shown, offset, message.text());
+            self.add(&shown, offset, message.text());
         }
     }
 
@@ -172,7 +184,7 @@ impl<'a> Report<'a> {
     pub(in crate::config) fn warning(&self, path: &Path, message: impl Message) {
         if self.remarks.borrow().warnings.len() < limits::PROBLEMS {
             let (shown, offset) = self.locate(path);
-            let remark = self.remark(shown, offset, message.text());
+            let remark = self.remark(&shown, offset, message.text());
             self.remarks.borrow_mut().warnings.push(remark);
         }
     }
@@ -209,21 +221,22 @@ impl<'a> Report<'a> {
         has_room
     }
 
-    fn add(&self, path: String, offset: usize, message: String) {
+    fn add(&self, path: &Path, offset: usize, message: String) {
         let remark = self.remark(path, offset, message);
         self.remarks.borrow_mut().problems.push(remark);
     }
 
-    fn remark(&self, path: String, offset: usize, message: String) -> Located {
+    fn remark(&self, path: &Path, offset: usize, message: String) -> Located {
         let newlines = self.text.as_bytes()[..offset].iter().filter(|&&byte| byte == b'\n');
-        Located { offset, problem: Problem { path, line: Some(1 + newlines.count()), message } }
+        let line = Some(1 + newlines.count());
+        Located { offset, problem: Problem { path: path.to_string(), line, message } }
     }
 
     /// The deepest part of `path` that the file has, and its offset.
-    fn locate(&self, path: &Path) -> (String, usize) {
+    fn locate(&self, path: &Path) -> (Path, usize) {
         let mut value = self.root;
-        let mut offset = value.range().start;
-        for (depth, segment) in path.0.iter().enumerate() {
+        let mut located = (Path::default(), value.range().start);
+        for segment in path.segments() {
             let inner = match (segment, value) {
                 (Segment::Key(key), Value::Object(object)) => {
                     let property = object.properties.iter().find(|p| p.name.as_str() == key);
@@ -234,11 +247,12 @@ impl<'a> Report<'a> {
                 }
                 _ => None,
             };
-            let Some(inner) = inner else {
-                return (Path(path.0[..depth].to_vec()).to_string(), offset);
+            let Some((offset, inner)) = inner else {
+                break;
             };
-            (offset, value) = inner;
+            located = (located.0.join(segment.clone()), offset);
+            value = inner;
         }
-        (path.to_string(), offset)
+        located
     }
 }

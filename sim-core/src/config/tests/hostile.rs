@@ -155,8 +155,8 @@ fn split_tokens(text: &str) -> Vec<&str> {
     let mut pieces = Vec::new();
     let mut rest = text;
     while !rest.is_empty() {
-        let len = if rest.starts_with('"') {
-            rest[1..].find('"').map_or(rest.len(), |end| end + 2)
+        let len = if let Some(string) = rest.strip_prefix('"') {
+            string.find('"').map_or(rest.len(), |end| end + 2)
         } else {
             let is_part = |c: char| is_scalar(&rest[..1]) == is_scalar(c.encode_utf8(&mut [0; 4]));
             rest.find(|c: char| c == '"' || !is_part(c)).unwrap_or(rest.len())

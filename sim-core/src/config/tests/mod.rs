@@ -1,8 +1,11 @@
 //! Tests of the reader.
 
+mod generated;
+mod generator;
 mod hostile;
 mod problems;
 mod reference;
+mod shipped;
 mod values;
 
 use super::{ConfigError, ExperimentConfig, Problem};
