@@ -1,8 +1,9 @@
 //! `algorithm`: what evolves, by which rule, and on which task.
 
 use std::fmt;
+use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::NamedMap;
 
@@ -31,7 +32,7 @@ pub struct AlgorithmConfig {
 }
 
 /// Evolutionary algorithms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlgorithmName {
     /// Genetic algorithm.
     #[serde(rename = "GA")]
@@ -54,7 +55,7 @@ pub enum AlgorithmName {
 }
 
 /// Fitness functions; see `fitness`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FitnessFunction {
     /// Experiment A: one robot, and the same one, has its LED on.
@@ -130,32 +131,101 @@ pub enum EnsembleSelector {
     Named(String),
 }
 
+impl SynapseSelector {
+    /// As it stands in a query.
+    pub fn as_str(&self) -> &str {
+        match self {
+            Self::All => "all",
+            Self::Sensory => "sensory",
+            Self::Hidden => "hidden",
+            Self::Motor => "motor",
+            Self::Named(name) => name,
+        }
+    }
+}
+
+impl EnsembleSelector {
+    /// As it stands in a query.
+    pub fn as_str(&self) -> &str {
+        match self {
+            Self::All => "all",
+            Self::Named(name) => name,
+        }
+    }
+}
+
+impl fmt::Display for NeuronParameter {
+    /// As it stands in a query.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bias => "bias",
+            Self::Tau => "tau",
+            Self::Gain => "gain",
+        })
+    }
+}
+
 impl fmt::Display for GenotypeQuery {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Weights(selector) => {
-                let selector = match selector {
-                    SynapseSelector::All => "all",
-                    SynapseSelector::Sensory => "sensory",
-                    SynapseSelector::Hidden => "hidden",
-                    SynapseSelector::Motor => "motor",
-                    SynapseSelector::Named(name) => name,
-                };
-                write!(f, "synapses:weights:{selector}")
-            }
+            Self::Weights(selector) => write!(f, "synapses:weights:{}", selector.as_str()),
             Self::Neurons(parameter, selector) => {
-                let parameter = match parameter {
-                    NeuronParameter::Bias => "bias",
-                    NeuronParameter::Tau => "tau",
-                    NeuronParameter::Gain => "gain",
-                };
-                let selector = match selector {
-                    EnsembleSelector::All => "all",
-                    EnsembleSelector::Named(name) => name,
-                };
-                write!(f, "neurons:{parameter}:{selector}")
+                write!(f, "neurons:{parameter}:{}", selector.as_str())
             }
         }
+    }
+}
+
+/// A text that is no query.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ParseQueryError {
+    /// It names something of the original simulator that this one lacks.
+    #[error("not supported: `{0}`")]
+    Unsupported(String),
+    /// It has another form.
+    #[error(
+        "expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `bias`, `tau` or `gain`"
+    )]
+    Malformed,
+}
+
+impl FromStr for GenotypeQuery {
+    type Err = ParseQueryError;
+
+    /// Table 4.1; `gains` is another name of `gain`, as in section 4.3.
+    fn from_str(text: &str) -> Result<Self, ParseQueryError> {
+        let mut parts = text.splitn(3, ':');
+        let mut next = || parts.next().filter(|part| !part.is_empty());
+        let (Some(part), Some(parameter), Some(selector)) = (next(), next(), next()) else {
+            return Err(ParseQueryError::Malformed);
+        };
+        let parameter = match (part, parameter) {
+            ("synapses", "weights") => {
+                return Ok(Self::Weights(match selector {
+                    "all" => SynapseSelector::All,
+                    "sensory" => SynapseSelector::Sensory,
+                    "hidden" => SynapseSelector::Hidden,
+                    "motor" => SynapseSelector::Motor,
+                    name => SynapseSelector::Named(name.to_owned()),
+                }));
+            }
+            ("neurons", "bias") => NeuronParameter::Bias,
+            ("neurons", "tau") => NeuronParameter::Tau,
+            ("neurons", "gain" | "gains") => NeuronParameter::Gain,
+            ("synapses", "delays")
+            | ("neurons", "decoding")
+            | ("encoders" | "encoding" | "decoders" | "decoding", "weights") => {
+                return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
+            }
+            _ => return Err(ParseQueryError::Malformed),
+        };
+        Ok(Self::Neurons(
+            parameter,
+            match selector {
+                "all" => EnsembleSelector::All,
+                name => EnsembleSelector::Named(name.to_owned()),
+            },
+        ))
     }
 }
 
@@ -207,8 +277,25 @@ pub struct GaParams {
     pub num_elite: u32,
 }
 
+impl Default for GaParams {
+    fn default() -> Self {
+        Self {
+            selection_operator: SelectionOperator::Tournament,
+            tournament_size: 3,
+            mating_operator: MatingOperator::Random,
+            crossover_operator: CrossoverOperator::BlxAlpha,
+            alpha: 0.5,
+            crossover_prob: 0.9,
+            mutation_operator: MutationOperator::Gaussian,
+            mutation_prob: 0.05,
+            mutation_sigma: 0.3_f64.sqrt(),
+            num_elite: 3,
+        }
+    }
+}
+
 /// Selection operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionOperator {
     /// The best of K drawn uniformly.
@@ -224,7 +311,7 @@ pub enum SelectionOperator {
 }
 
 /// Mating operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatingOperator {
     /// Uniformly random pairs.
@@ -232,7 +319,7 @@ pub enum MatingOperator {
 }
 
 /// Crossover operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CrossoverOperator {
     /// BLX-alpha.
@@ -251,7 +338,7 @@ pub enum CrossoverOperator {
 }
 
 /// Mutation operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MutationOperator {
     /// Adds N(0, mutation_sigma^2).
@@ -274,6 +361,12 @@ pub struct SnesParams {
     pub sigma_init: f64,
 }
 
+impl Default for SnesParams {
+    fn default() -> Self {
+        Self { eta_mu: 1.0, eta_sigma: None, mu_init: 0.5, sigma_init: 0.2 }
+    }
+}
+
 /// xNES (Algorithm 2).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct XnesParams {
@@ -291,6 +384,12 @@ pub struct XnesParams {
     pub sigma_init: f64,
 }
 
+impl Default for XnesParams {
+    fn default() -> Self {
+        Self { eta_mu: 1.0, eta_sigma: None, eta_b: None, mu_init: 0.5, sigma_init: 0.2 }
+    }
+}
+
 /// CMA-ES and sep-CMA-ES.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CmaEsParams {
@@ -298,6 +397,12 @@ pub struct CmaEsParams {
     pub mu_init: f64,
     /// First step size; default 0.2.
     pub sigma_init: f64,
+}
+
+impl Default for CmaEsParams {
+    fn default() -> Self {
+        Self { mu_init: 0.5, sigma_init: 0.2 }
+    }
 }
 
 /// OpenAI-ES.
@@ -315,4 +420,17 @@ pub struct OpenAiEsParams {
     pub beta2: f64,
     /// L2 pull towards `mu_init` per generation; default 0.
     pub weight_decay: f64,
+}
+
+impl Default for OpenAiEsParams {
+    fn default() -> Self {
+        Self {
+            mu_init: 0.5,
+            sigma: 0.1,
+            learning_rate: 0.02,
+            beta1: 0.9,
+            beta2: 0.999,
+            weight_decay: 0.0,
+        }
+    }
 }

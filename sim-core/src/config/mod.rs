@@ -9,7 +9,12 @@
 //! field says otherwise.
 
 mod algorithm;
+mod check;
+pub mod limits;
 mod problem;
+mod read;
+#[cfg(test)]
+mod tests;
 mod topology;
 mod world;
 
@@ -42,11 +47,16 @@ impl ExperimentConfig {
     /// Reads an experiment file. Returns the configuration and the warnings
     /// (keys that are accepted and ignored), or every problem of the file.
     /// `default_name` names an experiment whose file gives no name.
-    pub fn from_json(
-        _text: &str,
-        _default_name: &str,
-    ) -> Result<(Self, Vec<Problem>), ConfigError> {
-        todo!()
+    pub fn from_json(text: &str, default_name: &str) -> Result<(Self, Vec<Problem>), ConfigError> {
+        read::read(text, default_name)
+    }
+
+    /// The swarms with their names, in the order that numbers the robots.
+    pub fn robots(&self) -> impl Iterator<Item = (&str, &RobotConfig)> {
+        self.world.objects.iter().filter_map(|(name, object)| match object {
+            ObjectConfig::Robot(robot) => Some((name.as_str(), robot)),
+            _ => None,
+        })
     }
 
     /// The canonical form, as compact JSON.

@@ -1,17 +1,24 @@
 //! `topology`: stimuli, ensembles, synapse groups, outputs and their decoding.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::NamedMap;
+
+/// Of [`TopologyConfig::dt`].
+pub(super) const DEFAULT_DT: f64 = 0.1;
+/// Of [`TopologyConfig::time_scale`].
+pub(super) const DEFAULT_TIME_SCALE: u32 = 20;
+/// Of [`TopologyConfig::seed`].
+pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
 
 /// Structure of the CTRNN; its trainable values come from the genotype.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TopologyConfig {
-    /// Euler step of the network, seconds.
+    /// Euler step of the network, seconds; default 0.1.
     pub dt: f64,
-    /// Network substeps per environment step.
+    /// Network substeps per environment step; default 20.
     pub time_scale: u32,
-    /// Seed of the random connections (and of fixed weights).
+    /// Seed of the random connections (and of fixed weights); default 821.
     pub seed: u64,
     /// Inputs, in the order in which they are stacked.
     pub stimuli: NamedMap<StimulusConfig>,
@@ -35,7 +42,7 @@ pub struct StimulusConfig {
 }
 
 /// A reading of a robot, by the name that config files use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum SensorQuery {
     /// Message of the chosen frame; `msg_length` values.
     #[serde(rename = "wireless_receiver:msg")]
@@ -68,14 +75,14 @@ pub enum SensorQuery {
 pub struct EnsembleConfig {
     /// Number of neurons.
     pub n: u32,
-    /// Activation function F.
+    /// Activation function F; default sigmoid.
     pub activation: Activation,
     /// Values for parameters that no query of the genotype covers.
     pub params: NeuronParams,
 }
 
 /// Activation function of an ensemble.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
     /// 1 / (1 + exp(-x)), range (0, 1).
@@ -112,7 +119,7 @@ pub struct OutputConfig {
 }
 
 /// An actuator, by the name that config files use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum ActuatorQuery {
     /// Wheels: 2 neurons (right, left), or 1 for rotation in place (w, -w).
     #[serde(rename = "wheel_actuator")]
@@ -136,10 +143,10 @@ pub struct SynapseGroupConfig {
     pub pre: Vec<String>,
     /// Names of ensembles.
     pub post: Vec<String>,
-    /// Whether the genotype may hold its weights; fixed weights are drawn from
-    /// U(-1, 1) with `topology.seed`.
+    /// Whether the genotype may hold its weights, default true; fixed weights are
+    /// drawn from U(-1, 1) with `topology.seed`.
     pub trainable: bool,
-    /// Connection probability.
+    /// Connection probability; default 1.
     pub p: f64,
 }
 

@@ -1,15 +1,18 @@
 //! `world`: the arena and what is in it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{NamedMap, SensorQuery};
+use super::{ActuatorQuery, NamedMap, SensorQuery};
+
+/// Of [`WorldConfig::height`] and [`WorldConfig::width`].
+pub(super) const DEFAULT_WORLD_SIZE: f64 = 1000.0;
 
 /// A flat torus and its objects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorldConfig {
-    /// Height H (y axis), cm.
+    /// Height H (y axis), cm; default 1000.
     pub height: f64,
-    /// Width W (x axis), cm.
+    /// Width W (x axis), cm; default 1000.
     pub width: f64,
     /// Robots, lights, ground areas; their order numbers the robots.
     pub objects: NamedMap<ObjectConfig>,
@@ -18,6 +21,7 @@ pub struct WorldConfig {
 /// One kind of object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
+#[expect(clippy::large_enum_variant, reason = "a world has a handful of them")]
 pub enum ObjectConfig {
     /// A swarm of equal robots.
     Robot(RobotConfig),
@@ -25,6 +29,17 @@ pub enum ObjectConfig {
     LightSource(LightSourceConfig),
     /// Coloured discs on the ground.
     GroundArea(GroundAreaConfig),
+}
+
+impl ObjectConfig {
+    /// How many of them there are.
+    pub fn num_instances(&self) -> u32 {
+        match self {
+            Self::Robot(robot) => robot.num_instances,
+            Self::LightSource(light) => light.num_instances,
+            Self::GroundArea(area) => area.num_instances,
+        }
+    }
 }
 
 /// A swarm of equal robots.
@@ -47,12 +62,13 @@ pub struct RobotConfig {
 }
 
 /// Controllers of robots.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RobotController {
     /// The network of `topology`.
     NeuralController,
     /// Braitenberg vehicle 2b: light-sensor halves to crossed wheels.
+    #[serde(alias = "Braitenberg2")]
     BraitenbergLightFollower,
 }
 
@@ -61,6 +77,12 @@ pub enum RobotController {
 pub struct RobotParams {
     /// Whether its controller may evolve; default true.
     pub trainable: bool,
+}
+
+impl Default for RobotParams {
+    fn default() -> Self {
+        Self { trainable: true }
+    }
 }
 
 /// Sensors; absent ones are not mounted.
@@ -80,6 +102,23 @@ pub struct SensorsConfig {
     pub ground_sensor: Option<GroundSensorConfig>,
 }
 
+impl SensorsConfig {
+    /// Number of values of a reading; none if its sensor is not mounted.
+    pub fn reading_len(&self, reading: SensorQuery) -> Option<u32> {
+        let receiver = self.wireless_receiver.as_ref();
+        match reading {
+            SensorQuery::ReceiverMessage => receiver.map(|receiver| receiver.msg_length),
+            SensorQuery::ReceiverSignal | SensorQuery::ReceiverState => receiver.map(|_| 1),
+            SensorQuery::ReceiverReceivingDirection | SensorQuery::ReceiverSendingDirection => {
+                receiver.map(|_| 2)
+            }
+            SensorQuery::Light => self.light_sensor.as_ref().map(|sensor| sensor.n_sectors),
+            SensorQuery::Distance => self.distance_sensor.as_ref().map(|sensor| sensor.n_sectors),
+            SensorQuery::Ground => self.ground_sensor.as_ref().map(|_| 1),
+        }
+    }
+}
+
 /// Receiver of the wireless link (section 3.3).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WirelessReceiverConfig {
@@ -95,6 +134,19 @@ pub struct WirelessReceiverConfig {
     pub decay_rho: f64,
     /// Decay of the strength per radian; default 1.
     pub decay_phi: f64,
+}
+
+impl Default for WirelessReceiverConfig {
+    fn default() -> Self {
+        Self {
+            n_sectors: 4,
+            range: 100.0,
+            msg_length: 2,
+            max_hops: 10,
+            decay_rho: 0.05,
+            decay_phi: 1.0,
+        }
+    }
 }
 
 /// Light sensor.
@@ -114,6 +166,19 @@ pub struct LightSensorConfig {
     pub noise_variance: f64,
 }
 
+impl Default for LightSensorConfig {
+    fn default() -> Self {
+        Self {
+            n_sectors: 6,
+            range: 80.0,
+            color: "red".to_owned(),
+            decay_rho: 0.05,
+            decay_phi: 1.0,
+            noise_variance: 0.1,
+        }
+    }
+}
+
 /// Distance sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DistanceSensorConfig {
@@ -129,11 +194,23 @@ pub struct DistanceSensorConfig {
     pub noise_variance: f64,
 }
 
+impl Default for DistanceSensorConfig {
+    fn default() -> Self {
+        Self { n_sectors: 4, range: 60.0, decay_rho: 0.05, decay_phi: 1.0, noise_variance: 0.1 }
+    }
+}
+
 /// Ground sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroundSensorConfig {
     /// Colour it sees; default "black".
     pub color: String,
+}
+
+impl Default for GroundSensorConfig {
+    fn default() -> Self {
+        Self { color: "black".to_owned() }
+    }
 }
 
 /// Actuators; absent ones are not mounted.
@@ -150,6 +227,17 @@ pub struct ActuatorsConfig {
     pub wireless_transmitter: Option<WirelessTransmitterConfig>,
 }
 
+impl ActuatorsConfig {
+    /// Whether the actuator is mounted.
+    pub fn has(&self, actuator: ActuatorQuery) -> bool {
+        match actuator {
+            ActuatorQuery::Wheels => self.wheel_actuator.is_some(),
+            ActuatorQuery::Led => self.led_actuator.is_some(),
+            ActuatorQuery::Message | ActuatorQuery::Mode => self.wireless_transmitter.is_some(),
+        }
+    }
+}
+
 /// Differential drive (section 3.2.1).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WheelActuatorConfig {
@@ -159,6 +247,12 @@ pub struct WheelActuatorConfig {
     pub axle_length: f64,
     /// Duration of an environment step dk, s; default 0.33.
     pub step_duration: f64,
+}
+
+impl Default for WheelActuatorConfig {
+    fn default() -> Self {
+        Self { max_speed: 10.0, axle_length: 11.0, step_duration: 0.33 }
+    }
 }
 
 /// LED.
@@ -179,6 +273,19 @@ pub struct WirelessTransmitterConfig {
     pub n_symbols: u32,
     /// Inverse temperature of the quantiser; default 100.
     pub beta: f64,
+}
+
+impl Default for WirelessTransmitterConfig {
+    fn default() -> Self {
+        Self { range: 100.0, msg_length: 2, quantize: true, n_symbols: 16, beta: 100.0 }
+    }
+}
+
+impl WirelessTransmitterConfig {
+    /// Levels per component of the quantiser, K = round(M*^(1/M)), Eq. 3.13.
+    pub fn n_levels(&self) -> u32 {
+        libm::round(libm::pow(self.n_symbols.into(), f64::from(self.msg_length).recip())) as u32
+    }
 }
 
 /// Start of a robot.
@@ -248,6 +355,12 @@ pub struct LeaderFailureConfig {
     pub time_to_failure: u32,
 }
 
+impl Default for LeaderFailureConfig {
+    fn default() -> Self {
+        Self { time_to_failure: 50 }
+    }
+}
+
 /// Some robots, drawn anew each trial, lose a stimulus.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StimuliInhibitionConfig {
@@ -268,7 +381,7 @@ pub enum InhibitedStimulus {
 }
 
 /// Serialises as `"wireless_receiver"`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum WholeReceiver {
     /// All of the receiver's readings.
     #[serde(rename = "wireless_receiver")]
@@ -282,6 +395,12 @@ pub struct TopologySwitchConfig {
     pub every: u32,
 }
 
+impl Default for TopologySwitchConfig {
+    fn default() -> Self {
+        Self { every: 200 }
+    }
+}
+
 /// Some robots turn to a target heading and hold it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UncontrollableRotationConfig {
@@ -289,7 +408,7 @@ pub struct UncontrollableRotationConfig {
     pub affected_robots: u32,
     /// First affected step; default 200.
     pub start: u32,
-    /// Target headings, radians, in order.
+    /// Target headings, radians, in order; default: 270, 90, 15 and 180 degrees.
     pub targets: Vec<f64>,
     /// Step at which the next target applies; default 600.
     pub switch_at: u32,
@@ -341,6 +460,12 @@ pub struct LightParams {
     pub color: String,
 }
 
+impl Default for LightParams {
+    fn default() -> Self {
+        Self { range: 80.0, color: "red".to_owned() }
+    }
+}
+
 /// Coloured discs on the ground.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroundAreaConfig {
@@ -359,4 +484,10 @@ pub struct GroundAreaParams {
     pub range: f64,
     /// Colour; default "black".
     pub color: String,
+}
+
+impl Default for GroundAreaParams {
+    fn default() -> Self {
+        Self { range: 100.0, color: "black".to_owned() }
+    }
 }

@@ -1,0 +1,72 @@
+//! Upper bounds of what an experiment may ask for.
+//!
+//! Experiment files come from the network: one that is accepted must not exhaust
+//! the memory of the coordinator or of a worker, nor keep a worker busy for
+//! hours with a single episode. The bounds lie far above the experiments that
+//! this simulator exists for (10 to 50 robots, 24 neurons, about 450 genes).
+
+/// Bytes of an experiment file.
+pub const FILE_BYTES: usize = 1 << 20;
+/// Lists and objects within each other.
+pub const NESTING: usize = 64;
+/// Problems that are reported one by one; the rest is counted.
+pub const PROBLEMS: usize = 100;
+/// Characters of a name.
+pub const NAME_CHARS: usize = 128;
+/// Entries of a map of names, and of a list of names.
+pub const ENTRIES: usize = 256;
+/// Queries of all populations together.
+pub const QUERIES: usize = 1_024;
+/// Absolute value of any physical quantity or network parameter, so that no
+/// product of a few of them overflows. Quantities that must be positive are at
+/// least its reciprocal.
+pub const MAGNITUDE: f64 = 1e9;
+
+/// Individuals per generation.
+pub const POPULATION: u32 = 100_000;
+/// Generations of a run.
+pub const GENERATIONS: u64 = 10_000_000;
+/// Environment steps per trial.
+pub const STEPS: u32 = 100_000;
+/// Trials per individual.
+pub const TRIALS: u32 = 1_000;
+/// Trials per generation, over all individuals.
+pub const TRIALS_PER_GENERATION: u64 = 10_000_000;
+/// Genes per generation, over all individuals.
+pub const GENES_PER_GENERATION: u64 = 50_000_000;
+/// Genes of a genotype whose algorithm keeps a full covariance or shape matrix
+/// (xNES, CMA-ES).
+pub const GENES_OF_FULL_MATRIX: u64 = 4_096;
+
+/// Network substeps per environment step.
+pub const TIME_SCALE: u32 = 1_000;
+/// Values of all stimuli together.
+pub const INPUTS: u32 = 10_000;
+/// Neurons of all ensembles together.
+pub const NEURONS: u32 = 10_000;
+/// Synapses of all groups together, if every possible one exists.
+pub const SYNAPSES: u64 = 1_000_000;
+
+/// Robots of all objects together.
+pub const ROBOTS: u32 = 10_000;
+/// Lights and ground areas, of all objects together.
+pub const FIXTURES: u32 = 1_000;
+/// Sectors of a sensor.
+pub const SECTORS: u32 = 360;
+/// Components of a message.
+pub const MESSAGE_LENGTH: u32 = 64;
+/// Points of the quantiser's lattice.
+pub const LATTICE_POINTS: u32 = 4_096;
+/// Hops of a frame.
+pub const HOPS: u32 = 1_000_000;
+/// Target headings of `uncontrollable_rotation`.
+pub const TARGETS: usize = 1_000;
+
+/// Inputs and neurons of all robots together: the memory of an episode.
+pub const NETWORK_STATES: u64 = 10_000_000;
+/// Robots x steps: the random draws of an episode.
+pub const ROBOT_STEPS: u64 = 20_000_000;
+/// Elementary operations of an episode: for every step and robot, one per
+/// synapse and neuron and network substep, one per robot or light and sector,
+/// and one per lattice point.
+pub const EPISODE_OPERATIONS: u64 = 1_000_000_000_000;

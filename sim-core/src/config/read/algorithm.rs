@@ -1,0 +1,25 @@
+//! Reads `algorithm`.
+
+use super::node::{Node, Object};
+use super::population::population;
+use crate::config::{AlgorithmConfig, AlgorithmName, FitnessFunction, limits};
+
+pub(super) fn algorithm(o: &mut Object<'_>) -> AlgorithmConfig {
+    let name = o.required("name").variant(&[]);
+    AlgorithmConfig {
+        name: name.unwrap_or(AlgorithmName::Ga),
+        evolvable_object: o.required("evolvable_object").name(),
+        population_size: o.required("population_size").u32(1..=limits::POPULATION),
+        generations: o.required("generations").u64(1..=limits::GENERATIONS),
+        evaluation_steps: o.required("evaluation_steps").u32(1..=limits::STEPS),
+        num_evaluations: o.required("num_evaluations").u32(1..=limits::TRIALS),
+        fitness_function: o
+            .required("fitness_function")
+            .variant(&[])
+            .unwrap_or(FitnessFunction::Grouping),
+        target_fitness: o.optional("target_fitness").map(Node::quantity),
+        populations: o
+            .required("populations")
+            .map(1, |_, node| node.object(|o| population(o, name))),
+    }
+}

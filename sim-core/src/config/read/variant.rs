@@ -1,0 +1,39 @@
+//! Unit variants of an enum by the names that `serde` gives them, so that no
+//! second list of names can drift from the types.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::value::StrDeserializer;
+use serde::de::{self, IntoDeserializer as _};
+
+/// The variant of this name.
+pub(super) fn variant<'a, T: Deserialize<'a>>(name: &'a str) -> Result<T, UnknownVariant> {
+    let deserializer: StrDeserializer<'a, UnknownVariant> = name.into_deserializer();
+    T::deserialize(deserializer)
+}
+
+/// The name belongs to no variant.
+#[derive(Debug)]
+pub(super) struct UnknownVariant {
+    /// The names of all variants.
+    pub(super) expected: &'static [&'static str],
+}
+
+impl de::Error for UnknownVariant {
+    fn custom<T: fmt::Display>(_: T) -> Self {
+        Self { expected: &[] }
+    }
+
+    fn unknown_variant(_: &str, expected: &'static [&'static str]) -> Self {
+        Self { expected }
+    }
+}
+
+impl std::error::Error for UnknownVariant {}
+
+impl fmt::Display for UnknownVariant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "none of {:?}", self.expected)
+    }
+}

@@ -1,0 +1,133 @@
+//! Algorithms and their populations.
+
+use serde_json::{Value, json};
+
+use super::network::Network;
+use super::world::Robot;
+use super::{Dice, insert, object};
+
+pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Value {
+    let name = dice.pick(&["GA", "SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"]);
+    let mut tasks = vec!["grouping"];
+    if network.has_led {
+        tasks.extend(["identify_leader", "identify_borderline"]);
+    }
+    if network.has_wheels {
+        tasks.extend(["orientation_consensus", "alignment"]);
+    }
+    if robot.has_light {
+        tasks.push("goto_light");
+    }
+    let queries = network.queries(dice);
+    let n_populations = dice.die(queries.len().min(3));
+    let mut populations = json!({});
+    for i in 0..n_populations {
+        let queries: Vec<_> = queries.iter().skip(i).step_by(n_populations).collect();
+        insert(&mut populations, &format!("p{i}"), population(dice, name, &queries));
+    }
+    let target = dice.number(0.0, 2.0);
+    let mut algorithm = object(dice, [("target_fitness", target)]);
+    for (key, value) in [
+        ("name", json!(name)),
+        ("evolvable_object", json!("swarm")),
+        ("population_size", json!(10 + dice.below(100))),
+        ("generations", json!(dice.die(1000))),
+        ("evaluation_steps", json!(100 + dice.die(500))),
+        ("num_evaluations", json!(dice.die(5))),
+        ("fitness_function", json!(dice.pick(&tasks))),
+        ("populations", populations),
+    ] {
+        insert(&mut algorithm, key, value);
+    }
+    algorithm
+}
+
+fn population(dice: &mut Dice, algorithm: &str, queries: &[&(String, [f64; 2])]) -> Value {
+    let names: Vec<&str> = queries.iter().map(|(name, _)| name.as_str()).collect();
+    let mut population = params(dice, algorithm);
+    if dice.chance(0.5) {
+        population = json!({"params": population});
+    }
+    let [mut low, mut high] =
+        [0, 1].map(|i| queries.iter().map(|(_, bounds)| json!(bounds[i])).collect::<Value>());
+    if queries.len() == 1 || dice.chance(0.2) {
+        [low, high] = [json!(-0.5), json!(0.5)];
+    }
+    insert(&mut population, "objects", json!(names));
+    insert(&mut population, "min_vals", low);
+    insert(&mut population, "max_vals", high);
+    population
+}
+
+fn params(dice: &mut Dice, algorithm: &str) -> Value {
+    let mut rate = || dice.number(0.01, 1.0);
+    let [eta_mu, eta_sigma, eta_b, mu_init, sigma, decay] = [(); 6].map(|()| rate());
+    match algorithm {
+        "GA" => {
+            let selection = json!(dice.pick(&[
+                "tournament",
+                "roulette",
+                "lin_rank",
+                "nonlin_rank",
+                "stochastic_universal"
+            ]));
+            let crossover = json!(dice.pick(&[
+                "blxalpha",
+                "uniform",
+                "onepoint",
+                "multipoint",
+                "simulated_binary"
+            ]));
+            let mutation = json!(dice.pick(&["gaussian", "uniform"]));
+            object(
+                dice,
+                [
+                    ("encoding", json!("real")),
+                    ("selection_operator", selection),
+                    ("tournament_size", json!(5)),
+                    ("mating_operator", json!("random")),
+                    ("crossover_operator", crossover),
+                    ("alpha", eta_mu),
+                    ("crossover_prob", mu_init),
+                    ("mutation_operator", mutation),
+                    ("mutation_prob", eta_b),
+                    ("mutation_sigma", sigma),
+                    ("num_elite", json!(1)),
+                ],
+            )
+        }
+        "SNES" => object(
+            dice,
+            [
+                ("eta_mu", eta_mu),
+                ("eta_sigma", eta_sigma),
+                ("mu_init", mu_init),
+                ("sigma_init", sigma),
+                ("mutation_prob", decay),
+            ],
+        ),
+        "xNES" => object(
+            dice,
+            [
+                ("eta_mu", eta_mu),
+                ("eta_sigma", eta_sigma),
+                ("eta_B", eta_b),
+                ("mu_init", mu_init),
+                ("sigma_init", sigma),
+            ],
+        ),
+        "openaiES" => object(
+            dice,
+            [
+                ("mu_init", mu_init),
+                ("sigma", sigma),
+                ("learning_rate", eta_mu),
+                ("beta1", json!(0.5)),
+                ("beta2", json!(0.25)),
+                ("weight_decay", decay),
+                ("encoding", json!("real")),
+            ],
+        ),
+        _ => object(dice, [("mu_init", mu_init), ("sigma_init", sigma)]),
+    }
+}
