@@ -255,15 +255,15 @@ mod tests {
         let mut config = experiment_a();
         config.algorithm.evolvable_object = "robotB".into();
         config.topology.synapses[0].pre = vec!["nobody".into()];
-        config.algorithm.populations[0].objects[1] =
-            GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()));
+        config.algorithm.populations[0].objects =
+            vec![GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()))];
         let error = Experiment::compile(&config).unwrap_err();
         let paths: Vec<&str> = error.problems.iter().map(|problem| &*problem.path).collect();
         assert_eq!(
             paths,
             [
                 "topology.synapses.I1-H1",
-                "algorithm.populations.p4.objects[1]",
+                "algorithm.populations.p1.objects",
                 "algorithm.evolvable_object",
             ]
         );
