@@ -1,7 +1,8 @@
 //! Experiment A: the radio, the decoders, leaders and their failure.
 
 use sim_core::config::{
-    ActuatorQuery, DecodingConfig, ExperimentConfig, FitnessFunction, LeaderFailureConfig,
+    Activation, ActuatorQuery, DecodingConfig, ExperimentConfig, FitnessFunction,
+    LeaderFailureConfig,
 };
 
 use crate::configs::{experiment_a, receiver_mut, set_msg_length, swarm_mut, transmitter_mut};
@@ -100,6 +101,17 @@ fn messages_without_quantisation_agree() {
 }
 
 #[test]
+fn messages_outside_the_lattice_agree() {
+    let mut config = judged_by_every_led();
+    config.algorithm.evaluation_steps = 100;
+    config.topology.ensembles["OUT_COMM"].activation = Activation::Tanh;
+    // So warm that a message left at -1 would choose other symbols than one at 0.
+    transmitter_mut(&mut config).beta = 5.0;
+    let episodes = assert_lively_agreement(&config);
+    assert!(spread(episodes.iter().map(|episode| episode.fitness)) > 0.01);
+}
+
+#[test]
 fn receivers_and_transmitters_of_every_kind_agree() {
     // Sectors, reach of receiver and transmitter, hops, decays.
     for (n_sectors, heard, sent, max_hops, decay_rho, decay_phi) in [
@@ -158,6 +170,17 @@ fn decoders_of_every_kind_agree() {
 }
 
 #[test]
+fn an_activity_of_one_half_is_over_the_threshold() {
+    let mut config = judged_by_every_led();
+    config.topology.decoding["outB"] = DecodingConfig::ThresholdDecoding { stochastic: false };
+    swarm_mut(&mut config).num_instances = 3;
+    let genotype = vec![0.5; random_genotype(&config, 0).len()];
+    let episodes = assert_agreement(&config, &genotype, 0, 0..1);
+    assert_eq!(episodes[0].fitness, 1.0);
+    assert_eq!(episodes[0].witness.n_relaying, 0);
+}
+
+#[test]
 fn robots_without_mode_or_message_agree() {
     for (actuator, output) in [(ActuatorQuery::Mode, "outC"), (ActuatorQuery::Message, "outA")] {
         let mut config = judged_by_every_led();
@@ -178,6 +201,11 @@ fn a_single_robot_leads_for_fifty_steps() {
     let episodes = assert_agreement(&config, &random_genotype(&config, 0), 0, 0..1);
     assert!((episodes[0].fitness - 122.5 / 300.0).abs() < 1e-12);
     assert_eq!(episodes[0].witness.n_faults, 1);
+
+    // If it never fails, it is worth 5 per step in the end.
+    swarm_mut(&mut config).perturbations.leader_failure = None;
+    let episodes = assert_agreement(&config, &random_genotype(&config, 0), 0, 0..1);
+    assert!((episodes[0].fitness - (122.5 + 250.0 * 5.0) / 300.0).abs() < 1e-12);
 }
 
 #[test]

@@ -37,13 +37,17 @@ pub fn identify_leader(leader: &SoleLeader) -> f64 {
     }
 }
 
+/// Experiment B's target: for each robot, whether it is on the border.
+pub fn borderline_of_swarm(robots: &[Robot<'_>], torus: Torus) -> Vec<bool> {
+    let range = robots[0].communication_range();
+    borderline(&positions(robots), torus, range, torus.width / 15.0)
+}
+
 /// Experiment B, Eq. 5.4: TPR * TNR of "LED on" as a sign of the border; TPR
 /// alone if no robot is interior.
-pub fn identify_borderline(robots: &[Robot<'_>], torus: Torus) -> f64 {
-    let range = robots[0].communication_range();
-    let is_border = borderline(&positions(robots), torus, range, torus.width / 15.0);
+pub fn identify_borderline(robots: &[Robot<'_>], is_border: &[bool]) -> f64 {
     let [mut n_border, mut n_interior, mut n_true_border, mut n_true_interior] = [0.0; 4];
-    for (robot, is_border) in robots.iter().zip(is_border) {
+    for (robot, &is_border) in robots.iter().zip(is_border) {
         let is_lit = robot.led > 0;
         if is_border {
             n_border += 1.0;

@@ -117,3 +117,43 @@ fn cholesky(var_x: f64, covariance: f64, var_y: f64) -> [f64; 3] {
     let l21 = covariance / l11;
     [l11, l21, (var_y - l21 * l21).sqrt()]
 }
+
+/// Section 5's measurements of the original: degree, distance to the nearest
+/// robot, extent, share on the alpha shape; each within 10 %.
+#[test]
+fn random_graphs_have_the_measured_statistics() {
+    use super::alpha_shape::borderline;
+    use sim_core::random::Purpose;
+
+    const N_SAMPLES: u64 = 200;
+    let torus = Torus { width: 1000.0, height: 1000.0 };
+    for (n, targets) in [
+        (10, [3.88, 54.8, 201.0, 0.83]),
+        (20, [5.48, 50.6, 287.0, 0.61]),
+        (30, [6.39, 49.4, 347.0, 0.50]),
+    ] {
+        let mut sums = [0.0; 4];
+        for trial in 0..N_SAMPLES {
+            let mut stream = Stream::new(0, 0, trial, Purpose::Positions, 0);
+            let graph = random_graph(100.0, [500.0, 500.0], n, torus, &mut stream);
+            for &a in &graph {
+                let distances = || {
+                    graph.iter().map(|&b| torus.distance(a, b)).filter(|&distance| distance > 0.0)
+                };
+                sums[0] += distances().filter(|&distance| distance < 100.0).count() as f64;
+                sums[1] += distances().fold(f64::INFINITY, f64::min);
+            }
+            for axis in [0, 1] {
+                let low = graph.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+                let high = graph.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
+                sums[2] += f64::from(n) * (high - low) / 2.0;
+            }
+            let is_border = borderline(&graph, torus, 100.0, 1000.0 / 15.0);
+            sums[3] += is_border.iter().filter(|&&is_border| is_border).count() as f64;
+        }
+        let measured = sums.map(|sum| sum / (f64::from(n) * N_SAMPLES as f64));
+        for (measured, target) in measured.into_iter().zip(targets) {
+            assert!((measured / target - 1.0).abs() < 0.1, "{n} robots: {measured}, {target}");
+        }
+    }
+}

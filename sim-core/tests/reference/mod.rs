@@ -19,10 +19,12 @@ mod network;
 mod perturbations;
 mod sensors;
 mod torus;
+mod witness;
 mod world;
 
 pub use network::genes;
-pub use world::{Simulation, Witness};
+pub use witness::Witness;
+pub use world::Simulation;
 
 use sim_core::config::ExperimentConfig;
 

@@ -15,6 +15,7 @@ use super::network::Network;
 use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
 use super::sensors::{self, Readings};
 use super::torus::{Torus, Vector};
+use super::witness::Witness;
 
 /// Steps in which every robot sends, whatever its network says.
 const N_SENDING_STEPS: u32 = 10;
@@ -73,40 +74,6 @@ impl Robot<'_> {
 pub struct Area<'a> {
     pub position: Vector,
     pub params: &'a GroundAreaParams,
-}
-
-/// What happened in an episode, so that a test can tell that it tested something.
-#[derive(Clone, Debug, Default)]
-pub struct Witness {
-    /// Robot-steps in which a frame was received.
-    pub n_receptions: usize,
-    /// ... that came by another robot than its originator.
-    pub n_relayed_receptions: usize,
-    /// Largest number of hops of a received frame.
-    pub max_hops: u32,
-    /// Robot-steps in which the receiver had to choose among sectors.
-    pub n_choices: usize,
-    /// Robot-steps in send mode and in relay mode.
-    pub n_sending: usize,
-    pub n_relaying: usize,
-    /// Robot-steps with the LED on.
-    pub n_lit: usize,
-    /// Largest LED colour.
-    pub max_color: u32,
-    /// Robots that became faulty.
-    pub n_faults: usize,
-    /// Readings of the light, distance and ground sensors that are not 0.
-    pub n_light: usize,
-    pub n_distance: usize,
-    pub n_ground: usize,
-    /// Robot-steps with a zeroed stimulus that would not have been 0.
-    pub n_inhibited: usize,
-    /// Robot-steps with wheel actions that the network did not decide.
-    pub n_uncontrollable: usize,
-    /// Times that positions were redrawn.
-    pub n_redrawn: usize,
-    /// Steps with a fitness other than 0.
-    pub n_rewarded: usize,
 }
 
 /// One trial of one genotype, step by step.
@@ -406,11 +373,16 @@ impl<'a> Simulation<'a> {
     }
 
     /// Fitness of the step, from its actions and from positions after moving.
-    fn fitness(&self) -> f64 {
+    fn fitness(&mut self) -> f64 {
         let robots = &self.robots;
         match self.config.algorithm.fitness_function {
             FitnessFunction::IdentifyLeader => fitness::identify_leader(&self.leader),
-            FitnessFunction::IdentifyBorderline => fitness::identify_borderline(robots, self.torus),
+            FitnessFunction::IdentifyBorderline => {
+                let is_border = fitness::borderline_of_swarm(robots, self.torus);
+                self.witness.n_interior +=
+                    is_border.iter().filter(|&&is_border| !is_border).count();
+                fitness::identify_borderline(robots, &is_border)
+            }
             FitnessFunction::OrientationConsensus => fitness::orientation_consensus(robots),
             FitnessFunction::Alignment => fitness::alignment(robots),
             FitnessFunction::GotoLight => fitness::goto_light(robots, &self.lights, self.torus),
