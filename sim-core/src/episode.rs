@@ -3,11 +3,14 @@
 
 use std::ops::Range;
 
+use indexmap::IndexMap;
+
 use crate::config::RobotController;
 use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
 use crate::experiment::{EvaluateError, Experiment};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
+use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 
 /// Simulates one episode per trial and returns their fitness, in order.
@@ -17,30 +20,89 @@ pub(crate) fn run(
     generation: u64,
     trials: Range<u32>,
 ) -> Result<Vec<f64>, EvaluateError> {
-    let trials = trials.map(|trial| Trial::new(experiment, generation, trial));
-    let mut trials = trials.collect::<Result<Vec<_>, _>>()?;
-    let groups = 0..experiment.world.groups.len();
-    let mut brains: Vec<Brain<'_>> =
-        groups.map(|group| Brain::new(experiment, group, phenotype, trials.len())).collect();
+    let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
     for step in 0..experiment.n_steps {
-        for trial in &mut trials {
+        episodes.step(step, |_, _, _| {})?;
+    }
+    Ok(episodes.trials.iter().map(Trial::fitness).collect())
+}
+
+/// Simulates the episode of one trial and shows each of its steps to `observe`.
+pub(crate) fn watch(
+    experiment: &Experiment,
+    phenotype: &Phenotype,
+    generation: u64,
+    trial: u32,
+    observe: &mut dyn FnMut(StepRecord),
+) -> Result<EpisodeSummary, EvaluateError> {
+    let mut episodes = Episodes::new(experiment, phenotype, generation, trial..trial + 1)?;
+    let mut sums: IndexMap<&'static str, (f64, u32)> = IndexMap::new();
+    for step in 0..experiment.n_steps {
+        episodes.step(step, |trial, brains, fitness| {
+            let mut record = trial.record(step, fitness);
+            for brain in brains {
+                brain.record(&mut record);
+            }
+            for (name, value) in &record.metrics {
+                let (sum, n) = sums.entry(name).or_default();
+                *sum += value;
+                *n += 1;
+            }
+            observe(record);
+        })?;
+    }
+    let means = sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n)));
+    Ok(EpisodeSummary { fitness: episodes.trials[0].fitness(), metrics: means.collect() })
+}
+
+/// Trials that share a phenotype.
+struct Episodes<'a> {
+    trials: Vec<Trial<'a>>,
+    /// Per group of robots.
+    brains: Vec<Brain<'a>>,
+}
+
+impl<'a> Episodes<'a> {
+    fn new(
+        experiment: &'a Experiment,
+        phenotype: &Phenotype,
+        generation: u64,
+        trials: Range<u32>,
+    ) -> Result<Self, EvaluateError> {
+        let trials = trials.map(|trial| Trial::new(experiment, generation, trial));
+        let trials = trials.collect::<Result<Vec<_>, _>>()?;
+        let groups = 0..experiment.world.groups.len();
+        let brain = |group| Brain::new(experiment, group, phenotype, trials.len());
+        let brains = groups.map(brain).collect();
+        Ok(Self { trials, brains })
+    }
+
+    /// One environment step; `see` gets each trial when its step has been judged.
+    fn step(
+        &mut self,
+        step: u32,
+        mut see: impl FnMut(&Trial<'_>, &[Brain<'_>], Option<f64>),
+    ) -> Result<(), EvaluateError> {
+        for trial in &mut self.trials {
             trial.sense(step)?;
         }
-        for brain in &mut brains {
-            brain.step(&mut trials);
+        for brain in &mut self.brains {
+            brain.decide(&mut self.trials);
         }
-        for trial in &mut trials {
-            trial.act(step);
+        for trial in &mut self.trials {
+            let fitness = trial.act(step);
+            see(trial, &self.brains, fitness);
+            trial.move_lights(step);
         }
+        Ok(())
     }
-    Ok(trials.iter().map(Trial::fitness).collect())
 }
 
 /// The controller of a group of robots, and its stimuli; one lane per trial and
 /// robot, trial by trial.
 struct Brain<'a> {
     group: usize,
-    n_robots: usize,
+    robots: Range<usize>,
     controller: Box<dyn Controller + 'a>,
     stimuli: Lanes,
 }
@@ -65,19 +127,31 @@ impl<'a> Brain<'a> {
         };
         Self {
             group: group_index,
-            n_robots: group.robots.len(),
+            robots: group.robots.clone(),
             controller,
             stimuli: Lanes::new(n_inputs, n_lanes),
         }
     }
 
-    fn step(&mut self, trials: &mut [Trial<'_>]) {
+    /// Decides what the group's robots do in this step.
+    fn decide(&mut self, trials: &mut [Trial<'_>]) {
+        let n_robots = self.robots.len();
         for (index, trial) in trials.iter().enumerate() {
-            trial.stimulate(self.group, index * self.n_robots, &mut self.stimuli);
+            trial.stimulate(self.group, index * n_robots, &mut self.stimuli);
         }
         self.controller.perceive(&self.stimuli);
         for (index, trial) in trials.iter_mut().enumerate() {
-            trial.decide(self.group, index * self.n_robots, &mut *self.controller);
+            trial.decide(self.group, index * n_robots, &mut *self.controller);
+        }
+    }
+
+    /// Adds the stimuli of the first trial's robots.
+    fn record(&self, record: &mut StepRecord) {
+        for (lane, robot) in record.robots[self.robots.clone()].iter_mut().enumerate() {
+            robot.stimuli = self.stimuli.column(lane).collect();
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@ use crate::episode;
 use crate::genotype::Codec;
 use crate::network::Network;
 use crate::problems::Problems;
+use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 use crate::world::World;
 
@@ -133,10 +134,23 @@ impl Experiment {
         trials: Range<u32>,
     ) -> Result<Vec<f64>, EvaluateError> {
         self.check_genotype(genotype)?;
-        if trials.is_empty() || trials.end > self.n_trials {
-            return Err(EvaluateError::Trials { trials, n_trials: self.n_trials });
-        }
+        self.check_trials(&trials)?;
         episode::run(self, &self.codec.decode(genotype), generation, trials)
+    }
+
+    /// Simulates the episode of one trial and shows each of its steps to
+    /// `observe`. Watching changes nothing: the fitness is
+    /// [`evaluate`](Self::evaluate)'s, bit for bit.
+    pub fn simulate(
+        &self,
+        genotype: &[f64],
+        generation: u64,
+        trial: u32,
+        observe: &mut dyn FnMut(StepRecord),
+    ) -> Result<EpisodeSummary, EvaluateError> {
+        self.check_genotype(genotype)?;
+        self.check_trials(&(trial..trial.saturating_add(1)))?;
+        episode::watch(self, &self.codec.decode(genotype), generation, trial, observe)
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with
@@ -144,6 +158,13 @@ impl Experiment {
     pub fn network_json(&self, genotype: &[f64]) -> Result<serde_json::Value, EvaluateError> {
         self.check_genotype(genotype)?;
         Ok(self.network.to_json(&self.codec.decode(genotype)))
+    }
+
+    fn check_trials(&self, trials: &Range<u32>) -> Result<(), EvaluateError> {
+        if trials.is_empty() || trials.end > self.n_trials {
+            return Err(EvaluateError::Trials { trials: trials.clone(), n_trials: self.n_trials });
+        }
+        Ok(())
     }
 
     fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
@@ -234,15 +255,15 @@ mod tests {
         let mut config = experiment_a();
         config.algorithm.evolvable_object = "robotB".into();
         config.topology.synapses[0].pre = vec!["nobody".into()];
-        config.algorithm.populations[0].objects[1] =
-            GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()));
+        config.algorithm.populations[0].objects =
+            vec![GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()))];
         let error = Experiment::compile(&config).unwrap_err();
         let paths: Vec<&str> = error.problems.iter().map(|problem| &*problem.path).collect();
         assert_eq!(
             paths,
             [
                 "topology.synapses.I1-H1",
-                "algorithm.populations.p4.objects[1]",
+                "algorithm.populations.p1.objects",
                 "algorithm.evolvable_object",
             ]
         );

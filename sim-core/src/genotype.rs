@@ -41,8 +41,8 @@ enum Parameter {
 }
 
 impl Codec {
-    /// Resolves the queries of all populations, in their order; notes queries that
-    /// cover nothing.
+    /// Resolves the queries of all populations, in their order; notes populations
+    /// without genes.
     pub fn compile(config: &ExperimentConfig, network: &Network, problems: &mut Problems) -> Self {
         let mut coverage = Coverage::new(network);
         let mut genes = Vec::new();
@@ -50,19 +50,17 @@ impl Codec {
         for (name, population) in &config.algorithm.populations {
             let first = genes.len();
             let bounds = population.min_vals.iter().zip(&population.max_vals);
-            for (index, (query, (&low, &high))) in population.objects.iter().zip(bounds).enumerate()
-            {
-                let parameters = select(query, network);
-                if parameters.is_empty() {
-                    // The name may be unknown, or chance has left out all synapses.
-                    let path = format!("algorithm.populations.{name}.objects[{index}]");
-                    problems.add(path, format!("`{query}` covers nothing that can evolve"));
-                }
+            for (query, (&low, &high)) in population.objects.iter().zip(bounds) {
                 let span = high - low;
-                for parameter in parameters {
+                for parameter in select(query, network) {
                     *coverage.of(parameter) = true;
                     genes.push(Gene { parameter, low, span });
                 }
+            }
+            if genes.len() == first {
+                // Chance has left out every synapse that the queries name.
+                let path = format!("algorithm.populations.{name}.objects");
+                problems.add(path, "nothing to evolve: none of these synapses exist");
             }
             segments.push(first..genes.len());
         }
@@ -341,14 +339,7 @@ mod tests {
         let motor = n_genes(weights(SynapseSelector::Motor));
         assert_eq!(sensory, 5 * 10);
         assert_eq!(sensory + hidden + motor, n_genes(weights(SynapseSelector::All)));
-        let motor_groups = [
-            "OUT_COMM-H1",
-            "OUT_LED-H1",
-            "OUT_STATE-H1",
-            "OUT_COMM-OUT_COMM",
-            "OUT_COMM-OUT_STATE",
-            "OUT_STATE-OUT_COMM",
-        ];
+        let motor_groups = ["COMM-H1", "LED-H1", "MODE-H1", "COMM-COMM", "COMM-MODE", "MODE-COMM"];
         assert_eq!(motor, motor_groups.iter().map(|group| n_genes(named(group))).sum::<usize>());
     }
 
@@ -356,7 +347,7 @@ mod tests {
     fn names_are_of_ensembles_stimuli_or_groups() {
         assert_eq!(n_genes(named("I1")), 20);
         assert_eq!(n_genes(named("I1-H1")), 20);
-        let from_h2 = ["H2-H2", "H2-OUT_COMM", "H2-OUT_STATE"];
+        let from_h2 = ["H2-H2", "H2-COMM", "H2-MODE"];
         assert_eq!(
             n_genes(named("H2")),
             from_h2.iter().map(|name| n_genes(named(name))).sum::<usize>()
@@ -372,13 +363,15 @@ mod tests {
     }
 
     #[test]
-    fn queries_that_cover_nothing_and_time_constants_that_diverge_are_problems() {
+    fn populations_without_genes_and_time_constants_that_diverge_are_problems() {
         let mut empty = with_queries(&[named("I1-H1")]);
         empty.topology.synapses[0].trainable = false;
         assert!(compile(&empty).2.check().is_err());
         empty.topology.synapses[0].trainable = true;
         empty.topology.synapses[0].p = 1e-9;
         assert!(compile(&empty).2.check().is_err());
+        empty.algorithm.populations[0] = experiment_a().algorithm.populations[0].clone();
+        assert!(compile(&empty).2.check().is_ok(), "other synapses exist");
         let mut fast = with_queries(&[named("I1-H1")]);
         fast.topology.ensembles[0].params.tau = 0.04;
         assert!(compile(&fast).2.check().is_err());

@@ -40,6 +40,15 @@ impl Lanes {
         self.blocks[row * self.n_blocks + lane / BLOCK][lane % BLOCK]
     }
 
+    /// The values of one lane, row by row.
+    pub fn column(&self, lane: usize) -> impl Iterator<Item = f64> {
+        self.blocks
+            .iter()
+            .skip(lane / BLOCK)
+            .step_by(self.n_blocks.max(1))
+            .map(move |b| b[lane % BLOCK])
+    }
+
     /// Sets one value.
     pub fn set(&mut self, row: usize, lane: usize, value: f64) {
         self.blocks[row * self.n_blocks + lane / BLOCK][lane % BLOCK] = value;
@@ -64,5 +73,6 @@ mod tests {
             }
             assert_eq!(lanes.row(row)[1][2], (row * 11 + 10) as f64);
         }
+        assert_eq!(lanes.column(9).collect::<Vec<_>>(), [9.0, 20.0, 31.0]);
     }
 }

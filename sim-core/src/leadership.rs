@@ -25,6 +25,11 @@ impl Leadership {
         sole.map(|robot| Leader { robot, n_steps: self.n_steps })
     }
 
+    /// Whether the last step had a sole leader.
+    pub fn has_leader(&self) -> bool {
+        self.leader.is_some()
+    }
+
     /// Forgets the leader: the next one's term starts anew.
     pub fn reset(&mut self) {
         self.leader = None;

@@ -22,6 +22,7 @@ mod network;
 mod perturbations;
 mod problems;
 pub mod random;
+mod record;
 mod senses;
 mod sensors;
 mod swarm;
@@ -31,7 +32,10 @@ mod torus;
 mod trial;
 mod world;
 
+pub use communication::Mode;
 pub use experiment::{EvaluateError, Experiment};
+pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
+pub use torus::Vec2;
 
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work

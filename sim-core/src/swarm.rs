@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::communication::{Mode, Origin};
 use crate::controllers::Action;
+use crate::record::{ReceivedFrame, RobotRecord};
 use crate::torus::Vec2;
 
 /// Where robots are, what they do, and what they heard.
@@ -27,6 +28,10 @@ pub(crate) struct Swarm {
     pub received_messages: Vec<f64>,
     /// Components of a message.
     pub message_len: usize,
+    /// Whether the controller gets light readings.
+    pub photosensitive: Vec<bool>,
+    /// Whether any robot changed its place or heading in this step.
+    pub moved: bool,
 }
 
 /// A frame taken from the air.
@@ -56,6 +61,27 @@ impl Swarm {
             received: vec![None; n],
             received_messages: vec![0.0; n * message_len],
             message_len,
+            photosensitive: vec![false; n],
+            moved: true,
+        }
+    }
+
+    /// What there is to see of a robot, except its stimuli.
+    pub fn record(&self, robot: usize) -> RobotRecord {
+        RobotRecord {
+            position: self.positions[robot],
+            heading: self.headings[robot],
+            stimuli: Vec::new(),
+            received: self.received[robot].map(|received| ReceivedFrame {
+                originator: received.origin.originator,
+                hops: received.origin.hops,
+                sector: received.sector,
+                signal: received.signal,
+            }),
+            wheels: self.wheels[robot],
+            led: self.leds[robot],
+            mode: self.modes[robot],
+            message: self.messages[self.message_range(robot)].to_vec(),
         }
     }
 

@@ -2,8 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use serde::Serialize;
+
 /// A position, or a displacement, in the plane; cm.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Vec2 {
     /// Along the world's width.
     pub x: f64,

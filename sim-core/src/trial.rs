@@ -2,6 +2,7 @@
 //! controllers do.
 
 use crate::communication::{Mode, Radio};
+use crate::config::SensorQuery;
 use crate::controllers::Controller;
 use crate::experiment::{EvaluateError, Experiment};
 use crate::fitness::{self, Fitness, Moment};
@@ -9,6 +10,7 @@ use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::perturbations::Perturbations;
 use crate::random::{Purpose, Stream};
+use crate::record::{Metrics, StepRecord};
 use crate::senses::Senses;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
@@ -32,8 +34,6 @@ pub(crate) struct Trial<'a> {
     decoding: Vec<Stream>,
     /// Noise of sensors, per robot.
     noise: Vec<Stream>,
-    /// Whether a robot changed its place or heading in this step, by itself or not.
-    moved: bool,
     fitness: Box<dyn Fitness>,
     fitness_sum: f64,
     n_judged_steps: u32,
@@ -133,13 +133,18 @@ impl<'a> Trial<'a> {
         });
         let light_paths = paths.collect();
         let n_robots = world.n_robots();
-        let swarm = Swarm::new(positions, headings, world.message_len);
-        let mut radio = Radio::new(
+        let mut swarm = Swarm::new(positions, headings, world.message_len);
+        for (group, state) in world.groups.iter().zip(&groups) {
+            for (index, robot) in group.robots.clone().enumerate() {
+                swarm.photosensitive[robot] = group.light_sensor.is_some()
+                    && !state.perturbations.inhibits(index, SensorQuery::Light);
+            }
+        }
+        let radio = Radio::new(
             world,
             address.streams(Purpose::Reception, n_robots),
             address.streams(Purpose::Quantisation, n_robots),
         );
-        radio.relocate(world, &swarm);
         Ok(Self {
             world,
             address,
@@ -151,7 +156,6 @@ impl<'a> Trial<'a> {
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
             noise: address.streams(Purpose::SensorNoise, n_robots),
-            moved: true,
             fitness: fitness::new(experiment.fitness, world),
             fitness_sum: 0.0,
             n_judged_steps: 0,
@@ -161,17 +165,19 @@ impl<'a> Trial<'a> {
     /// Start of a step: every robot senses, from positions and headings now and
     /// from the frames that are on the air.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
+        let mut relocated = std::mem::replace(&mut self.swarm.moved, false);
         // Robots whose topology switches find themselves elsewhere.
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             if state.perturbations.switches_topology(step) {
                 let torus = &self.world.torus;
                 let positions = self.address.place(&group.site, torus, &mut state.positions)?;
                 self.swarm.positions[group.robots.clone()].copy_from_slice(&positions);
-                self.moved = true;
+                self.swarm.moved = true;
+                relocated = true;
             }
         }
         // Who hears whom changes only when somebody moves.
-        if self.moved {
+        if relocated {
             self.radio.relocate(self.world, &self.swarm);
         }
         self.radio.receive(self.world, &mut self.swarm);
@@ -208,8 +214,9 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Rest of a step: actions take effect and are judged.
-    pub fn act(&mut self, step: u32) {
+    /// Actions take effect and are judged: fitness of the step, none if it does not
+    /// count.
+    pub fn act(&mut self, step: u32) -> Option<f64> {
         let world = self.world;
         // Nobody relays before there is something to relay.
         if step < N_FIRST_STEPS_SENDING {
@@ -228,25 +235,28 @@ impl<'a> Trial<'a> {
             }
         }
         // The step is judged.
-        let judged = world.judged();
-        let fitness = self.fitness.step(&Moment {
-            torus: &world.torus,
-            step,
-            moved: self.moved,
-            positions: &self.swarm.positions[judged.clone()],
-            headings: &self.swarm.headings[judged.clone()],
-            wheels: &self.swarm.wheels[judged.clone()],
-            leds: &self.swarm.leds[judged],
-            lights: &self.lights,
-        });
+        let fitness = self.fitness.step(&Moment::new(world, &self.swarm, &self.lights, step));
         if let Some(fitness) = fitness {
             self.fitness_sum += fitness;
             self.n_judged_steps += 1;
         }
-        // Lights move.
+        fitness
+    }
+
+    /// End of a step: lights move.
+    pub fn move_lights(&mut self, step: u32) {
         for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
-            *position = path.advance(*position, step, &world.torus);
+            *position = path.advance(*position, step, &self.world.torus);
         }
+    }
+
+    /// The step that was judged last, without stimuli, which controllers keep.
+    pub fn record(&self, step: u32, fitness: Option<f64>) -> StepRecord {
+        let mut metrics = Metrics::new();
+        let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
+        self.fitness.measure(&moment, &mut metrics);
+        let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
+        StepRecord { step, fitness, metrics, robots: robots.collect(), lights: self.lights.clone() }
     }
 
     /// Mean fitness over the steps that count; 0 without any.
@@ -260,7 +270,6 @@ impl<'a> Trial<'a> {
 
     /// Moves all robots by their wheels.
     fn drive(&mut self) {
-        self.moved = false;
         let swarm = &mut self.swarm;
         for group in &self.world.groups {
             let Some(drive) = &group.drive else { continue };
@@ -271,7 +280,7 @@ impl<'a> Trial<'a> {
                     swarm.headings[robot],
                     swarm.wheels[robot],
                 );
-                self.moved = true;
+                swarm.moved = true;
             }
         }
     }
@@ -281,7 +290,7 @@ impl<'a> Trial<'a> {
 mod tests {
     use super::*;
     use crate::communication::Origin;
-    use crate::config::{ExperimentConfig, Initializer, SensorQuery};
+    use crate::config::{ExperimentConfig, Initializer};
     use crate::testing::{experiment_a, robot};
 
     /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.

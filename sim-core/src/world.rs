@@ -251,7 +251,7 @@ impl World {
             }),
             quantiser: transmitter
                 .filter(|transmitter| transmitter.quantize)
-                .map(|t| Quantiser::new(t.msg_length as usize, t.n_symbols, t.beta)),
+                .map(|t| Quantiser::new(t.msg_length as usize, t.n_levels() as usize, t.beta)),
             perturbations: config.perturbations.clone(),
         };
         self.antennas.extend(group.robots.clone().map(|_| antenna(config)));

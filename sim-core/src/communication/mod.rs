@@ -10,8 +10,11 @@ pub(crate) use hearing::{Antenna, Receiver};
 pub(crate) use quantisation::Quantiser;
 pub(crate) use radio::Radio;
 
+use serde::Serialize;
+
 /// What a robot does with its transmitter.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Emits its own message.
     #[default]

@@ -3,6 +3,7 @@
 
 use super::{Fitness, Moment};
 use crate::border;
+use crate::record::Metrics;
 
 /// f = TPR * TNR; just TPR if no robot is in the interior.
 #[derive(Debug)]
@@ -24,49 +25,54 @@ impl Fitness for IdentifyBorderline {
         if moment.moved || self.targets.is_empty() {
             self.targets = border::of_swarm(moment.torus, moment.positions, self.range);
         }
-        Some(rates(&self.targets, moment.leds).fitness())
+        let rates = Rates::new(&self.targets, moment.leds);
+        Some(rates.true_positive * rates.true_negative)
+    }
+
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        let rates = Rates::new(&self.targets, moment.leds);
+        metrics.insert("true_positive_rate", rates.true_positive);
+        metrics.insert("true_negative_rate", rates.true_negative);
+        metrics.insert("accuracy", rates.accuracy);
     }
 }
 
 /// Shares of robots that know their place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rates {
+struct Rates {
     /// Share of border robots with the LED on.
-    pub true_positive: f64,
+    true_positive: f64,
     /// Share of interior robots with the LED off; 1 without any.
-    pub true_negative: f64,
+    true_negative: f64,
     /// Share of all robots that are right.
-    pub accuracy: f64,
+    accuracy: f64,
 }
 
 impl Rates {
-    fn fitness(self) -> f64 {
-        self.true_positive * self.true_negative
-    }
-}
-
-/// Compares LEDs with the robots' places.
-pub(crate) fn rates(at_border: &[bool], leds: &[u32]) -> Rates {
-    // Robots at the place, and those of them whose LED says so.
-    let count = |place: bool| {
-        let robots = at_border.iter().zip(leds).filter(|(at_border, _)| **at_border == place);
-        let right = robots.clone().filter(|(_, led)| (**led > 0) == place).count();
-        (right, robots.count())
-    };
-    let share = |(right, all): (usize, usize)| {
-        if all == 0 { 1.0 } else { right as f64 / all as f64 }
-    };
-    let (positive, negative) = (count(true), count(false));
-    Rates {
-        true_positive: share(positive),
-        true_negative: share(negative),
-        accuracy: share((positive.0 + negative.0, positive.1 + negative.1)),
+    /// Compares LEDs with the robots' places.
+    fn new(at_border: &[bool], leds: &[u32]) -> Self {
+        // Robots at the place whose LED says so, and all robots at the place.
+        let count = |place: bool| {
+            let robots = at_border.iter().zip(leds).filter(|(at_border, _)| **at_border == place);
+            let right = robots.clone().filter(|(_, led)| (**led > 0) == place).count();
+            (right, robots.count())
+        };
+        let share = |right: usize, all: usize| {
+            if all == 0 { 1.0 } else { right as f64 / all as f64 }
+        };
+        let (positive, negative) = (count(true), count(false));
+        Self {
+            true_positive: share(positive.0, positive.1),
+            true_negative: share(negative.0, negative.1),
+            accuracy: share(positive.0 + negative.0, positive.1 + negative.1),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fitness::metrics;
     use crate::torus::Vec2;
 
     const SQUARE: [Vec2; 5] = [
@@ -113,9 +119,16 @@ mod tests {
 
     #[test]
     fn accuracy_counts_all_robots() {
-        let rates = rates(&[true, true, false, false, false], &[1, 0, 0, 0, 1]);
-        assert_eq!(rates.true_positive, 0.5);
-        assert_eq!(rates.true_negative, 2.0 / 3.0);
-        assert_eq!(rates.accuracy, 0.6);
+        let rates = Rates::new(&[true, true, false, false, false], &[1, 0, 0, 0, 1]);
+        let expected = Rates { true_positive: 0.5, true_negative: 2.0 / 3.0, accuracy: 0.6 };
+        assert_eq!(rates, expected);
+    }
+
+    #[test]
+    fn the_rates_are_measured() {
+        let moment = Moment { positions: &SQUARE, leds: &[1, 1, 0, 0, 0], ..Moment::EMPTY };
+        let expected =
+            [("true_positive_rate", 0.5), ("true_negative_rate", 1.0), ("accuracy", 0.6)];
+        assert_eq!(metrics(&mut IdentifyBorderline::new(100.0), &moment), expected);
     }
 }

@@ -1,6 +1,7 @@
 //! `grouping`: robots gather, but not on top of each other.
 
 use super::{Fitness, Moment, mean};
+use crate::record::Metrics;
 
 /// Distance to the centroid at which a robot earns nothing, cm.
 const FAR: f64 = 100.0;
@@ -24,11 +25,19 @@ impl Fitness for Grouping {
         let nearness = |&robot| (1.0 - torus.distance(robot, centroid) / FAR).clamp(0.0, 1.0);
         Some(mean(moment.positions.iter().map(nearness)))
     }
+
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        let centroid = moment.torus.centroid(moment.positions);
+        let distances =
+            moment.positions.iter().map(|&robot| moment.torus.distance(robot, centroid));
+        metrics.insert("center_distance", mean(distances));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fitness::metrics;
     use crate::torus::Vec2;
 
     fn fitness(positions: &[(f64, f64)]) -> f64 {
@@ -55,5 +64,12 @@ mod tests {
     #[test]
     fn one_robot_is_a_group() {
         assert_eq!(fitness(&[(123.0, 456.0)]), 1.0);
+    }
+
+    #[test]
+    fn the_distance_to_the_centre_is_measured() {
+        let positions = [Vec2::new(990.0, 0.0), Vec2::new(10.0, 0.0)];
+        let moment = Moment { positions: &positions, ..Moment::EMPTY };
+        assert_eq!(metrics(&mut Grouping, &moment), [("center_distance", 10.0)]);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Fitness, Moment};
 use crate::leadership::Leadership;
+use crate::record::Metrics;
 
 /// Weight of a leader's experience per step.
 const WEIGHT: f64 = 0.1;
@@ -20,11 +21,16 @@ impl Fitness for IdentifyLeader {
         let leader = self.leadership.observe(moment.leds);
         Some(leader.map_or(0.0, |leader| (WEIGHT * f64::from(leader.n_steps - 1)).min(MAX)))
     }
+
+    fn measure(&self, _moment: &Moment<'_>, metrics: &mut Metrics) {
+        metrics.insert("one_leader", f64::from(self.leadership.has_leader()));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fitness::metrics;
 
     fn mean(steps: impl Iterator<Item = [u32; 3]>) -> f64 {
         let mut fitness = IdentifyLeader::default();
@@ -50,5 +56,14 @@ mod tests {
         assert_eq!(mean((0..50).map(|k| [k % 2, (k + 1) % 2, 0])), 0.0);
         assert_eq!(mean((0..50).map(|_| [1, 1, 0])), 0.0);
         assert_eq!(mean((0..50).map(|_| [0, 0, 0])), 0.0);
+    }
+
+    #[test]
+    fn one_leader_is_told_from_none_and_several() {
+        let mut fitness = IdentifyLeader::default();
+        for (leds, expected) in [([0, 0], 0.0), ([0, 1], 1.0), ([2, 0], 1.0), ([1, 1], 0.0)] {
+            let moment = Moment { leds: &leds, ..Moment::EMPTY };
+            assert_eq!(metrics(&mut fitness, &moment), [("one_leader", expected)]);
+        }
     }
 }

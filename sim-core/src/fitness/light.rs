@@ -1,6 +1,8 @@
 //! `goto_light`: robots are near the light.
 
 use super::{Fitness, Moment, mean};
+use crate::record::Metrics;
+use crate::torus::Vec2;
 
 /// Distance to the light that counts as near, cm.
 const NEAR: f64 = 80.0;
@@ -17,12 +19,39 @@ impl Fitness for GotoLight {
         });
         Some(mean(near))
     }
+
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        let torus = moment.torus;
+        let centroid = torus.centroid(moment.positions);
+        for (photosensitive, light_distance, center_distance) in [
+            (true, "light_distance_photosensitive", "center_distance_photosensitive"),
+            (false, "light_distance_others", "center_distance_others"),
+        ] {
+            let robots = moment.positions.iter().zip(moment.photosensitive);
+            let robots: Vec<Vec2> = robots
+                .filter(|&(_, &sees_light)| sees_light == photosensitive)
+                .map(|(&position, _)| position)
+                .collect();
+            if robots.is_empty() {
+                continue;
+            }
+            if !moment.lights.is_empty() {
+                let to_light = |&robot: &Vec2| {
+                    let distances = moment.lights.iter().map(|&light| torus.distance(robot, light));
+                    distances.fold(f64::INFINITY, f64::min)
+                };
+                metrics.insert(light_distance, mean(robots.iter().map(to_light)));
+            }
+            let to_center = |&robot: &Vec2| torus.distance(robot, centroid);
+            metrics.insert(center_distance, mean(robots.iter().map(to_center)));
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::torus::Vec2;
+    use crate::fitness::metrics;
 
     #[test]
     fn fitness_is_the_share_of_robots_near_the_light() {
@@ -36,5 +65,25 @@ mod tests {
         let moment = Moment { positions: &positions, lights: &light, ..Moment::EMPTY };
         assert_eq!(GotoLight.step(&moment), Some(0.5));
         assert_eq!(GotoLight.step(&Moment { lights: &[], ..moment }), Some(0.0));
+    }
+
+    #[test]
+    fn distances_are_those_of_photosensitive_and_other_robots() {
+        let positions = [Vec2::new(0.0, 0.0), Vec2::new(30.0, 0.0), Vec2::new(60.0, 0.0)];
+        let moment = Moment {
+            positions: &positions,
+            photosensitive: &[false, true, false],
+            lights: &[Vec2::new(990.0, 0.0), Vec2::new(500.0, 500.0)],
+            ..Moment::EMPTY
+        };
+        let expected = [
+            ("light_distance_photosensitive", 40.0),
+            ("center_distance_photosensitive", 0.0),
+            ("light_distance_others", 40.0),
+            ("center_distance_others", 30.0),
+        ];
+        assert_eq!(metrics(&mut GotoLight, &moment), expected);
+        let blind = Moment { photosensitive: &[false; 3], lights: &[], ..moment };
+        assert_eq!(metrics(&mut GotoLight, &blind), [("center_distance_others", 20.0)]);
     }
 }

@@ -7,6 +7,8 @@ mod light;
 mod orientation;
 
 use crate::config::FitnessFunction;
+use crate::record::Metrics;
+use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
 
@@ -18,7 +20,7 @@ pub(crate) struct Moment<'a> {
     pub torus: &'a Torus,
     /// Environment step, from 0.
     pub step: u32,
-    /// Whether any robot changed its place or heading since the last moment.
+    /// Whether any robot changed its place or heading in this step.
     pub moved: bool,
     /// Positions of the robots.
     pub positions: &'a [Vec2],
@@ -28,8 +30,28 @@ pub(crate) struct Moment<'a> {
     pub wheels: &'a [[f64; 2]],
     /// Colours of the robots' LEDs.
     pub leds: &'a [u32],
+    /// Which of the robots see light.
+    pub photosensitive: &'a [bool],
     /// Positions of the lights.
     pub lights: &'a [Vec2],
+}
+
+impl<'a> Moment<'a> {
+    /// This step of a trial.
+    pub fn new(world: &'a World, swarm: &'a Swarm, lights: &'a [Vec2], step: u32) -> Self {
+        let judged = world.judged();
+        Self {
+            torus: &world.torus,
+            step,
+            moved: swarm.moved,
+            positions: &swarm.positions[judged.clone()],
+            headings: &swarm.headings[judged.clone()],
+            wheels: &swarm.wheels[judged.clone()],
+            leds: &swarm.leds[judged.clone()],
+            photosensitive: &swarm.photosensitive[judged],
+            lights,
+        }
+    }
 }
 
 /// A fitness function in one trial. The trial's fitness is the mean over the
@@ -37,6 +59,9 @@ pub(crate) struct Moment<'a> {
 pub(crate) trait Fitness {
     /// Fitness of a step; none if it does not count.
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64>;
+
+    /// Adds the measures of the step that was judged last.
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics);
 }
 
 /// The named fitness function at the start of a trial.
@@ -60,6 +85,15 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     if n == 0 { 0.0 } else { sum / n as f64 }
 }
 
+/// What a step is measured as.
+#[cfg(test)]
+fn metrics(fitness: &mut dyn Fitness, moment: &Moment<'_>) -> Vec<(&'static str, f64)> {
+    let mut metrics = Metrics::new();
+    fitness.step(moment);
+    fitness.measure(moment, &mut metrics);
+    metrics.into_iter().collect()
+}
+
 #[cfg(test)]
 impl Moment<'static> {
     /// Nobody, in a world of 1000 x 1000 cm.
@@ -71,6 +105,7 @@ impl Moment<'static> {
         headings: &[],
         wheels: &[],
         leds: &[],
+        photosensitive: &[],
         lights: &[],
     };
 }

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::{Fitness, Moment, mean};
+use crate::record::Metrics;
 use crate::torus::{Vec2, angular_difference};
 
 /// Steps that `alignment` does not judge.
@@ -20,11 +21,15 @@ impl Fitness for OrientationConsensus {
         let calm = 1.0 - mean(moment.wheels.iter().map(|[right, _]| right.abs()));
         Some((1.0 - misalignment(moment.headings) / PI) * calm)
     }
+
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        metrics.insert("misalignment", misalignment(moment.headings));
+    }
 }
 
 /// Mean distance of headings to their circular mean, radians in \[0, pi\] (Eq. 6.2).
 /// Headings that cancel out have the mean 0.
-pub(crate) fn misalignment(headings: &[f64]) -> f64 {
+fn misalignment(headings: &[f64]) -> f64 {
     let sum = headings.iter().fold(Vec2::default(), |sum, &heading| {
         let direction = Vec2::unit(heading);
         Vec2 { x: sum.x + direction.x, y: sum.y + direction.y }
@@ -53,6 +58,10 @@ impl Fitness for Alignment {
         let calm = mean(moment.wheels.iter().map(|[right, _]| (1.0 - right.abs()).clamp(0.0, 1.0)));
         Some(aligned * calm)
     }
+
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        metrics.insert("misalignment", misalignment(moment.headings));
+    }
 }
 
 #[cfg(test)]
@@ -62,6 +71,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::fitness::metrics;
     use crate::torus::wrap_angle;
 
     fn moment<'a>(headings: &'a [f64], wheels: &'a [[f64; 2]], step: u32) -> Moment<'a> {
@@ -83,6 +93,17 @@ mod tests {
         assert!((misalignment(&[3.0, 3.0, 3.3]) - 0.4 / 3.0).abs() < 1e-3);
         assert_eq!(misalignment(&[1.5]), 0.0);
         assert_eq!(misalignment(&[]), 0.0);
+    }
+
+    #[test]
+    fn misalignment_is_measured_from_the_first_step_on() {
+        let moment = moment(&[0.0, PI / 2.0], &[[0.0; 2]; 2], 0);
+        for fitness in [&mut OrientationConsensus as &mut dyn Fitness, &mut Alignment] {
+            let metrics = metrics(fitness, &moment);
+            assert_eq!(metrics.len(), 1);
+            assert_eq!(metrics[0].0, "misalignment");
+            assert!((metrics[0].1 - PI / 4.0).abs() < 1e-12);
+        }
     }
 
     #[test]

@@ -1,0 +1,79 @@
+//! What there is to see in an episode: every robot in every step, and how well
+//! the task is done.
+
+use indexmap::IndexMap;
+use serde::Serialize;
+
+use crate::communication::Mode;
+use crate::torus::Vec2;
+
+/// Named measures of a task, beside its fitness:
+///
+/// | task | measures |
+/// |---|---|
+/// | leader | `one_leader`: 1 if exactly one robot has its LED on, else 0 |
+/// | borderline | `true_positive_rate`, `true_negative_rate`, `accuracy` of the LEDs |
+/// | orientation, alignment | `misalignment`: mean distance to the circular mean heading, radians (Eq. 6.2) |
+/// | light | `light_distance_*`, `center_distance_*`: mean distance to the nearest light and to the swarm's centre of mass, cm, of the `photosensitive` robots and of the `others` |
+/// | grouping | `center_distance`: mean distance to the centre of mass, cm |
+///
+/// A measure of nobody (no light, no photosensitive robot) is absent.
+pub type Metrics = IndexMap<&'static str, f64>;
+
+/// The result of an episode that was watched.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EpisodeSummary {
+    /// The same as [`Experiment::evaluate`](crate::Experiment::evaluate) gives.
+    pub fitness: f64,
+    /// Means over the steps.
+    pub metrics: Metrics,
+}
+
+/// One environment step of a trial.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StepRecord {
+    /// From 0.
+    pub step: u32,
+    /// Fitness of the step; none if it does not count.
+    pub fitness: Option<f64>,
+    /// Measures of the step.
+    pub metrics: Metrics,
+    /// All robots, in the order of the objects of the world.
+    pub robots: Vec<RobotRecord>,
+    /// Positions of all lights during the step.
+    pub lights: Vec<Vec2>,
+}
+
+/// One robot in one step.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotRecord {
+    /// Position at the end of the step, cm.
+    pub position: Vec2,
+    /// Heading at the end of the step, in \[0, 2 pi).
+    pub heading: f64,
+    /// What its controller got, input by input.
+    pub stimuli: Vec<f64>,
+    /// The frame that it took from the air.
+    pub received: Option<ReceivedFrame>,
+    /// Actions of the right and left wheel, in \[-1, 1\].
+    pub wheels: [f64; 2],
+    /// Colour of its LED, 0 off.
+    pub led: u32,
+    /// Whether it sent or relayed.
+    pub mode: Mode,
+    /// Its own message, as quantised; on the air if it sent.
+    pub message: Vec<f64>,
+}
+
+/// A frame that a robot took from the air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ReceivedFrame {
+    /// The robot whose message it carries.
+    pub originator: usize,
+    /// Emissions until then, from 1.
+    pub hops: u32,
+    /// The sector that received it.
+    pub sector: usize,
+    /// Its strength, in (0, 1\].
+    pub signal: f64,
+}
