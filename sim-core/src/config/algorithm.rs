@@ -1,38 +1,47 @@
 //! `algorithm`: what evolves, by which rule, and on which task.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::NamedMap;
+use super::{NamedMap, limits, schema};
 
 /// Evolution and evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm.
     pub name: AlgorithmName,
     /// Name of the world object whose controller evolves.
     pub evolvable_object: String,
     /// Individuals per generation, P.
+    #[schemars(range(min = 1, max = limits::POPULATION))]
     pub population_size: u32,
     /// Number of generations.
+    #[schemars(range(min = 1, max = limits::GENERATIONS))]
     pub generations: u64,
     /// Environment steps per trial, T_E.
+    #[schemars(range(min = 1, max = limits::STEPS))]
     pub evaluation_steps: u32,
     /// Trials per individual.
+    #[schemars(range(min = 1, max = limits::TRIALS))]
     pub num_evaluations: u32,
     /// Fitness of a trial.
     pub fitness_function: FitnessFunction,
     /// Stop when the mean fitness of a generation reaches this.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(default, with = "f64")]
     pub target_fitness: Option<f64>,
     /// Populations, in genotype order; several evolve cooperatively.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub populations: NamedMap<PopulationConfig>,
 }
 
 /// Evolutionary algorithms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum AlgorithmName {
     /// Genetic algorithm.
     #[serde(rename = "GA")]
@@ -55,7 +64,7 @@ pub enum AlgorithmName {
 }
 
 /// Fitness functions; see `fitness`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FitnessFunction {
     /// Experiment A: one robot, and the same one, has its LED on.
@@ -73,13 +82,21 @@ pub enum FitnessFunction {
 }
 
 /// One population: its segment of the genotype and its algorithm's parameters.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("params"),
+    transform = schema::params_without_params
+)]
 pub struct PopulationConfig {
     /// What its genes encode, in genotype order.
+    #[schemars(length(min = 1, max = limits::ENTRIES))]
     pub objects: Vec<GenotypeQuery>,
     /// Upper bound of the decoded values, per query.
+    #[schemars(schema_with = "schema::number_or_numbers")]
     pub max_vals: Vec<f64>,
     /// Lower bound of the decoded values, per query.
+    #[schemars(schema_with = "schema::number_or_numbers")]
     pub min_vals: Vec<f64>,
     /// Parameters of the algorithm; of the variant that `algorithm.name` names.
     pub params: AlgorithmParams,
@@ -235,9 +252,28 @@ impl Serialize for GenotypeQuery {
     }
 }
 
+impl JsonSchema for GenotypeQuery {
+    fn schema_name() -> Cow<'static, str> {
+        "GenotypeQuery".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "Names a part of the network's parameters (Table 4.1).",
+            "type": "string",
+            "pattern": "^(synapses:weights|neurons:(bias|tau|gains?)):.+$",
+        })
+    }
+}
+
+/// Keys of the genetic algorithm that files of the original simulator may have
+/// for any algorithm.
+pub(super) const GENETIC_KEYS: &str = "selection_operator, mating_operator, crossover_operator, \
+    crossover_prob, mutation_operator, mutation_prob, num_elite";
+
 /// Parameters of an algorithm. `algorithm.name` says which variant applies, so
 /// the canonical form carries no tag.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum AlgorithmParams {
     /// [`AlgorithmName::Ga`]
@@ -253,25 +289,31 @@ pub enum AlgorithmParams {
 }
 
 /// Genetic algorithm (Table 3.4).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default, deny_unknown_fields, transform = schema::encoded)]
 pub struct GaParams {
     /// How parents are chosen.
     pub selection_operator: SelectionOperator,
     /// Contestants of a tournament, drawn with replacement; default 3.
+    #[schemars(range(min = 1, max = limits::POPULATION))]
     pub tournament_size: u32,
     /// How parents are paired.
     pub mating_operator: MatingOperator,
     /// How two parents yield two children.
     pub crossover_operator: CrossoverOperator,
     /// BLX-alpha's alpha; default 0.5.
+    #[schemars(range(min = 0))]
     pub alpha: f64,
     /// Probability that a pair is crossed; default 0.9.
+    #[schemars(range(min = 0, max = 1))]
     pub crossover_prob: f64,
     /// How a gene mutates.
     pub mutation_operator: MutationOperator,
     /// Probability that a gene mutates; default 0.05.
+    #[schemars(range(min = 0, max = 1))]
     pub mutation_prob: f64,
     /// Standard deviation of Gaussian mutation; default sqrt(0.3).
+    #[schemars(range(min = 0))]
     pub mutation_sigma: f64,
     /// Individuals that survive unchanged; default 3.
     pub num_elite: u32,
@@ -295,7 +337,7 @@ impl Default for GaParams {
 }
 
 /// Selection operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionOperator {
     /// The best of K drawn uniformly.
@@ -311,7 +353,7 @@ pub enum SelectionOperator {
 }
 
 /// Mating operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatingOperator {
     /// Uniformly random pairs.
@@ -319,7 +361,7 @@ pub enum MatingOperator {
 }
 
 /// Crossover operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CrossoverOperator {
     /// BLX-alpha.
@@ -338,7 +380,7 @@ pub enum CrossoverOperator {
 }
 
 /// Mutation operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MutationOperator {
     /// Adds N(0, mutation_sigma^2).
@@ -348,16 +390,26 @@ pub enum MutationOperator {
 }
 
 /// SNES (Algorithm 3).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct SnesParams {
     /// Learning rate of mu; default 1.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_mu: f64,
     /// Learning rate of sigma; none: (3 + ln d) / (5 sqrt d).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_sigma: Option<f64>,
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First standard deviation of every gene; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -368,19 +420,30 @@ impl Default for SnesParams {
 }
 
 /// xNES (Algorithm 2).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct XnesParams {
     /// Learning rate of mu; default 1.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_mu: f64,
     /// Learning rate of sigma; none: (9 + 3 ln d) / (5 d sqrt d).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_sigma: Option<f64>,
     /// Learning rate of the shape B; none: as `eta_sigma`.
     #[serde(rename = "eta_B", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_b: Option<f64>,
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First standard deviation of every gene; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -391,11 +454,19 @@ impl Default for XnesParams {
 }
 
 /// CMA-ES and sep-CMA-ES.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct CmaEsParams {
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First step size; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -406,19 +477,31 @@ impl Default for CmaEsParams {
 }
 
 /// OpenAI-ES.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct OpenAiEsParams {
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// Standard deviation of the perturbations; default 0.1.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma: f64,
     /// Adam's step size; default 0.02.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub learning_rate: f64,
     /// Adam's decay of the first moment; default 0.9.
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub beta1: f64,
     /// Adam's decay of the second moment; default 0.999.
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub beta2: f64,
     /// L2 pull towards `mu_init` per generation; default 0.
+    #[schemars(range(min = 0, max = 1))]
     pub weight_decay: f64,
 }
 

@@ -38,6 +38,8 @@ pub(super) fn read(
 }
 
 fn experiment(o: &mut Object<'_>, default_name: &str) -> ExperimentConfig {
+    // Tells an editor where the schema is.
+    o.optional("$schema").map(Node::string);
     let name = o.optional("name").map(Node::name);
     let checkpoint = o.optional("checkpoint_file").filter(|node| !node.is_null()).map(Node::name);
     let config = ExperimentConfig {
