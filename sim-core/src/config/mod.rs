@@ -10,9 +10,12 @@
 
 mod algorithm;
 mod check;
+mod equipment;
 pub mod limits;
 mod problem;
+mod query;
 mod read;
+mod robot;
 mod schema;
 #[cfg(test)]
 mod tests;
@@ -24,7 +27,10 @@ use serde::Serialize;
 use serde_json::json;
 
 pub use algorithm::*;
+pub use equipment::*;
 pub use problem::{ConfigError, Problem};
+pub use query::*;
+pub use robot::*;
 pub use schema::json_schema;
 pub use topology::*;
 pub use world::*;
