@@ -1,7 +1,8 @@
 //! The wire protocol: generated from `swarm/v1/*.proto`, and nothing else.
 
 /// Package `swarm.v1`.
-#[allow(missing_docs, clippy::all)]
+// Generated code keeps its own style.
+#[allow(missing_docs, unused_qualifications, clippy::all)]
 pub mod v1 {
     tonic::include_proto!("swarm.v1");
 }

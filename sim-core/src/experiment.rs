@@ -2,17 +2,33 @@
 
 use std::ops::Range;
 
-use crate::config::{ConfigError, ExperimentConfig};
+use crate::config::{ConfigError, ExperimentConfig, FitnessFunction};
+use crate::episode;
+use crate::genotype::Codec;
+use crate::network::Network;
+use crate::problems::Problems;
+use crate::trial::Trial;
+use crate::world::World;
+
+/// Trials whose start is tried out when an experiment is compiled.
+const N_TRIED_TRIALS: u32 = 8;
 
 /// A compiled experiment: (genotype, generation, trials) -> fitness.
 #[derive(Debug, Clone)]
-pub struct Experiment {}
+pub struct Experiment {
+    pub(crate) seed: u64,
+    pub(crate) n_steps: u32,
+    n_trials: u32,
+    pub(crate) fitness: FitnessFunction,
+    pub(crate) network: Network,
+    codec: Codec,
+    pub(crate) world: World,
+}
 
-/// A genotype or trial range that does not belong to the experiment: a bug of
-/// the caller.
+/// Why a genotype could not be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EvaluateError {
-    /// The genotype has another length.
+    /// The genotype has another length: a bug of the caller.
     #[error("the genotype has {actual} genes, the experiment's have {expected}")]
     GenotypeLength {
         /// Genes of the experiment's genotypes.
@@ -20,7 +36,7 @@ pub enum EvaluateError {
         /// Genes of this one.
         actual: usize,
     },
-    /// A gene outside \[0, 1\] or not finite.
+    /// A gene outside \[0, 1\] or not finite: a bug of the caller.
     #[error("gene {index} is {value}, outside [0, 1]")]
     GeneOutOfRange {
         /// Index of the gene.
@@ -28,7 +44,7 @@ pub enum EvaluateError {
         /// Its value.
         value: f64,
     },
-    /// No trials, or some beyond `num_evaluations`.
+    /// No trials, or some beyond `num_evaluations`: a bug of the caller.
     #[error("trials {}..{} are not within 0..{n_trials}", trials.start, trials.end)]
     Trials {
         /// The requested trials.
@@ -36,30 +52,73 @@ pub enum EvaluateError {
         /// Trials per individual.
         n_trials: u32,
     },
+    /// An initialiser found no place: the experiment asks for what its world
+    /// cannot hold. Every genotype meets it in this trial.
+    #[error(
+        "world.objects.{object}.initializers.positions: no place for number {index} \
+         in generation {generation}, trial {trial}"
+    )]
+    Unplaceable {
+        /// Name of the object.
+        object: String,
+        /// Index of the instance without a place.
+        index: usize,
+        /// Generation of the trial.
+        generation: u64,
+        /// The trial.
+        trial: u32,
+    },
 }
 
 impl Experiment {
-    /// Compiles a configuration. The reader has checked it already; what only
-    /// compiling can find (an initialiser that cannot be met, say) is reported
-    /// in the same way.
-    pub fn compile(_config: &ExperimentConfig) -> Result<Self, ConfigError> {
-        todo!()
+    /// Compiles a configuration that the reader of experiment files accepts. What
+    /// only compiling can find (an initialiser that cannot be met, say) is
+    /// reported in the same way.
+    pub fn compile(config: &ExperimentConfig) -> Result<Self, ConfigError> {
+        let mut problems = Problems::default();
+        let algorithm = &config.algorithm;
+        let network = Network::compile(&config.topology, &mut problems);
+        let codec = Codec::compile(config, &network, &mut problems);
+        let world =
+            World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
+        problems.check()?;
+        let experiment = Self {
+            seed: config.seed,
+            n_steps: algorithm.evaluation_steps,
+            n_trials: algorithm.num_evaluations,
+            fitness: algorithm.fitness_function,
+            network,
+            codec,
+            world: world.expect("a world without problems is one"),
+        };
+        let mut problems = Problems::default();
+        for trial in 0..experiment.n_trials.min(N_TRIED_TRIALS) {
+            if let Err(EvaluateError::Unplaceable { object, index, .. }) =
+                Trial::new(&experiment, 0, trial)
+            {
+                let path = format!("world.objects.{object}.initializers.positions");
+                problems.add(path, format!("no place for number {index} in trial {trial}"));
+                break;
+            }
+        }
+        problems.check()?;
+        Ok(experiment)
     }
 
     /// Length d of a genotype.
     pub fn genotype_len(&self) -> usize {
-        todo!()
+        self.codec.genotype_len()
     }
 
     /// Genes of each population, in the order of `algorithm.populations`.
     pub fn population_segments(&self) -> &[Range<usize>] {
-        todo!()
+        self.codec.segments()
     }
 
     /// Parameters that no query of the genotype covers and that keep their
     /// defaults, one line each, for a warning.
     pub fn uncovered_parameters(&self) -> &[String] {
-        todo!()
+        self.codec.uncovered()
     }
 
     /// Simulates one episode per trial and returns their fitness, in order.
@@ -69,16 +128,137 @@ impl Experiment {
     /// other trials are asked for.
     pub fn evaluate(
         &self,
-        _genotype: &[f64],
-        _generation: u64,
-        _trials: Range<u32>,
+        genotype: &[f64],
+        generation: u64,
+        trials: Range<u32>,
     ) -> Result<Vec<f64>, EvaluateError> {
-        todo!()
+        self.check_genotype(genotype)?;
+        if trials.is_empty() || trials.end > self.n_trials {
+            return Err(EvaluateError::Trials { trials, n_trials: self.n_trials });
+        }
+        episode::run(self, &self.codec.decode(genotype), generation, trials)
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with
     /// `tau`, `bias`, `gain` and activation, synapses with weights.
-    pub fn network_json(&self, _genotype: &[f64]) -> Result<serde_json::Value, EvaluateError> {
-        todo!()
+    pub fn network_json(&self, genotype: &[f64]) -> Result<serde_json::Value, EvaluateError> {
+        self.check_genotype(genotype)?;
+        Ok(self.network.to_json(&self.codec.decode(genotype)))
+    }
+
+    fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
+        let (expected, actual) = (self.genotype_len(), genotype.len());
+        if actual != expected {
+            return Err(EvaluateError::GenotypeLength { expected, actual });
+        }
+        match genotype.iter().position(|gene| !(0.0..=1.0).contains(gene)) {
+            Some(index) => Err(EvaluateError::GeneOutOfRange { index, value: genotype[index] }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{GenotypeQuery, SynapseSelector};
+    use crate::testing::{experiment_a, genotype, robot};
+
+    #[test]
+    fn the_genotype_of_experiment_a_has_about_455_genes() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let d = experiment.genotype_len();
+        assert!((445..=465).contains(&d), "{d}");
+        assert_eq!(experiment.population_segments(), std::slice::from_ref(&(0..d)));
+        assert!(experiment.uncovered_parameters().is_empty());
+    }
+
+    #[test]
+    fn a_trial_does_not_depend_on_the_trials_beside_it() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        for seed in 0..3 {
+            let genotype = genotype(experiment.genotype_len(), seed);
+            let together = experiment.evaluate(&genotype, 7, 0..5).unwrap();
+            for trial in 0..5 {
+                let alone = experiment.evaluate(&genotype, 7, trial..trial + 1).unwrap();
+                assert_eq!(alone[0].to_bits(), together[trial as usize].to_bits());
+            }
+        }
+    }
+
+    #[test]
+    fn fitness_varies_with_genotype_generation_and_trial_only() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let mut seen = Vec::new();
+        for seed in 0..20 {
+            let genotype = genotype(experiment.genotype_len(), seed);
+            let fitness = experiment.evaluate(&genotype, 0, 0..5).unwrap();
+            assert_eq!(fitness, experiment.evaluate(&genotype, 0, 0..5).unwrap());
+            assert!(fitness.iter().all(|f| (0.0..=2.45).contains(f)), "{fitness:?}");
+            seen.push(fitness);
+        }
+        seen.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        seen.dedup();
+        assert!(seen.len() > 5, "{seen:?}");
+    }
+
+    #[test]
+    fn genotypes_and_trials_are_checked() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let d = experiment.genotype_len();
+        let mut genes = vec![0.5; d];
+        let short = experiment.evaluate(&genes[1..], 0, 0..1);
+        assert_eq!(short, Err(EvaluateError::GenotypeLength { expected: d, actual: d - 1 }));
+        for trials in [0..0, 5..6, 0..6] {
+            let expected = EvaluateError::Trials { trials: trials.clone(), n_trials: 5 };
+            assert_eq!(experiment.evaluate(&genes, 0, trials), Err(expected));
+        }
+        genes[3] = 1.5;
+        let outside = experiment.network_json(&genes);
+        assert_eq!(outside, Err(EvaluateError::GeneOutOfRange { index: 3, value: 1.5 }));
+        genes[3] = f64::NAN;
+        assert!(experiment.evaluate(&genes, 0, 0..1).is_err());
+    }
+
+    #[test]
+    fn a_world_without_room_is_an_error_of_the_configuration() {
+        let mut config = experiment_a();
+        (config.world.width, config.world.height) = (100.0, 100.0);
+        robot(&mut config).num_instances = 50;
+        let error = Experiment::compile(&config).unwrap_err();
+        assert_eq!(error.problems[0].path, "world.objects.robotA.initializers.positions");
+    }
+
+    #[test]
+    fn all_problems_are_reported_at_once() {
+        let mut config = experiment_a();
+        config.algorithm.evolvable_object = "robotB".into();
+        config.topology.synapses[0].pre = vec!["nobody".into()];
+        config.algorithm.populations[0].objects[1] =
+            GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()));
+        let error = Experiment::compile(&config).unwrap_err();
+        let paths: Vec<&str> = error.problems.iter().map(|problem| &*problem.path).collect();
+        assert_eq!(
+            paths,
+            [
+                "topology.synapses.I1-H1",
+                "algorithm.populations.p4.objects[1]",
+                "algorithm.evolvable_object",
+            ]
+        );
+    }
+
+    #[test]
+    fn the_network_can_be_read() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let d = experiment.genotype_len();
+        let json = experiment.network_json(&vec![0.5; d]).unwrap();
+        assert_eq!(json["neurons"].as_array().unwrap().len(), 24);
+        assert_eq!(json["synapses"].as_array().unwrap().len(), d - 3 * 24);
+        assert_eq!(json["synapses"][0]["weight"], 0.0);
+        assert_eq!(json["synapses"][0]["pre"]["input"], 0);
+        assert_eq!(json["neurons"][0]["bias"], 0.0);
+        assert_eq!(json["neurons"][0]["activation"], "sigmoid");
+        assert_eq!(json["stimuli"][2]["sensor"], "wireless_receiver:receiving_direction");
     }
 }

@@ -4,9 +4,32 @@
 //! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
 //! same inputs give the same bits on every machine.
 
+mod alpha_shape;
+mod border;
+mod communication;
 pub mod config;
+mod controllers;
+mod drive;
+mod episode;
 mod experiment;
+mod fitness;
+mod genotype;
+mod initializers;
+mod lanes;
+mod leadership;
+mod lights;
+mod network;
+mod perturbations;
+mod problems;
 pub mod random;
+mod senses;
+mod sensors;
+mod swarm;
+#[cfg(test)]
+mod testing;
+mod torus;
+mod trial;
+mod world;
 
 pub use experiment::{EvaluateError, Experiment};
 

@@ -96,6 +96,19 @@ impl Stream {
     }
 }
 
+/// The index that a uniform `u` in \[0, 1) draws with probabilities proportional
+/// to `weights`: the smallest i with w_0 + ... + w_i > u * total. `weights` are
+/// not negative, and one at least is positive.
+pub(crate) fn sample(weights: &[f64], u: f64) -> usize {
+    let total = weights.iter().fold(0.0, |sum, weight| sum + weight);
+    let mut sum = 0.0;
+    let drawn = weights.iter().position(|weight| {
+        sum += weight;
+        sum > u * total
+    });
+    drawn.unwrap_or(weights.len() - 1)
+}
+
 const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
 const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
 
@@ -204,6 +217,15 @@ mod tests {
             let q = standard_normal_quantile(p);
             assert!((q - expected).abs() <= 1e-14 * expected.abs().max(1.0), "{p}: {q} {expected}");
         }
+    }
+
+    #[test]
+    fn sampling_follows_the_weights_in_order() {
+        let weights = [0.0, 1.0, 0.0, 3.0];
+        assert_eq!(sample(&weights, 0.0), 1);
+        assert_eq!(sample(&weights, 0.249), 1);
+        assert_eq!(sample(&weights, 0.25), 3);
+        assert_eq!(sample(&weights, 1.0 - TWO_POW_MINUS_53), 3);
     }
 
     #[test]

@@ -1,1 +1,232 @@
-//! (see lib)
+//! A worker: it computes the fitness of genotypes for a coordinator, and keeps
+//! nothing that matters.
+//!
+//! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
+
+mod backoff;
+mod convert;
+mod pool;
+mod session;
+
+use std::{io, time::Duration};
+
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Endpoint;
+use tracing::{info, warn};
+
+pub use crate::backoff::Backoff;
+use crate::{
+    pool::{Evaluator, Pool},
+    session::{Ended, OpenError, Session},
+};
+
+/// Most items that a worker computes at the same time.
+pub const SLOTS_MAX: usize = 4096;
+
+/// Longest name of a worker, in bytes.
+pub const NAME_BYTES_MAX: usize = 128;
+
+/// How to be a worker, and whose.
+#[derive(Debug, Clone)]
+pub struct WorkerConfig {
+    /// Where the coordinator listens, such as `http://127.0.0.1:7700`.
+    pub coordinator: String,
+    /// Name for logs, 1 to [`NAME_BYTES_MAX`] bytes.
+    pub name: String,
+    /// Number of items computed at the same time, each on a thread of its own,
+    /// 1 to [`SLOTS_MAX`].
+    pub slots: usize,
+    /// Upper bound of the random delay before the first reconnection; it doubles
+    /// with every further one that fails.
+    pub retry_delay_min: Duration,
+    /// Largest upper bound of that delay.
+    pub retry_delay_max: Duration,
+}
+
+impl WorkerConfig {
+    /// A worker that reconnects within 250 ms at first, and within 10 s at last.
+    pub fn new(coordinator: impl Into<String>, name: impl Into<String>, slots: usize) -> Self {
+        Self {
+            coordinator: coordinator.into(),
+            name: name.into(),
+            slots,
+            retry_delay_min: Duration::from_millis(250),
+            retry_delay_max: Duration::from_secs(10),
+        }
+    }
+}
+
+/// Why a worker gave up. What may pass (a coordinator that is down, a broken
+/// connection) is retried and never gets here.
+#[derive(Debug, thiserror::Error)]
+pub enum WorkerError {
+    /// The coordinator's address is none. Fix the input.
+    #[error(
+        "`{address}` is not the address of a coordinator ({reason}); expected something like http://127.0.0.1:7700"
+    )]
+    Address {
+        /// The address.
+        address: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A name that the protocol cannot carry. Fix the input.
+    #[error("a worker's name has 1 to {NAME_BYTES_MAX} bytes, this one has {0}")]
+    Name(usize),
+    /// A number of slots that the protocol does not allow. Fix the input.
+    #[error("a worker has 1 to {SLOTS_MAX} slots, not {0}")]
+    Slots(usize),
+    /// Coordinator and worker would not compute the same bits. Install the same
+    /// version of both.
+    #[error(
+        "the coordinator at {address} refused this worker: {refusal}; this worker speaks protocol {} \
+         and computes with {}",
+        swarm_proto::PROTOCOL_VERSION,
+        sim_core::FINGERPRINT
+    )]
+    VersionMismatch {
+        /// Address of the coordinator.
+        address: String,
+        /// The coordinator's reason, which names its version.
+        refusal: String,
+    },
+    /// The operating system gave no thread.
+    #[error("cannot start the threads that compute: {0}")]
+    Threads(#[from] io::Error),
+}
+
+impl WorkerError {
+    /// Whether the configuration is at fault.
+    pub fn is_input(&self) -> bool {
+        matches!(self, Self::Address { .. } | Self::Name(_) | Self::Slots(_))
+    }
+}
+
+/// Works for the coordinator until `shutdown` is cancelled: then it finishes
+/// what it is computing, delivers that, and returns.
+///
+/// A coordinator that is not up, or goes away, is tried again without end, after
+/// random delays that grow.
+pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
+    run_with(config, shutdown, convert::evaluator).await
+}
+
+/// [`run`] with another way to make a specification computable.
+async fn run_with(
+    config: WorkerConfig,
+    shutdown: CancellationToken,
+    evaluator: fn(String) -> Evaluator,
+) -> Result<(), WorkerError> {
+    let endpoint = endpoint(&config)?;
+    let pool = Pool::start(config.slots)?;
+    let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
+    loop {
+        let opened = tokio::select! {
+            biased;
+            () = shutdown.cancelled() => return Ok(()),
+            opened = Session::open(&endpoint, &config) => opened,
+        };
+        let (what, reason) = match opened {
+            Ok(session) => {
+                info!(
+                    coordinator = config.coordinator,
+                    name = config.name,
+                    worker_id = session.worker_id(),
+                    slots = config.slots,
+                    "connected"
+                );
+                let ended = session.serve(&pool, &shutdown, evaluator).await;
+                // What is queued was assigned on this stream: it is not ours any more.
+                pool.drop_queued(|_| true);
+                match ended {
+                    Ended::Drained => return Ok(()),
+                    Ended::Lost { reason, worked } => {
+                        if worked {
+                            backoff.reset();
+                        }
+                        ("connection lost", reason)
+                    }
+                }
+            }
+            Err(OpenError::VersionMismatch(refusal)) => {
+                return Err(WorkerError::VersionMismatch { address: config.coordinator, refusal });
+            }
+            Err(OpenError::Refused(reason)) => ("refused", reason),
+            Err(OpenError::Unreachable(reason)) => ("cannot connect", reason),
+        };
+        let delay = backoff.next_delay(rand::random());
+        warn!(
+            coordinator = config.coordinator,
+            name = config.name,
+            reason,
+            "{what}, retrying in {:.1} s",
+            delay.as_secs_f64()
+        );
+        tokio::select! {
+            biased;
+            () = shutdown.cancelled() => return Ok(()),
+            () = tokio::time::sleep(delay) => {}
+        }
+    }
+}
+
+/// Checks the configuration and describes the connection.
+fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
+    if !(1..=NAME_BYTES_MAX).contains(&config.name.len()) {
+        return Err(WorkerError::Name(config.name.len()));
+    }
+    if !(1..=SLOTS_MAX).contains(&config.slots) {
+        return Err(WorkerError::Slots(config.slots));
+    }
+    let not_an_address =
+        |reason: String| WorkerError::Address { address: config.coordinator.clone(), reason };
+    let endpoint = Endpoint::from_shared(config.coordinator.clone())
+        .map_err(|error| not_an_address(session::with_causes(&error)))?;
+    if endpoint.uri().scheme_str() != Some("http") || endpoint.uri().host().is_none() {
+        return Err(not_an_address("it does not start with http:// and a host".into()));
+    }
+    Ok(endpoint
+        .connect_timeout(Duration::from_secs(5))
+        // A coordinator whose machine vanished closes nothing: only pings find out.
+        .http2_keep_alive_interval(Duration::from_secs(10))
+        .keep_alive_timeout(Duration::from_secs(10))
+        .keep_alive_while_idle(true))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rejection(coordinator: &str, name: &str, slots: usize) -> WorkerError {
+        endpoint(&WorkerConfig::new(coordinator, name, slots)).unwrap_err()
+    }
+
+    #[test]
+    fn what_the_protocol_cannot_carry_is_an_input_error() {
+        let url = "http://127.0.0.1:7700";
+        for error in [
+            rejection("", "w", 1),
+            rejection("127.0.0.1:7700", "w", 1),
+            rejection("not an address", "w", 1),
+            rejection("ftp://host:1", "w", 1),
+            rejection(url, "", 1),
+            rejection(url, &"w".repeat(129), 1),
+            rejection(url, "w", 0),
+            rejection(url, "w", 4097),
+        ] {
+            assert!(error.is_input(), "{error}");
+        }
+        assert!(endpoint(&WorkerConfig::new(url, "w", 4096)).is_ok());
+    }
+
+    #[test]
+    fn a_version_mismatch_names_both_versions() {
+        let error = WorkerError::VersionMismatch {
+            address: "http://host:1".into(),
+            refusal: "this coordinator computes with sim-core 9".into(),
+        };
+        let text = error.to_string();
+        assert!(text.contains("sim-core 9") && text.contains(sim_core::FINGERPRINT), "{text}");
+        assert!(!error.is_input());
+    }
+}

@@ -1,0 +1,208 @@
+//! Everything that ends a command early: what to say, and the exit code.
+
+use std::{io, path::PathBuf};
+
+use tonic::{Code, Status};
+
+/// Why a command did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Bad input; the message says what would be right.
+    #[error("{0}")]
+    Input(String),
+    /// An experiment file with problems, one per line.
+    #[error("{} is not a valid experiment file", file.display())]
+    Config {
+        /// The file.
+        file: PathBuf,
+        /// The coordinator's words.
+        problems: String,
+    },
+    /// The coordinator of `run` does not start, which is the data directory's
+    /// fault.
+    #[error(transparent)]
+    Start(#[from] coordinator::StartError),
+    /// No such experiment, or no champion.
+    #[error("{0}")]
+    NotFound(String),
+    /// No answer.
+    #[error(
+        "cannot reach the coordinator at {address}: {reason}; start it with `coordinator` or pass \
+         --coordinator"
+    )]
+    Unreachable {
+        /// The coordinator's address.
+        address: String,
+        /// The cause.
+        reason: String,
+    },
+    /// The experiment ended otherwise than by completing.
+    #[error("experiment {id} {}", with_reason(.state, .reason))]
+    Ended {
+        /// Number of the experiment.
+        id: u64,
+        /// `failed` or `cancelled`.
+        state: &'static str,
+        /// Why; may be empty.
+        reason: String,
+    },
+    /// A signal; the text says what becomes of the experiment.
+    #[error("interrupted; {0}")]
+    Interrupted(String),
+    /// Whoever read standard output has had enough.
+    #[error("standard output is closed")]
+    OutputClosed,
+    /// Standard output, or a file, cannot be written.
+    #[error("cannot write {what}: {source}")]
+    Write {
+        /// What was to be written.
+        what: String,
+        /// Why it cannot.
+        source: io::Error,
+    },
+    /// Not the user's fault.
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Error {
+    /// See `swarmctl --help`.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::OutputClosed => 0,
+            Self::Write { .. } | Self::Internal(_) => 1,
+            Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
+            Self::NotFound(_) => 3,
+            Self::Unreachable { .. } => 4,
+            Self::Ended { .. } => 5,
+            Self::Interrupted(_) => 130,
+        }
+    }
+
+    /// What to print on standard error, if anything.
+    pub fn report(&self) -> Option<String> {
+        match self {
+            Self::OutputClosed => None,
+            Self::Config { file, problems } => Some(prefix_lines(problems, &file.display())),
+            Self::Interrupted(_) => Some(self.to_string()),
+            _ => Some(format!("error: {self}")),
+        }
+    }
+
+    /// Standard output's errors: a closed pipe is none.
+    pub fn from_stdout(source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::BrokenPipe => Self::OutputClosed,
+            _ => Self::Write { what: "standard output".into(), source },
+        }
+    }
+
+    /// A coordinator's refusal, or its silence.
+    pub fn from_status(status: &Status, address: &str) -> Self {
+        let message = status.message();
+        match status.code() {
+            _ if is_transport(status) => {
+                Self::Unreachable { address: address.into(), reason: reason(status) }
+            }
+            Code::NotFound | Code::FailedPrecondition => Self::NotFound(message.into()),
+            Code::InvalidArgument => Self::Input(message.into()),
+            code => {
+                let text = if message.is_empty() { code.description() } else { message };
+                Self::Internal(format!("the coordinator at {address} answered: {text}"))
+            }
+        }
+    }
+}
+
+/// Whether the same request may succeed later, without anyone's doing.
+pub fn is_transient(status: &Status) -> bool {
+    let code = status.code();
+    is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
+}
+
+/// Whether the status is about the connection: the ones that this side makes up
+/// know their cause, those of a coordinator do not.
+fn is_transport(status: &Status) -> bool {
+    let code = status.code();
+    std::error::Error::source(status).is_some()
+        || matches!(code, Code::Unavailable | Code::DeadlineExceeded)
+}
+
+/// The deepest cause, which names the thing that went wrong.
+pub fn reason(status: &Status) -> String {
+    let mut source = std::error::Error::source(status);
+    let mut text = status.message().to_owned();
+    while let Some(cause) = source {
+        text = cause.to_string();
+        source = cause.source();
+    }
+    if text.is_empty() { status.code().description().into() } else { text }
+}
+
+/// Each line of a text behind a name.
+pub fn prefix_lines(text: &str, name: &impl std::fmt::Display) -> String {
+    let lines: Vec<String> = text.lines().map(|line| format!("{name}: {line}")).collect();
+    lines.join("\n")
+}
+
+fn with_reason(state: &str, reason: &str) -> String {
+    let verb = if state == "failed" { "failed" } else { "was cancelled" };
+    if reason.is_empty() { verb.into() } else { format!("{verb}: {reason}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ADDRESS: &str = "http://127.0.0.1:7700";
+
+    fn exit_code(status: Status) -> u8 {
+        Error::from_status(&status, ADDRESS).exit_code()
+    }
+
+    #[test]
+    fn exit_codes_follow_status_codes() {
+        assert_eq!(exit_code(Status::internal("a bug")), 1);
+        assert_eq!(exit_code(Status::unimplemented("")), 1);
+        assert_eq!(exit_code(Status::invalid_argument("no")), 2);
+        assert_eq!(exit_code(Status::not_found("no experiment 3")), 3);
+        assert_eq!(exit_code(Status::failed_precondition("no champion yet")), 3);
+        assert_eq!(exit_code(Status::unavailable("")), 4);
+        assert_eq!(exit_code(Status::from_error("broken".into())), 4);
+    }
+
+    #[test]
+    fn exit_codes_of_what_happens_here() {
+        let ended = Error::Ended { id: 3, state: "failed", reason: "item 7".into() };
+        assert_eq!(ended.exit_code(), 5);
+        assert_eq!(ended.report().unwrap(), "error: experiment 3 failed: item 7");
+        let cancelled = Error::Ended { id: 3, state: "cancelled", reason: String::new() };
+        assert_eq!(cancelled.report().unwrap(), "error: experiment 3 was cancelled");
+        assert_eq!(Error::Interrupted("x".into()).exit_code(), 130);
+        assert_eq!(Error::Input("x".into()).exit_code(), 2);
+    }
+
+    #[test]
+    fn an_unreachable_coordinator_is_named_with_cause_and_remedy() {
+        let status = Status::from_error(Box::new(io::Error::other("connection refused")));
+        let report = Error::from_status(&status, ADDRESS).report().unwrap();
+        for part in [ADDRESS, "connection refused", "--coordinator"] {
+            assert!(report.contains(part), "{report}");
+        }
+    }
+
+    #[test]
+    fn every_problem_of_a_file_has_its_line() {
+        let file = PathBuf::from("a.json");
+        let error = Error::Config { file, problems: "line 3: x\nworld: y".into() };
+        assert_eq!(error.report().unwrap(), "a.json: line 3: x\na.json: world: y");
+        assert_eq!(error.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_closed_pipe_is_no_error() {
+        let error = Error::from_stdout(io::ErrorKind::BrokenPipe.into());
+        assert_eq!((error.exit_code(), error.report()), (0, None));
+        assert_eq!(Error::from_stdout(io::ErrorKind::StorageFull.into()).exit_code(), 1);
+    }
+}

@@ -1,0 +1,273 @@
+//! What `--output json` prints. Numbers read back to the same bits; a fitness
+//! that is not finite is `null`.
+
+use serde::Serialize;
+use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, GetChampionResponse};
+
+/// A value on one line.
+pub fn line(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("plain data with string keys serialises")
+}
+
+/// A value for reading.
+pub fn document(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("plain data with string keys serialises")
+}
+
+/// The name of a state.
+pub fn state_name(state: ExperimentState) -> &'static str {
+    match state {
+        ExperimentState::Unspecified => "unknown",
+        ExperimentState::Running => "running",
+        ExperimentState::Completed => "completed",
+        ExperimentState::Failed => "failed",
+        ExperimentState::Cancelled => "cancelled",
+    }
+}
+
+/// A generation, as `run` and `watch` print it.
+#[derive(Debug, Serialize)]
+pub struct Generation<'a> {
+    experiment: u64,
+    generation: u64,
+    best: f64,
+    mean: f64,
+    min: f64,
+    standard_deviation: f64,
+    episodes: u64,
+    duration_ms: u64,
+    workers: u32,
+    idle_share: f64,
+    digest: &'a str,
+}
+
+impl<'a> Generation<'a> {
+    pub fn new(experiment_id: u64, summary: &'a GenerationSummary) -> Self {
+        Self {
+            experiment: experiment_id,
+            generation: summary.generation,
+            best: summary.best,
+            mean: summary.mean,
+            min: summary.min,
+            standard_deviation: summary.standard_deviation,
+            episodes: summary.episodes,
+            duration_ms: summary.duration_ms,
+            workers: summary.workers,
+            idle_share: summary.idle_share,
+            digest: &summary.digest,
+        }
+    }
+}
+
+/// The end of an experiment, the last line of `run` and `watch`.
+#[derive(Debug, Serialize)]
+pub struct End<'a> {
+    experiment: u64,
+    state: &'static str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    reason: &'a str,
+    digest: Option<&'a str>,
+    champion: Option<ChampionSummary>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    champion_file: Option<&'a str>,
+}
+
+#[derive(Debug, Serialize)]
+struct ChampionSummary {
+    fitness: f64,
+    generation: u64,
+    individual: u32,
+}
+
+impl<'a> End<'a> {
+    pub fn new(experiment: &'a Experiment, champion: Option<&GetChampionResponse>) -> Self {
+        Self {
+            experiment: experiment.id,
+            state: state_name(experiment.state()),
+            reason: &experiment.reason,
+            digest: experiment.latest.as_ref().map(|latest| latest.digest.as_str()),
+            champion: champion.map(|champion| ChampionSummary {
+                fitness: champion.fitness,
+                generation: champion.generation,
+                individual: champion.individual,
+            }),
+            champion_file: None,
+        }
+    }
+
+    pub fn with_champion_file(self, champion_file: Option<&'a str>) -> Self {
+        Self { champion_file, ..self }
+    }
+}
+
+/// An experiment, as `list`, `submit` and `cancel` print it.
+#[derive(Debug, Serialize)]
+pub struct ExperimentDocument<'a> {
+    id: u64,
+    name: &'a str,
+    state: &'static str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    reason: &'a str,
+    generations_done: u64,
+    generations: u64,
+    seed: u64,
+    algorithm: &'a str,
+    population_size: u32,
+    genotype_len: u32,
+    submitted_at_ms: u64,
+    champion_fitness: Option<f64>,
+    config_digest: &'a str,
+    latest: Option<Generation<'a>>,
+}
+
+impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
+    fn from(experiment: &'a Experiment) -> Self {
+        Self {
+            id: experiment.id,
+            name: &experiment.name,
+            state: state_name(experiment.state()),
+            reason: &experiment.reason,
+            generations_done: experiment.generations_done,
+            generations: experiment.generations,
+            seed: experiment.seed,
+            algorithm: &experiment.algorithm,
+            population_size: experiment.population_size,
+            genotype_len: experiment.genotype_len,
+            submitted_at_ms: experiment.submitted_at_ms,
+            champion_fitness: experiment.champion_fitness,
+            config_digest: &experiment.config_digest,
+            latest: experiment.latest.as_ref().map(|latest| Generation::new(experiment.id, latest)),
+        }
+    }
+}
+
+/// A champion, all of it, as `champion` prints it.
+#[derive(Debug, Serialize)]
+pub struct ChampionDocument<'a> {
+    experiment: u64,
+    generation: u64,
+    individual: u32,
+    fitness: f64,
+    trial_fitness: &'a [f64],
+    genotype: &'a [f64],
+    network: serde_json::Value,
+}
+
+impl<'a> ChampionDocument<'a> {
+    /// Fails if the network is not JSON.
+    pub fn new(champion: &'a GetChampionResponse) -> serde_json::Result<Self> {
+        Ok(Self {
+            experiment: champion.experiment_id,
+            generation: champion.generation,
+            individual: champion.individual,
+            fitness: champion.fitness,
+            trial_fitness: &champion.trial_fitness,
+            genotype: &champion.genotype,
+            network: serde_json::from_str(&champion.network_json)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    fn summary() -> GenerationSummary {
+        GenerationSummary {
+            generation: 11,
+            best: 0.1 + 0.2,
+            mean: f64::MIN_POSITIVE,
+            min: -0.0,
+            standard_deviation: 1.0 / 3.0,
+            digest: "1a2b".into(),
+            duration_ms: 250,
+            episodes: 500,
+            workers: 2,
+            idle_share: 0.05,
+        }
+    }
+
+    fn champion() -> GetChampionResponse {
+        GetChampionResponse {
+            experiment_id: 3,
+            generation: 7,
+            individual: 2,
+            fitness: 1.25,
+            trial_fitness: vec![1.0, 1.5],
+            genotype: vec![0.1, 1.0 / 3.0],
+            network_json: r#"{"neurons":[{"tau":0.1}]}"#.into(),
+        }
+    }
+
+    #[test]
+    fn a_generation_is_one_line_whose_numbers_read_back_exactly() {
+        let summary = summary();
+        let text = line(&Generation::new(3, &summary));
+        assert!(!text.contains('\n'));
+        let value: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["experiment"], 3);
+        assert_eq!(value["generation"], 11);
+        assert_eq!(value["digest"], "1a2b");
+        let bits = |key: &str| value[key].as_f64().unwrap().to_bits();
+        assert_eq!(bits("best"), summary.best.to_bits());
+        assert_eq!(bits("mean"), summary.mean.to_bits());
+        assert_eq!(bits("min"), summary.min.to_bits());
+        assert_eq!(bits("standard_deviation"), summary.standard_deviation.to_bits());
+    }
+
+    #[test]
+    fn a_fitness_that_is_no_number_is_null() {
+        let summary = GenerationSummary { min: f64::NAN, ..summary() };
+        let value: Value = serde_json::from_str(&line(&Generation::new(3, &summary))).unwrap();
+        assert_eq!(value["min"], Value::Null);
+    }
+
+    #[test]
+    fn the_end_names_state_digest_and_champion() {
+        let experiment = Experiment {
+            id: 3,
+            state: ExperimentState::Completed.into(),
+            latest: Some(summary()),
+            ..Experiment::default()
+        };
+        let champion = champion();
+        let value = serde_json::to_value(End::new(&experiment, Some(&champion))).unwrap();
+        assert_eq!(
+            value,
+            json!({
+                "experiment": 3,
+                "state": "completed",
+                "digest": "1a2b",
+                "champion": {"fitness": 1.25, "generation": 7, "individual": 2},
+            })
+        );
+    }
+
+    #[test]
+    fn a_failure_before_the_first_generation_has_a_reason_and_no_champion() {
+        let experiment = Experiment {
+            id: 3,
+            state: ExperimentState::Failed.into(),
+            reason: "item 7 killed 3 workers".into(),
+            ..Experiment::default()
+        };
+        let value = serde_json::to_value(End::new(&experiment, None)).unwrap();
+        let reason = "item 7 killed 3 workers";
+        assert_eq!(
+            value,
+            json!({"experiment": 3, "state": "failed", "reason": reason, "digest": null, "champion": null})
+        );
+    }
+
+    #[test]
+    fn a_champion_contains_its_network() {
+        let champion = champion();
+        let value = serde_json::to_value(ChampionDocument::new(&champion).unwrap()).unwrap();
+        assert_eq!(value["network"]["neurons"][0]["tau"], 0.1);
+        assert_eq!(value["genotype"][1].as_f64().unwrap().to_bits(), (1.0f64 / 3.0).to_bits());
+        let broken = GetChampionResponse { network_json: "{".into(), ..champion };
+        assert!(ChampionDocument::new(&broken).is_err());
+    }
+}

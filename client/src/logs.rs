@@ -1,0 +1,16 @@
+//! Warnings of the services that `run` embeds, past the progress bar.
+
+use tracing_subscriber::filter::LevelFilter;
+
+use crate::progress::BesideBar;
+
+/// Logs warnings and errors, on lines of their own.
+pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
+    tracing_subscriber::fmt()
+        .with_max_level(LevelFilter::WARN)
+        .with_writer(stderr)
+        .with_ansi(false)
+        .with_target(false)
+        .without_time()
+        .init();
+}

@@ -1,0 +1,210 @@
+//! How a command shows what it does: a bar on a terminal, lines elsewhere, or
+//! JSON lines. Results go to standard output, remarks to standard error.
+
+use std::{
+    collections::VecDeque,
+    io::{self, IsTerminal as _, Write},
+    time::Duration,
+};
+
+use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use swarm_proto::v1::{Experiment, GenerationSummary};
+
+use crate::{args::OutputFormat, error::Error, json, text};
+
+/// Generations over which the estimate of the remaining time averages.
+const ETA_WINDOW: usize = 20;
+
+/// Where output goes, and the bar if there is one.
+pub struct Progress {
+    format: OutputFormat,
+    stdout: Box<dyn Write + Send>,
+    has_terminal: bool,
+    /// Hidden unless an experiment is followed on a terminal.
+    bar: ProgressBar,
+    experiment_id: u64,
+    generations: u64,
+    /// The latest generations' durations.
+    durations_ms: VecDeque<u64>,
+}
+
+impl Progress {
+    /// Prints to this process's standard output.
+    pub fn new(format: OutputFormat) -> Self {
+        let has_terminal = io::stdout().is_terminal() && io::stderr().is_terminal();
+        Self { has_terminal, ..Self::to(format, Box::new(io::stdout())) }
+    }
+
+    /// Prints to something that is not a terminal.
+    pub fn to(format: OutputFormat, stdout: Box<dyn Write + Send>) -> Self {
+        Self {
+            format,
+            stdout,
+            has_terminal: false,
+            bar: ProgressBar::hidden(),
+            experiment_id: 0,
+            generations: 0,
+            durations_ms: VecDeque::new(),
+        }
+    }
+
+    /// What standard output is for.
+    pub fn format(&self) -> OutputFormat {
+        self.format
+    }
+
+    /// A line, or several, on standard output.
+    pub fn print(&mut self, text: &str) -> Result<(), Error> {
+        let Self { bar, stdout, .. } = self;
+        bar.suspend(|| writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
+            .map_err(Error::from_stdout)
+    }
+
+    /// A remark on standard error.
+    pub fn remark(&self, text: &str) {
+        // Whoever closed standard error does not want to know.
+        let _ = self.stderr()().write_all(format!("{text}\n").as_bytes());
+    }
+
+    /// Makes writers to standard error that do not garble the bar.
+    pub fn stderr(&self) -> impl Fn() -> BesideBar + Send + Sync + 'static {
+        let bar = self.bar.clone();
+        move || BesideBar(bar.clone())
+    }
+
+    /// Shows the bar of an experiment, if there is a terminal.
+    pub fn begin(&mut self, experiment: &Experiment) {
+        self.experiment_id = experiment.id;
+        self.generations = experiment.generations;
+        if self.has_terminal && self.format == OutputFormat::Text {
+            let style = ProgressStyle::with_template("{prefix} {bar:24} {pos}/{len}  {msg}")
+                .expect("the template is valid");
+            self.bar.set_style(style);
+            self.bar.set_length(experiment.generations);
+            self.bar.set_prefix(experiment.name.clone());
+            self.bar.set_message("waiting for the first generation");
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.bar.tick();
+        }
+    }
+
+    /// Shows a generation.
+    pub fn generation(&mut self, summary: &GenerationSummary) -> Result<(), Error> {
+        self.durations_ms.truncate(ETA_WINDOW - 1);
+        self.durations_ms.push_front(summary.duration_ms);
+        match self.format {
+            OutputFormat::Json => {
+                self.print(&json::line(&json::Generation::new(self.experiment_id, summary)))
+            }
+            OutputFormat::Text if self.has_terminal => {
+                let done = summary.generation + 1;
+                let eta = remaining(&self.durations_ms, self.generations.saturating_sub(done));
+                let fitness = text::fitness(summary);
+                self.bar.set_position(done);
+                self.bar.set_message(format!("{fitness}  ETA {}", FormattedDuration(eta)));
+                Ok(())
+            }
+            OutputFormat::Text => self.print(&text::generation(summary, self.generations)),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Time for `generations` more like the latest ones.
+fn remaining(durations_ms: &VecDeque<u64>, generations: u64) -> Duration {
+    let mean_ms = durations_ms.iter().sum::<u64>() as f64 / durations_ms.len().max(1) as f64;
+    Duration::from_secs((mean_ms * generations as f64 / 1000.0).round() as u64)
+}
+
+/// Standard error, while a bar may be in the way.
+pub struct BesideBar(ProgressBar);
+
+impl Write for BesideBar {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.suspend(|| io::stderr().write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+
+    /// Standard output that can be read.
+    #[derive(Debug, Clone, Default)]
+    pub struct Captured(Arc<Mutex<Vec<u8>>>);
+
+    impl Captured {
+        pub fn progress(&self, format: OutputFormat) -> Progress {
+            Progress::to(format, Box::new(self.clone()))
+        }
+
+        pub fn lines(&self) -> Vec<String> {
+            let text = String::from_utf8(self.0.lock().unwrap().clone()).unwrap();
+            text.lines().map(str::to_owned).collect()
+        }
+    }
+
+    impl Write for Captured {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// What `| head` leaves behind.
+    struct Closed;
+
+    impl Write for Closed {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(io::ErrorKind::BrokenPipe.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn without_a_terminal_each_generation_is_a_line() {
+        let captured = Captured::default();
+        let mut progress = captured.progress(OutputFormat::Text);
+        progress.begin(&Experiment { id: 1, generations: 2, ..Experiment::default() });
+        for generation in 0..2 {
+            progress.generation(&GenerationSummary { generation, ..Default::default() }).unwrap();
+        }
+        let lines = captured.lines();
+        assert_eq!(lines.len(), 2);
+        assert!(lines[1].starts_with("generation 2/2  "), "{lines:?}");
+    }
+
+    #[test]
+    fn the_rest_takes_as_long_as_the_latest_generations() {
+        assert_eq!(remaining(&[1500, 2500].into(), 10), Duration::from_secs(20));
+        assert_eq!(remaining(&VecDeque::new(), 10), Duration::ZERO);
+        let mut progress = Captured::default().progress(OutputFormat::Json);
+        for duration_ms in 0..100 {
+            progress.generation(&GenerationSummary { duration_ms, ..Default::default() }).unwrap();
+        }
+        assert_eq!(progress.durations_ms.len(), ETA_WINDOW);
+        assert_eq!(progress.durations_ms.front(), Some(&99));
+    }
+
+    #[test]
+    fn a_closed_pipe_ends_the_output_quietly() {
+        let mut progress = Progress::to(OutputFormat::Text, Box::new(Closed));
+        assert!(matches!(progress.print("x"), Err(Error::OutputClosed)));
+    }
+}

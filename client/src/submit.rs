@@ -1,0 +1,103 @@
+//! `swarmctl submit`: gives an experiment to the coordinator.
+
+use crate::{
+    args::{OutputFormat, SubmitArgs},
+    connection::{Connection, present},
+    error::Error,
+    experiment_file::{ExperimentFile, random_request_id},
+    json,
+    progress::Progress,
+    text, watch,
+};
+
+/// Submits, and follows if asked to.
+pub async fn submit(
+    connection: &Connection,
+    args: &SubmitArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let file = ExperimentFile::read(&args.experiment.config)?;
+    let request = file.request(&args.experiment, random_request_id("submit"));
+    let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
+    if let Some(warnings) = file.warnings(&response.warnings) {
+        progress.remark(&warnings);
+    }
+    let experiment = present(response.experiment)?;
+    match (progress.format(), args.watch) {
+        (OutputFormat::Text, true) => progress.print(&text::submitted(&experiment))?,
+        (OutputFormat::Text, false) => progress.print(&format!(
+            "{}\nfollow it with: swarmctl watch {}",
+            text::submitted(&experiment),
+            experiment.id
+        ))?,
+        (OutputFormat::Json, true) => {}
+        (OutputFormat::Json, false) => {
+            progress.print(&json::document(&json::ExperimentDocument::from(&experiment)))?;
+        }
+    }
+    if args.watch { watch::watch(connection, experiment.id, progress).await } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::PathBuf};
+
+    use swarm_proto::v1::Experiment;
+    use tempfile::TempDir;
+    use tonic::Status;
+
+    use super::*;
+    use crate::{
+        args::ExperimentArgs,
+        fake_coordinator::{FakeCoordinator, Script},
+        progress::tests::Captured,
+    };
+
+    fn file() -> (TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("leader.json");
+        fs::write(&path, "{}").unwrap();
+        (dir, path)
+    }
+
+    fn args(config: PathBuf) -> SubmitArgs {
+        let experiment = ExperimentArgs { config, generations: None, seed: Some(7) };
+        SubmitArgs { experiment, watch: false }
+    }
+
+    #[tokio::test]
+    async fn a_submission_is_repeated_under_the_same_id() {
+        let (fake, connection) = FakeCoordinator::serve(Script {
+            experiment: Experiment { id: 3, ..Experiment::default() },
+            submit_refusals: [Status::unavailable("starting"), Status::unavailable("soon")].into(),
+            ..Script::default()
+        })
+        .await;
+        let (_dir, path) = file();
+        let captured = Captured::default();
+        let mut progress = captured.progress(OutputFormat::Json);
+        submit(&connection, &args(path), &mut progress).await.unwrap();
+        let submitted = fake.script(|script| script.submitted.clone());
+        assert_eq!(submitted.len(), 3);
+        assert!(submitted[0].request_id.len() > 16);
+        assert!(submitted.iter().all(|request| *request == submitted[0]));
+        let document: serde_json::Value =
+            serde_json::from_str(&captured.lines().join("\n")).unwrap();
+        assert_eq!(document["id"], 3);
+    }
+
+    #[tokio::test]
+    async fn a_refused_file_is_reported_line_by_line() {
+        let (_fake, connection) = FakeCoordinator::serve(Script {
+            submit_refusals: [Status::invalid_argument("line 1: a\nline 2: b")].into(),
+            ..Script::default()
+        })
+        .await;
+        let (_dir, path) = file();
+        let mut progress = Captured::default().progress(OutputFormat::Text);
+        let error = submit(&connection, &args(path.clone()), &mut progress).await.unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        let path = path.display();
+        assert_eq!(error.report().unwrap(), format!("{path}: line 1: a\n{path}: line 2: b"));
+    }
+}

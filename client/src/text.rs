@@ -1,0 +1,264 @@
+//! What `--output text` prints.
+
+use std::path::Path;
+
+use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, GetChampionResponse};
+
+use crate::json::state_name;
+
+/// Digits of a digest that tell runs apart at a glance.
+const DIGEST_DIGITS: usize = 12;
+
+/// One generation on one line.
+pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
+    let done = summary.generation + 1;
+    let width = generations.to_string().len();
+    format!(
+        "generation {done:>width$}/{generations}  {}  min {:.3}  {:.0} episodes/s  digest {}",
+        fitness(summary),
+        summary.min,
+        episodes_per_s(summary),
+        short(&summary.digest),
+    )
+}
+
+/// The two numbers that people follow.
+pub fn fitness(summary: &GenerationSummary) -> String {
+    format!("best {:.3}  mean {:.3}", summary.best, summary.mean)
+}
+
+fn episodes_per_s(summary: &GenerationSummary) -> f64 {
+    summary.episodes as f64 * 1000.0 / summary.duration_ms.max(1) as f64
+}
+
+fn short(digest: &str) -> &str {
+    digest.get(..DIGEST_DIGITS).unwrap_or(digest)
+}
+
+/// "experiment 3 (leader)".
+pub fn title(experiment: &Experiment) -> String {
+    format!("experiment {} ({})", experiment.id, experiment.name)
+}
+
+/// What was submitted.
+pub fn submitted(experiment: &Experiment) -> String {
+    format!(
+        "{}: {} generations of {} by {}, {} genes, seed {}",
+        title(experiment),
+        experiment.generations,
+        experiment.population_size,
+        experiment.algorithm,
+        experiment.genotype_len,
+        experiment.seed,
+    )
+}
+
+/// Where an experiment stands, on one line.
+pub fn standing(experiment: &Experiment) -> String {
+    let mut text = format!(
+        "{} {} after {} of {} generations",
+        title(experiment),
+        state_name(experiment.state()),
+        experiment.generations_done,
+        experiment.generations,
+    );
+    if !experiment.reason.is_empty() {
+        text += &format!(": {}", experiment.reason);
+    }
+    text
+}
+
+/// What an experiment has come to.
+pub fn end(
+    experiment: &Experiment,
+    first_best: Option<f64>,
+    champion: Option<&GetChampionResponse>,
+) -> String {
+    let mut lines = vec![standing(experiment)];
+    if let Some(best) = first_best {
+        lines.push(row("best of the first generation", &format!("{best:.6}")));
+    }
+    if let Some(latest) = &experiment.latest {
+        lines.push(row("mean of the last generation", &format!("{:.6}", latest.mean)));
+    }
+    if let Some(champion) = champion {
+        let GetChampionResponse { fitness, generation, individual, .. } = champion;
+        let text = format!("{fitness:.6} (generation {}, individual {individual})", generation + 1);
+        lines.push(row("champion", &text));
+    }
+    if let Some(latest) = &experiment.latest {
+        lines.push(row("digest", &latest.digest));
+    }
+    lines.join("\n")
+}
+
+/// Where `run` has left things.
+pub fn files(data_dir: &Path, champion_file: Option<&Path>) -> String {
+    let mut lines = vec![row("data", &data_dir.display().to_string())];
+    if let Some(file) = champion_file {
+        lines.push(row("champion file", &file.display().to_string()));
+    }
+    lines.join("\n")
+}
+
+fn row(name: &str, value: &str) -> String {
+    format!("  {name:<30}{value}")
+}
+
+/// All experiments, one per line under a heading.
+pub fn table(experiments: &[Experiment]) -> String {
+    if experiments.is_empty() {
+        return "no experiments yet".into();
+    }
+    let heading =
+        ["id", "state", "generations", "champion", "seed", "algorithm", "name"].map(String::from);
+    let rows = experiments.iter().map(|experiment| {
+        [
+            experiment.id.to_string(),
+            state_name(experiment.state()).into(),
+            format!("{}/{}", experiment.generations_done, experiment.generations),
+            experiment.champion_fitness.map_or("-".into(), |fitness| format!("{fitness:.3}")),
+            experiment.seed.to_string(),
+            experiment.algorithm.clone(),
+            experiment.name.clone(),
+        ]
+    });
+    let rows: Vec<_> = std::iter::once(heading).chain(rows).collect();
+    let widths: [usize; 7] = std::array::from_fn(|column| {
+        rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0)
+    });
+    let lines: Vec<String> = rows
+        .iter()
+        .map(|row| {
+            let cells: Vec<String> =
+                row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+            cells.join("  ").trim_end().to_owned()
+        })
+        .collect();
+    lines.join("\n")
+}
+
+/// What became of a request to cancel.
+pub fn cancelled(experiment: &Experiment) -> String {
+    match experiment.state() {
+        ExperimentState::Cancelled => standing(experiment),
+        _ => format!("{}; nothing to cancel", standing(experiment)),
+    }
+}
+
+/// A command line that a shell reads back to the same arguments.
+pub fn shell_command(args: impl IntoIterator<Item = String>) -> String {
+    let quoted: Vec<String> = args
+        .into_iter()
+        .map(|arg| {
+            let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
+            if !arg.is_empty() && arg.chars().all(is_plain) {
+                arg
+            } else {
+                format!("'{}'", arg.replace('\'', r"'\''"))
+            }
+        })
+        .collect();
+    quoted.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(generation: u64) -> GenerationSummary {
+        GenerationSummary {
+            generation,
+            best: 1.2344,
+            mean: 0.4561,
+            min: 0.0,
+            digest: "1a2b3c4d5e6f7a8b".into(),
+            duration_ms: 500,
+            episodes: 617,
+            ..GenerationSummary::default()
+        }
+    }
+
+    fn experiment(state: ExperimentState) -> Experiment {
+        Experiment {
+            id: 3,
+            name: "leader".into(),
+            state: state.into(),
+            generations_done: 12,
+            generations: 40,
+            seed: 7,
+            algorithm: "SNES".into(),
+            population_size: 100,
+            genotype_len: 455,
+            latest: Some(summary(11)),
+            champion_fitness: Some(2.0),
+            ..Experiment::default()
+        }
+    }
+
+    #[test]
+    fn a_generation_is_one_line() {
+        assert_eq!(
+            generation(&summary(11), 40),
+            "generation 12/40  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
+        );
+        assert!(generation(&summary(0), 100).starts_with("generation   1/100  "));
+    }
+
+    #[test]
+    fn an_immediate_generation_divides_by_no_zero() {
+        let summary = GenerationSummary { duration_ms: 0, ..summary(0) };
+        assert!(generation(&summary, 1).contains("617000 episodes/s"));
+    }
+
+    #[test]
+    fn the_end_tells_the_whole_story() {
+        let champion = GetChampionResponse {
+            generation: 6,
+            individual: 4,
+            fitness: 2.0,
+            ..GetChampionResponse::default()
+        };
+        let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion));
+        assert_eq!(
+            text,
+            "experiment 3 (leader) completed after 12 of 40 generations\n  \
+             best of the first generation  0.500000\n  \
+             mean of the last generation   0.456100\n  \
+             champion                      2.000000 (generation 7, individual 4)\n  \
+             digest                        1a2b3c4d5e6f7a8b"
+        );
+    }
+
+    #[test]
+    fn the_table_is_aligned() {
+        let mut other = experiment(ExperimentState::Running);
+        other.id = 10;
+        other.champion_fitness = None;
+        let text = table(&[experiment(ExperimentState::Completed), other]);
+        assert_eq!(
+            text,
+            "id  state      generations  champion  seed  algorithm  name\n\
+             3   completed  12/40        2.000     7     SNES       leader\n\
+             10  running    12/40        -         7     SNES       leader"
+        );
+        assert_eq!(table(&[]), "no experiments yet");
+    }
+
+    #[test]
+    fn cancelling_what_has_ended_says_so() {
+        let text = cancelled(&experiment(ExperimentState::Completed));
+        assert!(
+            text.ends_with("completed after 12 of 40 generations; nothing to cancel"),
+            "{text}"
+        );
+        let text = cancelled(&experiment(ExperimentState::Cancelled));
+        assert!(text.ends_with("cancelled after 12 of 40 generations"), "{text}");
+    }
+
+    #[test]
+    fn commands_survive_a_shell() {
+        let args = ["swarmctl", "run", "my file's.json", "", "--seed=7"].map(String::from);
+        assert_eq!(shell_command(args), r"swarmctl run 'my file'\''s.json' '' --seed=7");
+    }
+}

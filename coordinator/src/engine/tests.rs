@@ -1,0 +1,439 @@
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+
+use super::*;
+
+const LEASE: Duration = Duration::from_secs(10);
+const EXPERIMENT: ExperimentId = ExperimentId(1);
+
+/// A fleet in virtual time: carries out the engine's commands on fake workers,
+/// whose fitness is a function of genotype and trial.
+struct Fleet {
+    engine: Engine,
+    now: Instant,
+    workers: BTreeMap<WorkerId, FakeWorker>,
+    judged: Vec<(ExperimentId, JudgedGeneration)>,
+    failed: Vec<(ExperimentId, String)>,
+    n_items_sent: usize,
+}
+
+#[derive(Default)]
+struct FakeWorker {
+    specs: BTreeSet<ExperimentId>,
+    items: VecDeque<(ExperimentId, Item)>,
+}
+
+fn fitness(genotype: &[f64], trial: u32) -> f64 {
+    genotype[0] * 1000.0 + f64::from(trial)
+}
+
+fn genotypes(n: usize) -> Vec<Genotype> {
+    (0..n).map(|i| vec![i as f64]).collect()
+}
+
+impl Fleet {
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "any instant will do as the origin of virtual time"
+    )]
+    fn new() -> Self {
+        let now = Instant::now();
+        Self {
+            engine: Engine::new(now, LEASE),
+            now,
+            workers: BTreeMap::new(),
+            judged: Vec::new(),
+            failed: Vec::new(),
+            n_items_sent: 0,
+        }
+    }
+
+    fn start(&mut self, id: ExperimentId, n_individuals: usize, n_trials: u32) {
+        self.engine.on_experiment_started(id, "spec".into());
+        self.ask(id, 0, n_individuals, n_trials);
+    }
+
+    fn ask(&mut self, id: ExperimentId, generation: u64, n_individuals: usize, n_trials: u32) {
+        let genotypes = genotypes(n_individuals);
+        self.engine.on_generation_asked(self.now, id, generation, genotypes, n_trials);
+        self.carry_out();
+    }
+
+    fn join(&mut self, n_slots: usize) -> WorkerId {
+        let id = self.engine.on_worker_joined(self.now, "fake", n_slots);
+        self.workers.insert(id, FakeWorker::default());
+        self.carry_out();
+        id
+    }
+
+    fn kill(&mut self, id: WorkerId) {
+        self.workers.remove(&id);
+        self.engine.on_worker_left(self.now, id);
+        self.carry_out();
+    }
+
+    /// The worker's oldest item is computed.
+    fn step(&mut self, id: WorkerId) -> bool {
+        let Some((_, item)) = self.workers.get_mut(&id).and_then(|w| w.items.pop_front()) else {
+            return false;
+        };
+        let fitness = item.trials.clone().map(|trial| fitness(&item.genotype, trial)).collect();
+        self.answer(id, item.id, Ok(fitness));
+        true
+    }
+
+    fn answer(&mut self, worker: WorkerId, item: ItemId, outcome: Result<Vec<f64>, String>) {
+        let compute_time = Duration::from_millis(10);
+        let result = ItemResult { id: item, outcome, compute_time };
+        self.engine.on_results(self.now, worker, vec![result]);
+        self.carry_out();
+    }
+
+    fn carry_out(&mut self) {
+        while let Some(command) = self.engine.poll_command() {
+            match command {
+                Command::SendSpec { worker, experiment, .. } => {
+                    let is_new = self.workers.get_mut(&worker).unwrap().specs.insert(experiment);
+                    assert!(is_new, "a specification is sent once");
+                }
+                Command::SendItems { worker, experiment, items, .. } => {
+                    let worker = self.workers.get_mut(&worker).unwrap();
+                    assert!(worker.specs.contains(&experiment), "the specification comes first");
+                    self.n_items_sent += items.len();
+                    worker.items.extend(items.into_iter().map(|item| (experiment, item)));
+                }
+                Command::SendEnd { worker, experiment } => {
+                    let worker = self.workers.get_mut(&worker).unwrap();
+                    worker.specs.remove(&experiment);
+                    worker.items.retain(|(of, _)| *of != experiment);
+                }
+                Command::Disconnect { worker, .. } => {
+                    self.workers.remove(&worker);
+                }
+                Command::FinishGeneration { experiment, judged } => {
+                    self.judged.push((experiment, judged));
+                }
+                Command::FailExperiment { experiment, reason } => {
+                    self.failed.push((experiment, reason));
+                }
+            }
+        }
+        self.engine.sanity_check();
+        for (id, worker) in &self.workers {
+            let n_slots = self.engine.workers[id].n_slots;
+            assert!(worker.items.len() <= CREDITS_PER_SLOT * n_slots, "credits are respected");
+        }
+    }
+
+    /// Lets every worker compute until nothing is left.
+    fn run(&mut self) {
+        let ids: Vec<WorkerId> = self.workers.keys().copied().collect();
+        loop {
+            let n_steps = ids.iter().filter(|&&id| self.step(id)).count();
+            if n_steps == 0 {
+                return;
+            }
+        }
+    }
+
+    fn assert_judged(&self, n_individuals: usize, n_trials: u32) {
+        let (_, judged) = &self.judged[0];
+        let expected: Vec<Vec<f64>> = genotypes(n_individuals)
+            .iter()
+            .map(|genotype| (0..n_trials).map(|trial| fitness(genotype, trial)).collect())
+            .collect();
+        assert_eq!(judged.trial_fitness, expected);
+        assert_eq!(self.judged.len(), 1, "a generation is judged once");
+    }
+}
+
+impl Engine {
+    /// Panics if the state contradicts itself.
+    fn sanity_check(&self) {
+        for (&id, worker) in &self.workers {
+            assert_eq!(
+                self.available.contains(&(worker.load(), id)),
+                worker.has_credit(),
+                "exactly the workers with credit are available"
+            );
+            for assignment in worker.in_flight.values() {
+                assert!(self.experiments.contains_key(&assignment.experiment));
+                assert!(worker.known_experiments.contains(&assignment.experiment));
+            }
+        }
+        assert!(self.available.iter().all(|(_, id)| self.workers.contains_key(id)));
+        for (&id, experiment) in &self.experiments {
+            let Some(generation) = &experiment.generation else { continue };
+            let in_flight = self.workers.values().flat_map(|worker| worker.in_flight.values());
+            let in_flight = in_flight.filter(|a| a.experiment == id).map(|a| a.task.trials.len());
+            let queued = generation.queue.iter().map(|task| task.trials.len());
+            assert_eq!(
+                in_flight.sum::<usize>() + queued.sum::<usize>(),
+                generation.n_trials_left(),
+                "every trial is judged, queued or in flight, and only one of these"
+            );
+            let n_turns = self.turns.iter().filter(|&&turn| turn == id).count();
+            assert_eq!(n_turns, usize::from(!generation.queue.is_empty()));
+        }
+        assert!(
+            self.turns.is_empty() || self.available.is_empty(),
+            "no work waits while a worker has credit"
+        );
+        let n_slots: usize = self.workers.values().map(|worker| worker.n_slots).sum();
+        assert_eq!(n_slots, self.fleet_time.n_slots);
+    }
+}
+
+#[test]
+fn fitness_is_in_index_order_whoever_computed_it() {
+    let mut fleet = Fleet::new();
+    fleet.join(1);
+    fleet.join(3);
+    fleet.start(EXPERIMENT, 50, 4);
+    fleet.run();
+    fleet.assert_judged(50, 4);
+    assert_eq!(fleet.n_items_sent, 50);
+}
+
+#[test]
+fn work_waits_for_the_first_worker() {
+    let mut fleet = Fleet::new();
+    fleet.start(EXPERIMENT, 3, 1);
+    fleet.join(1);
+    fleet.run();
+    fleet.assert_judged(3, 1);
+}
+
+#[test]
+fn items_of_a_lost_worker_go_to_others() {
+    let mut fleet = Fleet::new();
+    let lost = fleet.join(2);
+    fleet.start(EXPERIMENT, 10, 2);
+    fleet.step(lost);
+    assert_eq!(fleet.workers[&lost].items.len(), 4);
+    fleet.kill(lost);
+    fleet.join(1);
+    fleet.run();
+    fleet.assert_judged(10, 2);
+    assert_eq!(fleet.n_items_sent, 10 + 4);
+}
+
+#[test]
+fn a_silent_worker_is_dropped_after_its_lease_and_a_busy_one_is_not() {
+    let mut fleet = Fleet::new();
+    let silent = fleet.join(1);
+    let busy = fleet.join(1);
+    fleet.start(EXPERIMENT, 6, 1);
+    for _ in 0..4 {
+        fleet.now += LEASE / 3;
+        fleet.engine.on_heartbeat(fleet.now, busy);
+        fleet.engine.on_tick(fleet.now);
+        fleet.carry_out();
+    }
+    assert!(!fleet.workers.contains_key(&silent));
+    assert_eq!(fleet.workers[&busy].items.len(), 2, "long episodes are no reason to lose work");
+    fleet.run();
+    fleet.assert_judged(6, 1);
+}
+
+#[test]
+fn a_draining_worker_gets_nothing_more_and_is_not_blamed() {
+    let mut fleet = Fleet::new();
+    fleet.start(EXPERIMENT, 1, 1);
+    for _ in 0..2 * MAX_ATTEMPTS {
+        let id = fleet.join(1);
+        fleet.engine.on_draining(fleet.now, id);
+        fleet.kill(id);
+    }
+    let id = fleet.join(1);
+    fleet.engine.on_draining(fleet.now, id);
+    fleet.step(id);
+    fleet.assert_judged(1, 1);
+    fleet.ask(EXPERIMENT, 1, 1, 1);
+    assert!(fleet.workers[&id].items.is_empty());
+}
+
+#[test]
+fn an_item_that_takes_its_workers_down_fails_its_experiment_and_no_other() {
+    let mut fleet = Fleet::new();
+    let other = ExperimentId(2);
+    fleet.start(EXPERIMENT, 1, 1);
+    for _ in 0..MAX_ATTEMPTS {
+        assert!(fleet.failed.is_empty());
+        let id = fleet.join(1);
+        fleet.kill(id);
+    }
+    assert_eq!(fleet.failed.len(), 1);
+    assert_eq!(fleet.failed[0].0, EXPERIMENT);
+    assert!(fleet.failed[0].1.contains("individual 0 of generation 0"), "{}", fleet.failed[0].1);
+    fleet.join(1);
+    fleet.start(other, 5, 1);
+    fleet.run();
+    assert_eq!(fleet.judged[0].0, other);
+}
+
+#[test]
+fn items_that_wait_in_a_lost_worker_are_not_blamed() {
+    let mut fleet = Fleet::new();
+    fleet.start(EXPERIMENT, 2, 1);
+    // One slot, two credits: individual 0 is computed, 1 waits. Answer 0 each
+    // time under a fresh worker, and 1 is never the oldest.
+    for _ in 0..MAX_ATTEMPTS - 1 {
+        let id = fleet.join(1);
+        assert_eq!(fleet.workers[&id].items.len(), 2);
+        fleet.kill(id);
+    }
+    let id = fleet.join(1);
+    fleet.step(id);
+    fleet.kill(id);
+    let id = fleet.join(1);
+    fleet.step(id);
+    assert!(fleet.failed.is_empty());
+    fleet.assert_judged(2, 1);
+}
+
+#[test]
+fn failing_items_are_tried_again_and_then_fail_the_experiment() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(1);
+    fleet.start(EXPERIMENT, 1, 1);
+    for _ in 0..MAX_ATTEMPTS {
+        let item = fleet.workers.get_mut(&id).unwrap().items.pop_front().unwrap().1;
+        fleet.answer(id, item.id, Err("it overflowed".to_owned()));
+    }
+    assert!(fleet.failed[0].1.contains("it overflowed"));
+    assert!(fleet.workers.contains_key(&id), "the worker is not to blame");
+}
+
+#[test]
+fn a_result_of_the_wrong_length_drops_its_worker() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(1);
+    fleet.start(EXPERIMENT, 1, 2);
+    let item = fleet.workers[&id].items[0].1.id;
+    fleet.answer(id, item, Ok(vec![1.0]));
+    assert!(fleet.workers.is_empty() && fleet.judged.is_empty());
+}
+
+#[test]
+fn results_of_unknown_items_and_of_ended_experiments_are_ignored() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(1);
+    fleet.start(EXPERIMENT, 2, 1);
+    let item = fleet.workers[&id].items[0].1.id;
+    fleet.answer(id, ItemId(999), Ok(vec![5.0]));
+    fleet.engine.on_experiment_ended(EXPERIMENT);
+    fleet.carry_out();
+    fleet.answer(id, item, Ok(vec![5.0]));
+    assert!(fleet.judged.is_empty());
+    assert!(fleet.workers[&id].specs.is_empty());
+}
+
+#[test]
+fn a_result_that_comes_twice_counts_once() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(1);
+    fleet.start(EXPERIMENT, 2, 1);
+    let item = fleet.workers[&id].items[0].1.clone();
+    fleet.answer(id, item.id, Ok(vec![fitness(&item.genotype, 0)]));
+    fleet.answer(id, item.id, Ok(vec![-1.0]));
+    fleet.workers.get_mut(&id).unwrap().items.pop_front();
+    fleet.run();
+    fleet.assert_judged(2, 1);
+}
+
+#[test]
+fn experiments_take_turns() {
+    let mut fleet = Fleet::new();
+    let other = ExperimentId(2);
+    fleet.start(EXPERIMENT, 100, 1);
+    fleet.start(other, 4, 1);
+    let id = fleet.join(1);
+    while fleet.judged.is_empty() {
+        assert!(fleet.step(id));
+    }
+    assert_eq!(fleet.judged[0].0, other, "the short one need not wait for the long one");
+}
+
+#[test]
+fn idle_share_is_the_time_slots_did_not_compute() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(2);
+    fleet.start(EXPERIMENT, 1, 1);
+    fleet.now += Duration::from_millis(20);
+    fleet.step(id);
+    let (_, judged) = &fleet.judged[0];
+    assert_eq!(judged.duration, Duration::from_millis(20));
+    assert!((judged.idle_share - 0.75).abs() < 1e-9, "{}", judged.idle_share);
+}
+
+#[test]
+fn ten_thousand_workers_share_a_generation() {
+    let mut fleet = Fleet::new();
+    let ids: Vec<WorkerId> =
+        (0..10_000).map(|_| fleet.engine.on_worker_joined(fleet.now, "fake", 1)).collect();
+    fleet.workers = ids.iter().map(|&id| (id, FakeWorker::default())).collect();
+    fleet.start(EXPERIMENT, 10_000, 1);
+    assert!(fleet.workers.values().all(|worker| worker.items.len() == 1));
+}
+
+#[derive(Debug, Clone)]
+enum Happening {
+    Join(usize),
+    Kill(usize),
+    Compute(usize),
+    Drain(usize),
+    FallSilent,
+}
+
+fn happening() -> impl Strategy<Value = Happening> {
+    prop_oneof![
+        2 => (1..4usize).prop_map(Happening::Join),
+        1 => any::<usize>().prop_map(Happening::Kill),
+        12 => any::<usize>().prop_map(Happening::Compute),
+        1 => any::<usize>().prop_map(Happening::Drain),
+        1 => Just(Happening::FallSilent),
+    ]
+}
+
+proptest! {
+    /// Whatever happens to the workers, no work is lost, none is accepted
+    /// twice, and the fitness is that of an undisturbed fleet, unless an item
+    /// was blamed too often.
+    #[test]
+    fn any_history_judges_the_same_fitness(
+        history in prop::collection::vec(happening(), 0..200),
+        n_individuals in 1..40usize,
+        n_trials in 1..4u32,
+    ) {
+        let mut fleet = Fleet::new();
+        fleet.start(EXPERIMENT, n_individuals, n_trials);
+        for happening in history {
+            let ids: Vec<WorkerId> = fleet.workers.keys().copied().collect();
+            let pick = |i: usize| (!ids.is_empty()).then(|| ids[i % ids.len()]);
+            match happening {
+                Happening::Join(n_slots) => { fleet.join(n_slots); }
+                Happening::Kill(i) => if let Some(id) = pick(i) { fleet.kill(id) },
+                Happening::Compute(i) => if let Some(id) = pick(i) { fleet.step(id); },
+                Happening::Drain(i) => if let Some(id) = pick(i) {
+                    fleet.engine.on_draining(fleet.now, id);
+                    fleet.carry_out();
+                },
+                Happening::FallSilent => {
+                    fleet.now += LEASE;
+                    fleet.engine.on_tick(fleet.now);
+                    fleet.carry_out();
+                    prop_assert!(fleet.workers.is_empty());
+                }
+            }
+        }
+        fleet.join(2);
+        fleet.run();
+        if fleet.failed.is_empty() {
+            fleet.assert_judged(n_individuals, n_trials);
+        } else {
+            prop_assert!(fleet.judged.is_empty());
+        }
+    }
+}

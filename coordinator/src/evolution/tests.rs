@@ -1,0 +1,181 @@
+use sim_core::config::SnesParams;
+
+use super::*;
+
+const SNES: SnesParams = SnesParams { eta_mu: 1.0, eta_sigma: None, mu_init: 0.5, sigma_init: 0.2 };
+
+fn evolution(population_size: usize, segment_lens: &[usize]) -> Evolution {
+    let mut start = 0;
+    let populations = segment_lens
+        .iter()
+        .map(|&len| {
+            let segment = start..start + len;
+            start += len;
+            Population { segment, algorithm: Algorithm::Snes(Snes::new(&SNES, len)) }
+        })
+        .collect();
+    Evolution {
+        seed: 11,
+        population_size,
+        n_generations: 0,
+        populations,
+        champion: None,
+        digest: "00".repeat(32).parse().unwrap(),
+    }
+}
+
+/// A noisy sphere: two trials that differ.
+fn judge(genotypes: &[Genotype]) -> Vec<Vec<f64>> {
+    let sphere = |genes: &[f64]| -genes.iter().map(|g| (g - 0.3) * (g - 0.3)).sum::<f64>();
+    genotypes.iter().map(|genes| vec![sphere(genes) + genes[0] * 1e-3, sphere(genes)]).collect()
+}
+
+fn step(evolution: &mut Evolution) -> GenerationRecord {
+    let asked = evolution.ask();
+    let trial_fitness = judge(&asked.genotypes);
+    evolution.tell(asked, &trial_fitness).unwrap()
+}
+
+/// Values of an independent transcription of the update in Python's floats.
+#[test]
+fn a_step_of_snes_is_that_of_the_paper() {
+    let mut snes = Snes::new(&SNES, 2);
+    snes.set_distribution(&[0.5, 0.25], &[0.2, 0.4]);
+    let sample = Sample {
+        genotypes: Vec::new(),
+        normals: vec![vec![0.5, -1.0], vec![1.5, 0.25], vec![-2.0, 0.75], vec![0.0, 3.0]],
+    };
+    snes.learn(&sample, &ranking::ranking(&[1.0, 3.0, -1.0, 2.0]));
+    let (mu, sigma) = snes.distribution();
+    let expected_mu = [0.7191268130927555, 0.34653501865989644];
+    let expected_sigma = [0.20096600763378755, 0.38119408062925314];
+    for (actual, expected) in mu.iter().zip(expected_mu).chain(sigma.iter().zip(expected_sigma)) {
+        assert!((actual - expected).abs() < 1e-15, "{actual} {expected}");
+    }
+}
+
+#[test]
+fn genes_stay_within_bounds_and_follow_the_distribution() {
+    let asked = evolution(500, &[4]).ask();
+    let genes: Vec<f64> = asked.genotypes.concat();
+    assert!(genes.iter().all(|gene| (0.0..=1.0).contains(gene)));
+    let mean = mean(&genes);
+    let variance = genes.iter().map(|g| (g - mean) * (g - mean)).sum::<f64>() / genes.len() as f64;
+    assert!((mean - 0.5).abs() < 0.02 && (variance.sqrt() - 0.2).abs() < 0.02);
+}
+
+#[test]
+fn snes_climbs_the_sphere() {
+    let mut evolution = evolution(20, &[10]);
+    let first = step(&mut evolution);
+    for _ in 0..150 {
+        step(&mut evolution);
+    }
+    let last = step(&mut evolution);
+    assert!(last.statistics.mean > -1e-3, "{:?} -> {:?}", first.statistics, last.statistics);
+    assert!(first.statistics.mean < -0.2);
+    assert!(evolution.champion().unwrap().fitness > -1e-3);
+}
+
+#[test]
+fn asking_twice_gives_the_same() {
+    let evolution = evolution(7, &[3, 2]);
+    assert_eq!(evolution.ask(), evolution.ask());
+}
+
+#[test]
+fn resuming_from_any_checkpoint_gives_the_same_bits() {
+    let mut uninterrupted = evolution(8, &[3, 4]);
+    let mut resumed = uninterrupted.clone();
+    for _ in 0..12 {
+        step(&mut uninterrupted);
+        step(&mut resumed);
+        let checkpoint = serde_json::to_string(&resumed).unwrap();
+        resumed = serde_json::from_str(&checkpoint).unwrap();
+        assert_eq!(resumed, uninterrupted);
+        assert_eq!(resumed.digest(), uninterrupted.digest());
+    }
+}
+
+#[test]
+fn several_populations_join_their_segments_in_order() {
+    let asked = evolution(5, &[3, 4]).ask();
+    for (i, genotype) in asked.genotypes.iter().enumerate() {
+        let joined = [&asked.samples[0].genotypes[i][..], &asked.samples[1].genotypes[i][..]];
+        assert_eq!(*genotype, joined.concat());
+    }
+    assert_ne!(asked.samples[0].normals[0][..3], asked.samples[1].normals[0][..3]);
+}
+
+#[test]
+fn shifting_and_scaling_fitness_changes_nothing_of_what_is_learnt() {
+    let mut plain = evolution(10, &[4]);
+    let mut scaled = plain.clone();
+    for _ in 0..5 {
+        let asked = plain.ask();
+        let fitness = judge(&asked.genotypes);
+        let other: Vec<Vec<f64>> =
+            fitness.iter().map(|t| t.iter().map(|f| 4.0 * f - 2.0).collect()).collect();
+        scaled.tell(asked.clone(), &other).unwrap();
+        plain.tell(asked, &fitness).unwrap();
+        assert_eq!(plain.populations, scaled.populations);
+        assert_ne!(plain.digest(), scaled.digest());
+    }
+}
+
+#[test]
+fn the_champion_is_the_best_mean_so_far_and_the_first_of_equals() {
+    let mut evolution = evolution(3, &[2]);
+    let asked = evolution.ask();
+    let genotypes = asked.genotypes.clone();
+    let record = evolution.tell(asked, &[vec![0.0, 2.0], vec![3.0, 1.0], vec![2.0, 2.0]]).unwrap();
+    assert!(record.has_new_champion);
+    let champion = evolution.champion().unwrap().clone();
+    assert_eq!((champion.generation, champion.individual, champion.fitness), (0, 1, 2.0));
+    assert_eq!(champion.genotype, genotypes[1]);
+    let asked = evolution.ask();
+    let record = evolution.tell(asked, &[vec![2.0, 2.0], vec![0.0, 0.0], vec![1.0, 1.0]]).unwrap();
+    assert!(!record.has_new_champion);
+    assert_eq!(evolution.champion(), Some(&champion));
+}
+
+#[test]
+fn fitness_that_is_not_finite_ranks_last_and_is_counted() {
+    let mut evolution = evolution(4, &[2]);
+    let asked = evolution.ask();
+    let fitness = [vec![f64::NAN, 9.0], vec![1.0, 1.0], vec![f64::INFINITY, 0.0], vec![2.0, 4.0]];
+    let record = evolution.tell(asked, &fitness).unwrap();
+    assert_eq!(record.n_non_finite, 2);
+    let expected = Statistics { best: 3.0, mean: 2.0, min: 1.0, standard_deviation: 1.0 };
+    assert_eq!(record.statistics, expected);
+    assert_eq!(evolution.champion().unwrap().individual, 3);
+}
+
+#[test]
+fn a_generation_without_finite_fitness_is_an_error() {
+    let mut evolution = evolution(2, &[2]);
+    let asked = evolution.ask();
+    let error = evolution.tell(asked, &[vec![f64::NAN], vec![f64::INFINITY]]).unwrap_err();
+    assert_eq!(error, EvolutionError::NoFiniteFitness { generation: 0 });
+}
+
+/// The value is that of Python's hashlib over the documented bytes.
+#[test]
+fn a_link_of_the_digest_chain_hashes_the_documented_bytes() {
+    let start: Digest = "00".repeat(32).parse().unwrap();
+    let link = start.next(3, &[vec![0.25, 0.5], vec![1.0, -0.0]], &[vec![1.5], vec![2.5]]);
+    assert_eq!(
+        link.to_string(),
+        "75b0d81921a9901588735d1f9e03c7e0159bcb1100065319a224f08fea9fa2e3"
+    );
+}
+
+#[test]
+fn every_bit_of_genotypes_and_fitness_enters_the_digest() {
+    let start: Digest = "00".repeat(32).parse().unwrap();
+    let of = |gene: f64, fitness: f64| start.next(0, &[vec![gene]], &[vec![fitness]]);
+    assert_ne!(of(0.5, 1.0), of(0.5f64.next_up(), 1.0));
+    assert_ne!(of(0.5, 1.0), of(0.5, 1.0f64.next_down()));
+    assert_ne!(of(0.0, 1.0), of(-0.0, 1.0));
+    assert_ne!(start.next(0, &[], &[]), start.next(1, &[], &[]));
+}

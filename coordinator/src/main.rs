@@ -1,0 +1,102 @@
+//! The coordinator as a program.
+
+use std::{
+    io::{self, IsTerminal as _},
+    net::SocketAddr,
+    path::PathBuf,
+    process::ExitCode,
+    time::Duration,
+};
+
+use clap::{Parser, ValueEnum};
+use coordinator::{Coordinator, CoordinatorConfig, StartError};
+use tokio::signal::unix::{SignalKind, signal};
+use tracing::{error, info};
+use tracing_subscriber::EnvFilter;
+
+/// Owns the evolution of robot swarms: takes experiment files, hands genotypes
+/// to workers, keeps every generation.
+///
+/// Follow its log: one line per generation. Stop it with SIGTERM or Ctrl-C; at
+/// the next start, unfinished experiments go on from their last completed
+/// generation, to the same bits.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Args {
+    /// Address to listen on. There is no authentication: keep it on loopback or
+    /// on a network whose every member you trust.
+    #[arg(long, env = "SWARM_LISTEN", default_value = "127.0.0.1:7700")]
+    listen: SocketAddr,
+    /// Directory for the database; created if need be.
+    #[arg(long, env = "SWARM_DATA_DIR", default_value = "swarm-data")]
+    data_dir: PathBuf,
+    /// Seconds of silence after which a worker's items go to others.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    lease: u32,
+    /// Form of the log lines.
+    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
+    log_format: LogFormat,
+    /// What to log: error, warn, info, debug, trace, or a tracing filter.
+    #[arg(long, env = "SWARM_LOG", default_value = "info")]
+    log_level: String,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  stopped by a signal
+  1  internal error
+  2  bad input: address in use, data directory unusable, wrong arguments";
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LogFormat {
+    Text,
+    Json,
+}
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    let args = Args::parse();
+    let filter = match EnvFilter::try_new(&args.log_level) {
+        Ok(filter) => filter,
+        Err(error) => {
+            eprintln!("error: --log-level {}: {error}", args.log_level);
+            return ExitCode::from(2);
+        }
+    };
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal());
+    match args.log_format {
+        LogFormat::Text => log.with_target(false).init(),
+        LogFormat::Json => log.json().flatten_event(true).with_current_span(false).init(),
+    }
+    match serve(&args).await {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            error!("{error:#}");
+            let is_input = error.is::<StartError>();
+            ExitCode::from(if is_input { 2 } else { 1 })
+        }
+    }
+}
+
+async fn serve(args: &Args) -> anyhow::Result<()> {
+    // Before anything else, so that an early signal is not lost.
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    let lease = Duration::from_secs(args.lease.into());
+    let coordinator = Coordinator::start(CoordinatorConfig {
+        heartbeat_interval: lease / 5,
+        lease,
+        ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
+    })
+    .await?;
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+    }
+    info!("coordinator stops");
+    coordinator.shutdown().await;
+    Ok(())
+}

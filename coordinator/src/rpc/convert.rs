@@ -1,0 +1,167 @@
+//! Wire types to core types and back.
+
+use std::time::Duration;
+
+use swarm_proto::v1::{
+    self, WorkResponse, event::Kind, item_result::Outcome, work_response::Message,
+};
+use tonic::Status;
+
+use crate::{
+    driver::ToWorker,
+    engine::{Item, ItemResult},
+    ids::ItemId,
+    store::{Event, EventKind, Experiment, ExperimentState, Generation},
+};
+
+/// What a worker says about itself or its failures is cut at this many bytes.
+const TEXT_LEN_MAX: usize = 512;
+
+/// What a worker is told about time.
+#[derive(Debug, Clone, Copy)]
+pub struct WelcomeTimes {
+    /// Between heartbeats.
+    pub heartbeat_interval: Duration,
+    /// Silence after which a worker loses its items.
+    pub lease: Duration,
+}
+
+/// What a worker is told, as a message, or as the status that ends its stream.
+pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, Status> {
+    let message = match message {
+        ToWorker::Welcome(id) => Message::Welcome(v1::Welcome {
+            worker_id: id.0,
+            heartbeat_interval_ms: times.heartbeat_interval.as_millis() as u32,
+            lease_ms: times.lease.as_millis() as u32,
+        }),
+        ToWorker::Spec(experiment, config_json) => Message::Spec(v1::ExperimentSpec {
+            experiment_id: experiment.0,
+            config_json: config_json.to_string(),
+        }),
+        ToWorker::Items(experiment, generation, items) => Message::Batch(v1::ItemBatch {
+            experiment_id: experiment.0,
+            generation,
+            items: items.iter().map(item).collect(),
+        }),
+        ToWorker::End(experiment) => {
+            Message::EndExperiment(v1::EndExperiment { experiment_id: experiment.0 })
+        }
+        ToWorker::Dropped(reason) => {
+            return Err(Status::aborted(format!("the coordinator drops this worker: {reason}")));
+        }
+    };
+    Ok(WorkResponse { message: Some(message) })
+}
+
+fn item(item: &Item) -> v1::Item {
+    v1::Item {
+        item_id: item.id.0,
+        first_trial: item.trials.start,
+        trial_count: item.trials.end - item.trials.start,
+        genotype: item.genotype.to_vec(),
+    }
+}
+
+/// A worker's result; none if it says neither fitness nor failure.
+pub fn item_result(result: v1::ItemResult) -> Option<ItemResult> {
+    Some(ItemResult {
+        id: ItemId(result.item_id),
+        outcome: match result.outcome? {
+            Outcome::Fitness(fitness) => Ok(fitness.values),
+            Outcome::Failure(failure) => Err(printable(&failure.message)),
+        },
+        compute_time: Duration::from_micros(result.compute_us),
+    })
+}
+
+/// Text from the network, fit for a log: bounded, on one line.
+pub fn printable(text: &str) -> String {
+    let end = text.floor_char_boundary(TEXT_LEN_MAX);
+    text[..end].chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// An experiment for clients.
+pub fn experiment(experiment: Experiment) -> v1::Experiment {
+    let summary = ConfigSummary::of(&experiment.config_json);
+    v1::Experiment {
+        id: experiment.id.0,
+        name: summary.name,
+        state: state(experiment.state).into(),
+        reason: experiment.reason,
+        generations_done: experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1),
+        generations: summary.generations,
+        seed: summary.seed,
+        algorithm: summary.algorithm,
+        population_size: summary.population_size,
+        genotype_len: experiment.genotype_len as u32,
+        submitted_at_ms: experiment.submitted_at_ms,
+        latest: experiment.latest.map(generation),
+        champion_fitness: experiment.champion_fitness,
+        config_digest: experiment.config_digest,
+    }
+}
+
+/// What of a canonical configuration clients see in a list.
+#[derive(Default)]
+struct ConfigSummary {
+    name: String,
+    seed: u64,
+    generations: u64,
+    algorithm: String,
+    population_size: u32,
+}
+
+impl ConfigSummary {
+    /// Reads the keys without the rest of the schema: listing must work for
+    /// experiments of any version.
+    fn of(config_json: &str) -> Self {
+        let Ok(config) = serde_json::from_str::<serde_json::Value>(config_json) else {
+            return Self::default();
+        };
+        let algorithm = &config["algorithm"];
+        let text = |value: &serde_json::Value| value.as_str().unwrap_or_default().to_owned();
+        Self {
+            name: text(&config["name"]),
+            seed: config["seed"].as_u64().unwrap_or_default(),
+            generations: algorithm["generations"].as_u64().unwrap_or_default(),
+            algorithm: text(&algorithm["name"]),
+            population_size: algorithm["population_size"].as_u64().unwrap_or_default() as u32,
+        }
+    }
+}
+
+/// An event for clients.
+pub fn event(event: Event) -> v1::Event {
+    let kind = match event.kind {
+        EventKind::Generation(completed) => Kind::GenerationCompleted(generation(completed)),
+        EventKind::State { state: new, reason } => {
+            Kind::StateChanged(v1::StateChange { state: state(new).into(), reason })
+        }
+        EventKind::Notice(message) => Kind::Notice(v1::Notice { message }),
+    };
+    v1::Event { sequence: event.sequence, at_ms: event.at_ms, kind: Some(kind) }
+}
+
+fn generation(generation: Generation) -> v1::GenerationSummary {
+    v1::GenerationSummary {
+        generation: generation.generation,
+        best: generation.statistics.best,
+        mean: generation.statistics.mean,
+        min: generation.statistics.min,
+        standard_deviation: generation.statistics.standard_deviation,
+        digest: generation.digest,
+        duration_ms: generation.duration_ms,
+        episodes: generation.episodes,
+        workers: generation.workers as u32,
+        idle_share: generation.idle_share,
+    }
+}
+
+fn state(state: ExperimentState) -> v1::ExperimentState {
+    match state {
+        ExperimentState::Running => v1::ExperimentState::Running,
+        ExperimentState::Completed => v1::ExperimentState::Completed,
+        ExperimentState::Failed => v1::ExperimentState::Failed,
+        ExperimentState::Cancelled => v1::ExperimentState::Cancelled,
+    }
+}

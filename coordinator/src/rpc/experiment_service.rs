@@ -1,0 +1,294 @@
+//! `ExperimentService`: submit, look, watch, cancel.
+
+use std::pin::Pin;
+
+use sim_core::config::{ConfigError, ExperimentConfig};
+use swarm_proto::v1::{
+    CancelExperimentRequest, CancelExperimentResponse, GetChampionRequest, GetChampionResponse,
+    GetExperimentRequest, GetExperimentResponse, ListExperimentsRequest, ListExperimentsResponse,
+    SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
+    WatchExperimentResponse, experiment_service_server::ExperimentService,
+};
+use tokio::{
+    sync::{mpsc, oneshot},
+    task,
+};
+use tokio_stream::{Stream, wrappers::ReceiverStream};
+use tokio_util::sync::CancellationToken;
+use tonic::{Request, Response, Status};
+use tracing::info;
+
+use crate::{
+    clock,
+    driver::{Event, EventSender},
+    ids::ExperimentId,
+    shared_store::SharedStore,
+    store::{self, ExperimentState, NewExperiment, Store, StoreError},
+    submission::{Checked, Runnable, Submission},
+};
+
+use super::{convert, shutting_down, store_status};
+
+/// Longest `request_id` and `default_name`, bytes.
+const KEY_LEN_MAX: usize = 128;
+/// Experiments that may be unfinished at the same time.
+const UNFINISHED_MAX: usize = 1000;
+/// Problems of a configuration travel in a header, whose size clients limit.
+const PROBLEMS_LEN_MAX: usize = 4096;
+/// Events read from the store at once.
+const EVENT_PAGE_LEN: u32 = 256;
+/// Events that may wait for a watcher to read them.
+const WATCH_QUEUE_LEN: usize = 16;
+
+/// The service.
+#[derive(Debug)]
+pub struct Experiments {
+    /// To the driver.
+    pub events: EventSender,
+    /// For everything that is only read.
+    pub store: SharedStore,
+    /// Ends all streams.
+    pub shutdown: CancellationToken,
+}
+
+#[tonic::async_trait]
+impl ExperimentService for Experiments {
+    type WatchExperimentStream =
+        Pin<Box<dyn Stream<Item = Result<WatchExperimentResponse, Status>> + Send>>;
+
+    async fn submit_experiment(
+        &self,
+        request: Request<SubmitExperimentRequest>,
+    ) -> Result<Response<SubmitExperimentResponse>, Status> {
+        let request = request.into_inner();
+        for (key, value) in
+            [("request_id", &request.request_id), ("default_name", &request.default_name)]
+        {
+            if value.len() > KEY_LEN_MAX {
+                let message = format!("{key} is longer than {KEY_LEN_MAX} bytes");
+                return Err(Status::invalid_argument(message));
+            }
+        }
+        let resume_unfinished = request.resume_unfinished;
+        let submission = Submission {
+            request_id: Some(request.request_id).filter(|id| !id.is_empty()),
+            config_json: request.config_json,
+            default_name: request.default_name,
+            seed: request.seed,
+            generations: request.generations,
+        };
+        // Compiling is work for a CPU, not for the I/O threads.
+        let Checked { new, evolution, warnings } = task::spawn_blocking(move || submission.check())
+            .await
+            .map_err(|_| {
+                Status::internal("checking the configuration panicked; please report this")
+            })?
+            .map_err(|error| Status::invalid_argument(problems(&error)))?;
+
+        let (stored, new) = self
+            .store
+            .try_write(move |store| match place(store, &new, resume_unfinished)? {
+                Placement::TooMany => Ok((None, new)),
+                Placement::Existing(id) => Ok((store.experiment(id)?.map(|e| (e, false)), new)),
+                Placement::Created(id) => Ok((store.experiment(id)?.map(|e| (e, true)), new)),
+            })
+            .await
+            .map_err(store_status)?;
+        let Some((experiment, is_new)) = stored else {
+            return Err(Status::resource_exhausted(format!(
+                "{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some"
+            )));
+        };
+        if is_new {
+            info!(experiment = %experiment.id, name = new.config.name, "experiment submitted");
+            let runnable = Box::new(Runnable::new(experiment.id, new.config, evolution));
+            let ready = Event::ExperimentReady(runnable);
+            self.events.send(ready).await.map_err(|_| shutting_down())?;
+        }
+        let experiment = Some(convert::experiment(experiment));
+        Ok(Response::new(SubmitExperimentResponse { experiment, warnings }))
+    }
+
+    async fn get_experiment(
+        &self,
+        request: Request<GetExperimentRequest>,
+    ) -> Result<Response<GetExperimentResponse>, Status> {
+        let experiment = self.find(request.into_inner().experiment_id).await?;
+        let experiment = Some(convert::experiment(experiment));
+        Ok(Response::new(GetExperimentResponse { experiment }))
+    }
+
+    async fn list_experiments(
+        &self,
+        _request: Request<ListExperimentsRequest>,
+    ) -> Result<Response<ListExperimentsResponse>, Status> {
+        let experiments =
+            self.store.read(|store| store.experiments()).await.map_err(store_status)?;
+        let experiments = experiments.into_iter().map(convert::experiment).collect();
+        Ok(Response::new(ListExperimentsResponse { experiments }))
+    }
+
+    async fn watch_experiment(
+        &self,
+        request: Request<WatchExperimentRequest>,
+    ) -> Result<Response<Self::WatchExperimentStream>, Status> {
+        let request = request.into_inner();
+        let id = self.find(request.experiment_id).await?.id;
+        let (outbox, inbox) = mpsc::channel(WATCH_QUEUE_LEN);
+        let (store, shutdown) = (self.store.clone(), self.shutdown.clone());
+        tokio::spawn(async move {
+            let watching = watch(id, request.from_sequence.max(1), store, &outbox);
+            let status = tokio::select! {
+                () = shutdown.cancelled() => shutting_down(),
+                () = outbox.closed() => return,
+                result = watching => match result {
+                    Ok(()) => return,
+                    Err(status) => status,
+                },
+            };
+            // If the client is gone it need not be told.
+            let _ = outbox.send(Err(status)).await;
+        });
+        Ok(Response::new(Box::pin(ReceiverStream::new(inbox))))
+    }
+
+    async fn cancel_experiment(
+        &self,
+        request: Request<CancelExperimentRequest>,
+    ) -> Result<Response<CancelExperimentResponse>, Status> {
+        let experiment = self.find(request.into_inner().experiment_id).await?;
+        let id = experiment.id;
+        if experiment.state == ExperimentState::Running {
+            let (reply, ended) = oneshot::channel();
+            let cancel = Event::CancelRequested { experiment: id, reply };
+            self.events.send(cancel).await.map_err(|_| shutting_down())?;
+            // Not answered: it has ended in another way meanwhile, as the store
+            // will tell.
+            let _ = ended.await;
+        }
+        let experiment = Some(convert::experiment(self.find(id.0).await?));
+        Ok(Response::new(CancelExperimentResponse { experiment }))
+    }
+
+    async fn get_champion(
+        &self,
+        request: Request<GetChampionRequest>,
+    ) -> Result<Response<GetChampionResponse>, Status> {
+        let experiment = self.find(request.into_inner().experiment_id).await?;
+        let id = experiment.id;
+        let champion =
+            self.store.read(move |store| store.champion(id)).await.map_err(store_status)?;
+        let Some(champion) = champion else {
+            return Err(Status::failed_precondition(format!(
+                "experiment {id} has no champion yet: its first generation is not complete"
+            )));
+        };
+        let genotype = champion.genotype.clone();
+        let network =
+            task::spawn_blocking(move || network_json(&experiment.config_json, &genotype))
+                .await
+                .map_err(|_| {
+                    Status::internal("decoding the champion panicked; please report this")
+                })?
+                .map_err(Status::data_loss)?;
+        Ok(Response::new(GetChampionResponse {
+            experiment_id: id.0,
+            generation: champion.generation,
+            individual: champion.individual,
+            fitness: champion.fitness,
+            trial_fitness: champion.trial_fitness,
+            genotype: champion.genotype,
+            network_json: network,
+        }))
+    }
+}
+
+impl Experiments {
+    async fn find(&self, id: u64) -> Result<store::Experiment, Status> {
+        let experiment = self.store.read(move |store| store.experiment(ExperimentId(id))).await;
+        experiment.map_err(store_status)?.ok_or_else(|| {
+            Status::not_found(format!("there is no experiment {id}; `swarmctl list` shows all"))
+        })
+    }
+}
+
+/// Where a submission ends up.
+enum Placement {
+    Created(ExperimentId),
+    Existing(ExperimentId),
+    TooMany,
+}
+
+fn place(
+    store: &mut Store,
+    new: &NewExperiment,
+    resume_unfinished: bool,
+) -> Result<Placement, StoreError> {
+    let mut unfinished = store.experiments()?;
+    unfinished.retain(|experiment| experiment.state == ExperimentState::Running);
+    if resume_unfinished {
+        let config_json = new.config.to_canonical_json();
+        if let Some(same) = unfinished.iter().find(|e| e.config_json == config_json) {
+            return Ok(Placement::Existing(same.id));
+        }
+    }
+    if unfinished.len() >= UNFINISHED_MAX {
+        return Ok(Placement::TooMany);
+    }
+    let (id, is_new) = store.create(new, clock::unix_ms())?;
+    Ok(if is_new { Placement::Created(id) } else { Placement::Existing(id) })
+}
+
+/// Sends events until the one that ends the experiment.
+async fn watch(
+    id: ExperimentId,
+    mut next_sequence: u64,
+    store: SharedStore,
+    outbox: &mpsc::Sender<Result<WatchExperimentResponse, Status>>,
+) -> Result<(), Status> {
+    let mut news = store.news();
+    loop {
+        news.mark_unchanged();
+        let page = store
+            .read(move |store| store.events(id, next_sequence, EVENT_PAGE_LEN))
+            .await
+            .map_err(store_status)?;
+        let is_full = page.len() == EVENT_PAGE_LEN as usize;
+        for event in page {
+            next_sequence = event.sequence + 1;
+            let is_last = event.kind.is_last();
+            let response = WatchExperimentResponse { event: Some(convert::event(event)) };
+            if outbox.send(Ok(response)).await.is_err() || is_last {
+                return Ok(());
+            }
+        }
+        if !is_full && news.changed().await.is_err() {
+            return Err(shutting_down());
+        }
+    }
+}
+
+/// All problems, one per line, as far as there is room.
+fn problems(error: &ConfigError) -> String {
+    let mut text = String::new();
+    for (i, problem) in error.problems.iter().enumerate() {
+        let line = problem.to_string();
+        if i > 0 && text.len() + line.len() > PROBLEMS_LEN_MAX {
+            text += &format!("\n... and {} more", error.problems.len() - i);
+            break;
+        }
+        if i > 0 {
+            text.push('\n');
+        }
+        text += &line[..line.floor_char_boundary(PROBLEMS_LEN_MAX)];
+    }
+    text
+}
+
+fn network_json(config_json: &str, genotype: &[f64]) -> Result<String, String> {
+    let (config, _) =
+        ExperimentConfig::from_json(config_json, "").map_err(|error| error.to_string())?;
+    let experiment = sim_core::Experiment::compile(&config).map_err(|error| error.to_string())?;
+    let network = experiment.network_json(genotype).map_err(|error| error.to_string())?;
+    Ok(network.to_string())
+}

@@ -1,0 +1,149 @@
+//! `WorkerService`: one stream per worker, translated to the driver's events.
+
+use std::{pin::Pin, time::Duration};
+
+use swarm_proto::{
+    PROTOCOL_VERSION,
+    v1::{
+        Hello, WorkRequest, WorkResponse, work_request::Message,
+        worker_service_server::WorkerService,
+    },
+};
+use tokio::sync::{mpsc, oneshot};
+use tokio_stream::{Stream, StreamExt as _, wrappers::ReceiverStream};
+use tokio_util::sync::CancellationToken;
+use tonic::{Request, Response, Status, Streaming};
+use tracing::warn;
+
+use crate::{
+    driver::{Event, EventSender, WorkerLink, WorkerMessage},
+    engine::CREDITS_PER_SLOT,
+    ids::WorkerId,
+};
+
+use super::{
+    convert::{self, WelcomeTimes},
+    shutting_down,
+};
+
+/// Time for a new stream to say `Hello`.
+const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+/// Largest number of slots of one worker.
+const SLOTS_MAX: u32 = 4096;
+/// Longest name of a worker, bytes.
+const NAME_LEN_MAX: usize = 128;
+/// Messages, beyond one per credit, that may wait for a worker to read them.
+const OUTBOX_SLACK: usize = 64;
+
+/// The service.
+#[derive(Debug)]
+pub struct Workers {
+    /// To the driver.
+    pub events: EventSender,
+    /// What `Welcome` says.
+    pub times: WelcomeTimes,
+    /// Ends all streams.
+    pub shutdown: CancellationToken,
+}
+
+#[tonic::async_trait]
+impl WorkerService for Workers {
+    type WorkStream = Pin<Box<dyn Stream<Item = Result<WorkResponse, Status>> + Send>>;
+
+    async fn work(
+        &self,
+        request: Request<Streaming<WorkRequest>>,
+    ) -> Result<Response<Self::WorkStream>, Status> {
+        let address = request.remote_addr().map_or_else(|| "?".to_owned(), |a| a.to_string());
+        let mut inbound = request.into_inner();
+        let first = tokio::time::timeout(HELLO_TIMEOUT, inbound.message())
+            .await
+            .map_err(|_| Status::deadline_exceeded("no Hello in time"))??;
+        let hello = match first.and_then(|request| request.message) {
+            Some(Message::Hello(hello)) => hello,
+            _ => return Err(Status::invalid_argument("the first message must be Hello")),
+        };
+        check_hello(&hello).inspect_err(|status| {
+            let name = convert::printable(&hello.name);
+            warn!(name, address, reason = status.message(), "worker refused");
+        })?;
+
+        let n_slots = hello.slots as usize;
+        let (outbox, inbox) = mpsc::channel(CREDITS_PER_SLOT * n_slots + OUTBOX_SLACK);
+        let link = WorkerLink { outbox, dropped: self.shutdown.child_token() };
+        let dropped = link.dropped.clone();
+        let (reply, id) = oneshot::channel();
+        let joined = Event::WorkerJoined { name: hello.name, n_slots, link, reply };
+        self.events.send(joined).await.map_err(|_| shutting_down())?;
+        let id = id.await.map_err(|_| shutting_down())?;
+        tokio::spawn(listen(id, inbound, self.events.clone(), dropped));
+
+        let times = self.times;
+        let outbound =
+            ReceiverStream::new(inbox).map(move |message| convert::to_wire(message, times));
+        Ok(Response::new(Box::pin(outbound)))
+    }
+}
+
+/// Passes on what a worker says until its stream ends.
+async fn listen(
+    id: WorkerId,
+    mut inbound: Streaming<WorkRequest>,
+    events: EventSender,
+    dropped: CancellationToken,
+) {
+    let reason = loop {
+        let received = tokio::select! {
+            () = dropped.cancelled() => return,
+            received = inbound.message() => received,
+        };
+        let message = match received {
+            Ok(Some(WorkRequest { message: Some(message) })) => message,
+            // A message of a kind that this version does not know.
+            Ok(Some(WorkRequest { message: None })) => continue,
+            Ok(None) => break "it closed its stream".to_owned(),
+            Err(status) => break format!("its stream broke: {}", status.message()),
+        };
+        let message = match message {
+            Message::Heartbeat(_) => WorkerMessage::Heartbeat,
+            Message::Draining(_) => WorkerMessage::Draining,
+            Message::Results(results) => WorkerMessage::Results(
+                results.results.into_iter().filter_map(convert::item_result).collect(),
+            ),
+            Message::Hello(_) => break "it said Hello twice".to_owned(),
+        };
+        if events.send(Event::WorkerSpoke(id, message)).await.is_err() {
+            return;
+        }
+    };
+    // If the driver is gone, so are all workers.
+    let _ = events.send(Event::WorkerLeft { worker: id, reason }).await;
+}
+
+fn check_hello(hello: &Hello) -> Result<(), Status> {
+    if hello.protocol_version != PROTOCOL_VERSION {
+        return Err(Status::failed_precondition(format!(
+            "the worker speaks protocol version {}, the coordinator {PROTOCOL_VERSION}; \
+             run the same release on both sides",
+            hello.protocol_version
+        )));
+    }
+    if hello.sim_core_fingerprint != sim_core::FINGERPRINT {
+        return Err(Status::failed_precondition(format!(
+            "the worker simulates with \"{}\", the coordinator with \"{}\"; \
+             run the same release on both sides",
+            convert::printable(&hello.sim_core_fingerprint),
+            sim_core::FINGERPRINT
+        )));
+    }
+    if hello.slots == 0 || hello.slots > SLOTS_MAX {
+        return Err(Status::invalid_argument(format!(
+            "slots is {}, not within 1..={SLOTS_MAX}",
+            hello.slots
+        )));
+    }
+    if hello.name.len() > NAME_LEN_MAX {
+        return Err(Status::invalid_argument(format!("name is longer than {NAME_LEN_MAX} bytes")));
+    }
+    Ok(())
+}

@@ -1,0 +1,453 @@
+//! The coordinator's memory: a SQLite database that holds every completed
+//! generation, and from which a killed coordinator goes on.
+//!
+//! Every method that changes something is one transaction, on disk when it
+//! returns.
+
+mod records;
+mod schema;
+
+use std::{
+    fs::{self, File, TryLockError},
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
+
+use crate::{
+    evolution::{Champion, Statistics},
+    ids::ExperimentId,
+};
+
+pub use records::{Event, EventKind, Experiment, ExperimentState, Generation, NewExperiment};
+
+const DATABASE_FILE: &str = "swarmevo.sqlite3";
+const LOCK_FILE: &str = "swarmevo.lock";
+
+/// The open database of one data directory.
+#[derive(Debug)]
+pub struct Store {
+    connection: Connection,
+    /// Held for as long as the store is open: one coordinator per directory.
+    _lock: File,
+}
+
+/// What went wrong with the store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The directory cannot be created or written. Fix its path or permissions.
+    #[error("cannot use the data directory {}: {source}", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Another coordinator uses the directory.
+    #[error(
+        "the data directory {} is in use by another coordinator; stop it or choose another directory",
+        path.display()
+    )]
+    Locked {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The database was written by a newer version.
+    #[error(
+        "the database has schema version {found}, this program knows up to {supported}; \
+         use the newer program, or another data directory"
+    )]
+    Newer {
+        /// Version of the database.
+        found: i64,
+        /// Version of this program.
+        supported: i64,
+    },
+    /// The database's content makes no sense.
+    #[error(
+        "the database is damaged: {0}; restore it from a copy, or choose another data directory"
+    )]
+    Corrupt(String),
+    /// The disk is full, or cannot be read or written; try again later.
+    #[error("the database cannot be read or written: {0}; is there room on the disk?")]
+    Unavailable(rusqlite::Error),
+    /// The experiment has ended meanwhile.
+    #[error("experiment {0} has ended")]
+    Ended(ExperimentId),
+    /// Anything else is a bug.
+    #[error("the database refuses an operation: {0}; please report this")]
+    Bug(rusqlite::Error),
+}
+
+impl From<rusqlite::Error> for StoreError {
+    fn from(error: rusqlite::Error) -> Self {
+        use rusqlite::ErrorCode::{
+            CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
+            ReadOnly, SystemIoFailure,
+        };
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
+            Some(
+                CannotOpen | DatabaseBusy | DatabaseLocked | DiskFull | ReadOnly | SystemIoFailure,
+            ) => Self::Unavailable(error),
+            _ => Self::Bug(error),
+        }
+    }
+}
+
+type Result<T> = std::result::Result<T, StoreError>;
+
+/// A generation to be committed.
+#[derive(Debug, Clone)]
+pub struct GenerationCommit<'a> {
+    /// History row.
+    pub generation: &'a Generation,
+    /// Evolution after it, as JSON.
+    pub checkpoint: &'a str,
+    /// The champion, if it is of this generation.
+    pub new_champion: Option<&'a Champion>,
+    /// Things worth a line.
+    pub notices: &'a [String],
+    /// Whether this was the last generation, and why.
+    pub completed: Option<&'a str>,
+}
+
+impl Store {
+    /// Opens, and if need be creates, the database in `directory`.
+    pub fn open(directory: &Path) -> Result<Self> {
+        let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
+        fs::create_dir_all(directory).map_err(unusable)?;
+        let lock = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
+        lock.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => StoreError::Locked { path: directory.to_owned() },
+            TryLockError::Error(source) => unusable(source),
+        })?;
+        let mut connection = Connection::open(directory.join(DATABASE_FILE))?;
+        connection.busy_timeout(Duration::from_secs(5))?;
+        // First, because it refuses a database that must stay as it is.
+        schema::check_version(&connection)?;
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        connection.pragma_update(None, "synchronous", "FULL")?;
+        connection.pragma_update(None, "foreign_keys", true)?;
+        schema::migrate(&mut connection)?;
+        Ok(Self { connection, _lock: lock })
+    }
+
+    /// Adds an experiment. If `request_id` has been used before, nothing is
+    /// added and the id of that experiment is returned.
+    pub fn create(&mut self, new: &NewExperiment, now_ms: u64) -> Result<(ExperimentId, bool)> {
+        let transaction = self.connection.transaction()?;
+        if let Some(request_id) = &new.request_id {
+            let existing = transaction
+                .query_row(
+                    "SELECT id FROM experiments WHERE request_id = ?1",
+                    [request_id],
+                    |row| row.get(0).map(ExperimentId),
+                )
+                .optional()?;
+            if let Some(id) = existing {
+                return Ok((id, false));
+            }
+        }
+        transaction.execute(
+            "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
+                                      genotype_len, state, submitted_at_ms)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7)",
+            params![
+                new.request_id,
+                new.config.name,
+                new.config.to_canonical_json(),
+                new.config_digest.to_string(),
+                sim_core::FINGERPRINT,
+                new.genotype_len,
+                now_ms
+            ],
+        )?;
+        let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
+        transaction.execute(
+            "INSERT INTO checkpoints (experiment_id, state) VALUES (?1, ?2)",
+            params![id.0, new.checkpoint],
+        )?;
+        let state = ExperimentState::Running;
+        add_state_event(&transaction, id, now_ms, state, "submitted")?;
+        transaction.commit()?;
+        Ok((id, true))
+    }
+
+    /// Commits a generation with everything that belongs to it;
+    /// [`StoreError::Ended`] if the experiment is not running any more.
+    pub fn commit_generation(
+        &mut self,
+        id: ExperimentId,
+        now_ms: u64,
+        commit: &GenerationCommit<'_>,
+    ) -> Result<()> {
+        let transaction = self.connection.transaction()?;
+        let state: String = transaction.query_row(
+            "SELECT state FROM experiments WHERE id = ?1",
+            [id.0],
+            |row| row.get(0),
+        )?;
+        if state != ExperimentState::Running.name() {
+            return Err(StoreError::Ended(id));
+        }
+        let generation = commit.generation;
+        let statistics = &generation.statistics;
+        transaction.execute(
+            "INSERT INTO generations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+            params![
+                id.0,
+                generation.generation,
+                statistics.best,
+                statistics.mean,
+                statistics.min,
+                statistics.standard_deviation,
+                generation.digest,
+                generation.duration_ms,
+                generation.episodes,
+                generation.workers,
+                generation.idle_share
+            ],
+        )?;
+        transaction.execute(
+            "UPDATE checkpoints SET state = ?2 WHERE experiment_id = ?1",
+            params![id.0, commit.checkpoint],
+        )?;
+        if let Some(champion) = commit.new_champion {
+            transaction.execute(
+                "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                params![
+                    id.0,
+                    champion.generation,
+                    champion.individual,
+                    champion.fitness,
+                    json(&champion.trial_fitness),
+                    json(&champion.genotype)
+                ],
+            )?;
+        }
+        for notice in commit.notices {
+            add_notice(&transaction, id, now_ms, notice)?;
+        }
+        transaction.execute(
+            "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
+             VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
+                     ?2, 'generation', ?3)",
+            params![id.0, now_ms, generation.generation],
+        )?;
+        if let Some(reason) = commit.completed {
+            end(&transaction, id, now_ms, ExperimentState::Completed, reason)?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Ends a running experiment; one that has ended stays as it is.
+    pub fn end(
+        &mut self,
+        id: ExperimentId,
+        now_ms: u64,
+        state: ExperimentState,
+        reason: &str,
+    ) -> Result<()> {
+        let transaction = self.connection.transaction()?;
+        end(&transaction, id, now_ms, state, reason)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Reads one experiment.
+    pub fn experiment(&self, id: ExperimentId) -> Result<Option<Experiment>> {
+        if i64::try_from(id.0).is_err() {
+            return Ok(None); // SQLite's integers are signed.
+        }
+        let mut statement =
+            self.connection.prepare_cached(&format!("{SELECT_EXPERIMENT} WHERE e.id = ?1"))?;
+        statement.query_row([id.0], read_experiment).optional()?.transpose()
+    }
+
+    /// Reads all experiments, oldest first.
+    pub fn experiments(&self) -> Result<Vec<Experiment>> {
+        let mut statement =
+            self.connection.prepare_cached(&format!("{SELECT_EXPERIMENT} ORDER BY e.id"))?;
+        let rows = statement.query_map([], read_experiment)?;
+        rows.map(|row| row?).collect()
+    }
+
+    /// The state of evolution after the latest generation, as JSON.
+    pub fn checkpoint(&self, id: ExperimentId) -> Result<Option<String>> {
+        let mut statement = self
+            .connection
+            .prepare_cached("SELECT state FROM checkpoints WHERE experiment_id = ?1")?;
+        Ok(statement.query_row([id.0], |row| row.get(0)).optional()?)
+    }
+
+    /// The champion so far; none before the first generation.
+    pub fn champion(&self, id: ExperimentId) -> Result<Option<Champion>> {
+        let mut statement = self.connection.prepare_cached(
+            "SELECT generation, individual, fitness, trial_fitness, genotype
+             FROM champions WHERE experiment_id = ?1",
+        )?;
+        let row = statement
+            .query_row([id.0], |row| {
+                Ok((
+                    row.get(0)?,
+                    row.get(1)?,
+                    row.get(2)?,
+                    row.get::<_, String>(3)?,
+                    row.get::<_, String>(4)?,
+                ))
+            })
+            .optional()?;
+        let Some((generation, individual, fitness, trial_fitness, genotype)) = row else {
+            return Ok(None);
+        };
+        let list = |text: &str| {
+            serde_json::from_str(text)
+                .map_err(|error| StoreError::Corrupt(format!("champion of {id}: {error}")))
+        };
+        let trial_fitness = list(&trial_fitness)?;
+        let genotype = list(&genotype)?;
+        Ok(Some(Champion { generation, individual, fitness, trial_fitness, genotype }))
+    }
+
+    /// At most `limit` events from `from_sequence` on.
+    pub fn events(&self, id: ExperimentId, from_sequence: u64, limit: u32) -> Result<Vec<Event>> {
+        let mut statement = self.connection.prepare_cached(
+            "SELECT v.sequence, v.at_ms, v.kind, v.state, v.message,
+                    g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
+                    g.duration_ms, g.episodes, g.workers, g.idle_share
+             FROM events v
+             LEFT JOIN generations g
+                    ON g.experiment_id = v.experiment_id AND g.generation = v.generation
+             WHERE v.experiment_id = ?1 AND v.sequence >= ?2
+             ORDER BY v.sequence LIMIT ?3",
+        )?;
+        let from_sequence = i64::try_from(from_sequence).unwrap_or(i64::MAX);
+        let rows = statement.query_map(params![id.0, from_sequence, limit], |row| {
+            let (sequence, at_ms) = (row.get(0)?, row.get(1)?);
+            let message = row.get::<_, Option<String>>(4)?.unwrap_or_default();
+            let kind = match row.get::<_, String>(2)?.as_str() {
+                "generation" => read_generation(row, 5)?.map(EventKind::Generation),
+                "state" => {
+                    let state: Option<String> = row.get(3)?;
+                    state
+                        .and_then(|name| ExperimentState::from_name(&name))
+                        .map(|state| EventKind::State { state, reason: message })
+                }
+                _ => Some(EventKind::Notice(message)),
+            };
+            Ok(kind
+                .map(|kind| Event { sequence, at_ms, kind })
+                .ok_or_else(|| StoreError::Corrupt(format!("event {sequence} of {id}"))))
+        })?;
+        rows.map(|row| row?).collect()
+    }
+}
+
+const SELECT_EXPERIMENT: &str =
+    "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
+            e.submitted_at_ms, c.fitness,
+            g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
+            g.duration_ms, g.episodes, g.workers, g.idle_share
+     FROM experiments e
+     LEFT JOIN champions c ON c.experiment_id = e.id
+     LEFT JOIN generations g ON g.experiment_id = e.id AND g.generation =
+               (SELECT max(generation) FROM generations WHERE experiment_id = e.id)";
+
+fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
+    let id = ExperimentId(row.get(0)?);
+    let state: String = row.get(5)?;
+    let Some(state) = ExperimentState::from_name(&state) else {
+        return Ok(Err(StoreError::Corrupt(format!("experiment {id} has state \"{state}\""))));
+    };
+    Ok(Ok(Experiment {
+        id,
+        config_json: row.get(1)?,
+        config_digest: row.get(2)?,
+        fingerprint: row.get(3)?,
+        genotype_len: row.get(4)?,
+        state,
+        reason: row.get(6)?,
+        submitted_at_ms: row.get(7)?,
+        champion_fitness: row.get(8)?,
+        latest: read_generation(row, 9)?,
+    }))
+}
+
+/// Reads the columns of `generations`, in the schema's order, from `first` on;
+/// none if an outer join found no row.
+fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Generation>> {
+    let Some(generation) = row.get(first)? else { return Ok(None) };
+    Ok(Some(Generation {
+        generation,
+        statistics: Statistics {
+            best: row.get(first + 1)?,
+            mean: row.get(first + 2)?,
+            min: row.get(first + 3)?,
+            standard_deviation: row.get(first + 4)?,
+        },
+        digest: row.get(first + 5)?,
+        duration_ms: row.get(first + 6)?,
+        episodes: row.get(first + 7)?,
+        workers: row.get(first + 8)?,
+        idle_share: row.get(first + 9)?,
+    }))
+}
+
+fn end(
+    transaction: &Transaction<'_>,
+    id: ExperimentId,
+    now_ms: u64,
+    state: ExperimentState,
+    reason: &str,
+) -> rusqlite::Result<()> {
+    let n_changed = transaction.execute(
+        "UPDATE experiments SET state = ?2, reason = ?3 WHERE id = ?1 AND state = 'running'",
+        params![id.0, state.name(), reason],
+    )?;
+    if n_changed > 0 {
+        add_state_event(transaction, id, now_ms, state, reason)?;
+    }
+    Ok(())
+}
+
+fn add_state_event(
+    transaction: &Transaction<'_>,
+    id: ExperimentId,
+    now_ms: u64,
+    state: ExperimentState,
+    reason: &str,
+) -> rusqlite::Result<()> {
+    transaction.execute(
+        "INSERT INTO events (experiment_id, sequence, at_ms, kind, state, message)
+         VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
+                 ?2, 'state', ?3, ?4)",
+        params![id.0, now_ms, state.name(), reason],
+    )?;
+    Ok(())
+}
+
+fn add_notice(
+    transaction: &Transaction<'_>,
+    id: ExperimentId,
+    now_ms: u64,
+    text: &str,
+) -> rusqlite::Result<()> {
+    transaction.execute(
+        "INSERT INTO events (experiment_id, sequence, at_ms, kind, message)
+         VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
+                 ?2, 'notice', ?3)",
+        params![id.0, now_ms, text],
+    )?;
+    Ok(())
+}
+
+fn json(values: &[f64]) -> String {
+    serde_json::to_string(values).expect("numbers serialise")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,133 @@
+//! What the store keeps, as plain data.
+
+use sim_core::config::ExperimentConfig;
+
+use crate::{
+    evolution::{Digest, Statistics},
+    ids::ExperimentId,
+};
+
+/// Where an experiment stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExperimentState {
+    /// Computing, or waiting for workers.
+    Running,
+    /// All generations done, or the target fitness reached.
+    Completed,
+    /// Given up.
+    Failed,
+    /// Ended by a client.
+    Cancelled,
+}
+
+impl ExperimentState {
+    /// Its name in the database.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Completed => "completed",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+
+    /// The state of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Running, Self::Completed, Self::Failed, Self::Cancelled]
+            .into_iter()
+            .find(|state| state.name() == name)
+    }
+}
+
+/// A submission that has passed all checks.
+#[derive(Debug, Clone)]
+pub struct NewExperiment {
+    /// The client's key against double submission.
+    pub request_id: Option<String>,
+    /// Checked.
+    pub config: ExperimentConfig,
+    /// Link -1 of the digest chain.
+    pub config_digest: Digest,
+    /// Genes of a genotype.
+    pub genotype_len: usize,
+    /// Evolution before its first generation, as JSON.
+    pub checkpoint: String,
+}
+
+/// An experiment as it stands.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Its id.
+    pub id: ExperimentId,
+    /// Canonical configuration, as JSON.
+    pub config_json: String,
+    /// Link -1 of the digest chain.
+    pub config_digest: String,
+    /// The simulation that computes it.
+    pub fingerprint: String,
+    /// Genes of a genotype.
+    pub genotype_len: u64,
+    /// Where it stands.
+    pub state: ExperimentState,
+    /// Why it ended, if not by completing its generations.
+    pub reason: String,
+    /// Milliseconds since 1970 UTC.
+    pub submitted_at_ms: u64,
+    /// Latest completed generation.
+    pub latest: Option<Generation>,
+    /// Fitness of the champion so far.
+    pub champion_fitness: Option<f64>,
+}
+
+/// A completed generation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Generation {
+    /// From 0.
+    pub generation: u64,
+    /// Of the individuals' mean fitness.
+    pub statistics: Statistics,
+    /// Link of the digest chain, hexadecimal.
+    pub digest: String,
+    /// Wall-clock time.
+    pub duration_ms: u64,
+    /// Episodes simulated.
+    pub episodes: u64,
+    /// Workers at its end.
+    pub workers: u64,
+    /// Share of the fleet's time not spent computing.
+    pub idle_share: f64,
+}
+
+/// Something that happened to an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// From 1, without gaps.
+    pub sequence: u64,
+    /// Milliseconds since 1970 UTC.
+    pub at_ms: u64,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What can happen to an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EventKind {
+    /// A generation was completed.
+    Generation(Generation),
+    /// The state changed.
+    State {
+        /// The new state.
+        state: ExperimentState,
+        /// Why.
+        reason: String,
+    },
+    /// Something worth a line in a log.
+    Notice(String),
+}
+
+impl EventKind {
+    /// Whether nothing can follow.
+    pub fn is_last(&self) -> bool {
+        matches!(self, Self::State { state, .. } if *state != ExperimentState::Running)
+    }
+}

@@ -1,0 +1,174 @@
+use std::fs;
+
+use crate::{
+    evolution::{Champion, Evolution, Statistics},
+    submission::{Submission, checkpoint_json},
+};
+
+use super::*;
+
+fn new_experiment(request_id: Option<&str>) -> NewExperiment {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
+    let submission = Submission {
+        request_id: request_id.map(str::to_owned),
+        config_json: fs::read_to_string(path).unwrap(),
+        // Beyond the range of SQLite's integers.
+        seed: Some(u64::MAX),
+        ..Submission::default()
+    };
+    submission.check().unwrap().new
+}
+
+fn generation(generation: u64) -> Generation {
+    Generation {
+        generation,
+        statistics: Statistics {
+            best: 0.1 + 0.2,
+            mean: 1.0 / 3.0,
+            min: -f64::MIN_POSITIVE,
+            standard_deviation: 0.0,
+        },
+        digest: format!("{generation:064x}"),
+        duration_ms: 12,
+        episodes: 300,
+        workers: 2,
+        idle_share: 0.25,
+    }
+}
+
+fn commit(store: &mut Store, id: ExperimentId, number: u64, completed: Option<&str>) -> Result<()> {
+    let champion = Champion {
+        generation: number,
+        individual: 3,
+        fitness: 0.7,
+        trial_fitness: vec![0.6, 0.8],
+        genotype: vec![0.1, 1.0 / 3.0],
+    };
+    store.commit_generation(
+        id,
+        1000 + number,
+        &GenerationCommit {
+            generation: &generation(number),
+            checkpoint: &format!("after {number}"),
+            new_champion: Some(&champion),
+            notices: &["look".to_owned()],
+            completed,
+        },
+    )
+}
+
+fn open() -> (tempfile::TempDir, Store) {
+    let directory = tempfile::tempdir().unwrap();
+    let store = Store::open(directory.path()).unwrap();
+    (directory, store)
+}
+
+#[test]
+fn what_is_committed_is_there_after_reopening_bit_for_bit() {
+    let (directory, mut store) = open();
+    let new = new_experiment(None);
+    let (id, _) = store.create(&new, 5).unwrap();
+    commit(&mut store, id, 0, None).unwrap();
+    commit(&mut store, id, 1, None).unwrap();
+    drop(store);
+
+    let store = Store::open(directory.path()).unwrap();
+    let experiment = store.experiment(id).unwrap().unwrap();
+    assert_eq!(experiment.config_json, new.config.to_canonical_json());
+    assert!(experiment.config_json.contains(&u64::MAX.to_string()), "the seed keeps its value");
+    assert_eq!(experiment.state, ExperimentState::Running);
+    assert_eq!(experiment.latest, Some(generation(1)));
+    assert_eq!(experiment.champion_fitness, Some(0.7));
+    assert_eq!(store.checkpoint(id).unwrap().unwrap(), "after 1");
+    let champion = store.champion(id).unwrap().unwrap();
+    assert_eq!(champion.genotype, [0.1, 1.0 / 3.0]);
+    assert_eq!(champion.generation, 1);
+}
+
+#[test]
+fn a_new_experiment_can_be_resumed_before_its_first_generation() {
+    let (_directory, mut store) = open();
+    let new = new_experiment(None);
+    let (id, _) = store.create(&new, 5).unwrap();
+    let checkpoint = store.checkpoint(id).unwrap().unwrap();
+    let evolution: Evolution = serde_json::from_str(&checkpoint).unwrap();
+    assert_eq!(evolution.n_generations(), 0);
+    assert_eq!(checkpoint_json(&evolution), checkpoint);
+    assert_eq!(store.champion(id).unwrap(), None);
+}
+
+#[test]
+fn a_request_id_creates_one_experiment() {
+    let (_directory, mut store) = open();
+    let (first, is_new) = store.create(&new_experiment(Some("key")), 5).unwrap();
+    assert!(is_new);
+    assert_eq!(store.create(&new_experiment(Some("key")), 6).unwrap(), (first, false));
+    let (other, is_new) = store.create(&new_experiment(None), 7).unwrap();
+    assert!(is_new && other != first);
+    assert_eq!(store.experiments().unwrap().len(), 2);
+}
+
+#[test]
+fn events_tell_the_whole_story_in_order_and_from_any_number() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    commit(&mut store, id, 0, None).unwrap();
+    commit(&mut store, id, 1, Some("")).unwrap();
+    let events = store.events(id, 1, 100).unwrap();
+    let running =
+        EventKind::State { state: ExperimentState::Running, reason: "submitted".to_owned() };
+    let completed = EventKind::State { state: ExperimentState::Completed, reason: String::new() };
+    let notice = EventKind::Notice("look".to_owned());
+    let expected = [
+        running,
+        notice.clone(),
+        EventKind::Generation(generation(0)),
+        notice,
+        EventKind::Generation(generation(1)),
+        completed,
+    ];
+    let kinds: Vec<EventKind> = events.iter().map(|event| event.kind.clone()).collect();
+    assert_eq!(kinds, expected);
+    let sequences: Vec<u64> = events.iter().map(|event| event.sequence).collect();
+    assert_eq!(sequences, [1, 2, 3, 4, 5, 6]);
+    let n_last = events.iter().filter(|event| event.kind.is_last()).count();
+    assert_eq!(n_last, 1);
+
+    assert_eq!(store.events(id, 3, 2).unwrap(), events[2..4]);
+    assert_eq!(store.events(id, 7, 100).unwrap(), []);
+    assert_eq!(store.events(id, u64::MAX, 100).unwrap(), []);
+}
+
+#[test]
+fn an_ended_experiment_takes_no_more_generations_and_ends_once() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    store.end(id, 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.end(id, 7, ExperimentState::Failed, "too late").unwrap();
+    assert!(
+        matches!(commit(&mut store, id, 0, None), Err(StoreError::Ended(ended)) if ended == id)
+    );
+    let experiment = store.experiment(id).unwrap().unwrap();
+    assert_eq!(experiment.state, ExperimentState::Cancelled);
+    assert_eq!(experiment.reason, "enough");
+    assert_eq!(store.events(id, 1, 100).unwrap().len(), 2);
+}
+
+#[test]
+fn a_generation_that_cannot_be_committed_leaves_nothing_behind() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    commit(&mut store, id, 0, None).unwrap();
+    let before = store.events(id, 1, 100).unwrap();
+    assert!(commit(&mut store, id, 0, None).is_err(), "a generation is committed once");
+    assert_eq!(store.events(id, 1, 100).unwrap(), before);
+    assert_eq!(store.checkpoint(id).unwrap().unwrap(), "after 0");
+}
+
+#[test]
+fn unknown_experiments_are_none() {
+    let (_directory, store) = open();
+    for id in [0, 1, u64::MAX] {
+        assert!(store.experiment(ExperimentId(id)).unwrap().is_none());
+    }
+}

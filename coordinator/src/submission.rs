@@ -1,0 +1,104 @@
+//! From an experiment file, or a row of the store, to an experiment that can
+//! run.
+
+use std::sync::Arc;
+
+use sim_core::config::{ConfigError, ExperimentConfig};
+
+use crate::{
+    evolution::{Digest, Evolution},
+    ids::ExperimentId,
+    store::{self, NewExperiment, StoreError},
+};
+
+/// What a client submits.
+#[derive(Debug, Clone, Default)]
+pub struct Submission {
+    /// Key against double submission.
+    pub request_id: Option<String>,
+    /// The experiment file.
+    pub config_json: String,
+    /// Name if the file gives none.
+    pub default_name: String,
+    /// Replaces the file's seed.
+    pub seed: Option<u64>,
+    /// Replaces the file's number of generations.
+    pub generations: Option<u64>,
+}
+
+/// A submission that has passed all checks.
+#[derive(Debug)]
+pub struct Checked {
+    /// For the store.
+    pub new: NewExperiment,
+    /// Before its first generation.
+    pub evolution: Evolution,
+    /// What the file says and nobody heeds, and what keeps its default; one
+    /// line each.
+    pub warnings: Vec<String>,
+}
+
+/// An experiment that can run.
+#[derive(Debug)]
+pub struct Runnable {
+    /// Its id.
+    pub id: ExperimentId,
+    /// Its configuration.
+    pub config: ExperimentConfig,
+    /// The canonical configuration, for workers.
+    pub spec: Arc<str>,
+    /// Where its evolution stands.
+    pub evolution: Evolution,
+}
+
+impl Submission {
+    /// Checks everything about a submission; it can run if this succeeds.
+    pub fn check(self) -> Result<Checked, ConfigError> {
+        let (mut config, warnings) =
+            ExperimentConfig::from_json(&self.config_json, &self.default_name)?;
+        if self.seed.is_some() || self.generations.is_some() {
+            config.seed = self.seed.unwrap_or(config.seed);
+            config.algorithm.generations = self.generations.unwrap_or(config.algorithm.generations);
+            // The file's limits hold for what replaces parts of it, too.
+            let name = config.name.clone();
+            (config, _) = ExperimentConfig::from_json(&config.to_canonical_json(), &name)?;
+        }
+        let experiment = sim_core::Experiment::compile(&config)?;
+        let evolution = Evolution::new(&config, experiment.population_segments())?;
+        let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        warnings.extend(experiment.uncovered_parameters().iter().cloned());
+        let new = NewExperiment {
+            request_id: self.request_id,
+            config_digest: Digest::of_config(&config),
+            genotype_len: experiment.genotype_len(),
+            checkpoint: checkpoint_json(&evolution),
+            config,
+        };
+        Ok(Checked { new, evolution, warnings })
+    }
+}
+
+impl Runnable {
+    /// A new experiment.
+    pub fn new(id: ExperimentId, config: ExperimentConfig, evolution: Evolution) -> Self {
+        Self { id, spec: config.to_canonical_json().into(), config, evolution }
+    }
+
+    /// An experiment as the store has it.
+    pub fn restore(experiment: &store::Experiment, checkpoint: &str) -> Result<Self, StoreError> {
+        let id = experiment.id;
+        let corrupt = |what: &str, error: &dyn std::fmt::Display| {
+            StoreError::Corrupt(format!("{what} of experiment {id}: {error}"))
+        };
+        let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "")
+            .map_err(|error| corrupt("configuration", &error))?;
+        let evolution =
+            serde_json::from_str(checkpoint).map_err(|error| corrupt("checkpoint", &error))?;
+        Ok(Self::new(id, config, evolution))
+    }
+}
+
+/// Evolution as the store keeps it.
+pub fn checkpoint_json(evolution: &Evolution) -> String {
+    serde_json::to_string(evolution).expect("numbers and lists serialise")
+}

@@ -1,0 +1,53 @@
+//! The frames on the air, one per robot.
+
+use crate::torus::Vec2;
+
+/// Where a frame's message comes from. A frame without an origin is one that a
+/// robot emitted which had nothing to relay: nobody accepts it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Origin {
+    /// The robot whose message it is.
+    pub originator: usize,
+    /// Emissions so far, from 1.
+    pub hops: u32,
+    /// In which direction the originator sent it, in the originator's own frame,
+    /// as the first relaying robot observed it; zero (none) on the first hop.
+    pub sending_direction: Vec2,
+}
+
+/// All frames on the air. Frame r is robot r's; before the first step there is
+/// none, which nobody can tell from frames without origin.
+#[derive(Debug, Clone)]
+pub(crate) struct Ether {
+    origins: Vec<Option<Origin>>,
+    /// `[robot][component]`
+    messages: Vec<f64>,
+    message_len: usize,
+}
+
+impl Ether {
+    /// Silence.
+    pub fn new(n_robots: usize, message_len: usize) -> Self {
+        Self {
+            origins: vec![None; n_robots],
+            messages: vec![0.0; n_robots * message_len],
+            message_len,
+        }
+    }
+
+    /// Origin of a robot's frame.
+    pub fn origin(&self, emitter: usize) -> Option<&Origin> {
+        self.origins[emitter].as_ref()
+    }
+
+    /// Message of a robot's frame.
+    pub fn message(&self, emitter: usize) -> &[f64] {
+        &self.messages[emitter * self.message_len..][..self.message_len]
+    }
+
+    /// Puts a robot's frame on the air, in place of its last one.
+    pub fn emit(&mut self, emitter: usize, origin: Option<Origin>, message: &[f64]) {
+        self.origins[emitter] = origin;
+        self.messages[emitter * self.message_len..][..self.message_len].copy_from_slice(message);
+    }
+}

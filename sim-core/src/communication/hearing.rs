@@ -1,0 +1,217 @@
+//! Who hears whom, in which sector and how strongly. It depends on positions and
+//! headings alone, so it is computed again only when a robot has moved.
+
+use std::f64::consts::PI;
+
+use crate::sensors::Decay;
+use crate::torus::{Torus, Vec2, angular_difference, sector_angle, wrap_angle};
+
+/// A border between sectors belongs to both in spite of rounding, radians.
+const BORDER: f64 = 1e-12;
+
+/// What a robot's receiver and transmitter are like.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Antenna {
+    /// Reach of the transmitter, cm; none: it does not emit.
+    pub emits_within: Option<f64>,
+    /// The receiver; none: it does not listen.
+    pub receiver: Option<Receiver>,
+}
+
+/// What a receiver is like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Receiver {
+    /// Sectors, n.
+    pub n_sectors: usize,
+    /// Reach, cm.
+    pub range: f64,
+    /// Fading of the strength.
+    pub decay: Decay,
+    /// Frames of so many hops are not accepted.
+    pub max_hops: u32,
+}
+
+/// The strongest emitter in a sector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Heard {
+    /// The robot that is heard.
+    pub emitter: usize,
+    /// How strongly.
+    pub strength: f64,
+    /// Direction from the emitter to the listener, as the emitter's sector
+    /// that faces it: (cos, sin) in the emitter's own frame.
+    pub sending_direction: Vec2,
+}
+
+/// The strongest emitter in every sector of every robot. Every emitter puts a
+/// frame on the air in each step, so it is also the sector's frame.
+#[derive(Debug, Clone)]
+pub(crate) struct Hearing {
+    /// `[robot][sector]`
+    sectors: Vec<Option<Heard>>,
+    /// First sector of each robot, and the end.
+    first: Vec<usize>,
+}
+
+impl Hearing {
+    /// Nobody hears anyone yet.
+    pub fn new(antennas: &[Antenna]) -> Self {
+        let mut first = vec![0];
+        let mut n_sectors = 0;
+        for antenna in antennas {
+            n_sectors += antenna.receiver.map_or(0, |receiver| receiver.n_sectors);
+            first.push(n_sectors);
+        }
+        Self { sectors: vec![None; n_sectors], first }
+    }
+
+    /// The sectors of one robot.
+    pub fn of(&self, robot: usize) -> &[Option<Heard>] {
+        &self.sectors[self.first[robot]..self.first[robot + 1]]
+    }
+
+    /// Computes everything from positions and headings.
+    pub fn update(
+        &mut self,
+        torus: &Torus,
+        antennas: &[Antenna],
+        positions: &[Vec2],
+        headings: &[f64],
+    ) {
+        self.sectors.fill(None);
+        for (robot, antenna) in antennas.iter().enumerate() {
+            let Some(receiver) = antenna.receiver else { continue };
+            let sectors = &mut self.sectors[self.first[robot]..self.first[robot + 1]];
+            for (emitter, other) in antennas.iter().enumerate() {
+                let Some(reach) = other.emits_within else { continue };
+                let away = torus.displacement(positions[robot], positions[emitter]);
+                let rho = away.norm();
+                if emitter == robot || rho > receiver.range.min(reach) {
+                    continue;
+                }
+                let bearing = wrap_angle(away.angle() - headings[robot]);
+                let back = Vec2::new(-away.x, -away.y);
+                let sending = wrap_angle(back.angle() - headings[emitter]);
+                let n_sending = other.receiver.map_or(receiver.n_sectors, |r| r.n_sectors);
+                for (sector, strongest) in sectors.iter_mut().enumerate() {
+                    let angle = sector_angle(sector, receiver.n_sectors);
+                    let phi = angular_difference(bearing, angle);
+                    if phi > PI / receiver.n_sectors as f64 + BORDER {
+                        continue;
+                    }
+                    let strength = receiver.decay.strength(rho, phi);
+                    if strongest.is_none_or(|heard| strength > heard.strength) {
+                        let sending_direction = facing(sending, n_sending);
+                        *strongest = Some(Heard { emitter, strength, sending_direction });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// (cos, sin) of the sector of `n_sectors` that is nearest to an angle in
+/// \[0, 2 pi); on ties the one of the lower index.
+fn facing(angle: f64, n_sectors: usize) -> Vec2 {
+    let mut nearest = (f64::INFINITY, 0.0);
+    for sector in 0..n_sectors {
+        let direction = sector_angle(sector, n_sectors);
+        let difference = angular_difference(angle, direction);
+        if difference < nearest.0 - BORDER {
+            nearest = (difference, direction);
+        }
+    }
+    Vec2::unit(nearest.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+    use super::*;
+
+    const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
+    const ANTENNA: Antenna = Antenna {
+        emits_within: Some(100.0),
+        receiver: Some(Receiver {
+            n_sectors: 4,
+            range: 100.0,
+            decay: Decay { rho: 0.05, phi: 1.0 },
+            max_hops: 10,
+        }),
+    };
+
+    fn hearing(antennas: &[Antenna], robots: &[(f64, f64, f64)]) -> Hearing {
+        let positions: Vec<Vec2> = robots.iter().map(|&(x, y, _)| Vec2::new(x, y)).collect();
+        let headings: Vec<f64> = robots.iter().map(|&(_, _, heading)| heading).collect();
+        let mut hearing = Hearing::new(antennas);
+        hearing.update(&TORUS, antennas, &positions, &headings);
+        hearing
+    }
+
+    fn emitters(hearing: &Hearing, robot: usize) -> Vec<Option<usize>> {
+        hearing.of(robot).iter().map(|heard| heard.map(|heard| heard.emitter)).collect()
+    }
+
+    #[test]
+    fn strength_and_directions_match_a_case_by_hand() {
+        // 50 cm away, 53.13 degrees to the left; the other one looks up.
+        let robots = [(990.0, 500.0, 0.0), (20.0, 540.0, FRAC_PI_2)];
+        let hearing = hearing(&[ANTENNA; 2], &robots);
+        assert_eq!(emitters(&hearing, 0), [None, Some(1), None, None]);
+        let heard = hearing.of(0)[1].unwrap();
+        let phi = FRAC_PI_2 - libm::atan2(4.0, 3.0);
+        assert!((heard.strength - libm::exp(-2.5 - phi)).abs() < 1e-15);
+        // Seen from the other: 143.13 degrees to its left, nearest to 180.
+        assert!((heard.sending_direction.x + 1.0).abs() < 1e-15);
+        assert!(heard.sending_direction.y.abs() < 1e-15);
+        assert_eq!(emitters(&hearing, 1), [None, None, Some(0), None]);
+    }
+
+    #[test]
+    fn the_strongest_wins_its_sector_and_the_lower_index_wins_ties() {
+        let robots = [(500.0, 500.0, 0.0), (560.0, 500.0, 0.0), (550.0, 500.0, 0.0)];
+        assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(2));
+        let robots = [(500.0, 500.0, 0.0), (550.0, 520.0, 0.0), (550.0, 480.0, 0.0)];
+        assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(1));
+    }
+
+    #[test]
+    fn a_robot_on_a_border_is_heard_on_both_sides() {
+        for corner in 0..4 {
+            let angle = FRAC_PI_4 + f64::from(corner) * FRAC_PI_2;
+            let away = Vec2::unit(angle);
+            let other = (500.0 + 50.0 * away.x.signum(), 500.0 + 50.0 * away.y.signum(), 0.0);
+            let hearing = hearing(&[ANTENNA; 2], &[(500.0, 500.0, 0.0), other]);
+            let heard = emitters(&hearing, 0).iter().flatten().count();
+            assert_eq!(heard, 2, "corner {corner}");
+        }
+    }
+
+    #[test]
+    fn the_smaller_reach_decides() {
+        let weak = Antenna { emits_within: Some(40.0), ..ANTENNA };
+        let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0)];
+        let hearing = hearing(&[ANTENNA, weak], &robots);
+        assert_eq!(hearing.of(0), [None; 4]);
+        assert_eq!(emitters(&hearing, 1)[2], Some(0));
+    }
+
+    #[test]
+    fn robots_at_one_point_hear_each_other_ahead() {
+        let hearing = hearing(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
+        assert_eq!(emitters(&hearing, 0), [Some(1), None, None, None]);
+        assert_eq!(hearing.of(0)[0].unwrap().strength, 1.0);
+    }
+
+    #[test]
+    fn ears_and_voices_are_independent() {
+        let beacon = Antenna { receiver: None, ..ANTENNA };
+        let listener = Antenna { emits_within: None, ..ANTENNA };
+        let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0), (510.0, 500.0, 0.0)];
+        let hearing = hearing(&[beacon, ANTENNA, listener], &robots);
+        assert!(hearing.of(0).is_empty());
+        assert_eq!(emitters(&hearing, 1)[2], Some(0));
+        assert_eq!(emitters(&hearing, 2), [Some(1), None, Some(0), None]);
+    }
+}

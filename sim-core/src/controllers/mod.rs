@@ -1,0 +1,36 @@
+//! What decides robots' actions.
+
+mod braitenberg;
+mod neural;
+
+pub(crate) use braitenberg::BraitenbergLightFollower;
+pub(crate) use neural::NeuralController;
+
+use crate::communication::Mode;
+use crate::lanes::Lanes;
+use crate::random::Stream;
+
+/// Decides for all robots of one object of the world, in all trials at once: one
+/// lane per robot and trial.
+pub(crate) trait Controller {
+    /// Takes in one environment step's stimuli, `[input][lane]`.
+    fn perceive(&mut self, stimuli: &Lanes);
+
+    /// Sets the actions of one lane; `action` holds the defaults. `stream` is the
+    /// robot's own for stochastic decisions, from which every step draws the same
+    /// number of values.
+    fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>);
+}
+
+/// The actions of one robot in one step.
+#[derive(Debug)]
+pub(crate) struct Action<'a> {
+    /// Right and left wheel, in \[-1, 1\].
+    pub wheels: &'a mut [f64; 2],
+    /// Colour of the LED, 0 off.
+    pub led: &'a mut u32,
+    /// Communication mode.
+    pub mode: &'a mut Mode,
+    /// Message, before quantisation.
+    pub message: &'a mut [f64],
+}

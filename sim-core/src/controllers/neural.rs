@@ -1,0 +1,37 @@
+//! Robots run by the network that a genotype encodes.
+
+use super::{Action, Controller};
+use crate::lanes::Lanes;
+use crate::network::ctrnn::Ctrnn;
+use crate::network::decoding::Output;
+use crate::network::{Network, Phenotype};
+use crate::random::Stream;
+
+/// One network, its state in every lane, and the decoding of its outputs.
+#[derive(Debug)]
+pub(crate) struct NeuralController<'a> {
+    ctrnn: Ctrnn,
+    outputs: &'a [Output],
+    /// Scratch of decoders.
+    weights: Vec<f64>,
+}
+
+impl<'a> NeuralController<'a> {
+    /// At rest in every lane.
+    pub fn new(network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
+        let ctrnn = Ctrnn::new(network, phenotype, n_lanes);
+        Self { ctrnn, outputs: &network.outputs, weights: Vec::new() }
+    }
+}
+
+impl Controller for NeuralController<'_> {
+    fn perceive(&mut self, stimuli: &Lanes) {
+        self.ctrnn.step(stimuli);
+    }
+
+    fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>) {
+        for output in self.outputs {
+            output.decode(self.ctrnn.activity(), lane, stream, &mut self.weights, action);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! `grouping`: robots gather, but not on top of each other.
+
+use super::{Fitness, Moment, mean};
+
+/// Distance to the centroid at which a robot earns nothing, cm.
+const FAR: f64 = 100.0;
+/// Robots that are not farther apart than this spoil the step, cm.
+const CROWDED: f64 = 20.0;
+
+/// f = mean clip(1 - distance to centroid / 100, 0, 1), or 0 if two robots are
+/// within 20 cm of each other.
+#[derive(Debug)]
+pub(super) struct Grouping;
+
+impl Fitness for Grouping {
+    fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
+        let torus = moment.torus;
+        for (robot, &a) in moment.positions.iter().enumerate() {
+            if moment.positions[..robot].iter().any(|&b| torus.distance(a, b) <= CROWDED) {
+                return Some(0.0);
+            }
+        }
+        let centroid = torus.centroid(moment.positions);
+        let nearness = |&robot| (1.0 - torus.distance(robot, centroid) / FAR).clamp(0.0, 1.0);
+        Some(mean(moment.positions.iter().map(nearness)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::torus::Vec2;
+
+    fn fitness(positions: &[(f64, f64)]) -> f64 {
+        let positions: Vec<Vec2> = positions.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
+        Grouping.step(&Moment { positions: &positions, ..Moment::EMPTY }).unwrap()
+    }
+
+    #[test]
+    fn nearness_to_the_centroid_counts() {
+        assert!((fitness(&[(980.0, 0.0), (20.0, 0.0)]) - 0.8).abs() < 1e-12);
+        // Centroid at x = 60: distances 60, 10, 50, of the last 120.
+        let far = fitness(&[(0.0, 0.0), (50.0, 0.0), (10.0, 0.0), (180.0, 0.0)]);
+        assert_eq!(far, 0.0, "10 cm apart");
+        let spread = fitness(&[(0.0, 0.0), (50.0, 0.0), (25.0, 0.0), (165.0, 0.0)]);
+        assert!((spread - (0.4 + 0.9 + 0.65 + 0.0) / 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn crowds_earn_nothing() {
+        assert_eq!(fitness(&[(0.0, 0.0), (20.0, 0.0)]), 0.0);
+        assert!(fitness(&[(0.0, 0.0), (20.1, 0.0)]) > 0.8);
+    }
+
+    #[test]
+    fn one_robot_is_a_group() {
+        assert_eq!(fitness(&[(123.0, 456.0)]), 1.0);
+    }
+}

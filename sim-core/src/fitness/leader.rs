@@ -1,0 +1,54 @@
+//! `identify_leader` (Eq. 5.2 and 5.3): one robot, and the same one, leads.
+
+use super::{Fitness, Moment};
+use crate::leadership::Leadership;
+
+/// Weight of a leader's experience per step.
+const WEIGHT: f64 = 0.1;
+/// Largest fitness of a step.
+const MAX: f64 = 5.0;
+
+/// f = min(0.1 c, 5) with exactly one leader, c the number of steps before this
+/// one in which it has been sole leader without interruption; else 0.
+#[derive(Debug, Default)]
+pub(super) struct IdentifyLeader {
+    leadership: Leadership,
+}
+
+impl Fitness for IdentifyLeader {
+    fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
+        let leader = self.leadership.observe(moment.leds);
+        Some(leader.map_or(0.0, |leader| (WEIGHT * f64::from(leader.n_steps - 1)).min(MAX)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean(steps: impl Iterator<Item = [u32; 3]>) -> f64 {
+        let mut fitness = IdentifyLeader::default();
+        let values: Vec<f64> = steps
+            .map(|leds| fitness.step(&Moment { leds: &leds, ..Moment::EMPTY }).unwrap())
+            .collect();
+        values.iter().sum::<f64>() / values.len() as f64
+    }
+
+    #[test]
+    fn one_leader_for_50_steps_gives_the_optimum() {
+        assert!((mean((0..50).map(|_| [0, 1, 0])) - 2.45).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_leader_earns_at_most_five() {
+        let late = mean((0..1000).map(|_| [0, 1, 0]));
+        assert!((late - (50.0 * 2.45 + 950.0 * 5.0) / 1000.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn changing_several_and_no_leaders_earn_nothing() {
+        assert_eq!(mean((0..50).map(|k| [k % 2, (k + 1) % 2, 0])), 0.0);
+        assert_eq!(mean((0..50).map(|_| [1, 1, 0])), 0.0);
+        assert_eq!(mean((0..50).map(|_| [0, 0, 0])), 0.0);
+    }
+}

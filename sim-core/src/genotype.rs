@@ -1,0 +1,425 @@
+//! From genes in \[0, 1\] to the network's parameters (section 3.4.2, Eq. 3.17).
+
+use std::ops::Range;
+
+use crate::config::{
+    EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter, SynapseSelector,
+    TopologyConfig,
+};
+use crate::network::connections::Source;
+use crate::network::{Network, Phenotype};
+use crate::problems::Problems;
+use crate::random::{Purpose, Stream};
+
+/// What each gene means.
+#[derive(Debug, Clone)]
+pub(crate) struct Codec {
+    genes: Vec<Gene>,
+    /// Genes of each population.
+    segments: Vec<Range<usize>>,
+    /// Values of everything that no gene covers.
+    defaults: Phenotype,
+    /// What no gene covers, in words.
+    uncovered: Vec<String>,
+}
+
+/// One gene: `parameter` = gene * span + low.
+#[derive(Debug, Clone, Copy)]
+struct Gene {
+    parameter: Parameter,
+    low: f64,
+    span: f64,
+}
+
+/// A value of the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Parameter {
+    /// Of a synapse.
+    Weight(usize),
+    /// Of a neuron.
+    Neuron(NeuronParameter, usize),
+}
+
+impl Codec {
+    /// Resolves the queries of all populations, in their order; notes queries that
+    /// cover nothing.
+    pub fn compile(config: &ExperimentConfig, network: &Network, problems: &mut Problems) -> Self {
+        let mut coverage = Coverage::new(network);
+        let mut genes = Vec::new();
+        let mut segments = Vec::new();
+        for (name, population) in &config.algorithm.populations {
+            let first = genes.len();
+            let bounds = population.min_vals.iter().zip(&population.max_vals);
+            for (index, (query, (&low, &high))) in population.objects.iter().zip(bounds).enumerate()
+            {
+                let parameters = select(query, network);
+                if parameters.is_empty() {
+                    // The name may be unknown, or chance has left out all synapses.
+                    let path = format!("algorithm.populations.{name}.objects[{index}]");
+                    problems.add(path, format!("`{query}` covers nothing that can evolve"));
+                }
+                let span = high - low;
+                for parameter in parameters {
+                    *coverage.of(parameter) = true;
+                    genes.push(Gene { parameter, low, span });
+                }
+            }
+            segments.push(first..genes.len());
+        }
+        let defaults = defaults(&config.topology, network, &coverage, problems);
+        let uncovered = coverage.describe(network);
+        Self { genes, segments, defaults, uncovered }
+    }
+
+    /// Number of genes, d.
+    pub fn genotype_len(&self) -> usize {
+        self.genes.len()
+    }
+
+    /// Genes of each population.
+    pub fn segments(&self) -> &[Range<usize>] {
+        &self.segments
+    }
+
+    /// What no gene covers, one line each.
+    pub fn uncovered(&self) -> &[String] {
+        &self.uncovered
+    }
+
+    /// Decodes d genes.
+    pub fn decode(&self, genotype: &[f64]) -> Phenotype {
+        let mut phenotype = self.defaults.clone();
+        for (gene, x) in self.genes.iter().zip(genotype) {
+            let value = x * gene.span + gene.low;
+            match gene.parameter {
+                Parameter::Weight(synapse) => phenotype.weights[synapse] = value,
+                Parameter::Neuron(NeuronParameter::Bias, neuron) => phenotype.bias[neuron] = value,
+                Parameter::Neuron(NeuronParameter::Gain, neuron) => phenotype.gain[neuron] = value,
+                Parameter::Neuron(NeuronParameter::Tau, neuron) => {
+                    phenotype.tau[neuron] = tau(value);
+                }
+            }
+        }
+        phenotype
+    }
+}
+
+/// Time constants are decoded on a logarithmic scale.
+fn tau(exponent: f64) -> f64 {
+    2.0 * libm::pow(10.0, exponent)
+}
+
+/// The parameters that a query covers, in genotype order.
+fn select(query: &GenotypeQuery, network: &Network) -> Vec<Parameter> {
+    match query {
+        GenotypeQuery::Weights(selector) => select_weights(selector, network),
+        GenotypeQuery::Neurons(parameter, selector) => {
+            let neurons = match selector {
+                EnsembleSelector::All => 0..network.n_neurons(),
+                EnsembleSelector::Named(name) => {
+                    network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
+                }
+            };
+            neurons.map(|neuron| Parameter::Neuron(*parameter, neuron)).collect()
+        }
+    }
+}
+
+/// A name is that of a group of synapses, a stimulus or an ensemble; the reader of
+/// experiment files sees to it that it is not several of them.
+fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Parameter> {
+    let is_motor = |neuron: &usize| {
+        let mut ensembles = network.ensembles.values();
+        ensembles.any(|ensemble| ensemble.motor && ensemble.neurons.contains(neuron))
+    };
+    let trainable = network.groups.iter().filter(|(_, group)| group.trainable);
+    let selected = trainable.flat_map(|(group_name, group)| {
+        group.synapses.clone().filter(move |&synapse| {
+            let pre = network.synapses[synapse].pre;
+            match (selector, pre) {
+                (SynapseSelector::All, _) => true,
+                (SynapseSelector::Sensory, pre) => matches!(pre, Source::Input(_)),
+                (SynapseSelector::Hidden, Source::Neuron(neuron)) => !is_motor(&neuron),
+                (SynapseSelector::Motor, Source::Neuron(neuron)) => is_motor(&neuron),
+                (SynapseSelector::Hidden | SynapseSelector::Motor, Source::Input(_)) => false,
+                (SynapseSelector::Named(name), _) if name == group_name => true,
+                (SynapseSelector::Named(name), Source::Input(input)) => {
+                    network.stimuli.get(name).is_some_and(|s| s.inputs.contains(&input))
+                }
+                (SynapseSelector::Named(name), Source::Neuron(neuron)) => {
+                    network.ensembles.get(name).is_some_and(|e| e.neurons.contains(&neuron))
+                }
+            }
+        })
+    });
+    selected.map(Parameter::Weight).collect()
+}
+
+/// Values of what the genotype does not cover.
+fn defaults(
+    config: &TopologyConfig,
+    network: &Network,
+    coverage: &Coverage,
+    problems: &mut Problems,
+) -> Phenotype {
+    let mut weights = vec![0.0; network.synapses.len()];
+    for (index, group) in network.groups.values().enumerate() {
+        let mut stream = Stream::new(config.seed, 0, 0, Purpose::FixedWeights, index as u64);
+        for synapse in group.synapses.clone().filter(|&synapse| !coverage.weights[synapse]) {
+            weights[synapse] = -1.0 + 2.0 * stream.uniform();
+        }
+    }
+    let mut phenotype = Phenotype { weights, tau: vec![], gain: vec![], bias: vec![] };
+    for (name, ensemble) in &network.ensembles {
+        let params = ensemble.defaults;
+        // Euler steps beyond twice the time constant diverge.
+        if network.dt > 2.0 * params.tau
+            && coverage.tau[ensemble.neurons.clone()].iter().any(|covered| !covered)
+        {
+            let message = format!("{} s is less than half of topology.dt: unstable", params.tau);
+            problems.add(format!("topology.ensembles.{name}.params.tau"), message);
+        }
+        for _ in ensemble.neurons.clone() {
+            phenotype.tau.push(params.tau);
+            phenotype.gain.push(params.gain);
+            phenotype.bias.push(params.bias);
+        }
+    }
+    phenotype
+}
+
+/// Which values the genotype covers.
+struct Coverage {
+    weights: Vec<bool>,
+    bias: Vec<bool>,
+    tau: Vec<bool>,
+    gain: Vec<bool>,
+}
+
+impl Coverage {
+    fn new(network: &Network) -> Self {
+        let neurons = vec![false; network.n_neurons()];
+        Self {
+            weights: vec![false; network.synapses.len()],
+            bias: neurons.clone(),
+            tau: neurons.clone(),
+            gain: neurons,
+        }
+    }
+
+    fn neurons(&self, parameter: NeuronParameter) -> &[bool] {
+        match parameter {
+            NeuronParameter::Bias => &self.bias,
+            NeuronParameter::Tau => &self.tau,
+            NeuronParameter::Gain => &self.gain,
+        }
+    }
+
+    /// Whether a value is covered.
+    fn of(&mut self, parameter: Parameter) -> &mut bool {
+        match parameter {
+            Parameter::Weight(synapse) => &mut self.weights[synapse],
+            Parameter::Neuron(NeuronParameter::Bias, neuron) => &mut self.bias[neuron],
+            Parameter::Neuron(NeuronParameter::Tau, neuron) => &mut self.tau[neuron],
+            Parameter::Neuron(NeuronParameter::Gain, neuron) => &mut self.gain[neuron],
+        }
+    }
+
+    /// What is not covered, except what the experiment declares untrainable.
+    fn describe(&self, network: &Network) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {
+            let n = group.synapses.clone().filter(|&synapse| !self.weights[synapse]).count();
+            if n > 0 {
+                lines.push(format!("synapses:weights:{name}: {n} weights stay random"));
+            }
+        }
+        for parameter in [NeuronParameter::Bias, NeuronParameter::Tau, NeuronParameter::Gain] {
+            for (name, ensemble) in &network.ensembles {
+                let (label, value) = match parameter {
+                    NeuronParameter::Bias => ("bias", ensemble.defaults.bias),
+                    NeuronParameter::Tau => ("tau", ensemble.defaults.tau),
+                    NeuronParameter::Gain => ("gain", ensemble.defaults.gain),
+                };
+                if self.neurons(parameter)[ensemble.neurons.clone()].iter().any(|covered| !covered)
+                {
+                    lines.push(format!("neurons:{label}:{name} stays {value}"));
+                }
+            }
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{experiment_a, genotype};
+
+    fn compile(config: &ExperimentConfig) -> (Network, Codec, Problems) {
+        let mut problems = Problems::default();
+        let network = Network::compile(&config.topology, &mut problems);
+        let codec = Codec::compile(config, &network, &mut problems);
+        (network, codec, problems)
+    }
+
+    fn with_queries(queries: &[GenotypeQuery]) -> ExperimentConfig {
+        let mut config = experiment_a();
+        let population = &mut config.algorithm.populations[0];
+        population.objects = queries.to_vec();
+        population.max_vals = vec![3.0; queries.len()];
+        population.min_vals = vec![-3.0; queries.len()];
+        config
+    }
+
+    fn weights(selector: SynapseSelector) -> GenotypeQuery {
+        GenotypeQuery::Weights(selector)
+    }
+
+    fn named(name: &str) -> GenotypeQuery {
+        weights(SynapseSelector::Named(name.into()))
+    }
+
+    /// Number of genes of a query.
+    fn n_genes(query: GenotypeQuery) -> usize {
+        compile(&with_queries(&[query])).1.genotype_len()
+    }
+
+    /// Inverse of `decode`.
+    fn encode(codec: &Codec, phenotype: &Phenotype) -> Vec<f64> {
+        let gene = |gene: &Gene| {
+            let value = match gene.parameter {
+                Parameter::Weight(synapse) => phenotype.weights[synapse],
+                Parameter::Neuron(NeuronParameter::Bias, neuron) => phenotype.bias[neuron],
+                Parameter::Neuron(NeuronParameter::Gain, neuron) => phenotype.gain[neuron],
+                Parameter::Neuron(NeuronParameter::Tau, neuron) => {
+                    libm::log10(phenotype.tau[neuron] / 2.0)
+                }
+            };
+            (value - gene.low) / gene.span
+        };
+        codec.genes.iter().map(gene).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn decoding_is_invertible_and_keeps_bounds(seed in 0..1000u64) {
+            let (_, codec, _) = compile(&experiment_a());
+            let genes = genotype(codec.genotype_len(), seed);
+            let phenotype = codec.decode(&genes);
+            for (gene, back) in genes.iter().zip(encode(&codec, &phenotype)) {
+                prop_assert!((gene - back).abs() < 1e-12);
+            }
+            prop_assert!(phenotype.weights.iter().all(|w| (-3.0..=3.0).contains(w)));
+            prop_assert!(phenotype.tau.iter().all(|tau| (0.2..=11.25).contains(tau)));
+            prop_assert!(phenotype.gain.iter().all(|gain| (0.05..=5.0).contains(gain)));
+            prop_assert!(phenotype.bias.iter().all(|bias| (-1.5..=1.5).contains(bias)));
+        }
+    }
+
+    #[test]
+    fn values_match_cases_by_hand() {
+        let (network, codec, _) = compile(&experiment_a());
+        let n_weights = network.synapses.len();
+        let mut genes = vec![0.5; codec.genotype_len()];
+        genes[0] = 1.0;
+        genes[n_weights] = 0.0;
+        genes[n_weights + 24] = 4.0 / 7.0;
+        let phenotype = codec.decode(&genes);
+        assert_eq!(phenotype.weights[..2], [3.0, 0.0]);
+        assert_eq!(phenotype.bias[..2], [-1.5, 0.0]);
+        assert!((phenotype.tau[0] - 2.0).abs() < 1e-12, "2 * 10^0");
+        assert!((phenotype.gain[0] - 2.525).abs() < 1e-12);
+    }
+
+    #[test]
+    fn kinds_of_synapses_go_by_their_presynaptic_side() {
+        let sensory = n_genes(weights(SynapseSelector::Sensory));
+        let hidden = n_genes(weights(SynapseSelector::Hidden));
+        let motor = n_genes(weights(SynapseSelector::Motor));
+        assert_eq!(sensory, 5 * 10);
+        assert_eq!(sensory + hidden + motor, n_genes(weights(SynapseSelector::All)));
+        let motor_groups = [
+            "OUT_COMM-H1",
+            "OUT_LED-H1",
+            "OUT_STATE-H1",
+            "OUT_COMM-OUT_COMM",
+            "OUT_COMM-OUT_STATE",
+            "OUT_STATE-OUT_COMM",
+        ];
+        assert_eq!(motor, motor_groups.iter().map(|group| n_genes(named(group))).sum::<usize>());
+    }
+
+    #[test]
+    fn names_are_of_ensembles_stimuli_or_groups() {
+        assert_eq!(n_genes(named("I1")), 20);
+        assert_eq!(n_genes(named("I1-H1")), 20);
+        let from_h2 = ["H2-H2", "H2-OUT_COMM", "H2-OUT_STATE"];
+        assert_eq!(
+            n_genes(named("H2")),
+            from_h2.iter().map(|name| n_genes(named(name))).sum::<usize>()
+        );
+        let bias = |name: &str| {
+            let ensemble = EnsembleSelector::Named(name.into());
+            GenotypeQuery::Neurons(NeuronParameter::Bias, ensemble)
+        };
+        assert_eq!(n_genes(bias("OUT_COMM")), 2);
+        for query in [named("H3"), bias("H3"), bias("I1")] {
+            assert!(compile(&with_queries(&[query])).2.check().is_err());
+        }
+    }
+
+    #[test]
+    fn queries_that_cover_nothing_and_time_constants_that_diverge_are_problems() {
+        let mut empty = with_queries(&[named("I1-H1")]);
+        empty.topology.synapses[0].trainable = false;
+        assert!(compile(&empty).2.check().is_err());
+        empty.topology.synapses[0].trainable = true;
+        empty.topology.synapses[0].p = 1e-9;
+        assert!(compile(&empty).2.check().is_err());
+        let mut fast = with_queries(&[named("I1-H1")]);
+        fast.topology.ensembles[0].params.tau = 0.04;
+        assert!(compile(&fast).2.check().is_err());
+        let mut covered = experiment_a();
+        covered.topology.ensembles[0].params.tau = 0.04;
+        assert!(compile(&covered).2.check().is_ok());
+    }
+
+    #[test]
+    fn segments_follow_populations_and_queries() {
+        let mut config = with_queries(&[named("H2"), named("I1")]);
+        let second = with_queries(&[named("H1")]).algorithm.populations[0].clone();
+        config.algorithm.populations.insert("second".into(), second);
+        let (network, codec, problems) = compile(&config);
+        problems.check().unwrap();
+        let first = n_genes(named("H2")) + 20;
+        assert_eq!(codec.segments(), [0..first, first..first + n_genes(named("H1"))]);
+        let mut genes = vec![0.5; codec.genotype_len()];
+        genes[first - 20] = 1.0;
+        let weights = codec.decode(&genes).weights;
+        assert_eq!(weights[network.groups["I1-H1"].synapses.start], 3.0);
+    }
+
+    #[test]
+    fn what_no_query_covers_is_named_and_fixed() {
+        let mut config = with_queries(&[weights(SynapseSelector::Sensory)]);
+        config.topology.synapses["H1-H2"].trainable = false;
+        let (network, codec, problems) = compile(&config);
+        problems.check().unwrap();
+        let n = network.groups["H1-H1"].synapses.len();
+        assert_eq!(
+            codec.uncovered()[0],
+            format!("synapses:weights:H1-H1: {n} weights stay random")
+        );
+        assert_eq!(codec.uncovered().len(), 11 + 3 * 5);
+        assert!(codec.uncovered().contains(&"neurons:tau:OUT_LED stays 2".to_owned()));
+        let low = codec.decode(&vec![0.0; codec.genotype_len()]);
+        let high = codec.decode(&vec![1.0; codec.genotype_len()]);
+        let fixed = network.groups["H1-H2"].synapses.clone();
+        assert_eq!(low.weights[fixed.clone()], high.weights[fixed.clone()]);
+        assert!(low.weights[fixed.clone()].iter().all(|w| (-1.0..1.0).contains(w)));
+        assert!(low.weights[fixed].iter().any(|&w| w != 0.0));
+    }
+}

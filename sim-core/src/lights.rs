@@ -1,0 +1,166 @@
+//! Lights and how they move.
+
+use crate::config::LightController;
+use crate::random::Stream;
+use crate::torus::{Torus, Vec2, wrap_angle};
+
+/// Probability per step that an orbiting light turns back.
+const FLIP_PROBABILITY: f64 = 0.01;
+/// Angle per step of an orbiting light, radians.
+const ORBIT_STEP: f64 = 0.01;
+/// Radius that an orbit tends to, cm.
+const ORBIT_RADIUS: f64 = 200.0;
+/// Steps in which an orbit's radius nearly reaches its limit.
+const ORBIT_SETTLING: f64 = 50.0;
+/// Side of the square around the world's centre that targets are drawn from, cm.
+const TARGET_SQUARE: f64 = 200.0;
+
+/// The path of one light in one trial.
+#[derive(Debug, Clone)]
+pub(crate) struct LightPath {
+    stream: Stream,
+    motion: Motion,
+}
+
+#[derive(Debug, Clone)]
+enum Motion {
+    Static,
+    /// Polar coordinates around the centre of the world (Eq. 5.7 and 5.8).
+    Orbit {
+        angle: f64,
+        radius: f64,
+        sense: f64,
+    },
+    /// Eq. 6.4.
+    Drift {
+        every: u32,
+        step: f64,
+        target: Vec2,
+    },
+}
+
+impl LightPath {
+    /// The path of a light that starts at `position`.
+    pub fn new(
+        controller: &LightController,
+        position: Vec2,
+        torus: &Torus,
+        stream: Stream,
+    ) -> Self {
+        let motion = match *controller {
+            LightController::Static {} => Motion::Static,
+            LightController::LightOrbitController {} => {
+                let away = torus.displacement(torus.center(), position);
+                Motion::Orbit { angle: away.angle(), radius: away.norm(), sense: 1.0 }
+            }
+            LightController::LightRndPosController { every, step } => {
+                Motion::Drift { every, step, target: position }
+            }
+        };
+        Self { stream, motion }
+    }
+
+    /// Position after environment step `step`, from the position before.
+    pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus) -> Vec2 {
+        match &mut self.motion {
+            Motion::Static => position,
+            Motion::Orbit { angle, radius, sense } => {
+                if self.stream.bernoulli(FLIP_PROBABILITY) {
+                    *sense = -*sense;
+                }
+                *angle = wrap_angle(*angle + *sense * ORBIT_STEP);
+                *radius += (ORBIT_RADIUS - *radius) / ORBIT_SETTLING;
+                let (center, direction) = (torus.center(), Vec2::unit(*angle));
+                torus.wrap(Vec2 {
+                    x: center.x + *radius * direction.x,
+                    y: center.y + *radius * direction.y,
+                })
+            }
+            Motion::Drift { every, step: share, target } => {
+                if step.is_multiple_of(*every) {
+                    let mut coordinate = |center: f64| {
+                        center - 0.5 * TARGET_SQUARE + TARGET_SQUARE * self.stream.uniform()
+                    };
+                    let x = coordinate(torus.center().x);
+                    *target = torus.wrap(Vec2 { x, y: coordinate(torus.center().y) });
+                }
+                let way = torus.displacement(position, *target);
+                torus.wrap(Vec2 { x: position.x + *share * way.x, y: position.y + *share * way.y })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Purpose;
+
+    const TORUS: Torus = Torus { width: 1000.0, height: 800.0 };
+
+    fn path(controller: LightController, start: Vec2) -> impl FnMut(u32) -> Vec2 {
+        let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
+        let mut path = LightPath::new(&controller, start, &TORUS, stream);
+        let mut position = start;
+        move |step| {
+            position = path.advance(position, step, &TORUS);
+            position
+        }
+    }
+
+    #[test]
+    fn an_orbit_starts_where_the_light_is_and_settles_at_its_radius() {
+        let mut path = path(LightController::LightOrbitController {}, Vec2::new(501.0, 400.0));
+        let mut radius = 1.0;
+        for step in 0..40 {
+            // The first flip of this stream comes later.
+            let position = path(step);
+            radius += (200.0 - radius) / 50.0;
+            let angle = 0.01 * f64::from(step + 1);
+            let expected =
+                Vec2::new(500.0 + radius * libm::cos(angle), 400.0 + radius * libm::sin(angle));
+            assert!(TORUS.distance(position, expected) < 1e-9, "step {step}");
+        }
+        let settled = (40..1000).map(&mut path).last().unwrap();
+        assert!((TORUS.distance(settled, TORUS.center()) - 200.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn an_orbit_flips_once_in_a_hundred_steps() {
+        let mut path = path(LightController::LightOrbitController {}, Vec2::new(501.0, 400.0));
+        let angle = |p: Vec2| TORUS.displacement(TORUS.center(), p).angle();
+        let angles: Vec<f64> = (0..20_000).map(|step| angle(path(step))).collect();
+        let senses: Vec<bool> =
+            angles.windows(2).map(|pair| wrap_angle(pair[1] - pair[0]) < 1.0).collect();
+        let flips = senses.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        assert!((150..250).contains(&flips), "{flips}");
+    }
+
+    #[test]
+    fn a_drifting_light_covers_its_share_of_the_way() {
+        let start = Vec2::new(500.0, 400.0);
+        let controller = LightController::LightRndPosController { every: 50, step: 0.1 };
+        let mut path = path(controller, start);
+        let mut draws = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
+        let mut position = start;
+        let mut target = start;
+        for step in 0..200 {
+            if step % 50 == 0 {
+                let x = 400.0 + 200.0 * draws.uniform();
+                target = Vec2::new(x, 300.0 + 200.0 * draws.uniform());
+            }
+            position = Vec2::new(
+                position.x + 0.1 * (target.x - position.x),
+                position.y + 0.1 * (target.y - position.y),
+            );
+            assert!(TORUS.distance(path(step), position) < 1e-9, "step {step}");
+        }
+    }
+
+    #[test]
+    fn a_static_light_stays() {
+        let start = Vec2::new(1.0, 2.0);
+        let mut path = path(LightController::Static {}, start);
+        assert!((0..10).all(|step| path(step) == start));
+    }
+}

@@ -1,0 +1,63 @@
+//! A network with its values, for people and other programs to read.
+
+use serde_json::{Value, json};
+
+use super::connections::Source;
+use super::{Network, Phenotype};
+
+impl Network {
+    /// Stimuli, neurons and synapses with their values. Inputs and neurons are
+    /// numbered each from 0 in the order of the experiment file.
+    pub fn to_json(&self, phenotype: &Phenotype) -> Value {
+        let stimuli = self.stimuli.iter().map(|(name, stimulus)| {
+            json!({
+                "name": name,
+                "sensor": stimulus.sensor,
+                "first_input": stimulus.inputs.start,
+                "n": stimulus.inputs.len(),
+            })
+        });
+        let neurons = self.ensembles.iter().flat_map(|(name, ensemble)| {
+            ensemble.neurons.clone().map(move |neuron| {
+                json!({
+                    "ensemble": name,
+                    "activation": ensemble.activation,
+                    "tau": phenotype.tau[neuron],
+                    "gain": phenotype.gain[neuron],
+                    "bias": phenotype.bias[neuron],
+                })
+            })
+        });
+        let synapses = self.groups.iter().flat_map(|(name, group)| {
+            group.synapses.clone().map(move |index| {
+                let synapse = self.synapses[index];
+                let pre = match synapse.pre {
+                    Source::Input(input) => json!({ "input": input }),
+                    Source::Neuron(neuron) => json!({ "neuron": neuron }),
+                };
+                json!({
+                    "group": name,
+                    "pre": pre,
+                    "post": synapse.post,
+                    "weight": phenotype.weights[index],
+                    "trainable": group.trainable,
+                })
+            })
+        });
+        let outputs = self.outputs.iter().map(|output| {
+            json!({
+                "actuator": output.actuator,
+                "first_neuron": output.neurons.start,
+                "n": output.neurons.len(),
+            })
+        });
+        json!({
+            "dt": self.dt,
+            "time_scale": self.n_substeps,
+            "stimuli": stimuli.collect::<Vec<_>>(),
+            "neurons": neurons.collect::<Vec<_>>(),
+            "synapses": synapses.collect::<Vec<_>>(),
+            "outputs": outputs.collect::<Vec<_>>(),
+        })
+    }
+}

@@ -1,0 +1,112 @@
+//! The neural network's structure: what is the same for all genotypes.
+
+pub(crate) mod connections;
+pub(crate) mod ctrnn;
+pub(crate) mod decoding;
+mod json;
+
+use std::ops::Range;
+
+use indexmap::IndexMap;
+
+use crate::config::{Activation, NeuronParams, SensorQuery, TopologyConfig};
+use crate::problems::Problems;
+use connections::{Synapse, SynapseGroup};
+use decoding::Output;
+
+/// Structure of a network.
+#[derive(Debug, Clone)]
+pub(crate) struct Network {
+    /// Euler step, seconds.
+    pub dt: f64,
+    /// Substeps per environment step.
+    pub n_substeps: u32,
+    /// Inputs by name, in the order of their rows.
+    pub stimuli: IndexMap<String, Stimulus>,
+    /// Neurons by name of their ensemble, in their order.
+    pub ensembles: IndexMap<String, Ensemble>,
+    /// Synapse groups by name.
+    pub groups: IndexMap<String, SynapseGroup>,
+    /// All synapses, group by group.
+    pub synapses: Vec<Synapse>,
+    /// What neurons do, in the order of the configuration.
+    pub outputs: Vec<Output>,
+}
+
+/// A named input.
+#[derive(Debug, Clone)]
+pub(crate) struct Stimulus {
+    /// Its rows among the inputs.
+    pub inputs: Range<usize>,
+    /// The reading that it carries.
+    pub sensor: SensorQuery,
+}
+
+/// A named group of neurons.
+#[derive(Debug, Clone)]
+pub(crate) struct Ensemble {
+    /// Its neurons.
+    pub neurons: Range<usize>,
+    /// Activation function F.
+    pub activation: Activation,
+    /// Values of what the genotype does not cover.
+    pub defaults: NeuronParams,
+    /// Whether an output reads it.
+    pub motor: bool,
+}
+
+/// What a genotype decides: one value per synapse, or per neuron.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Phenotype {
+    /// Per synapse.
+    pub weights: Vec<f64>,
+    /// Time constants tau per neuron, seconds.
+    pub tau: Vec<f64>,
+    /// Gains g per neuron.
+    pub gain: Vec<f64>,
+    /// Biases beta per neuron.
+    pub bias: Vec<f64>,
+}
+
+impl Network {
+    /// Draws the connections; notes names that nothing has.
+    pub fn compile(config: &TopologyConfig, problems: &mut Problems) -> Self {
+        let mut n_inputs = 0;
+        let stimuli = config.stimuli.iter().map(|(name, stimulus)| {
+            let inputs = n_inputs..n_inputs + stimulus.n as usize;
+            n_inputs = inputs.end;
+            (name.clone(), Stimulus { inputs, sensor: stimulus.sensor })
+        });
+        let stimuli: IndexMap<_, _> = stimuli.collect();
+        let mut n_neurons = 0;
+        let ensembles = config.ensembles.iter().map(|(name, ensemble)| {
+            let neurons = n_neurons..n_neurons + ensemble.n as usize;
+            n_neurons = neurons.end;
+            let motor = config.outputs.values().any(|output| output.ensemble == *name);
+            let ensemble = Ensemble {
+                neurons,
+                activation: ensemble.activation,
+                defaults: ensemble.params,
+                motor,
+            };
+            (name.clone(), ensemble)
+        });
+        let ensembles: IndexMap<_, _> = ensembles.collect();
+        let outputs = decoding::compile(config, &ensembles, problems);
+        let (groups, synapses) = connections::draw(config, &stimuli, &ensembles, problems);
+        Self {
+            dt: config.dt,
+            n_substeps: config.time_scale,
+            stimuli,
+            ensembles,
+            groups,
+            synapses,
+            outputs,
+        }
+    }
+
+    /// Number of neurons.
+    pub fn n_neurons(&self) -> usize {
+        self.ensembles.values().last().map_or(0, |ensemble| ensemble.neurons.end)
+    }
+}

@@ -1,0 +1,131 @@
+//! What goes wrong with the robots of one object, in one trial.
+
+mod inhibition;
+mod leader_failure;
+mod rotation;
+
+use inhibition::Inhibition;
+use leader_failure::LeaderFailure;
+use rotation::Rotation;
+
+use crate::config::{PerturbationsConfig, SensorQuery};
+use crate::random::Stream;
+use crate::swarm::Swarm;
+use crate::world::RobotGroup;
+
+/// Stream numbers of the perturbations that draw robots: their places in
+/// [`PerturbationsConfig`]. Part of the format of a run.
+const INHIBITION_STREAM: usize = 1;
+const ROTATION_STREAM: usize = 3;
+
+/// Perturbations of one group of robots.
+#[derive(Debug)]
+pub(crate) struct Perturbations {
+    leader_failure: Option<LeaderFailure>,
+    inhibition: Option<Inhibition>,
+    rotation: Option<Rotation>,
+    /// Period at which positions are redrawn, steps.
+    switch_every: Option<u32>,
+}
+
+impl Perturbations {
+    /// Draws the affected among `n_robots`; `stream` gives the trial's streams for
+    /// perturbations by number.
+    pub fn new(
+        config: &PerturbationsConfig,
+        n_robots: usize,
+        stream: impl Fn(usize) -> Stream,
+    ) -> Self {
+        let leader_failure = config.leader_failure.as_ref();
+        let inhibition = config.stimuli_inhibition.as_ref();
+        let rotation = config.uncontrollable_rotation.as_ref();
+        Self {
+            leader_failure: leader_failure
+                .map(|config| LeaderFailure::new(config.time_to_failure, n_robots)),
+            inhibition: inhibition
+                .map(|config| Inhibition::new(config, n_robots, &mut stream(INHIBITION_STREAM))),
+            rotation: rotation
+                .map(|config| Rotation::new(config, n_robots, &mut stream(ROTATION_STREAM))),
+            switch_every: config.topology_switch.as_ref().map(|config| config.every),
+        }
+    }
+
+    /// Whether positions are redrawn at the start of `step` (`topology_switch`).
+    pub fn switches_topology(&self, step: u32) -> bool {
+        self.switch_every.is_some_and(|every| step > 0 && step.is_multiple_of(every))
+    }
+
+    /// Whether the network of a robot, by its index in the group, gets zeros for a
+    /// reading.
+    pub fn inhibits(&self, robot: usize, reading: SensorQuery) -> bool {
+        self.inhibition.as_ref().is_some_and(|inhibition| inhibition.inhibits(robot, reading))
+    }
+
+    /// Rewrites the actions of the group.
+    pub fn rewrite(&mut self, step: u32, group: &RobotGroup, swarm: &mut Swarm) {
+        let robots = group.robots.clone();
+        if let Some(failure) = &mut self.leader_failure {
+            failure.rewrite(&mut swarm.leds[robots.clone()], &mut swarm.modes[robots.clone()]);
+        }
+        if let Some(rotation) = &self.rotation {
+            rotation.rewrite(step, &swarm.headings[robots.clone()], &mut swarm.wheels[robots]);
+        }
+    }
+}
+
+/// `n_affected` of `n_robots` robots, drawn without replacement.
+fn draw_affected(n_affected: u32, n_robots: usize, stream: &mut Stream) -> Vec<bool> {
+    let mut robots: Vec<usize> = (0..n_robots).collect();
+    let mut affected = vec![false; n_robots];
+    for index in 0..n_robots.min(n_affected as usize) {
+        robots.swap(index, index + stream.below(n_robots - index));
+        affected[robots[index]] = true;
+    }
+    affected
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::TopologySwitchConfig;
+    use crate::random::Purpose;
+
+    fn stream(number: usize) -> Stream {
+        Stream::new(0, 0, 0, Purpose::Perturbation, number as u64)
+    }
+
+    #[test]
+    fn affected_robots_are_distinct_and_uniform() {
+        let mut stream = stream(0);
+        let mut counts = [0; 10];
+        for _ in 0..10_000 {
+            let affected = draw_affected(4, 10, &mut stream);
+            assert_eq!(affected.iter().filter(|affected| **affected).count(), 4);
+            for (count, affected) in counts.iter_mut().zip(affected) {
+                *count += i32::from(affected);
+            }
+        }
+        assert!(counts.iter().all(|count| (3_800..4_200).contains(count)), "{counts:?}");
+    }
+
+    #[test]
+    fn all_or_none_may_be_affected() {
+        assert_eq!(draw_affected(0, 3, &mut stream(0)), [false; 3]);
+        assert_eq!(draw_affected(3, 3, &mut stream(0)), [true; 3]);
+        assert_eq!(draw_affected(9, 3, &mut stream(0)), [true; 3]);
+    }
+
+    #[test]
+    fn the_topology_switches_periodically_but_not_at_the_start() {
+        let config = PerturbationsConfig {
+            topology_switch: Some(TopologySwitchConfig { every: 200 }),
+            ..Default::default()
+        };
+        let perturbations = Perturbations::new(&config, 10, stream);
+        let switches: Vec<u32> =
+            (0..700).filter(|&step| perturbations.switches_topology(step)).collect();
+        assert_eq!(switches, [200, 400, 600]);
+        let none = Perturbations::new(&PerturbationsConfig::default(), 10, stream);
+        assert!((0..700).all(|step| !none.switches_topology(step)));
+    }
+}

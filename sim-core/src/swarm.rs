@@ -1,0 +1,82 @@
+//! State of all robots of one trial, as arrays indexed by robot.
+
+use std::ops::Range;
+
+use crate::communication::{Mode, Origin};
+use crate::controllers::Action;
+use crate::torus::Vec2;
+
+/// Where robots are, what they do, and what they heard.
+#[derive(Debug, Clone)]
+pub(crate) struct Swarm {
+    /// Positions.
+    pub positions: Vec<Vec2>,
+    /// Headings, in \[0, 2 pi).
+    pub headings: Vec<f64>,
+    /// Right and left wheel, in \[-1, 1\].
+    pub wheels: Vec<[f64; 2]>,
+    /// Colours of the LEDs, 0 off.
+    pub leds: Vec<u32>,
+    /// Communication modes.
+    pub modes: Vec<Mode>,
+    /// Own messages, `[robot][component]`.
+    pub messages: Vec<f64>,
+    /// The frame that each robot took from the air in this step.
+    pub received: Vec<Option<Received>>,
+    /// Messages of those frames, `[robot][component]`; zero without one.
+    pub received_messages: Vec<f64>,
+    /// Components of a message.
+    pub message_len: usize,
+}
+
+/// A frame taken from the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Received {
+    /// The receiving sector.
+    pub sector: usize,
+    /// Strength of the frame.
+    pub signal: f64,
+    /// (cos, sin) of the receiving sector in the receiver's own frame.
+    pub receiving_direction: Vec2,
+    /// Where it comes from, the sending direction filled in.
+    pub origin: Origin,
+}
+
+impl Swarm {
+    /// At the start of a trial: nothing heard, everything off, mode send.
+    pub fn new(positions: Vec<Vec2>, headings: Vec<f64>, message_len: usize) -> Self {
+        let n = positions.len();
+        Self {
+            positions,
+            headings,
+            wheels: vec![[0.0; 2]; n],
+            leds: vec![0; n],
+            modes: vec![Mode::Send; n],
+            messages: vec![0.0; n * message_len],
+            received: vec![None; n],
+            received_messages: vec![0.0; n * message_len],
+            message_len,
+        }
+    }
+
+    /// Place of a robot's message in `messages` and `received_messages`.
+    pub fn message_range(&self, robot: usize) -> Range<usize> {
+        robot * self.message_len..(robot + 1) * self.message_len
+    }
+
+    /// The robot's action, reset to: stand, LED off, send zeros.
+    pub fn fresh_action(&mut self, robot: usize) -> Action<'_> {
+        let message = self.message_range(robot);
+        let action = Action {
+            wheels: &mut self.wheels[robot],
+            led: &mut self.leds[robot],
+            mode: &mut self.modes[robot],
+            message: &mut self.messages[message],
+        };
+        *action.wheels = [0.0; 2];
+        *action.led = 0;
+        *action.mode = Mode::Send;
+        action.message.fill(0.0);
+        action
+    }
+}

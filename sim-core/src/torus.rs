@@ -1,0 +1,208 @@
+//! Positions, displacements and angles on the flat torus.
+
+use std::f64::consts::TAU;
+
+/// A position, or a displacement, in the plane; cm.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Vec2 {
+    /// Along the world's width.
+    pub x: f64,
+    /// Along the world's height.
+    pub y: f64,
+}
+
+impl Vec2 {
+    /// The vector (x, y).
+    pub const fn new(x: f64, y: f64) -> Self {
+        Self { x, y }
+    }
+
+    /// (cos, sin) of an angle.
+    pub(crate) fn unit(angle: f64) -> Self {
+        let (sin, cos) = libm::sincos(angle);
+        Self { x: cos, y: sin }
+    }
+
+    /// Euclidean norm.
+    pub(crate) fn norm(self) -> f64 {
+        (self.x * self.x + self.y * self.y).sqrt()
+    }
+
+    /// Signed angle in \[0, 2 pi); 0 for the zero vector.
+    pub(crate) fn angle(self) -> f64 {
+        if self.x == 0.0 && self.y == 0.0 {
+            return 0.0; // atan2 would take the signs of the zeros for a direction
+        }
+        wrap_angle(libm::atan2(self.y, self.x))
+    }
+}
+
+/// The same angle in \[0, 2 pi).
+pub(crate) fn wrap_angle(angle: f64) -> f64 {
+    wrap(angle, TAU)
+}
+
+/// Absolute difference, in \[0, pi\], of two angles in \[0, 2 pi).
+pub(crate) fn angular_difference(a: f64, b: f64) -> f64 {
+    let difference = (a - b).abs();
+    difference.min(TAU - difference)
+}
+
+/// Direction of sector `sector` of `n_sectors` in the robot's own frame, in
+/// \[0, 2 pi).
+pub(crate) fn sector_angle(sector: usize, n_sectors: usize) -> f64 {
+    sector as f64 * TAU / n_sectors as f64
+}
+
+/// x modulo `period`, in \[0, period).
+fn wrap(x: f64, period: f64) -> f64 {
+    if (0.0..period).contains(&x) {
+        return x;
+    }
+    let rest = x.rem_euclid(period);
+    // A tiny negative x rounds up to the period itself.
+    if rest < period { rest } else { 0.0 }
+}
+
+/// A flat torus: what leaves on one side enters on the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Torus {
+    /// Period along x, cm.
+    pub width: f64,
+    /// Period along y, cm.
+    pub height: f64,
+}
+
+impl Torus {
+    /// The middle of the world (W/2, H/2).
+    pub fn center(&self) -> Vec2 {
+        Vec2 { x: 0.5 * self.width, y: 0.5 * self.height }
+    }
+
+    /// The same position with coordinates in \[0, width) x \[0, height).
+    pub fn wrap(&self, position: Vec2) -> Vec2 {
+        Vec2 { x: wrap(position.x, self.width), y: wrap(position.y, self.height) }
+    }
+
+    /// The shortest way from `from` to `to`; both within the torus.
+    pub fn displacement(&self, from: Vec2, to: Vec2) -> Vec2 {
+        Vec2 { x: shortest(to.x - from.x, self.width), y: shortest(to.y - from.y, self.height) }
+    }
+
+    /// Length of the shortest way between two positions.
+    pub fn distance(&self, a: Vec2, b: Vec2) -> f64 {
+        self.displacement(a, b).norm()
+    }
+
+    /// Centre of mass of positions: the mean of the shortest ways from the first
+    /// one. It is that of the plane for what extends over less than half the
+    /// world. The origin without positions.
+    pub fn centroid(&self, positions: &[Vec2]) -> Vec2 {
+        let Some(&first) = positions.first() else { return Vec2::default() };
+        let sum = positions.iter().fold(Vec2::default(), |sum, &position| {
+            let way = self.displacement(first, position);
+            Vec2 { x: sum.x + way.x, y: sum.y + way.y }
+        });
+        let n = positions.len() as f64;
+        self.wrap(Vec2 { x: first.x + sum.x / n, y: first.y + sum.y / n })
+    }
+}
+
+/// The representative of `difference`, given in (-period, period), with the
+/// least absolute value.
+fn shortest(difference: f64, period: f64) -> f64 {
+    let half = 0.5 * period;
+    if difference > half {
+        difference - period
+    } else if difference < -half {
+        difference + period
+    } else {
+        difference
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const TORUS: Torus = Torus { width: 1000.0, height: 600.0 };
+
+    fn point() -> impl Strategy<Value = Vec2> {
+        (-1e4..1e4, -1e4..1e4).prop_map(|(x, y)| TORUS.wrap(Vec2::new(x, y)))
+    }
+
+    proptest! {
+        #[test]
+        fn wrapped_positions_lie_in_the_torus(x in -1e6..1e6, y in -1e6..1e6) {
+            let p = TORUS.wrap(Vec2::new(x, y));
+            prop_assert!((0.0..1000.0).contains(&p.x) && (0.0..600.0).contains(&p.y));
+            prop_assert_eq!(TORUS.wrap(p), p);
+        }
+
+        #[test]
+        fn displacements_are_shortest_antisymmetric_and_lead_to_the_target(a in point(), b in point()) {
+            let d = TORUS.displacement(a, b);
+            prop_assert!(d.x.abs() <= 500.0 && d.y.abs() <= 300.0);
+            let back = TORUS.displacement(b, a);
+            prop_assert_eq!((d.x, d.y), (-back.x, -back.y));
+            let reached = TORUS.wrap(Vec2::new(a.x + d.x, a.y + d.y));
+            prop_assert!(TORUS.distance(reached, b) < 1e-9);
+        }
+
+        #[test]
+        fn distance_is_a_metric_that_translations_keep(a in point(), b in point(), c in point()) {
+            let ab = TORUS.distance(a, b);
+            prop_assert!(ab <= TORUS.distance(a, c) + TORUS.distance(c, b) + 1e-9);
+            let shift = |p: Vec2| TORUS.wrap(Vec2::new(p.x + c.x, p.y + c.y));
+            prop_assert!((TORUS.distance(shift(a), shift(b)) - ab).abs() < 1e-9);
+        }
+
+        #[test]
+        fn angles_wrap_and_differ_symmetrically(a in -50.0..50.0f64, b in -50.0..50.0f64) {
+            let (a, b) = (wrap_angle(a), wrap_angle(b));
+            prop_assert!((0.0..TAU).contains(&a));
+            let d = angular_difference(a, b);
+            prop_assert!((0.0..=PI).contains(&d));
+            prop_assert_eq!(d, angular_difference(b, a));
+        }
+    }
+
+    #[test]
+    fn the_shortest_way_crosses_the_seam() {
+        let d = TORUS.displacement(Vec2::new(990.0, 5.0), Vec2::new(10.0, 595.0));
+        assert_eq!((d.x, d.y), (20.0, -10.0));
+    }
+
+    #[test]
+    fn the_centroid_of_a_swarm_on_the_seam_is_on_the_seam() {
+        let swarm = [Vec2::new(990.0, 0.0), Vec2::new(20.0, 590.0), Vec2::new(20.0, 580.0)];
+        let centroid = TORUS.centroid(&swarm);
+        assert!(TORUS.distance(centroid, Vec2::new(10.0, 590.0)) < 1e-9, "{centroid:?}");
+    }
+
+    #[test]
+    fn bearings_are_signed() {
+        assert_eq!(Vec2::new(1.0, 0.0).angle(), 0.0);
+        assert_eq!(Vec2::new(0.0, 1.0).angle(), FRAC_PI_2);
+        assert_eq!(Vec2::new(-1.0, 0.0).angle(), PI);
+        assert_eq!(Vec2::new(0.0, -1.0).angle(), 3.0 * FRAC_PI_2);
+        assert_eq!(Vec2::new(-0.0, -0.0).angle(), 0.0);
+    }
+
+    #[test]
+    fn tiny_negative_values_do_not_become_the_period() {
+        assert_eq!(wrap_angle(-1e-20), 0.0);
+        assert_eq!(TORUS.wrap(Vec2::new(-1e-20, -1e-20)), Vec2::new(0.0, 0.0));
+    }
+
+    #[test]
+    fn sectors_divide_the_circle() {
+        assert_eq!(sector_angle(0, 4), 0.0);
+        assert_eq!(sector_angle(1, 4), FRAC_PI_2);
+        assert_eq!(sector_angle(3, 4), 3.0 * FRAC_PI_2);
+    }
+}

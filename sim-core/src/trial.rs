@@ -1,0 +1,396 @@
+//! One trial of an experiment: the phases of its environment steps, except what
+//! controllers do.
+
+use crate::communication::{Mode, Radio};
+use crate::controllers::Controller;
+use crate::experiment::{EvaluateError, Experiment};
+use crate::fitness::{self, Fitness, Moment};
+use crate::lanes::Lanes;
+use crate::lights::LightPath;
+use crate::perturbations::Perturbations;
+use crate::random::{Purpose, Stream};
+use crate::senses::Senses;
+use crate::swarm::Swarm;
+use crate::torus::{Torus, Vec2};
+use crate::world::{Fixtures, Site, World};
+
+/// Steps at the start of an episode in which every robot sends.
+const N_FIRST_STEPS_SENDING: u32 = 10;
+
+/// State of a trial.
+pub(crate) struct Trial<'a> {
+    world: &'a World,
+    address: Address,
+    swarm: Swarm,
+    radio: Radio,
+    lights: Vec<Vec2>,
+    light_paths: Vec<LightPath>,
+    areas: Vec<Vec2>,
+    /// What each group of robots has beside the swarm's state.
+    groups: Vec<Group>,
+    /// Stochastic decoding, per robot.
+    decoding: Vec<Stream>,
+    /// Noise of sensors, per robot.
+    noise: Vec<Stream>,
+    /// Whether a robot changed its place or heading in this step, by itself or not.
+    moved: bool,
+    fitness: Box<dyn Fitness>,
+    fitness_sum: f64,
+    n_judged_steps: u32,
+}
+
+/// What belongs to a group of robots.
+struct Group {
+    senses: Senses,
+    perturbations: Perturbations,
+    /// Start positions, and those after each switch of the topology.
+    positions: Stream,
+}
+
+/// Which trial it is.
+#[derive(Debug, Clone, Copy)]
+struct Address {
+    seed: u64,
+    generation: u64,
+    trial: u32,
+}
+
+impl Address {
+    fn stream(self, purpose: Purpose, number: usize) -> Stream {
+        Stream::new(self.seed, self.generation, self.trial.into(), purpose, number as u64)
+    }
+
+    /// One stream for each of `n` robots, or lights.
+    fn streams(self, purpose: Purpose, n: usize) -> Vec<Stream> {
+        (0..n).map(|number| self.stream(purpose, number)).collect()
+    }
+
+    /// Draws the positions of an object's instances.
+    fn place(
+        self,
+        site: &Site,
+        torus: &Torus,
+        stream: &mut Stream,
+    ) -> Result<Vec<Vec2>, EvaluateError> {
+        site.positions.draw(torus, stream).map_err(|unplaceable| EvaluateError::Unplaceable {
+            object: site.name.clone(),
+            index: unplaceable.index,
+            generation: self.generation,
+            trial: self.trial,
+        })
+    }
+
+    /// Draws the positions of lights or ground areas.
+    fn place_fixtures(
+        self,
+        fixtures: &[Fixtures],
+        torus: &Torus,
+    ) -> Result<Vec<Vec2>, EvaluateError> {
+        let mut positions = Vec::new();
+        for Fixtures { site, .. } in fixtures {
+            let mut stream = self.stream(Purpose::Positions, site.object);
+            positions.extend(self.place(site, torus, &mut stream)?);
+        }
+        Ok(positions)
+    }
+}
+
+impl<'a> Trial<'a> {
+    /// The trial before its first step.
+    pub fn new(
+        experiment: &'a Experiment,
+        generation: u64,
+        trial: u32,
+    ) -> Result<Self, EvaluateError> {
+        let world = &experiment.world;
+        let address = Address { seed: experiment.seed, generation, trial };
+        let mut positions = Vec::with_capacity(world.n_robots());
+        let mut headings = Vec::with_capacity(world.n_robots());
+        let mut groups = Vec::with_capacity(world.groups.len());
+        for group in &world.groups {
+            let mut stream = address.stream(Purpose::Positions, group.site.object);
+            positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
+            let mut orientations = address.stream(Purpose::Orientations, group.site.object);
+            headings.extend(group.headings.draw(&mut orientations));
+            groups.push(Group {
+                senses: Senses::new(group),
+                perturbations: Perturbations::new(
+                    &group.perturbations,
+                    group.robots.len(),
+                    |number| address.stream(Purpose::Perturbation, number),
+                ),
+                positions: stream,
+            });
+        }
+        let lights = address.place_fixtures(&world.lights, &world.torus)?;
+        let areas = address.place_fixtures(&world.areas, &world.torus)?;
+        let controllers = world.lights.iter().zip(&world.light_controllers);
+        let controllers = controllers
+            .flat_map(|(lights, controller)| lights.members.clone().map(move |_| controller));
+        let paths = controllers.zip(&lights).enumerate().map(|(light, (controller, &position))| {
+            let stream = address.stream(Purpose::LightMovement, light);
+            LightPath::new(controller, position, &world.torus, stream)
+        });
+        let light_paths = paths.collect();
+        let n_robots = world.n_robots();
+        let swarm = Swarm::new(positions, headings, world.message_len);
+        let mut radio = Radio::new(
+            world,
+            address.streams(Purpose::Reception, n_robots),
+            address.streams(Purpose::Quantisation, n_robots),
+        );
+        radio.relocate(world, &swarm);
+        Ok(Self {
+            world,
+            address,
+            swarm,
+            radio,
+            lights,
+            light_paths,
+            areas,
+            groups,
+            decoding: address.streams(Purpose::Decoding, n_robots),
+            noise: address.streams(Purpose::SensorNoise, n_robots),
+            moved: true,
+            fitness: fitness::new(experiment.fitness, world),
+            fitness_sum: 0.0,
+            n_judged_steps: 0,
+        })
+    }
+
+    /// Start of a step: every robot senses, from positions and headings now and
+    /// from the frames that are on the air.
+    pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
+        // Robots whose topology switches find themselves elsewhere.
+        for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
+            if state.perturbations.switches_topology(step) {
+                let torus = &self.world.torus;
+                let positions = self.address.place(&group.site, torus, &mut state.positions)?;
+                self.swarm.positions[group.robots.clone()].copy_from_slice(&positions);
+                self.moved = true;
+            }
+        }
+        // Who hears whom changes only when somebody moves.
+        if self.moved {
+            self.radio.relocate(self.world, &self.swarm);
+        }
+        self.radio.receive(self.world, &mut self.swarm);
+        for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
+            let (swarm, noise) = (&self.swarm, &mut self.noise);
+            state.senses.update(self.world, group, swarm, &self.lights, &self.areas, noise);
+        }
+        Ok(())
+    }
+
+    /// Fills in the stimuli of a group, `[input][lane]`, from `first_lane` on.
+    /// Inhibited stimuli are zero.
+    pub fn stimulate(&self, group: usize, first_lane: usize, stimuli: &mut Lanes) {
+        let state = &self.groups[group];
+        let group = &self.world.groups[group];
+        for (index, robot) in group.robots.clone().enumerate() {
+            for (query, inputs) in &group.stimuli {
+                let inhibited = state.perturbations.inhibits(index, *query);
+                let reading = state.senses.reading(*query, &self.swarm, index, robot);
+                for (input, &value) in inputs.clone().zip(reading.values()) {
+                    let value = if inhibited { 0.0 } else { value };
+                    stimuli.set(input, first_lane + index, value);
+                }
+            }
+        }
+    }
+
+    /// Takes a group's actions from its controller.
+    pub fn decide(&mut self, group: usize, first_lane: usize, controller: &mut dyn Controller) {
+        let robots = self.world.groups[group].robots.clone();
+        for (lane, robot) in (first_lane..).zip(robots) {
+            let mut action = self.swarm.fresh_action(robot);
+            controller.act(lane, &mut self.decoding[robot], &mut action);
+        }
+    }
+
+    /// Rest of a step: actions take effect and are judged.
+    pub fn act(&mut self, step: u32) {
+        let world = self.world;
+        // Nobody relays before there is something to relay.
+        if step < N_FIRST_STEPS_SENDING {
+            self.swarm.modes.fill(Mode::Send);
+        }
+        // Perturbations rewrite actions.
+        for (group, state) in world.groups.iter().zip(&mut self.groups) {
+            state.perturbations.rewrite(step, group, &mut self.swarm);
+        }
+        // Wheels turn.
+        self.drive();
+        // Every transmitter puts its frame on the air.
+        for group in &world.groups {
+            for robot in group.robots.clone() {
+                self.radio.emit(world, &mut self.swarm, group.quantiser.as_ref(), robot);
+            }
+        }
+        // The step is judged.
+        let judged = world.judged();
+        let fitness = self.fitness.step(&Moment {
+            torus: &world.torus,
+            step,
+            moved: self.moved,
+            positions: &self.swarm.positions[judged.clone()],
+            headings: &self.swarm.headings[judged.clone()],
+            wheels: &self.swarm.wheels[judged.clone()],
+            leds: &self.swarm.leds[judged],
+            lights: &self.lights,
+        });
+        if let Some(fitness) = fitness {
+            self.fitness_sum += fitness;
+            self.n_judged_steps += 1;
+        }
+        // Lights move.
+        for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
+            *position = path.advance(*position, step, &world.torus);
+        }
+    }
+
+    /// Mean fitness over the steps that count; 0 without any.
+    pub fn fitness(&self) -> f64 {
+        if self.n_judged_steps == 0 {
+            0.0
+        } else {
+            self.fitness_sum / f64::from(self.n_judged_steps)
+        }
+    }
+
+    /// Moves all robots by their wheels.
+    fn drive(&mut self) {
+        self.moved = false;
+        let swarm = &mut self.swarm;
+        for group in &self.world.groups {
+            let Some(drive) = &group.drive else { continue };
+            for robot in group.robots.clone().filter(|&robot| swarm.wheels[robot] != [0.0; 2]) {
+                (swarm.positions[robot], swarm.headings[robot]) = drive.advance(
+                    &self.world.torus,
+                    swarm.positions[robot],
+                    swarm.headings[robot],
+                    swarm.wheels[robot],
+                );
+                self.moved = true;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::communication::Origin;
+    use crate::config::{ExperimentConfig, Initializer, SensorQuery};
+    use crate::testing::{experiment_a, robot};
+
+    /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
+    fn line(n: u32) -> ExperimentConfig {
+        let mut config = experiment_a();
+        config.world.width = 5000.0;
+        let robot = robot(&mut config);
+        robot.num_instances = n;
+        let values = (0..n).map(|index| vec![100.0 + 90.0 * f64::from(index), 500.0]).collect();
+        robot.initializers.positions = Initializer::Fixed { values };
+        robot.initializers.orientations = Initializer::Fixed { values: vec![vec![0.0]] };
+        robot.perturbations.leader_failure = None;
+        config
+    }
+
+    /// One step in which robots act as `modes` and `message` say.
+    fn step(trial: &mut Trial<'_>, modes: &[Mode], message: [f64; 2]) {
+        trial.sense(N_FIRST_STEPS_SENDING).unwrap();
+        trial.swarm.modes.copy_from_slice(modes);
+        for own in trial.swarm.messages.chunks_exact_mut(2) {
+            own.copy_from_slice(&message);
+        }
+        trial.act(N_FIRST_STEPS_SENDING);
+    }
+
+    #[test]
+    fn a_frame_crosses_a_line_one_hop_per_step_and_dies_at_max_hops() {
+        let experiment = Experiment::compile(&line(14)).unwrap();
+        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let mut modes = [Mode::Relay; 14];
+        modes[0] = Mode::Send;
+        step(&mut trial, &modes, [1.0, 0.0]);
+        for hop in 1..30 {
+            step(&mut trial, &[Mode::Relay; 14], [0.0, 1.0]);
+            assert_eq!(trial.swarm.received[0], None, "a frame came home after {hop} hops");
+            for robot in hop + 1..14 {
+                assert_eq!(trial.swarm.received[robot], None, "step {hop}, robot {robot}");
+            }
+            if hop > 9 {
+                assert!(trial.swarm.received.iter().all(Option::is_none), "step {hop}");
+                continue;
+            }
+            let received = trial.swarm.received[hop].unwrap();
+            let origin =
+                Origin { originator: 0, hops: hop as u32, sending_direction: Vec2::new(1.0, 0.0) };
+            assert_eq!(received.origin, origin);
+            assert_eq!(received.sector, 2);
+            assert!((received.receiving_direction.x + 1.0).abs() < 1e-15);
+            assert!((received.signal - libm::exp(-0.05 * 90.0)).abs() < 1e-15);
+            assert_eq!(trial.swarm.received_messages[2 * hop..2 * hop + 2], [1.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn nothing_is_heard_in_the_first_step_and_everyone_sends_in_the_first_ten() {
+        let experiment = Experiment::compile(&line(2)).unwrap();
+        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        for step in 0..12 {
+            trial.sense(step).unwrap();
+            // On the air: the frames of step - 1.
+            let heard = (1..=10).contains(&step);
+            assert_eq!(trial.swarm.received[0].is_some(), heard, "step {step}");
+            trial.swarm.modes.fill(Mode::Relay);
+            trial.act(step);
+        }
+    }
+
+    #[test]
+    fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
+        let experiment = Experiment::compile(&line(2)).unwrap();
+        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let read = |trial: &Trial<'_>, query| {
+            trial.groups[0].senses.reading(query, &trial.swarm, 0, 0).values().to_vec()
+        };
+        trial.sense(0).unwrap();
+        assert_eq!(read(&trial, SensorQuery::ReceiverState), [1.0]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverMessage), [0.0; 2]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverSignal), [0.0]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverReceivingDirection), [0.0; 2]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverSendingDirection), [0.0; 2]);
+        trial.swarm.messages.copy_from_slice(&[0.0, 0.0, 1.0, 0.0]);
+        trial.act(0);
+        trial.swarm.modes[0] = Mode::Relay;
+        trial.sense(1).unwrap();
+        assert_eq!(read(&trial, SensorQuery::ReceiverState), [0.0]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverMessage), [1.0, 0.0]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverSignal), [libm::exp(-4.5)]);
+        assert_eq!(read(&trial, SensorQuery::ReceiverReceivingDirection), [1.0, 0.0]);
+        let sent = read(&trial, SensorQuery::ReceiverSendingDirection);
+        assert!((sent[0] + 1.0).abs() < 1e-15 && sent[1].abs() < 1e-15, "{sent:?}");
+    }
+
+    #[test]
+    fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
+        let experiment = Experiment::compile(&line(3)).unwrap();
+        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        step(&mut trial, &[Mode::Send; 3], [0.0; 2]);
+        let mut from_right = 0;
+        for _ in 0..2000 {
+            step(&mut trial, &[Mode::Send; 3], [0.0; 2]);
+            from_right += usize::from(trial.swarm.received[1].unwrap().sector == 0);
+        }
+        assert!((900..1100).contains(&from_right), "{from_right}");
+        step(&mut trial, &[Mode::Send, Mode::Send, Mode::Relay], [0.0; 2]);
+        for _ in 0..20 {
+            // Robot 2 relays what robot 1 sent: of its neighbours, robot 1 can
+            // accept robot 0's frames only.
+            step(&mut trial, &[Mode::Send, Mode::Send, Mode::Relay], [0.0; 2]);
+            assert_eq!(trial.swarm.received[1].unwrap().sector, 2);
+        }
+    }
+}

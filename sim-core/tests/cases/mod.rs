@@ -1,0 +1,7 @@
+//! The episodes in which simulator and reference are compared, by subject.
+
+mod borderline;
+mod genotypes;
+mod leaders;
+mod movers;
+mod sensors;

@@ -1,0 +1,180 @@
+//! Lights, distances, ground areas, noise, and stimuli that are taken away.
+
+use sim_core::config::{
+    DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
+    GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
+    LightSourceConfig, ObjectConfig, PositionInitializers, SensorQuery, StimuliInhibitionConfig,
+    StimulusConfig, SynapseGroupConfig, WholeReceiver,
+};
+
+use crate::assert_varied_agreement;
+use crate::configs::{experiment_d, swarm_mut};
+use crate::reference::Episode;
+
+/// Experiment D with every sensor and without its perturbation, judged by all
+/// headings and wheels.
+fn all_sensors() -> ExperimentConfig {
+    let mut config = experiment_d();
+    config.algorithm.fitness_function = FitnessFunction::OrientationConsensus;
+    config.algorithm.evaluation_steps = 60;
+    let swarm = swarm_mut(&mut config);
+    swarm.perturbations = Default::default();
+    swarm.sensors.distance_sensor = Some(DistanceSensorConfig {
+        n_sectors: 5,
+        range: 60.0,
+        decay_rho: 0.02,
+        decay_phi: 0.7,
+        noise_variance: 0.02,
+    });
+    swarm.sensors.ground_sensor = Some(GroundSensorConfig { color: "black".into() });
+    if let Some(light_sensor) = &mut swarm.sensors.light_sensor {
+        light_sensor.decay_rho = 0.01;
+    }
+    for (name, n, sensor) in [
+        ("I6", 5, SensorQuery::Distance),
+        ("I7", 1, SensorQuery::Ground),
+        ("I8", 2, SensorQuery::ReceiverSendingDirection),
+    ] {
+        config.topology.stimuli.insert(name.into(), StimulusConfig { n, sensor });
+        config.topology.synapses.insert(
+            format!("{name}-H1"),
+            SynapseGroupConfig {
+                pre: vec![name.into()],
+                post: vec!["H1".into()],
+                trainable: true,
+                p: 1.0,
+            },
+        );
+    }
+    let area = |color: &str, range, center| {
+        ObjectConfig::GroundArea(GroundAreaConfig {
+            num_instances: 2,
+            initializers: PositionInitializers {
+                positions: Initializer::RandomCircumference { radius: 50.0, center },
+            },
+            params: GroundAreaParams { range, color: color.into() },
+        })
+    };
+    config.world.objects.insert("black".into(), area("black", 30.0, [520.0, 480.0]));
+    config.world.objects.insert("grey".into(), area("grey", 1000.0, [500.0, 500.0]));
+    config
+}
+
+fn light(
+    controller: LightController,
+    color: &str,
+    range: f64,
+    positions: Initializer,
+) -> ObjectConfig {
+    ObjectConfig::LightSource(LightSourceConfig {
+        num_instances: 2,
+        controller,
+        initializers: PositionInitializers { positions },
+        params: LightParams { range, color: color.into() },
+    })
+}
+
+fn fitness(episodes: &[Episode]) -> Vec<f64> {
+    episodes.iter().map(|episode| episode.fitness).collect()
+}
+
+#[test]
+fn every_sensor_agrees_with_and_without_noise() {
+    let mut config = all_sensors();
+    let noisy = assert_varied_agreement(&config);
+    for Episode { witness, .. } in &noisy {
+        assert!(witness.n_light > 0 && witness.n_distance > 0 && witness.n_ground > 0);
+    }
+    let sensors = &mut swarm_mut(&mut config).sensors;
+    sensors.light_sensor.as_mut().unwrap().noise_variance = 0.0;
+    let noisy_distance = assert_varied_agreement(&config);
+    assert_ne!(fitness(&noisy), fitness(&noisy_distance));
+    let sensors = &mut swarm_mut(&mut config).sensors;
+    sensors.distance_sensor.as_mut().unwrap().noise_variance = 0.0;
+    let silent = assert_varied_agreement(&config);
+    assert_ne!(fitness(&noisy_distance), fitness(&silent));
+    for Episode { witness, .. } in &silent {
+        assert!(witness.n_light > 0 && witness.n_distance > 0 && witness.n_ground > 0);
+    }
+}
+
+#[test]
+fn lights_on_every_path_agree() {
+    let mut config = all_sensors();
+    config.algorithm.evaluation_steps = 150;
+    let alone = fitness(&assert_varied_agreement(&config));
+    let lights = [
+        ("still", LightController::Static {}, "blue", 90.0),
+        (
+            "wanderers",
+            LightController::LightRndPosController { every: 20, step: 0.03 },
+            "red",
+            70.0,
+        ),
+        ("orbiters", LightController::LightOrbitController {}, "red", 40.0),
+    ];
+    for (name, controller, color, range) in lights {
+        let positions = Initializer::RandomUniform { low: 450.0, high: 550.0, size: 2 };
+        config.world.objects.insert(name.into(), light(controller, color, range, positions));
+    }
+    let together = fitness(&assert_varied_agreement(&config));
+    assert!(alone.iter().zip(&together).all(|(a, b)| a != b));
+}
+
+#[test]
+fn robots_near_a_light_on_every_path_agree() {
+    for controller in [
+        LightController::Static {},
+        LightController::LightOrbitController {},
+        LightController::LightRndPosController { every: 30, step: 0.05 },
+    ] {
+        let mut config = experiment_d();
+        config.algorithm.evaluation_steps = 300;
+        if let ObjectConfig::LightSource(light) = &mut config.world.objects["light_red"] {
+            light.controller = controller;
+        }
+        assert_varied_agreement(&config);
+    }
+}
+
+#[test]
+fn a_swarm_and_a_light_across_the_border_agree() {
+    // The robots start across the border, and so does the light, which then
+    // orbits around the centre of the world.
+    let mut config = experiment_d();
+    config.algorithm.evaluation_steps = 200;
+    config.algorithm.fitness_function = FitnessFunction::OrientationConsensus;
+    config.world.width = 800.0;
+    config.world.height = 500.0;
+    swarm_mut(&mut config).initializers.positions =
+        Initializer::RandomUniform { low: -60.0, high: 60.0, size: 2 };
+    if let ObjectConfig::LightSource(light) = &mut config.world.objects["light_red"] {
+        light.initializers.positions = Initializer::Fixed { values: vec![vec![790.0, 495.0]] };
+    }
+    assert_varied_agreement(&config);
+}
+
+#[test]
+fn inhibited_stimuli_agree() {
+    let mut config = all_sensors();
+    let whole = fitness(&assert_varied_agreement(&config));
+    for stimuli in [
+        InhibitedStimulus::Reading(SensorQuery::ReceiverMessage),
+        InhibitedStimulus::Reading(SensorQuery::ReceiverSignal),
+        InhibitedStimulus::Reading(SensorQuery::ReceiverReceivingDirection),
+        InhibitedStimulus::Reading(SensorQuery::ReceiverSendingDirection),
+        InhibitedStimulus::Reading(SensorQuery::ReceiverState),
+        InhibitedStimulus::Reading(SensorQuery::Light),
+        InhibitedStimulus::Reading(SensorQuery::Distance),
+        InhibitedStimulus::Reading(SensorQuery::Ground),
+        InhibitedStimulus::Receiver(WholeReceiver::WirelessReceiver),
+    ] {
+        for affected_robots in [3, 10] {
+            swarm_mut(&mut config).perturbations.stimuli_inhibition =
+                Some(StimuliInhibitionConfig { stimuli, affected_robots });
+            let episodes = assert_varied_agreement(&config);
+            assert!(episodes.iter().any(|episode| episode.witness.n_inhibited > 0), "{stimuli:?}");
+            assert_ne!(whole, fitness(&episodes), "{stimuli:?}");
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Lights and their paths (sections 5.4 and 6.4).
+
+use std::f64::consts::PI;
+
+use sim_core::config::{LightController, LightParams, LightSourceConfig};
+use sim_core::random::Stream;
+
+use super::torus::{Torus, Vector, norm};
+
+const ORBIT_RADIUS_CM: f64 = 200.0;
+const TARGET_SQUARE_CM: f64 = 200.0;
+
+/// A light and the state of what moves it.
+pub struct Light<'a> {
+    config: &'a LightSourceConfig,
+    pub position: Vector,
+    radius: f64,
+    angle: f64,
+    sense: f64,
+    target: Vector,
+    stream: Stream,
+}
+
+impl<'a> Light<'a> {
+    pub fn new(
+        config: &'a LightSourceConfig,
+        position: Vector,
+        torus: Torus,
+        stream: Stream,
+    ) -> Self {
+        let from_centre = torus.displacement(torus.centre(), position);
+        Self {
+            config,
+            position,
+            radius: norm(from_centre),
+            angle: torus.bearing(torus.centre(), position),
+            sense: 1.0,
+            target: position,
+            stream,
+        }
+    }
+
+    pub fn params(&self) -> &'a LightParams {
+        &self.config.params
+    }
+
+    /// Movement at the end of step `k`.
+    pub fn advance(&mut self, k: u32, torus: Torus) {
+        let centre = torus.centre();
+        match self.config.controller {
+            LightController::Static {} => {}
+            // Eq. 5.7-5.8
+            LightController::LightOrbitController {} => {
+                if self.stream.uniform() < 0.01 {
+                    self.sense = -self.sense;
+                }
+                self.angle += self.sense * 0.01;
+                self.radius += (ORBIT_RADIUS_CM - self.radius) / 50.0;
+                self.position = torus.wrap([
+                    centre[0] + self.radius * self.angle.cos(),
+                    centre[1] + self.radius * self.angle.sin(),
+                ]);
+            }
+            // Eq. 6.4
+            LightController::LightRndPosController { every, step } => {
+                if k.is_multiple_of(every) {
+                    let x = centre[0] - TARGET_SQUARE_CM / 2.0
+                        + TARGET_SQUARE_CM * self.stream.uniform();
+                    let y = centre[1] - TARGET_SQUARE_CM / 2.0
+                        + TARGET_SQUARE_CM * self.stream.uniform();
+                    self.target = torus.wrap([x, y]);
+                }
+                let way = torus.displacement(self.position, self.target);
+                self.position = torus
+                    .wrap([self.position[0] + step * way[0], self.position[1] + step * way[1]]);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_orbiting_light_spirals_outwards_from_the_centre() {
+    use sim_core::config::{Initializer, PositionInitializers};
+    use sim_core::random::Purpose;
+
+    let torus = Torus { width: 1000.0, height: 1000.0 };
+    let config = LightSourceConfig {
+        num_instances: 1,
+        controller: LightController::LightOrbitController {},
+        initializers: PositionInitializers {
+            positions: Initializer::Fixed { values: vec![vec![500.0, 500.0]] },
+        },
+        params: LightParams { range: 80.0, color: "red".into() },
+    };
+    let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
+    let mut light = Light::new(&config, torus.centre(), torus, stream);
+    for k in 0..300 {
+        light.advance(k, torus);
+    }
+    let radius = ORBIT_RADIUS_CM * (1.0 - 0.98f64.powi(300));
+    assert!((torus.distance(torus.centre(), light.position) - radius).abs() < 1e-9);
+    assert!(light.angle.abs() < 300.0 * 0.01 + 1e-9 && light.angle.abs() < PI);
+}

@@ -1,0 +1,46 @@
+//! The simulation, transcribed from its equations a second time: one robot at a
+//! time, plain structs, dense matrices, `f64` throughout. It is slow and obvious
+//! on purpose, because it is what the simulator is compared with.
+//!
+//! Of the crate it uses the types of a configuration and the random streams
+//! (addresses and draw order are part of the specification), nothing else.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "independence from the simulator's arithmetic, libm included, is the point"
+)]
+
+mod actuators;
+mod alpha_shape;
+mod communication;
+mod fitness;
+mod initializers;
+mod lights;
+mod network;
+mod perturbations;
+mod sensors;
+mod torus;
+mod witness;
+mod world;
+
+pub use network::genes;
+pub use witness::Witness;
+pub use world::Simulation;
+
+use sim_core::config::ExperimentConfig;
+
+/// An episode from its first to its last step.
+pub struct Episode {
+    /// Fitness of the trial.
+    pub fitness: f64,
+    /// What happened on the way.
+    pub witness: Witness,
+}
+
+/// Simulates one trial of one genotype.
+pub fn run(config: &ExperimentConfig, genotype: &[f64], generation: u64, trial: u32) -> Episode {
+    let mut simulation = Simulation::new(config, genotype, generation, trial);
+    let of_steps: Vec<f64> =
+        (0..config.algorithm.evaluation_steps).map(|_| simulation.step()).collect();
+    let fitness = fitness::of_trial(config.algorithm.fitness_function, &of_steps);
+    Episode { fitness, witness: simulation.witness }
+}

@@ -1,0 +1,291 @@
+//! The controller: which synapses exist, what a genotype means (section 3.4.2),
+//! and the CTRNN's dynamics (sections 2.1 and 3.4.1), with dense matrices.
+
+use std::ops::Range;
+
+use sim_core::config::{
+    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter,
+    SynapseSelector, TopologyConfig,
+};
+use sim_core::random::{Purpose, Stream};
+
+/// What a gene encodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gene {
+    /// Weight of the synapse of this number.
+    Weight(usize),
+    /// Parameter of the neuron of this number.
+    Neuron(NeuronParameter, usize),
+}
+
+/// A gene with its bounds.
+struct BoundedGene {
+    gene: Gene,
+    min: f64,
+    max: f64,
+}
+
+#[derive(Clone, Copy)]
+enum Pre {
+    Input(usize),
+    Neuron(usize),
+}
+
+/// An existing synapse.
+struct Synapse {
+    group: String,
+    group_idx: usize,
+    trainable: bool,
+    pre_name: String,
+    pre: Pre,
+    post: usize,
+}
+
+/// Numbers of the inputs of a stimulus, if there is one of this name.
+fn inputs_of(topology: &TopologyConfig, name: &str) -> Option<Range<usize>> {
+    let mut start = 0;
+    for (stimulus, config) in &topology.stimuli {
+        let end = start + config.n as usize;
+        if stimulus == name {
+            return Some(start..end);
+        }
+        start = end;
+    }
+    None
+}
+
+/// Numbers of the neurons of an ensemble, if there is one of this name.
+pub fn neurons_of(topology: &TopologyConfig, name: &str) -> Option<Range<usize>> {
+    let mut start = 0;
+    for (ensemble, config) in &topology.ensembles {
+        let end = start + config.n as usize;
+        if ensemble == name {
+            return Some(start..end);
+        }
+        start = end;
+    }
+    None
+}
+
+/// M_ij ~ B(p): every pair exists with its group's probability, drawn once per
+/// experiment. Their order is their number.
+fn synapses(topology: &TopologyConfig) -> Vec<Synapse> {
+    let mut synapses = Vec::new();
+    for (group_idx, (group, config)) in topology.synapses.iter().enumerate() {
+        let mut stream = Stream::new(topology.seed, 0, 0, Purpose::Connections, group_idx as u64);
+        for pre_name in &config.pre {
+            let sources: Vec<Pre> = match inputs_of(topology, pre_name) {
+                Some(inputs) => inputs.map(Pre::Input).collect(),
+                None => neurons_of(topology, pre_name)
+                    .expect("pre names a stimulus or an ensemble")
+                    .map(Pre::Neuron)
+                    .collect(),
+            };
+            for post_name in &config.post {
+                for post in neurons_of(topology, post_name).expect("post names an ensemble") {
+                    for &pre in &sources {
+                        if stream.uniform() < config.p {
+                            synapses.push(Synapse {
+                                group: group.clone(),
+                                group_idx,
+                                trainable: config.trainable,
+                                pre_name: pre_name.clone(),
+                                pre,
+                                post,
+                            });
+                        }
+                    }
+                }
+            }
+        }
+    }
+    synapses
+}
+
+/// Whether a query's selector covers a synapse (Table 4.1).
+fn selects(topology: &TopologyConfig, selector: &SynapseSelector, synapse: &Synapse) -> bool {
+    let is_sensory = matches!(synapse.pre, Pre::Input(_));
+    let is_motor = topology.outputs.values().any(|output| output.ensemble == synapse.pre_name);
+    synapse.trainable
+        && match selector {
+            SynapseSelector::All => true,
+            SynapseSelector::Sensory => is_sensory,
+            SynapseSelector::Motor => is_motor,
+            SynapseSelector::Hidden => !is_sensory && !is_motor,
+            SynapseSelector::Named(name) => *name == synapse.pre_name || *name == synapse.group,
+        }
+}
+
+/// Eq. 3.17, generalised: the segments that the queries name, in their order.
+fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<BoundedGene> {
+    let topology = &config.topology;
+    let mut genes = Vec::new();
+    for population in config.algorithm.populations.values() {
+        for (i, query) in population.objects.iter().enumerate() {
+            let (min, max) = (population.min_vals[i], population.max_vals[i]);
+            let covered: Vec<Gene> = match query {
+                GenotypeQuery::Weights(selector) => (0..synapses.len())
+                    .filter(|&s| selects(topology, selector, &synapses[s]))
+                    .map(Gene::Weight)
+                    .collect(),
+                GenotypeQuery::Neurons(parameter, selector) => {
+                    let neurons = match selector {
+                        EnsembleSelector::All => 0..n_neurons(topology),
+                        EnsembleSelector::Named(name) => {
+                            neurons_of(topology, name).expect("the query names an ensemble")
+                        }
+                    };
+                    neurons.map(|neuron| Gene::Neuron(*parameter, neuron)).collect()
+                }
+            };
+            genes.extend(covered.into_iter().map(|gene| BoundedGene { gene, min, max }));
+        }
+    }
+    genes
+}
+
+/// What each gene of the experiment's genotypes encodes.
+pub fn genes(config: &ExperimentConfig) -> Vec<Gene> {
+    bounded_genes(config, &synapses(&config.topology)).iter().map(|bounded| bounded.gene).collect()
+}
+
+fn n_neurons(topology: &TopologyConfig) -> usize {
+    topology.ensembles.values().map(|ensemble| ensemble.n as usize).sum()
+}
+
+fn n_inputs(topology: &TopologyConfig) -> usize {
+    topology.stimuli.values().map(|stimulus| stimulus.n as usize).sum()
+}
+
+/// The phenotype: N neurons, I inputs.
+pub struct Network {
+    dt: f64,
+    time_scale: u32,
+    /// N x N, row = postsynaptic neuron.
+    pub w_neurons: Vec<Vec<f64>>,
+    /// N x I, row = postsynaptic neuron.
+    pub w_inputs: Vec<Vec<f64>>,
+    pub tau: Vec<f64>,
+    pub gain: Vec<f64>,
+    pub bias: Vec<f64>,
+    activation: Vec<Activation>,
+}
+
+impl Network {
+    /// Decodes a genotype: x * (max - min) + min, and 2 * 10^that for tau. What
+    /// no query covers keeps its default; such weights are drawn from U(-1, 1).
+    pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
+        let topology = &config.topology;
+        let synapses = synapses(topology);
+        let genes = bounded_genes(config, &synapses);
+        assert_eq!(genotype.len(), genes.len(), "length of the genotype");
+
+        let mut tau = Vec::new();
+        let mut gain = Vec::new();
+        let mut bias = Vec::new();
+        let mut activation = Vec::new();
+        for ensemble in topology.ensembles.values() {
+            for _ in 0..ensemble.n {
+                tau.push(ensemble.params.tau);
+                gain.push(ensemble.params.gain);
+                bias.push(ensemble.params.bias);
+                activation.push(ensemble.activation);
+            }
+        }
+        let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
+        for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
+            let value = x * (max - min) + min;
+            match *gene {
+                Gene::Weight(synapse) => weights[synapse] = Some(value),
+                Gene::Neuron(NeuronParameter::Bias, neuron) => bias[neuron] = value,
+                Gene::Neuron(NeuronParameter::Gain, neuron) => gain[neuron] = value,
+                Gene::Neuron(NeuronParameter::Tau, neuron) => {
+                    tau[neuron] = 2.0 * 10f64.powf(value);
+                }
+            }
+        }
+
+        let n = n_neurons(topology);
+        let mut w_neurons = vec![vec![0.0; n]; n];
+        let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
+        let mut fixed_weights: Vec<Stream> = (0..topology.synapses.len() as u64)
+            .map(|group| Stream::new(topology.seed, 0, 0, Purpose::FixedWeights, group))
+            .collect();
+        for (synapse, weight) in synapses.iter().zip(weights) {
+            let weight =
+                weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform());
+            match synapse.pre {
+                Pre::Input(input) => w_inputs[synapse.post][input] = weight,
+                Pre::Neuron(neuron) => w_neurons[synapse.post][neuron] = weight,
+            }
+        }
+        let &TopologyConfig { dt, time_scale, .. } = topology;
+        Self { dt, time_scale, w_neurons, w_inputs, tau, gain, bias, activation }
+    }
+
+    pub fn n_neurons(&self) -> usize {
+        self.tau.len()
+    }
+
+    /// u = F(g * (v + beta))
+    pub fn activities(&self, v: &[f64]) -> Vec<f64> {
+        (0..v.len())
+            .map(|i| {
+                let x = self.gain[i] * (v[i] + self.bias[i]);
+                match self.activation[i] {
+                    Activation::Sigmoid => 1.0 / (1.0 + (-x).exp()),
+                    Activation::Tanh => x.tanh(),
+                }
+            })
+            .collect()
+    }
+
+    /// One environment step: `time_scale` times
+    /// v(t + dt) = v + (dt / tau) * (-v + W_N F(g * (v + beta)) + W_I phi),
+    /// all neurons at once, phi held. Returns u after the last substep.
+    pub fn step(&self, v: &mut [f64], phi: &[f64]) -> Vec<f64> {
+        for _ in 0..self.time_scale {
+            let u = self.activities(v);
+            for (i, v) in v.iter_mut().enumerate() {
+                let from_neurons = dot(&self.w_neurons[i], &u);
+                let from_inputs = dot(&self.w_inputs[i], phi);
+                *v += (self.dt / self.tau[i]) * (-*v + from_neurons + from_inputs);
+            }
+        }
+        self.activities(v)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// With W = 0 the fixed point is v = W_I phi, approached by the factor
+/// 1 - dt / tau per substep; a neuron that excites itself settles where
+/// v = w F(v).
+#[test]
+fn the_ctrnn_settles_at_its_fixed_point() {
+    let mut network = Network {
+        dt: 0.1,
+        time_scale: 20,
+        w_neurons: vec![vec![0.0, 0.0], vec![0.0, 2.0]],
+        w_inputs: vec![vec![3.0], vec![0.0]],
+        tau: vec![2.0, 0.2],
+        gain: vec![1.0, 1.0],
+        bias: vec![0.0, 0.0],
+        activation: vec![Activation::Sigmoid, Activation::Sigmoid],
+    };
+    let mut v = vec![0.0, 0.0];
+    network.step(&mut v, &[0.5]);
+    assert!((v[0] - 1.5 * (1.0 - 0.95f64.powi(20))).abs() < 1e-14);
+    for _ in 0..100 {
+        network.step(&mut v, &[0.5]);
+    }
+    assert!((v[0] - 1.5).abs() < 1e-12);
+    assert!((v[1] - 2.0 / (1.0 + (-v[1]).exp())).abs() < 1e-12);
+
+    network.activation[1] = Activation::Tanh;
+    network.bias[1] = 0.5;
+    network.gain[1] = 3.0;
+    assert_eq!(network.activities(&[0.0, 0.0]), [0.5, 1.5f64.tanh()]);
+}

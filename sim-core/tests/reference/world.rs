@@ -1,0 +1,426 @@
+//! The world and the order of one step: sense, control, act, judge, move lights.
+
+use sim_core::config::{
+    ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams, Initializer,
+    ObjectConfig, RobotConfig, RobotController, WirelessTransmitterConfig,
+};
+use sim_core::random::{Purpose, Stream};
+
+use super::actuators::{self, Actions};
+use super::communication::{Frame, Reception, quantise, receive};
+use super::fitness;
+use super::initializers::{headings, positions};
+use super::lights::Light;
+use super::network::Network;
+use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
+use super::sensors::{self, Readings};
+use super::torus::{Torus, Vector};
+use super::witness::Witness;
+
+/// Steps in which every robot sends, whatever its network says.
+const N_SENDING_STEPS: u32 = 10;
+
+/// A robot: what it is, where it is, what it did in the last step.
+pub struct Robot<'a> {
+    pub config: &'a RobotConfig,
+    object_idx: usize,
+    pub position: Vector,
+    pub heading: f64,
+    /// State of the network.
+    pub v: Vec<f64>,
+    /// Mode in force: send (or relay).
+    pub send: bool,
+    pub led: u32,
+    /// Right and left.
+    pub wheels: [f64; 2],
+    pub on_air: Option<Frame>,
+    pub received: Option<Reception>,
+    pub is_faulty: bool,
+    is_inhibited: bool,
+    is_uncontrollable: bool,
+    reception: Stream,
+    quantisation: Stream,
+    decoding: Stream,
+    noise: Stream,
+}
+
+impl Robot<'_> {
+    pub fn transmitter(&self) -> &WirelessTransmitterConfig {
+        self.config.actuators.wireless_transmitter.as_ref().expect("what is on the air was sent")
+    }
+
+    pub fn n_receiver_sectors(&self) -> u32 {
+        self.config.sensors.wireless_receiver.as_ref().expect("emitters have sectors").n_sectors
+    }
+
+    /// Distance under which two robots of this kind hear each other.
+    pub fn communication_range(&self) -> f64 {
+        let receiver = self.config.sensors.wireless_receiver.as_ref();
+        let receiver = receiver.expect("the fitness asks who hears whom");
+        receiver.range.min(self.transmitter().range)
+    }
+
+    /// M; 0 without a wireless link.
+    fn msg_length(&self) -> usize {
+        let sensors = &self.config.sensors;
+        let actuators = &self.config.actuators;
+        let receiver = sensors.wireless_receiver.as_ref().map(|receiver| receiver.msg_length);
+        let transmitter = actuators.wireless_transmitter.as_ref().map(|config| config.msg_length);
+        receiver.or(transmitter).unwrap_or(0) as usize
+    }
+}
+
+/// A coloured disc.
+pub struct Area<'a> {
+    pub position: Vector,
+    pub params: &'a GroundAreaParams,
+}
+
+/// One trial of one genotype, step by step.
+pub struct Simulation<'a> {
+    config: &'a ExperimentConfig,
+    torus: Torus,
+    network: Network,
+    pub robots: Vec<Robot<'a>>,
+    lights: Vec<Light<'a>>,
+    areas: Vec<Area<'a>>,
+    /// Per object of the world.
+    position_streams: Vec<Stream>,
+    leader: SoleLeader,
+    /// Number of the next step.
+    k: u32,
+    pub witness: Witness,
+}
+
+impl<'a> Simulation<'a> {
+    pub fn new(
+        config: &'a ExperimentConfig,
+        genotype: &[f64],
+        generation: u64,
+        trial: u32,
+    ) -> Self {
+        let world = &config.world;
+        let mut simulation = Self {
+            config,
+            torus: Torus { width: world.width, height: world.height },
+            network: Network::decode(config, genotype),
+            robots: Vec::new(),
+            lights: Vec::new(),
+            areas: Vec::new(),
+            position_streams: Vec::new(),
+            leader: SoleLeader::default(),
+            k: 0,
+            witness: Witness::default(),
+        };
+        let stream = |purpose, stream| {
+            Stream::new(config.seed, generation, u64::from(trial), purpose, stream as u64)
+        };
+        for (object_idx, object) in world.objects.values().enumerate() {
+            simulation.position_streams.push(stream(Purpose::Positions, object_idx));
+            match object {
+                ObjectConfig::Robot(robots) => {
+                    simulation.place_robots(robots, object_idx, &stream);
+                }
+                ObjectConfig::LightSource(lights) => {
+                    let initializer = &lights.initializers.positions;
+                    for position in
+                        simulation.draw_positions(object_idx, initializer, lights.num_instances)
+                    {
+                        let movement = stream(Purpose::LightMovement, simulation.lights.len());
+                        let light = Light::new(lights, position, simulation.torus, movement);
+                        simulation.lights.push(light);
+                    }
+                }
+                ObjectConfig::GroundArea(areas) => {
+                    let GroundAreaConfig { num_instances, initializers, params } = areas;
+                    let drawn = simulation.draw_positions(
+                        object_idx,
+                        &initializers.positions,
+                        *num_instances,
+                    );
+                    simulation
+                        .areas
+                        .extend(drawn.into_iter().map(|position| Area { position, params }));
+                }
+            }
+        }
+        simulation
+    }
+
+    fn place_robots(
+        &mut self,
+        config: &'a RobotConfig,
+        object_idx: usize,
+        stream: &dyn Fn(Purpose, usize) -> Stream,
+    ) {
+        assert_eq!(config.controller, RobotController::NeuralController, "no equation is given");
+        let n = config.num_instances;
+        let perturbations = &config.perturbations;
+        let draw_affected = |k: Option<u32>, place: usize| {
+            let mut stream = stream(Purpose::Perturbation, place);
+            affected_robots(n, k.unwrap_or(0), &mut stream)
+        };
+        let inhibited = draw_affected(
+            perturbations.stimuli_inhibition.as_ref().map(|config| config.affected_robots),
+            1,
+        );
+        let uncontrollable = draw_affected(
+            perturbations.uncontrollable_rotation.as_ref().map(|config| config.affected_robots),
+            3,
+        );
+        let positions = self.draw_positions(object_idx, &config.initializers.positions, n);
+        let mut orientations = stream(Purpose::Orientations, object_idx);
+        let headings = headings(&config.initializers.orientations, n, &mut orientations);
+        for i in 0..n as usize {
+            let number = self.robots.len();
+            self.robots.push(Robot {
+                config,
+                object_idx,
+                position: positions[i],
+                heading: headings[i],
+                v: vec![0.0; self.network.n_neurons()],
+                send: true,
+                led: 0,
+                wheels: [0.0, 0.0],
+                on_air: None,
+                received: None,
+                is_faulty: false,
+                is_inhibited: inhibited[i],
+                is_uncontrollable: uncontrollable[i],
+                reception: stream(Purpose::Reception, number),
+                quantisation: stream(Purpose::Quantisation, number),
+                decoding: stream(Purpose::Decoding, number),
+                noise: stream(Purpose::SensorNoise, number),
+            });
+        }
+    }
+
+    fn draw_positions(
+        &mut self,
+        object_idx: usize,
+        initializer: &Initializer,
+        n: u32,
+    ) -> Vec<Vector> {
+        positions(initializer, n, self.torus, &mut self.position_streams[object_idx])
+    }
+
+    /// One environment step; returns its fitness.
+    pub fn step(&mut self) -> f64 {
+        self.switch_topology();
+        let readings: Vec<Readings> = (0..self.robots.len()).map(|i| self.sense(i)).collect();
+        let mut actions = Vec::new();
+        for (i, readings) in readings.iter().enumerate() {
+            let phi = self.stimuli(i, readings);
+            let actions_of_robot = self.control(i, &phi);
+            actions.push(self.perturb(i, actions_of_robot));
+        }
+        for (i, (readings, actions)) in readings.into_iter().zip(actions).enumerate() {
+            self.act(i, readings.reception, actions);
+        }
+        self.observe_leader();
+        let fitness = self.fitness();
+        if fitness != 0.0 {
+            self.witness.n_rewarded += 1;
+        }
+        for light in &mut self.lights {
+            light.advance(self.k, self.torus);
+        }
+        self.k += 1;
+        fitness
+    }
+
+    /// `topology_switch`: new positions in every `every`-th step but the first.
+    fn switch_topology(&mut self) {
+        for (object_idx, object) in self.config.world.objects.values().enumerate() {
+            let ObjectConfig::Robot(config) = object else { continue };
+            let Some(switch) = &config.perturbations.topology_switch else { continue };
+            if self.k == 0 || !self.k.is_multiple_of(switch.every) {
+                continue;
+            }
+            let initializer = &config.initializers.positions;
+            let drawn = self.draw_positions(object_idx, initializer, config.num_instances);
+            let robots = self.robots.iter_mut().filter(|robot| robot.object_idx == object_idx);
+            for (robot, position) in robots.zip(drawn) {
+                robot.position = position;
+            }
+            self.witness.n_redrawn += 1;
+        }
+    }
+
+    /// Readings from positions and headings now, and from the frames that the
+    /// last step put on the air.
+    fn sense(&mut self, i: usize) -> Readings {
+        let uniform = self.robots[i].reception.uniform();
+        let reception = receive(i, &self.robots, self.torus, uniform);
+        if let Some(reception) = &reception {
+            self.witness.n_receptions += 1;
+            self.witness.n_relayed_receptions += usize::from(reception.hops > 1);
+            self.witness.max_hops = self.witness.max_hops.max(reception.hops);
+            self.witness.n_choices += usize::from(reception.n_candidates > 1);
+        }
+        let mut noise = self.robots[i].noise.clone();
+        let robot = &self.robots[i];
+        let sensors = &robot.config.sensors;
+        let light = sensors.light_sensor.as_ref().map_or(vec![], |config| {
+            sensors::light(config, robot, &self.lights, self.torus, &mut noise)
+        });
+        let distance = sensors.distance_sensor.as_ref().map_or(vec![], |config| {
+            sensors::distance(config, i, &self.robots, self.torus, &mut noise)
+        });
+        let ground = sensors
+            .ground_sensor
+            .as_ref()
+            .map_or(0.0, |config| sensors::ground(config, robot.position, &self.areas, self.torus));
+        let state = if robot.send { 1.0 } else { 0.0 };
+        self.robots[i].noise = noise;
+        let n_not_zero = |values: &[f64]| values.iter().filter(|&&value| value != 0.0).count();
+        self.witness.n_light += n_not_zero(&light);
+        self.witness.n_distance += n_not_zero(&distance);
+        self.witness.n_ground += n_not_zero(&[ground]);
+        Readings { reception, state, light, distance, ground }
+    }
+
+    /// Eq. 3.8: the stimuli in their order, after `stimuli_inhibition`.
+    fn stimuli(&mut self, i: usize, readings: &Readings) -> Vec<f64> {
+        let robot = &self.robots[i];
+        let inhibition = robot.config.perturbations.stimuli_inhibition.as_ref();
+        let mut phi = Vec::new();
+        for (name, stimulus) in &self.config.topology.stimuli {
+            let mut values = readings.get(stimulus.sensor, robot.msg_length());
+            assert_eq!(values.len(), stimulus.n as usize, "length of stimulus {name}");
+            if robot.is_inhibited
+                && inhibition.is_some_and(|config| inhibits(config.stimuli, stimulus.sensor))
+            {
+                self.witness.n_inhibited += usize::from(values.iter().any(|&value| value != 0.0));
+                values.fill(0.0);
+            }
+            phi.extend(values);
+        }
+        phi
+    }
+
+    /// Eq. 3.16: network and decoding.
+    fn control(&mut self, i: usize, phi: &[f64]) -> Actions {
+        let robot = &mut self.robots[i];
+        let msg_length = robot.msg_length();
+        let u = self.network.step(&mut robot.v, phi);
+        let mut actions =
+            actuators::decode(&self.config.topology, &u, msg_length, &mut robot.decoding);
+        if self.k < N_SENDING_STEPS {
+            actions.send = Some(true);
+        }
+        actions
+    }
+
+    /// `leader_failure` and `uncontrollable_rotation`.
+    fn perturb(&mut self, i: usize, mut actions: Actions) -> Actions {
+        let robot = &self.robots[i];
+        if robot.is_faulty {
+            actions.led = 0;
+            actions.send = Some(false);
+        }
+        if robot.is_uncontrollable
+            && let Some(config) = &robot.config.perturbations.uncontrollable_rotation
+            && let Some(wheels) = rotation(config, self.k, robot.heading)
+        {
+            actions.wheels = wheels;
+            self.witness.n_uncontrollable += 1;
+        }
+        actions
+    }
+
+    /// Wheels move, the LED switches, the new frame goes on the air.
+    fn act(&mut self, i: usize, reception: Option<Reception>, actions: Actions) {
+        let robot = &mut self.robots[i];
+        robot.wheels = actions.wheels;
+        if let Some(config) = &robot.config.actuators.wheel_actuator {
+            actuators::drive(robot, config, self.torus);
+        }
+        robot.led = actions.led;
+        robot.send = actions.send.unwrap_or(true);
+        if let Some(config) = &robot.config.actuators.wireless_transmitter {
+            let message = if config.quantize {
+                quantise(&actions.message, config, robot.quantisation.uniform())
+            } else {
+                actions.message
+            };
+            robot.on_air = Some(if robot.send {
+                Frame::sent(message, i)
+            } else {
+                Frame::relayed(reception.as_ref(), message.len())
+            });
+        }
+        robot.received = reception;
+        self.witness.n_sending += usize::from(robot.send);
+        self.witness.n_relaying += usize::from(!robot.send);
+        self.witness.n_lit += usize::from(robot.led > 0);
+        self.witness.max_color = self.witness.max_color.max(robot.led);
+    }
+
+    /// Counts the steps of a sole leader; after `time_to_failure` of them it is
+    /// faulty from the next step on.
+    fn observe_leader(&mut self) {
+        let leds: Vec<u32> = self.robots.iter().map(|robot| robot.led).collect();
+        self.leader.observe(&leds);
+        let Some(leader) = self.leader.robot else { return };
+        let robot = &mut self.robots[leader];
+        if let Some(config) = &robot.config.perturbations.leader_failure
+            && self.leader.n_steps >= config.time_to_failure
+        {
+            robot.is_faulty = true;
+            self.witness.n_faults += 1;
+        }
+    }
+
+    /// Fitness of the step, from its actions and from positions after moving.
+    fn fitness(&mut self) -> f64 {
+        let robots = &self.robots;
+        match self.config.algorithm.fitness_function {
+            FitnessFunction::IdentifyLeader => fitness::identify_leader(&self.leader),
+            FitnessFunction::IdentifyBorderline => {
+                let is_border = fitness::borderline_of_swarm(robots, self.torus);
+                self.witness.n_interior +=
+                    is_border.iter().filter(|&&is_border| !is_border).count();
+                fitness::identify_borderline(robots, &is_border)
+            }
+            FitnessFunction::OrientationConsensus => fitness::orientation_consensus(robots),
+            FitnessFunction::Alignment => fitness::alignment(robots),
+            FitnessFunction::GotoLight => fitness::goto_light(robots, &self.lights, self.torus),
+            FitnessFunction::Grouping => fitness::grouping(robots, self.torus),
+        }
+    }
+}
+
+/// A relayed frame moves one hop per step along a line of robots 60 cm apart.
+#[test]
+fn a_relayed_frame_moves_one_hop_per_step() {
+    let mut config = crate::configs::experiment_a();
+    let swarm = crate::configs::swarm_mut(&mut config);
+    swarm.num_instances = 4;
+    swarm.initializers.positions =
+        Initializer::Fixed { values: (0..4).map(|i| vec![60.0 * f64::from(i), 500.0]).collect() };
+    let genotype = vec![0.5; super::genes(&config).len()];
+    let mut simulation = Simulation::new(&config, &genotype, 0, 0);
+    let torus = simulation.torus;
+    for (i, robot) in simulation.robots.iter_mut().enumerate() {
+        robot.heading = 0.3 * i as f64;
+        robot.on_air =
+            Some(if i == 0 { Frame::sent(vec![1.0, 0.0], 0) } else { Frame::relayed(None, 2) });
+    }
+    for step in 1..4usize {
+        let heard: Vec<Option<Reception>> =
+            (0..4).map(|i| receive(i, &simulation.robots, torus, 0.5)).collect();
+        for (i, heard) in heard.iter().enumerate() {
+            // The frame reaches robot i in step i, and from there also echoes back.
+            assert_eq!(heard.is_some(), i > 0 && i <= step && (step - i) % 2 == 0, "{step} {i}");
+        }
+        let reception = heard[step].as_ref().expect("checked above");
+        assert_eq!((reception.originator, reception.hops), (0, step as u32));
+        assert_eq!(reception.message, [1.0, 0.0]);
+        // Robot 0 heads east: its sector 0 faced robot 1, and every relay says so.
+        assert_eq!(reception.sending_direction, [1.0, 0.0]);
+        for (robot, heard) in simulation.robots.iter_mut().zip(&heard) {
+            robot.on_air = Some(Frame::relayed(heard.as_ref(), 2));
+        }
+    }
+}

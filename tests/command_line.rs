@@ -1,0 +1,197 @@
+//! What people see: results, errors that say what to do, exit codes.
+
+use std::{fs, process::Command};
+
+use harness::{
+    CoordinatorProcess, Experiment, Outcome, WorkerProcess, binary, swarmctl, workspace_file,
+};
+use serde_json::{Value, json};
+
+#[test]
+fn quickstart_gets_better_and_gives_the_same_digest_twice() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = workspace_file("configs/quickstart.json");
+    let run = || {
+        // In the same data directory: a finished experiment is not continued.
+        let args =
+            ["run", path.to_str().unwrap(), "--data-dir", directory.path().to_str().unwrap()];
+        swarmctl(args).expect_success().json_lines()
+    };
+    let (first, second) = (run(), run());
+    let last = first.last().unwrap();
+    assert_eq!(last["state"], "completed");
+    let best = |line: &Value| line["best"].as_f64().unwrap();
+    assert!(last["champion"]["fitness"].as_f64().unwrap() > best(&first[0]));
+    let mean = |lines: &[Value]| {
+        lines.iter().map(|line| line["mean"].as_f64().unwrap()).sum::<f64>() / lines.len() as f64
+    };
+    let generations = &first[..first.len() - 1];
+    let (start, end) = (&generations[..5], &generations[generations.len() - 5..]);
+    assert!(mean(end) > 2.0 * mean(start), "{} {}", mean(start), mean(end));
+    assert_eq!(last["digest"], second.last().unwrap()["digest"]);
+    assert_ne!(last["experiment"], second.last().unwrap()["experiment"]);
+}
+
+#[test]
+fn an_interrupted_run_goes_on_with_the_same_command() {
+    let directory = tempfile::tempdir().unwrap();
+    let data_dir = directory.path().to_str().unwrap();
+    let experiment = Experiment::small(6);
+    let path = experiment.path();
+    let args = ["run", path.to_str().unwrap(), "--workers", "2", "--data-dir", data_dir];
+
+    let mut interrupted = harness::swarmctl_process(args);
+    interrupted.wait_for("generation 1", |line| line["generation"] == 1);
+    interrupted.signal("INT");
+    assert_eq!(interrupted.wait().code(), Some(130));
+    let n_done = interrupted.lines().iter().filter(|line| line["generation"].is_u64()).count();
+    assert!(n_done < 6, "the interrupt came before the end");
+
+    let continued = swarmctl(args).expect_success().json_lines();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let args = ["run", path.to_str().unwrap(), "--data-dir", elsewhere.path().to_str().unwrap()];
+    let undisturbed = swarmctl(args).expect_success().json_lines();
+    assert_eq!(continued.last().unwrap()["digest"], undisturbed.last().unwrap()["digest"]);
+    assert_eq!(continued.last().unwrap()["experiment"], 1, "no second experiment was started");
+}
+
+#[test]
+fn a_bad_file_lists_every_problem_and_creates_nothing() {
+    let coordinator = CoordinatorProcess::start();
+    let experiment = Experiment::small(1).edit(|e| {
+        e["algorithm"]["population_sise"] = json!(3);
+        e["algorithm"]["generations"] = json!("many");
+        e["world"]["objects"]["robotA"]["num_instances"] = json!(0);
+        e["topology"]["synapses"]["H1-H2"]["p"] = json!(1.5);
+    });
+    let outcome = coordinator.swarmctl(&["submit", experiment.path().to_str().unwrap()]);
+    assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+    for expected in [
+        "population_sise",
+        "population_size",
+        "algorithm.generations",
+        "world.objects.robotA.num_instances",
+        "topology.synapses.H1-H2.p",
+    ] {
+        assert!(outcome.stderr.contains(expected), "{expected} in {}", outcome.stderr);
+    }
+    assert_eq!(list(&coordinator), Vec::<Value>::new());
+}
+
+#[test]
+fn broken_json_and_missing_files_are_bad_input() {
+    let directory = tempfile::tempdir().unwrap();
+    let broken = directory.path().join("broken.json");
+    fs::write(&broken, "{\"topology\": ").unwrap();
+    let missing = directory.path().join("missing.json");
+    for path in [broken, missing] {
+        let data_dir = directory.path().join("data");
+        let args = ["run", path.to_str().unwrap(), "--data-dir", data_dir.to_str().unwrap()];
+        let outcome = swarmctl(args);
+        assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+        assert!(outcome.stderr.contains(path.file_name().unwrap().to_str().unwrap()));
+        assert!(outcome.stdout.is_empty());
+    }
+}
+
+#[test]
+fn unknown_experiments_are_not_found() {
+    let coordinator = CoordinatorProcess::start();
+    for command in ["watch", "cancel", "champion"] {
+        let outcome = coordinator.swarmctl(&[command, "77"]);
+        assert_eq!(outcome.code, Some(3), "{outcome:#?}");
+        assert!(outcome.stderr.contains("no experiment 77"), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_coordinator_that_is_not_there_is_named() {
+    let outcome = swarmctl(["--coordinator", "http://127.0.0.1:1", "list"]);
+    assert_eq!(outcome.code, Some(4), "{outcome:#?}");
+    assert!(outcome.stderr.contains("127.0.0.1:1"), "{}", outcome.stderr);
+}
+
+#[test]
+fn cancelled_experiments_keep_their_history_and_champion() {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let id = coordinator.submit(&Experiment::small(1000).path());
+    coordinator.wait_for_generation(1);
+    let cancelled = coordinator.swarmctl(&["cancel", &id.to_string()]).expect_success();
+    let cancelled: Value = serde_json::from_str(&cancelled.stdout).unwrap();
+    assert_eq!(cancelled["state"], "cancelled");
+    assert!(cancelled["generations_done"].as_u64().unwrap() >= 2);
+
+    let watched = coordinator.swarmctl(&["watch", &id.to_string()]);
+    assert_eq!(watched.code, Some(5), "a watcher learns that it did not complete");
+    let champion = coordinator.swarmctl(&["champion", &id.to_string()]).expect_success();
+    let champion: Value = serde_json::from_str(&champion.stdout).unwrap();
+    let genotype = champion["genotype"].as_array().unwrap();
+    assert!(genotype.len() > 300, "{}", genotype.len());
+    assert!(champion["network"]["neurons"].as_array().is_some_and(|n| n.len() == 24));
+    assert_eq!(list(&coordinator)[0]["state"], "cancelled");
+}
+
+#[test]
+fn a_port_in_use_is_one_clear_line() {
+    let coordinator = CoordinatorProcess::start();
+    let data_dir = tempfile::tempdir().unwrap();
+    let outcome = run_coordinator(coordinator.address(), data_dir.path().to_str().unwrap());
+    assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+    assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains(coordinator.address()), "{}", outcome.stderr);
+}
+
+#[test]
+fn an_unusable_data_directory_is_one_clear_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("a-file");
+    fs::write(&file, "").unwrap();
+    let inside_a_file = file.join("data");
+    let outcome = run_coordinator("127.0.0.1:0", inside_a_file.to_str().unwrap());
+    assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+    assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("a-file"), "{}", outcome.stderr);
+}
+
+#[test]
+fn two_coordinators_do_not_share_a_data_directory() {
+    let coordinator = CoordinatorProcess::start();
+    let outcome = run_coordinator("127.0.0.1:0", coordinator.data_dir().to_str().unwrap());
+    assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+    assert!(outcome.stderr.contains("in use by another coordinator"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_damaged_or_newer_database_is_refused_untouched() {
+    let newer = tempfile::tempdir().unwrap();
+    let path = newer.path().join("swarmevo.sqlite3");
+    let database = rusqlite::Connection::open(&path).unwrap();
+    database.pragma_update(None, "user_version", 1000).unwrap();
+    drop(database);
+    let damaged = tempfile::tempdir().unwrap();
+    fs::write(
+        damaged.path().join("swarmevo.sqlite3"),
+        "not a database, but long enough".repeat(99),
+    )
+    .unwrap();
+    for (directory, expected) in [(newer, "version 1000"), (damaged, "damaged")] {
+        let path = directory.path().join("swarmevo.sqlite3");
+        let before = fs::read(&path).unwrap();
+        let outcome = run_coordinator("127.0.0.1:0", directory.path().to_str().unwrap());
+        assert_eq!(outcome.code, Some(2), "{outcome:#?}");
+        assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
+        assert_eq!(fs::read(&path).unwrap(), before);
+    }
+}
+
+fn list(coordinator: &CoordinatorProcess) -> Vec<Value> {
+    let outcome = coordinator.swarmctl(&["list"]).expect_success();
+    serde_json::from_str(&outcome.stdout).expect("a JSON list")
+}
+
+fn run_coordinator(listen: &str, data_dir: &str) -> Outcome {
+    let mut command = Command::new(binary("coordinator"));
+    command.args(["--listen", listen, "--data-dir", data_dir]);
+    Outcome::of(&mut command)
+}

@@ -1,0 +1,74 @@
+//! The same configuration and seed give the same bits on any fleet.
+
+use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl};
+use serde_json::Value;
+
+fn run_embedded(experiment: &Experiment, n_workers: usize, extra: &[&str]) -> Vec<Value> {
+    let data_dir = tempfile::tempdir().unwrap();
+    let path = experiment.path();
+    let n_workers = n_workers.to_string();
+    let mut args = vec!["run", path.to_str().unwrap(), "--workers", &n_workers, "--data-dir"];
+    args.push(data_dir.path().to_str().unwrap());
+    args.extend(extra);
+    swarmctl(args).expect_success().json_lines()
+}
+
+/// The lines without what depends on the clock.
+fn timeless(lines: &[Value]) -> Vec<Value> {
+    let mut lines = lines.to_vec();
+    for line in &mut lines {
+        for key in ["duration_ms", "workers", "idle_share", "champion_file"] {
+            line.as_object_mut().unwrap().remove(key);
+        }
+    }
+    lines
+}
+
+#[test]
+fn one_worker_and_four_give_the_same_bits() {
+    let experiment = Experiment::small(4);
+    let of_one = run_embedded(&experiment, 1, &[]);
+    let of_four = run_embedded(&experiment, 4, &[]);
+    assert_eq!(of_one.len(), 5, "four generations and the end");
+    assert_eq!(timeless(&of_one), timeless(&of_four));
+}
+
+#[test]
+fn separate_processes_and_one_process_give_the_same_bits() {
+    let experiment = Experiment::small(3);
+    let of_one_process = run_embedded(&experiment, 2, &[]);
+
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 4);
+    let (digests, last) = coordinator.watch(coordinator.submit(&experiment.path())).finish();
+    for (line, digest) in of_one_process.iter().zip(&digests) {
+        assert_eq!(line["digest"], **digest);
+    }
+    assert_eq!(of_one_process.last().unwrap()["champion"], last["champion"]);
+}
+
+#[test]
+fn another_seed_gives_other_bits() {
+    let experiment = Experiment::small(1);
+    let as_configured = run_embedded(&experiment, 2, &[]);
+    let same_seed = run_embedded(&experiment, 2, &["--seed", "7"]);
+    let other_seed = run_embedded(&experiment, 2, &["--seed", "8"]);
+    assert_eq!(as_configured[0]["digest"], same_seed[0]["digest"]);
+    assert_ne!(as_configured[0]["digest"], other_seed[0]["digest"]);
+}
+
+#[test]
+fn experiments_that_share_a_fleet_do_not_influence_each_other() {
+    let (first, second) =
+        (Experiment::small(3), Experiment::small(3).edit(|e| e["seed"] = 8.into()));
+    let alone = [run_embedded(&first, 2, &[]), run_embedded(&second, 2, &[])];
+
+    let coordinator = CoordinatorProcess::start();
+    let ids = [&first, &second].map(|experiment| coordinator.submit(&experiment.path()));
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    for (id, alone) in ids.into_iter().zip(alone) {
+        let (digests, _) = coordinator.watch(id).finish();
+        let expected: Vec<&str> = alone[..3].iter().filter_map(|l| l["digest"].as_str()).collect();
+        assert_eq!(digests, expected);
+    }
+}

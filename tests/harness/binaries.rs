@@ -1,0 +1,37 @@
+//! The programs under test, built like the test itself.
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::OnceLock,
+};
+
+/// Path of one of the workspace's programs: `coordinator`, `worker`, `swarmctl`.
+///
+/// Cargo builds programs only for the tests of their own package, so the first
+/// call builds them all, into the directory and profile of the running test.
+pub fn binary(name: &str) -> PathBuf {
+    static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
+    DIRECTORY.get_or_init(build).join(name)
+}
+
+fn build() -> PathBuf {
+    // target/PROFILE/deps/TEST
+    let test = env::current_exe().expect("a running test has a path");
+    let directory = test.parent().and_then(Path::parent).expect("cargo's layout").to_owned();
+    let profile = match directory.file_name().and_then(|name| name.to_str()) {
+        Some("debug") | None => "dev",
+        Some(profile) => profile,
+    };
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .args(["build", "--quiet", "--bins", "-p", "coordinator", "-p", "worker", "-p", "swarmctl"])
+        .args(["--profile", profile, "--target-dir"])
+        .arg(directory.parent().expect("cargo's layout"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .status()
+        .expect("cargo runs");
+    assert!(status.success(), "the programs under test must build");
+    directory
+}

@@ -1,0 +1,67 @@
+//! Experiment files for tests, made from the shipped ones.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// A file of the workspace, by its path from the root.
+pub fn workspace_file(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// An experiment file in a directory of its own.
+#[derive(Debug)]
+pub struct Experiment {
+    directory: TempDir,
+    value: Value,
+}
+
+impl Experiment {
+    /// The thesis's leader selection, cut down so that a genotype takes some
+    /// tens of milliseconds and a generation takes some tenths of a second.
+    pub fn small(generations: u64) -> Self {
+        let text = fs::read_to_string(workspace_file("configs/leader_selection_snes.json"))
+            .expect("shipped with the project");
+        let mut value: Value = serde_json::from_str(&text).expect("valid JSON");
+        value["seed"] = json!(7);
+        let algorithm = &mut value["algorithm"];
+        algorithm["generations"] = json!(generations);
+        algorithm["population_size"] = json!(16);
+        algorithm["evaluation_steps"] = json!(80);
+        algorithm["num_evaluations"] = json!(3);
+        Self::of(value)
+    }
+
+    /// Any content.
+    pub fn of(value: Value) -> Self {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let experiment = Self { directory, value };
+        experiment.save();
+        experiment
+    }
+
+    /// Changes the file.
+    pub fn edit(mut self, edit: impl FnOnce(&mut Value)) -> Self {
+        edit(&mut self.value);
+        self.save();
+        self
+    }
+
+    /// The file.
+    pub fn path(&self) -> PathBuf {
+        self.directory.path().join("experiment.json")
+    }
+
+    /// Its text.
+    pub fn text(&self) -> String {
+        self.value.to_string()
+    }
+
+    fn save(&self) {
+        fs::write(self.path(), self.text()).expect("the temporary directory is writable");
+    }
+}

@@ -1,0 +1,91 @@
+//! Between the wire and the simulation: the only place of a worker that knows
+//! the shape of both.
+
+use std::sync::{Arc, OnceLock};
+
+use sim_core::{Experiment, config::ExperimentConfig};
+use swarm_proto::{
+    PROTOCOL_VERSION,
+    v1::{self, work_request::Message},
+};
+
+use crate::{
+    WorkerConfig,
+    pool::{Evaluator, Item, Outcome},
+};
+
+/// Makes a specification computable. It is compiled by the slot that computes
+/// its first item, once; what is wrong with it is the failure of each item.
+pub(crate) fn evaluator(config_json: String) -> Evaluator {
+    let compiled = OnceLock::new();
+    Arc::new(move |item: &Item| {
+        let experiment: &Experiment =
+            compiled.get_or_init(|| compile(&config_json)).as_ref().map_err(String::clone)?;
+        experiment
+            .evaluate(&item.genotype, item.generation, item.trials.clone())
+            .map_err(|error| error.to_string())
+    })
+}
+
+fn compile(config_json: &str) -> Result<Experiment, String> {
+    ExperimentConfig::from_json(config_json, "")
+        .and_then(|(config, _warnings)| Experiment::compile(&config))
+        .map_err(|error| format!("the experiment's specification is not valid: {error}"))
+}
+
+/// Reads an item, or fails it: the coordinator is not trusted to be right.
+pub(crate) fn item(
+    experiment_id: u64,
+    generation: u64,
+    item: v1::Item,
+) -> Result<Item, v1::ItemResult> {
+    let v1::Item { item_id, first_trial, trial_count, genotype } = item;
+    let Some(end) = first_trial.checked_add(trial_count) else {
+        let message = format!("{trial_count} trials from {first_trial} on are too many");
+        return Err(failure(item_id, message));
+    };
+    Ok(Item { id: item_id, experiment_id, generation, trials: first_trial..end, genotype })
+}
+
+pub(crate) fn result(outcome: Outcome) -> v1::ItemResult {
+    let compute_us = u64::try_from(outcome.duration.as_micros()).unwrap_or(u64::MAX);
+    match outcome.fitness {
+        Ok(values) => v1::ItemResult {
+            item_id: outcome.item_id,
+            outcome: Some(v1::item_result::Outcome::Fitness(v1::TrialFitness { values })),
+            compute_us,
+        },
+        Err(message) => v1::ItemResult { compute_us, ..failure(outcome.item_id, message) },
+    }
+}
+
+/// An item that was not computed.
+pub(crate) fn failure(item_id: u64, message: String) -> v1::ItemResult {
+    let outcome = v1::item_result::Outcome::Failure(v1::ItemFailure { message });
+    v1::ItemResult { item_id, outcome: Some(outcome), compute_us: 0 }
+}
+
+pub(crate) fn hello(config: &WorkerConfig) -> v1::WorkRequest {
+    request(Message::Hello(v1::Hello {
+        protocol_version: PROTOCOL_VERSION,
+        sim_core_fingerprint: sim_core::FINGERPRINT.into(),
+        name: config.name.clone(),
+        slots: u32::try_from(config.slots).expect("slots are checked to be at most SLOTS_MAX"),
+    }))
+}
+
+pub(crate) fn results(results: Vec<v1::ItemResult>) -> v1::WorkRequest {
+    request(Message::Results(v1::ItemResults { results }))
+}
+
+pub(crate) fn heartbeat() -> v1::WorkRequest {
+    request(Message::Heartbeat(v1::Heartbeat {}))
+}
+
+pub(crate) fn draining() -> v1::WorkRequest {
+    request(Message::Draining(v1::Draining {}))
+}
+
+fn request(message: Message) -> v1::WorkRequest {
+    v1::WorkRequest { message: Some(message) }
+}

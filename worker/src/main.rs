@@ -1,0 +1,112 @@
+//! The `worker` program: computes for a coordinator until it is told to stop.
+
+mod telemetry;
+
+use std::{env, fs, process::ExitCode, thread};
+
+use clap::Parser;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info};
+use worker::{WorkerConfig, WorkerError};
+
+use crate::telemetry::LogFormat;
+
+const EXIT_INTERNAL: u8 = 1;
+const EXIT_INPUT: u8 = 2;
+const EXIT_VERSION_MISMATCH: u8 = 6;
+const EXIT_INTERRUPTED: i32 = 130;
+
+/// Computes the fitness of genotypes for a coordinator.
+///
+/// Connects, and reconnects for as long as it takes. On SIGTERM or SIGINT it
+/// finishes what it is computing, delivers that and exits; a second signal ends
+/// it at once, at no loss but time.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Args {
+    /// Address of the coordinator.
+    #[arg(long, env = "SWARM_COORDINATOR", default_value = "http://127.0.0.1:7700")]
+    coordinator: String,
+    /// Name in the coordinator's log [default: the host's name and the process id]
+    #[arg(long)]
+    name: Option<String>,
+    /// Number of items computed at the same time [default: the number of cores]
+    #[arg(long)]
+    slots: Option<usize>,
+    /// How log lines look.
+    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
+    log_format: LogFormat,
+    /// What to log: error, warn, info, debug or trace, also per module
+    /// (info,worker=debug).
+    #[arg(long, env = "SWARM_LOG", default_value = "info")]
+    log_level: String,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    stopped by a signal
+  1    internal error
+  2    bad arguments
+  6    coordinator and worker are of different versions
+  130  ended at once by a second signal";
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    let args = Args::parse();
+    if let Err(error) = telemetry::init(args.log_format, &args.log_level) {
+        eprintln!("error: {error:#}");
+        return EXIT_INPUT.into();
+    }
+    let shutdown = CancellationToken::new();
+    if let Err(error) = stop_on_signals(shutdown.clone()) {
+        error!("cannot listen for signals: {error}");
+        return EXIT_INTERNAL.into();
+    }
+    let name = args.name.unwrap_or_else(default_name);
+    let slots = args.slots.unwrap_or_else(|| thread::available_parallelism().map_or(1, Into::into));
+    match worker::run(WorkerConfig::new(args.coordinator, name, slots), shutdown).await {
+        Ok(()) => {
+            info!("stopped");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            error!("{error}");
+            match error {
+                WorkerError::VersionMismatch { .. } => EXIT_VERSION_MISMATCH.into(),
+                error if error.is_input() => EXIT_INPUT.into(),
+                _ => EXIT_INTERNAL.into(),
+            }
+        }
+    }
+}
+
+/// The first signal asks the worker to finish, the second ends the process.
+fn stop_on_signals(shutdown: CancellationToken) -> std::io::Result<()> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::spawn(async move {
+        loop {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+            }
+            if shutdown.is_cancelled() {
+                std::process::exit(EXIT_INTERRUPTED);
+            }
+            shutdown.cancel();
+        }
+    });
+    Ok(())
+}
+
+/// The host's name, or "worker" if it has none, and the process id.
+fn default_name() -> String {
+    let host = fs::read_to_string("/proc/sys/kernel/hostname")
+        .ok()
+        .or_else(|| env::var("HOSTNAME").ok())
+        .map(|host| host.trim().to_owned())
+        .filter(|host| !host.is_empty())
+        .unwrap_or_else(|| "worker".into());
+    format!("{host}-{}", std::process::id())
+}

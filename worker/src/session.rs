@@ -1,0 +1,270 @@
+//! One conversation with the coordinator, from `Hello` to the end of its stream.
+
+use std::{collections::BTreeMap, error::Error, mem, sync::Arc, time::Duration};
+
+use swarm_proto::v1::{
+    self, WorkRequest, WorkResponse, work_response::Message,
+    worker_service_client::WorkerServiceClient,
+};
+use tokio::{
+    sync::mpsc,
+    time::{Instant, MissedTickBehavior, interval_at, timeout},
+};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Status, Streaming, transport::Endpoint};
+use tracing::{debug, info};
+
+use crate::{
+    WorkerConfig, convert,
+    pool::{Evaluator, Outcome, Pool, Task},
+};
+
+/// Largest message accepted from the coordinator.
+const INBOUND_BYTES_MAX: usize = 64 << 20;
+/// Messages that wait for the network.
+const OUTBOUND_MESSAGES_MAX: usize = 16;
+/// Results in one message, so that no message outgrows what a coordinator accepts.
+const RESULTS_PER_MESSAGE_MAX: usize = 256;
+/// How long the coordinator may take to answer `Hello`.
+const WELCOME_TIMEOUT: Duration = Duration::from_secs(10);
+/// How long it may take to confirm the end of a drained stream.
+const GOODBYE_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// A stream whose `Welcome` has arrived.
+pub(crate) struct Session {
+    welcome: v1::Welcome,
+    inbound: Streaming<WorkResponse>,
+    outbound: mpsc::Sender<WorkRequest>,
+}
+
+/// Why there is no session.
+#[derive(Debug)]
+pub(crate) enum OpenError {
+    /// There never will be one; with the coordinator's reason.
+    VersionMismatch(String),
+    /// The coordinator said no, for now.
+    Refused(String),
+    /// Nobody answered.
+    Unreachable(String),
+}
+
+/// How a session ended.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    /// As asked; all results are delivered.
+    Drained,
+    /// The stream broke.
+    Lost {
+        reason: String,
+        /// Whether the session was good for anything before.
+        worked: bool,
+    },
+}
+
+impl Session {
+    pub(crate) async fn open(
+        endpoint: &Endpoint,
+        config: &WorkerConfig,
+    ) -> Result<Self, OpenError> {
+        let channel = endpoint.connect().await.map_err(|error| {
+            OpenError::Unreachable(with_causes(error.source().unwrap_or(&error)))
+        })?;
+        let client = WorkerServiceClient::new(channel).max_decoding_message_size(INBOUND_BYTES_MAX);
+        timeout(WELCOME_TIMEOUT, Self::greet(client, config))
+            .await
+            .map_err(|_| OpenError::Refused("no answer to the greeting".into()))?
+    }
+
+    async fn greet(
+        mut client: WorkerServiceClient<tonic::transport::Channel>,
+        config: &WorkerConfig,
+    ) -> Result<Self, OpenError> {
+        let (outbound, requests) = mpsc::channel(OUTBOUND_MESSAGES_MAX);
+        outbound.try_send(convert::hello(config)).expect("a new channel has room");
+        let mut inbound =
+            client.work(ReceiverStream::new(requests)).await.map_err(refusal)?.into_inner();
+        match inbound.message().await.map_err(refusal)? {
+            Some(WorkResponse { message: Some(Message::Welcome(welcome)) }) => {
+                Ok(Self { welcome, inbound, outbound })
+            }
+            Some(_) => Err(OpenError::Refused("it answered something else than a welcome".into())),
+            None => Err(OpenError::Refused("it closed the stream".into())),
+        }
+    }
+
+    /// The coordinator's number for this stream.
+    pub(crate) fn worker_id(&self) -> u64 {
+        self.welcome.worker_id
+    }
+
+    /// Computes what the coordinator sends, until the stream breaks, or until
+    /// `shutdown` and everything that was being computed then is delivered.
+    pub(crate) async fn serve(
+        self,
+        pool: &Pool,
+        shutdown: &CancellationToken,
+        evaluator: fn(String) -> Evaluator,
+    ) -> Ended {
+        let Self { welcome, mut inbound, outbound } = self;
+        let (reply, mut outcomes) = mpsc::channel(pool.capacity());
+        let mut desk = Desk {
+            pool,
+            evaluator,
+            evaluators: BTreeMap::new(),
+            reply: Some(reply),
+            ready: Vec::new(),
+        };
+        let period = Duration::from_millis(u64::from(welcome.heartbeat_interval_ms.max(1)));
+        let mut heartbeat = interval_at(Instant::now() + period, period);
+        heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut worked = false;
+        let mut computed = Vec::new();
+        let mut all_computed = false;
+
+        while !(all_computed && desk.ready.is_empty()) {
+            // Results that the network does not take stop the intake of more.
+            let has_room = desk.ready.len() < RESULTS_PER_MESSAGE_MAX;
+            tokio::select! {
+                biased;
+                () = shutdown.cancelled(), if !desk.is_draining() => {
+                    desk.drain();
+                    if outbound.send(convert::draining()).await.is_err() {
+                        return Ended::Lost { reason: STOPPED_READING.into(), worked };
+                    }
+                }
+                _ = heartbeat.tick() => {
+                    worked = true;
+                    // If there is no room, what waits there is a sign of life too.
+                    let _ = outbound.try_send(convert::heartbeat());
+                }
+                message = inbound.message(), if has_room => match message {
+                    Ok(Some(WorkResponse { message: Some(message) })) => {
+                        worked = true;
+                        desk.on_message(message);
+                    }
+                    // A kind of message from the future.
+                    Ok(Some(WorkResponse { message: None })) => {}
+                    Ok(None) => {
+                        let reason = "the coordinator closed the stream".into();
+                        return Ended::Lost { reason, worked };
+                    }
+                    Err(status) => return Ended::Lost { reason: describe(&status), worked },
+                },
+                n = outcomes.recv_many(&mut computed, RESULTS_PER_MESSAGE_MAX),
+                    if has_room && !all_computed =>
+                {
+                    all_computed = n == 0;
+                    desk.ready.extend(computed.drain(..).map(convert::result));
+                }
+                permit = outbound.reserve(), if !desk.ready.is_empty() => match permit {
+                    Ok(permit) => permit.send(convert::results(mem::take(&mut desk.ready))),
+                    Err(_) => return Ended::Lost { reason: STOPPED_READING.into(), worked },
+                },
+            }
+        }
+
+        // Closing our side tells the coordinator; its closing tells us that it
+        // has read everything.
+        drop(outbound);
+        let goodbye = async { while let Ok(Some(_)) = inbound.message().await {} };
+        if timeout(GOODBYE_TIMEOUT, goodbye).await.is_err() {
+            debug!("the coordinator did not confirm the end of the stream");
+        }
+        Ended::Drained
+    }
+}
+
+const STOPPED_READING: &str = "the coordinator stopped reading";
+
+/// What a session knows: specifications, and results to be sent.
+struct Desk<'a> {
+    pool: &'a Pool,
+    evaluator: fn(String) -> Evaluator,
+    /// By experiment.
+    evaluators: BTreeMap<u64, Evaluator>,
+    /// Where slots put outcomes; none once no more items are taken.
+    reply: Option<mpsc::Sender<Outcome>>,
+    ready: Vec<v1::ItemResult>,
+}
+
+impl Desk<'_> {
+    fn is_draining(&self) -> bool {
+        self.reply.is_none()
+    }
+
+    fn drain(&mut self) {
+        self.reply = None;
+        let dropped = self.pool.drop_queued(|_| true);
+        info!(dropped, "draining");
+    }
+
+    fn on_message(&mut self, message: Message) {
+        match message {
+            Message::Spec(v1::ExperimentSpec { experiment_id, config_json }) => {
+                self.evaluators.insert(experiment_id, (self.evaluator)(config_json));
+            }
+            Message::Batch(batch) => self.on_batch(batch),
+            Message::EndExperiment(v1::EndExperiment { experiment_id }) => {
+                self.evaluators.remove(&experiment_id);
+                let dropped = self.pool.drop_queued(|item| item.experiment_id == experiment_id);
+                debug!(experiment_id, dropped, "experiment ended");
+            }
+            Message::Welcome(_) => debug!("ignored a second welcome"),
+        }
+    }
+
+    /// Queues items; those that cannot be are failed. While draining they are
+    /// dropped: the coordinator had not yet heard of it.
+    fn on_batch(&mut self, batch: v1::ItemBatch) {
+        let Some(reply) = &self.reply else { return };
+        let v1::ItemBatch { experiment_id, generation, items } = batch;
+        let evaluator = self.evaluators.get(&experiment_id);
+        for item in items {
+            let item_id = item.item_id;
+            let queued = convert::item(experiment_id, generation, item).and_then(|item| {
+                let evaluator = evaluator.map(Arc::clone).ok_or_else(|| {
+                    let message = format!("no specification of experiment {experiment_id} came");
+                    convert::failure(item_id, message)
+                })?;
+                self.pool.submit(Task { item, evaluator, reply: reply.clone() }).map_err(|_| {
+                    let message = format!("more than {} items are queued", self.pool.capacity());
+                    convert::failure(item_id, message)
+                })
+            });
+            self.ready.extend(queued.err());
+        }
+    }
+}
+
+fn refusal(status: Status) -> OpenError {
+    match status.code() {
+        Code::FailedPrecondition => OpenError::VersionMismatch(status.message().into()),
+        _ => OpenError::Refused(describe(&status)),
+    }
+}
+
+fn describe(status: &Status) -> String {
+    let message = status.message();
+    let text = if message.is_empty() { status.code().description() } else { message };
+    append_causes(text.into(), status.source())
+}
+
+/// An error and its causes, each said once.
+pub(crate) fn with_causes(error: &dyn Error) -> String {
+    append_causes(error.to_string(), error.source())
+}
+
+fn append_causes(mut text: String, mut source: Option<&dyn Error>) -> String {
+    while let Some(cause) = source {
+        let cause_text = cause.to_string();
+        if !text.contains(&cause_text) {
+            text = format!("{text}: {cause_text}");
+        }
+        source = cause.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,396 @@
+//! Sessions against a coordinator that the test plays.
+
+use std::{
+    collections::BTreeSet,
+    net::SocketAddr,
+    pin::Pin,
+    sync::{Mutex, mpsc as std_mpsc},
+};
+
+use swarm_proto::v1::{
+    work_request,
+    worker_service_server::{WorkerService, WorkerServiceServer},
+};
+use tokio::{net::TcpListener, task::JoinHandle};
+use tokio_stream::{Stream, wrappers::TcpListenerStream};
+use tonic::{Request, Response, transport::Server};
+
+use super::*;
+use crate::{WorkerError, run_with};
+
+const LONG: Duration = Duration::from_secs(3600);
+
+/// A worker's stream, seen from the coordinator.
+struct Conversation {
+    requests: Streaming<WorkRequest>,
+    responses: mpsc::Sender<Result<WorkResponse, Status>>,
+}
+
+struct FakeService {
+    conversations: mpsc::Sender<Conversation>,
+}
+
+#[tonic::async_trait]
+impl WorkerService for FakeService {
+    type WorkStream = Pin<Box<dyn Stream<Item = Result<WorkResponse, Status>> + Send>>;
+
+    async fn work(
+        &self,
+        request: Request<Streaming<WorkRequest>>,
+    ) -> Result<Response<Self::WorkStream>, Status> {
+        let (responses, stream) = mpsc::channel(16);
+        let conversation = Conversation { requests: request.into_inner(), responses };
+        self.conversations.send(conversation).await.map_err(|_| Status::unavailable("over"))?;
+        Ok(Response::new(Box::pin(ReceiverStream::new(stream))))
+    }
+}
+
+impl Conversation {
+    async fn send(&self, message: Message) {
+        let response = WorkResponse { message: Some(message) };
+        self.responses.send(Ok(response)).await.unwrap();
+    }
+
+    /// The next message; none at the end of the stream.
+    async fn next(&mut self) -> Option<work_request::Message> {
+        let request = self.requests.message().await.unwrap();
+        request.map(|request| request.message.expect("a worker sends no empty messages"))
+    }
+
+    /// The next `n` results, sorted by item.
+    async fn results(&mut self, n: usize) -> Vec<v1::ItemResult> {
+        let mut results = Vec::new();
+        while results.len() < n {
+            match self.next().await {
+                Some(work_request::Message::Results(batch)) => results.extend(batch.results),
+                other => panic!("expected results, not {other:?}"),
+            }
+        }
+        results.sort_by_key(|result| result.item_id);
+        results
+    }
+
+    /// Reads `Hello`, answers `Welcome`.
+    async fn welcome(&mut self, heartbeat_interval: Duration) -> v1::Hello {
+        let Some(work_request::Message::Hello(hello)) = self.next().await else {
+            panic!("a stream begins with Hello");
+        };
+        let heartbeat_interval_ms = u32::try_from(heartbeat_interval.as_millis()).unwrap();
+        self.send(Message::Welcome(v1::Welcome {
+            worker_id: 7,
+            heartbeat_interval_ms,
+            lease_ms: 3 * heartbeat_interval_ms,
+        }))
+        .await;
+        hello
+    }
+
+    async fn send_spec(&self, experiment_id: u64, config_json: &str) {
+        let config_json = config_json.into();
+        self.send(Message::Spec(v1::ExperimentSpec { experiment_id, config_json })).await;
+    }
+
+    async fn send_items(&self, experiment_id: u64, item_ids: impl IntoIterator<Item = u64>) {
+        let items = item_ids
+            .into_iter()
+            .map(|item_id| v1::Item {
+                item_id,
+                first_trial: 1,
+                trial_count: 2,
+                genotype: vec![0.1, 0.2, item_id as f64],
+            })
+            .collect();
+        let batch = v1::ItemBatch { experiment_id, generation: 5, items };
+        self.send(Message::Batch(batch)).await;
+    }
+}
+
+/// A coordinator, and a worker that connects to it.
+struct Stage {
+    conversations: mpsc::Receiver<Conversation>,
+    shutdown: CancellationToken,
+    worker: JoinHandle<Result<(), WorkerError>>,
+}
+
+impl Stage {
+    async fn new(slots: usize, evaluator: fn(String) -> Evaluator) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        Self { conversations: serve(listener), ..Self::worker(address, slots, evaluator) }
+    }
+
+    /// A worker whose coordinator is somebody else's affair.
+    fn worker(address: SocketAddr, slots: usize, evaluator: fn(String) -> Evaluator) -> Self {
+        let mut config = WorkerConfig::new(format!("http://{address}"), "ada", slots);
+        config.retry_delay_min = Duration::from_millis(1);
+        config.retry_delay_max = Duration::from_millis(20);
+        let shutdown = CancellationToken::new();
+        let worker = tokio::spawn(run_with(config, shutdown.clone(), evaluator));
+        Self { conversations: mpsc::channel(1).1, shutdown, worker }
+    }
+
+    async fn conversation(&mut self) -> Conversation {
+        self.conversations.recv().await.expect("the service lives")
+    }
+
+    /// Stops the worker.
+    async fn end(self) {
+        self.shutdown.cancel();
+        drop(self.conversations);
+        self.worker.await.unwrap().unwrap();
+    }
+}
+
+fn serve(listener: TcpListener) -> mpsc::Receiver<Conversation> {
+    let (sender, conversations) = mpsc::channel(4);
+    let service = WorkerServiceServer::new(FakeService { conversations: sender });
+    let incoming = TcpListenerStream::new(listener);
+    tokio::spawn(Server::builder().add_service(service).serve_with_incoming(incoming));
+    conversations
+}
+
+/// Fitness that depends on everything that an item says.
+fn arithmetic(config_json: String) -> Evaluator {
+    Arc::new(move |item| {
+        let factor: f64 = config_json.parse().map_err(|_| format!("`{config_json}`?"))?;
+        let sum: f64 = item.genotype.iter().sum();
+        Ok(item
+            .trials
+            .clone()
+            .map(|t| factor * sum / (item.generation + u64::from(t)) as f64)
+            .collect())
+    })
+}
+
+fn fitness(result: &v1::ItemResult) -> &[f64] {
+    match &result.outcome {
+        Some(v1::item_result::Outcome::Fitness(fitness)) => &fitness.values,
+        other => panic!("expected a fitness, not {other:?}"),
+    }
+}
+
+fn failure(result: &v1::ItemResult) -> &str {
+    match &result.outcome {
+        Some(v1::item_result::Outcome::Failure(failure)) => &failure.message,
+        other => panic!("expected a failure, not {other:?}"),
+    }
+}
+
+#[tokio::test]
+async fn a_worker_introduces_itself() {
+    let mut stage = Stage::new(3, arithmetic).await;
+    let hello = stage.conversation().await.welcome(LONG).await;
+    assert_eq!(hello.protocol_version, swarm_proto::PROTOCOL_VERSION);
+    assert_eq!(hello.sim_core_fingerprint, sim_core::FINGERPRINT);
+    assert_eq!((hello.name.as_str(), hello.slots), ("ada", 3));
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn results_are_what_was_computed_to_the_bit() {
+    let mut stage = Stage::new(2, arithmetic).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "0.3").await;
+    coordinator.send_items(1, 10..14).await;
+    for (result, id) in coordinator.results(4).await.iter().zip(10..) {
+        assert_eq!(result.item_id, id);
+        let sum = 0.1 + 0.2 + id as f64;
+        let expected = [0.3 * sum / 6.0, 0.3 * sum / 7.0].map(f64::to_bits);
+        assert_eq!(fitness(result).iter().map(|x| x.to_bits()).collect::<Vec<_>>(), expected);
+    }
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn an_item_that_cannot_be_computed_fails_alone() {
+    fn panics_on_item_1(_: String) -> Evaluator {
+        Arc::new(|item| if item.id == 1 { panic!("division by swarm") } else { Ok(vec![1.0]) })
+    }
+    let mut stage = Stage::new(1, panics_on_item_1).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_items(1, [1, 2]).await;
+    let results = coordinator.results(2).await;
+    assert_eq!(failure(&results[0]), "panicked: division by swarm");
+    assert_eq!(fitness(&results[1]), [1.0]);
+    // No specification; and trials whose numbers do not exist.
+    coordinator.send_items(2, [3]).await;
+    assert!(failure(&coordinator.results(1).await[0]).contains("experiment 2"));
+    let item = v1::Item { item_id: 4, first_trial: u32::MAX, trial_count: 2, genotype: vec![] };
+    let batch = v1::ItemBatch { experiment_id: 1, generation: 0, items: vec![item] };
+    coordinator.send(Message::Batch(batch)).await;
+    assert!(failure(&coordinator.results(1).await[0]).contains("trials"));
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn a_specification_that_does_not_parse_fails_its_items_with_the_reason() {
+    let mut stage = Stage::new(1, arithmetic).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "three").await;
+    coordinator.send_items(1, [1]).await;
+    assert_eq!(failure(&coordinator.results(1).await[0]), "`three`?");
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn an_ended_experiment_is_forgotten() {
+    let mut stage = Stage::new(1, arithmetic).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "1").await;
+    coordinator.send(Message::EndExperiment(v1::EndExperiment { experiment_id: 1 })).await;
+    coordinator.send_items(1, [1]).await;
+    assert!(failure(&coordinator.results(1).await[0]).contains("no specification"));
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn a_broken_stream_is_opened_again() {
+    let mut stage = Stage::new(1, arithmetic).await;
+    for _ in 0..3 {
+        let mut coordinator = stage.conversation().await;
+        assert_eq!(coordinator.welcome(LONG).await.name, "ada");
+        coordinator.send_spec(1, "1").await;
+        coordinator.send_items(1, [1]).await;
+        coordinator.results(1).await;
+    }
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn a_coordinator_that_comes_up_late_is_found() {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    drop(listener);
+    let stage = Stage::worker(address, 1, arithmetic);
+    let mut stage =
+        Stage { conversations: serve(TcpListener::bind(address).await.unwrap()), ..stage };
+    stage.conversation().await.welcome(LONG).await;
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn a_version_mismatch_is_fatal_and_any_other_refusal_is_not() {
+    let mut stage = Stage::new(1, arithmetic).await;
+    for status in [Status::unavailable("shutting down"), Status::failed_precondition("I am 9.9")] {
+        let coordinator = stage.conversation().await;
+        coordinator.responses.send(Err(status)).await.unwrap();
+    }
+    let error = stage.worker.await.unwrap().unwrap_err();
+    assert!(
+        matches!(&error, WorkerError::VersionMismatch { refusal, .. } if refusal == "I am 9.9")
+    );
+}
+
+/// What the gated evaluators of the tests below tell and are told. A
+/// function pointer captures nothing, so each test has a static of its own.
+struct Gate {
+    started: Mutex<Option<mpsc::UnboundedSender<u64>>>,
+    permits: Mutex<Option<std_mpsc::Receiver<()>>>,
+}
+
+impl Gate {
+    const fn new() -> Self {
+        Self { started: Mutex::new(None), permits: Mutex::new(None) }
+    }
+
+    fn open(&self) -> (mpsc::UnboundedReceiver<u64>, std_mpsc::Sender<()>) {
+        let (started, starts) = mpsc::unbounded_channel();
+        let (permit, permits) = std_mpsc::channel();
+        *self.started.lock().unwrap() = Some(started);
+        *self.permits.lock().unwrap() = Some(permits);
+        (starts, permit)
+    }
+
+    fn pass(&self, item_id: u64) {
+        self.started.lock().unwrap().as_ref().unwrap().send(item_id).unwrap();
+        self.permits.lock().unwrap().as_ref().unwrap().recv().unwrap();
+    }
+}
+
+#[tokio::test]
+async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() {
+    static GATE: Gate = Gate::new();
+    fn gated(_: String) -> Evaluator {
+        Arc::new(|item| {
+            GATE.pass(item.id);
+            Ok(vec![item.id as f64])
+        })
+    }
+    let (mut starts, permit) = GATE.open();
+    let mut stage = Stage::new(1, gated).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_items(1, [1, 2]).await;
+    assert_eq!(starts.recv().await, Some(1));
+    stage.shutdown.cancel();
+    assert!(matches!(coordinator.next().await, Some(work_request::Message::Draining(_))));
+    // Sent before the coordinator knew.
+    coordinator.send_items(1, [3]).await;
+    permit.send(()).unwrap();
+    assert_eq!(fitness(&coordinator.results(1).await[0]), [1.0]);
+    assert_eq!(coordinator.next().await, None);
+    drop(coordinator);
+    stage.worker.await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn hearts_beat_while_all_slots_compute() {
+    static GATE: Gate = Gate::new();
+    fn gated(_: String) -> Evaluator {
+        Arc::new(|item| {
+            GATE.pass(item.id);
+            Ok(vec![])
+        })
+    }
+    let (mut starts, permit) = GATE.open();
+    let mut stage = Stage::new(1, gated).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(Duration::from_millis(5)).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_items(1, [1]).await;
+    assert_eq!(starts.recv().await, Some(1));
+    for _ in 0..3 {
+        assert!(matches!(coordinator.next().await, Some(work_request::Message::Heartbeat(_))));
+    }
+    permit.send(()).unwrap();
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
+async fn more_items_than_the_credit_allows_are_failed() {
+    static GATE: Gate = Gate::new();
+    fn gated(_: String) -> Evaluator {
+        Arc::new(|item| {
+            GATE.pass(item.id);
+            Ok(vec![])
+        })
+    }
+    let (mut starts, permit) = GATE.open();
+    let mut stage = Stage::new(1, gated).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_items(1, [1]).await;
+    assert_eq!(starts.recv().await, Some(1));
+    coordinator.send_items(1, 2..=5).await;
+    let results = coordinator.results(2).await;
+    assert!(results.iter().all(|result| failure(result).contains("queued")));
+    let failed: BTreeSet<u64> = results.iter().map(|result| result.item_id).collect();
+    assert_eq!(failed, BTreeSet::from([4, 5]));
+    for _ in 0..3 {
+        permit.send(()).unwrap();
+    }
+    drop(coordinator);
+    stage.end().await;
+}
