@@ -80,7 +80,8 @@ impl Experiment {
         let algorithm = &config.algorithm;
         let network = Network::compile(&config.topology, &mut problems);
         let codec = Codec::compile(config, &network, &mut problems);
-        let world = World::compile(&config.world, &network, &mut problems);
+        let world =
+            World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
         problems.check()?;
         let experiment = Self {
             seed: config.seed,
@@ -89,7 +90,7 @@ impl Experiment {
             fitness: algorithm.fitness_function,
             network,
             codec,
-            world,
+            world: world.expect("a world without problems is one"),
         };
         let mut problems = Problems::default();
         for trial in 0..experiment.n_trials.min(N_TRIED_TRIALS) {
@@ -181,7 +182,7 @@ impl Experiment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{GenotypeQuery, Initializer, SynapseSelector};
+    use crate::config::{GenotypeQuery, SynapseSelector};
     use crate::testing::{experiment_a, genotype, robot};
 
     #[test]
@@ -252,8 +253,7 @@ mod tests {
     #[test]
     fn all_problems_are_reported_at_once() {
         let mut config = experiment_a();
-        let circle = Initializer::RandomCircumference { radius: 1.0, center: [0.0; 2] };
-        robot(&mut config).initializers.orientations = circle;
+        config.algorithm.evolvable_object = "robotB".into();
         config.topology.synapses[0].pre = vec!["nobody".into()];
         config.algorithm.populations[0].objects =
             vec![GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()))];
@@ -264,7 +264,7 @@ mod tests {
             [
                 "topology.synapses.I1-H1",
                 "algorithm.populations.p1.objects",
-                "world.objects.robotA.initializers.orientations",
+                "algorithm.evolvable_object",
             ]
         );
     }

@@ -29,6 +29,11 @@ impl Leadership {
     pub fn has_leader(&self) -> bool {
         self.leader.is_some()
     }
+
+    /// Forgets the leader: the next one's term starts anew.
+    pub fn reset(&mut self) {
+        self.leader = None;
+    }
 }
 
 /// The only robot with its LED on.
@@ -52,5 +57,7 @@ mod tests {
         assert_eq!(term([0, 0, 1]), Some((2, 1)));
         assert_eq!(term([1, 0, 1]), None);
         assert_eq!(term([0, 0, 1]), Some((2, 1)));
+        leadership.reset();
+        assert_eq!(leadership.observe(&[0, 0, 1]), Some(Leader { robot: 2, n_steps: 1 }));
     }
 }

@@ -116,7 +116,7 @@ impl<'a> Trial<'a> {
                 senses: Senses::new(group),
                 perturbations: Perturbations::new(
                     &group.perturbations,
-                    group.robots.clone(),
+                    group.robots.len(),
                     |number| address.stream(Purpose::Perturbation, number),
                 ),
                 positions: stream,
@@ -223,11 +223,8 @@ impl<'a> Trial<'a> {
             self.swarm.modes.fill(Mode::Send);
         }
         // Perturbations rewrite actions.
-        for (group, state) in world.groups.iter().zip(&self.groups) {
-            state.perturbations.rewrite(step, group.robots.clone(), &mut self.swarm);
-        }
-        for state in &mut self.groups {
-            state.perturbations.observe(&self.swarm);
+        for (group, state) in world.groups.iter().zip(&mut self.groups) {
+            state.perturbations.rewrite(step, group, &mut self.swarm);
         }
         // Wheels turn.
         self.drive();

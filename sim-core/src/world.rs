@@ -34,6 +34,8 @@ pub(crate) struct World {
     pub areas: Vec<Fixtures>,
     /// Components of a message; 0 without radio.
     pub message_len: usize,
+    /// Index in `groups` of the robots that evolve and are judged.
+    pub evolvable: usize,
 }
 
 /// What an object's instances have in common.
@@ -87,8 +89,14 @@ pub(crate) struct RobotGroup {
 }
 
 impl World {
-    /// Compiles the objects; notes those that have no start.
-    pub fn compile(config: &WorldConfig, network: &Network, problems: &mut Problems) -> Self {
+    /// Compiles the objects, of which `evolvable_object` names the robots that are
+    /// judged; none if there are no such robots.
+    pub fn compile(
+        config: &WorldConfig,
+        evolvable_object: &str,
+        network: &Network,
+        problems: &mut Problems,
+    ) -> Option<Self> {
         let mut world = Self {
             torus: Torus { width: config.width, height: config.height },
             groups: Vec::new(),
@@ -97,6 +105,7 @@ impl World {
             light_controllers: Vec::new(),
             areas: Vec::new(),
             message_len: 0,
+            evolvable: 0,
         };
         // Sensors refer to lights and areas, which may come after their robots.
         for (index, (name, object)) in config.objects.iter().enumerate() {
@@ -106,12 +115,20 @@ impl World {
                 ObjectConfig::GroundArea(area) => world.add_areas(index, name, area, problems),
             }
         }
+        let mut evolvable = None;
         for (index, (name, object)) in config.objects.iter().enumerate() {
             if let ObjectConfig::Robot(robot) = object {
+                if name == evolvable_object {
+                    evolvable = Some(world.groups.len());
+                }
                 world.add_robots(index, name, robot, network, problems);
             }
         }
-        world
+        if evolvable.is_none() {
+            let message = format!("no robots are named `{evolvable_object}`");
+            problems.add("algorithm.evolvable_object", message);
+        }
+        Some(Self { evolvable: evolvable?, ..world })
     }
 
     /// Number of robots of all objects.
@@ -129,9 +146,14 @@ impl World {
         self.areas.last().map_or(0, |areas| areas.members.end)
     }
 
-    /// Distance under which two robots of the first object hear each other, cm.
+    /// The robots that evolve and are judged.
+    pub fn judged(&self) -> Range<usize> {
+        self.groups[self.evolvable].robots.clone()
+    }
+
+    /// Distance within which two of the judged robots hear each other, cm.
     pub fn communication_range(&self) -> f64 {
-        let antenna = self.antennas.first().copied().unwrap_or_default();
+        let antenna = self.judged().next().map(|robot| self.antennas[robot]).unwrap_or_default();
         match (antenna.emits_within, antenna.receiver) {
             (Some(reach), Some(receiver)) => receiver.range.min(reach),
             _ => DEFAULT_RANGE,

@@ -12,8 +12,8 @@ use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
 
-/// What a fitness function sees of a step: all robots, as they acted and after they
-/// moved, and the lights before they move.
+/// What a fitness function sees of a step: the robots that are judged, as they
+/// acted and after they moved, and the lights before they move.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment<'a> {
     /// The plane.
@@ -39,15 +39,16 @@ pub(crate) struct Moment<'a> {
 impl<'a> Moment<'a> {
     /// This step of a trial.
     pub fn new(world: &'a World, swarm: &'a Swarm, lights: &'a [Vec2], step: u32) -> Self {
+        let judged = world.judged();
         Self {
             torus: &world.torus,
             step,
             moved: swarm.moved,
-            positions: &swarm.positions,
-            headings: &swarm.headings,
-            wheels: &swarm.wheels,
-            leds: &swarm.leds,
-            photosensitive: &swarm.photosensitive,
+            positions: &swarm.positions[judged.clone()],
+            headings: &swarm.headings[judged.clone()],
+            wheels: &swarm.wheels[judged.clone()],
+            leds: &swarm.leds[judged.clone()],
+            photosensitive: &swarm.photosensitive[judged],
             lights,
         }
     }

@@ -4,8 +4,6 @@ mod inhibition;
 mod leader_failure;
 mod rotation;
 
-use std::ops::Range;
-
 use inhibition::Inhibition;
 use leader_failure::LeaderFailure;
 use rotation::Rotation;
@@ -13,6 +11,7 @@ use rotation::Rotation;
 use crate::config::{PerturbationsConfig, SensorQuery};
 use crate::random::Stream;
 use crate::swarm::Swarm;
+use crate::world::RobotGroup;
 
 /// Stream numbers of the perturbations that draw robots: their places in
 /// [`PerturbationsConfig`]. Part of the format of a run.
@@ -30,20 +29,19 @@ pub(crate) struct Perturbations {
 }
 
 impl Perturbations {
-    /// Draws the affected among `robots`; `stream` gives the trial's streams for
+    /// Draws the affected among `n_robots`; `stream` gives the trial's streams for
     /// perturbations by number.
     pub fn new(
         config: &PerturbationsConfig,
-        robots: Range<usize>,
+        n_robots: usize,
         stream: impl Fn(usize) -> Stream,
     ) -> Self {
-        let n_robots = robots.len();
         let leader_failure = config.leader_failure.as_ref();
         let inhibition = config.stimuli_inhibition.as_ref();
         let rotation = config.uncontrollable_rotation.as_ref();
         Self {
             leader_failure: leader_failure
-                .map(|config| LeaderFailure::new(config.time_to_failure, robots)),
+                .map(|config| LeaderFailure::new(config.time_to_failure, n_robots)),
             inhibition: inhibition
                 .map(|config| Inhibition::new(config, n_robots, &mut stream(INHIBITION_STREAM))),
             rotation: rotation
@@ -63,20 +61,14 @@ impl Perturbations {
         self.inhibition.as_ref().is_some_and(|inhibition| inhibition.inhibits(robot, reading))
     }
 
-    /// Rewrites the actions of the group, `robots` of the swarm.
-    pub fn rewrite(&self, step: u32, robots: Range<usize>, swarm: &mut Swarm) {
-        if let Some(failure) = &self.leader_failure {
-            failure.rewrite(&mut swarm.leds, &mut swarm.modes);
+    /// Rewrites the actions of the group.
+    pub fn rewrite(&mut self, step: u32, group: &RobotGroup, swarm: &mut Swarm) {
+        let robots = group.robots.clone();
+        if let Some(failure) = &mut self.leader_failure {
+            failure.rewrite(&mut swarm.leds[robots.clone()], &mut swarm.modes[robots.clone()]);
         }
         if let Some(rotation) = &self.rotation {
             rotation.rewrite(step, &swarm.headings[robots.clone()], &mut swarm.wheels[robots]);
-        }
-    }
-
-    /// Takes in the actions of all robots as they are in the end.
-    pub fn observe(&mut self, swarm: &Swarm) {
-        if let Some(failure) = &mut self.leader_failure {
-            failure.observe(&swarm.leds);
         }
     }
 }
@@ -129,11 +121,11 @@ mod tests {
             topology_switch: Some(TopologySwitchConfig { every: 200 }),
             ..Default::default()
         };
-        let perturbations = Perturbations::new(&config, 0..10, stream);
+        let perturbations = Perturbations::new(&config, 10, stream);
         let switches: Vec<u32> =
             (0..700).filter(|&step| perturbations.switches_topology(step)).collect();
         assert_eq!(switches, [200, 400, 600]);
-        let none = Perturbations::new(&PerturbationsConfig::default(), 0..10, stream);
+        let none = Perturbations::new(&PerturbationsConfig::default(), 10, stream);
         assert!((0..700).all(|step| !none.switches_topology(step)));
     }
 }
