@@ -50,17 +50,14 @@ fn components(positions: &[Vector], torus: Torus, range: f64) -> Vec<Vec<(usize,
     components
 }
 
-/// For each point of the plane, whether it is on the alpha shape. The shape is
-/// made of the Delaunay triangles (no point inside the circumcircle) with a
-/// circumradius under `largest_radius`; its border, of the edges of exactly one
-/// of them. Points of no triangle are border, and so are all of fewer than 4.
+/// For each point of the plane, whether it is on the outer ring of the alpha
+/// shape. The shape is made of the Delaunay triangles (no point inside the
+/// circumcircle) with a circumradius under `largest_radius`. Outside is what one
+/// can walk to from afar without entering the shape; whatever touches the outside
+/// is on the ring. So are all of fewer than 4 points, or of points on a line.
 fn alpha_shape(points: &[Vector], largest_radius: f64) -> Vec<bool> {
     let n = points.len();
-    if n < 4 {
-        return vec![true; n];
-    }
-    let mut is_in_triangle = vec![false; n];
-    let mut n_triangles_at = vec![vec![0; n]; n];
+    let mut triangles = Vec::new();
     for a in 0..n {
         for b in a + 1..n {
             for c in b + 1..n {
@@ -70,28 +67,40 @@ fn alpha_shape(points: &[Vector], largest_radius: f64) -> Vec<bool> {
                 let is_inside = |d: usize| {
                     ![a, b, c].contains(&d) && norm(difference(points[d], centre)) < radius
                 };
-                if radius >= largest_radius || (0..n).any(is_inside) {
-                    continue;
-                }
-                for corner in [a, b, c] {
-                    is_in_triangle[corner] = true;
-                }
-                for (from, to) in [(a, b), (a, c), (b, c)] {
-                    n_triangles_at[from][to] += 1;
+                if !(0..n).any(is_inside) {
+                    let edges = [(a, b), (a, c), (b, c)];
+                    triangles.push(Triangle { edges, in_shape: radius < largest_radius });
                 }
             }
         }
     }
-    let mut is_border: Vec<bool> = is_in_triangle.iter().map(|is_in| !is_in).collect();
-    for a in 0..n {
-        for b in a + 1..n {
-            if n_triangles_at[a][b] == 1 {
-                is_border[a] = true;
-                is_border[b] = true;
+    if n < 4 || triangles.is_empty() {
+        return vec![true; n];
+    }
+
+    // Edges that face the outside; at first, those of the convex hull.
+    let n_at = |edge| triangles.iter().filter(|t: &&Triangle| t.edges.contains(&edge)).count();
+    let all_edges = triangles.iter().flat_map(|triangle| triangle.edges);
+    let mut outside: Vec<(usize, usize)> = all_edges.filter(|&edge| n_at(edge) == 1).collect();
+    let mut next = 0;
+    while next < outside.len() {
+        let edge = outside[next];
+        next += 1;
+        // One can walk through a triangle that is not in the shape.
+        for triangle in triangles.iter().filter(|t| !t.in_shape && t.edges.contains(&edge)) {
+            for further in triangle.edges {
+                if !outside.contains(&further) {
+                    outside.push(further);
+                }
             }
         }
     }
-    is_border
+    (0..n).map(|point| outside.iter().any(|&(a, b)| a == point || b == point)).collect()
+}
+
+struct Triangle {
+    edges: [(usize, usize); 3],
+    in_shape: bool,
 }
 
 /// Centre and radius of the circle through three points; none if they are on a

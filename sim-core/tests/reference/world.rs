@@ -360,10 +360,11 @@ impl<'a> Simulation<'a> {
     /// Counts the steps of a sole leader; after `time_to_failure` of them it is
     /// faulty from the next step on.
     fn observe_leader(&mut self) {
-        let leds: Vec<u32> = self.robots.iter().map(|robot| robot.led).collect();
+        let judged = self.judged_robots();
+        let leds: Vec<u32> = self.robots[judged.clone()].iter().map(|robot| robot.led).collect();
         self.leader.observe(&leds);
         let Some(leader) = self.leader.robot else { return };
-        let robot = &mut self.robots[leader];
+        let robot = &mut self.robots[judged][leader];
         if let Some(config) = &robot.config.perturbations.leader_failure
             && self.leader.n_steps >= config.time_to_failure
         {
@@ -372,9 +373,18 @@ impl<'a> Simulation<'a> {
         }
     }
 
+    /// The robots that evolve: fitness is about them alone.
+    fn judged_robots(&self) -> std::ops::Range<usize> {
+        let evolvable = &self.config.algorithm.evolvable_object;
+        let object_idx = self.config.world.objects.get_index_of(evolvable);
+        let is_judged = |robot: &Robot<'_>| Some(robot.object_idx) == object_idx;
+        let first = self.robots.iter().take_while(|robot| !is_judged(robot)).count();
+        first..first + self.robots.iter().filter(|robot| is_judged(robot)).count()
+    }
+
     /// Fitness of the step, from its actions and from positions after moving.
     fn fitness(&mut self) -> f64 {
-        let robots = &self.robots;
+        let robots = &self.robots[self.judged_robots()];
         match self.config.algorithm.fitness_function {
             FitnessFunction::IdentifyLeader => fitness::identify_leader(&self.leader),
             FitnessFunction::IdentifyBorderline => {
