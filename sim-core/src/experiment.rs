@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::config::{ConfigError, ExperimentConfig, FitnessFunction};
+use crate::config::{ConfigError, ExperimentConfig, FitnessFunction, limits};
 use crate::episode;
 use crate::genotype::Codec;
 use crate::network::Network;
@@ -45,13 +45,11 @@ pub enum EvaluateError {
         /// Its value.
         value: f64,
     },
-    /// No trials, or some beyond `num_evaluations`: a bug of the caller.
-    #[error("trials {}..{} are not within 0..{n_trials}", trials.start, trials.end)]
+    /// No trials, or some beyond the limit: a bug of the caller.
+    #[error("trials {}..{} are not within 0..{}", trials.start, trials.end, limits::TRIALS)]
     Trials {
         /// The requested trials.
         trials: Range<u32>,
-        /// Trials per individual.
-        n_trials: u32,
     },
     /// An initialiser found no place: the experiment asks for what its world
     /// cannot hold. Every genotype meets it in this trial.
@@ -124,8 +122,9 @@ impl Experiment {
 
     /// Simulates one episode per trial and returns their fitness, in order.
     ///
-    /// `genotype`: d genes in \[0, 1\]; `trials`: a non-empty part of
-    /// 0..`num_evaluations`. The fitness of a trial does not depend on which
+    /// `genotype`: d genes in \[0, 1\]; `generation`: whose worlds and noise, or
+    /// [`held_out`](crate::held_out) ones; `trials`: a non-empty part of
+    /// 0..[`limits::TRIALS`]. The fitness of a trial does not depend on which
     /// other trials are asked for.
     pub fn evaluate(
         &self,
@@ -161,8 +160,8 @@ impl Experiment {
     }
 
     fn check_trials(&self, trials: &Range<u32>) -> Result<(), EvaluateError> {
-        if trials.is_empty() || trials.end > self.n_trials {
-            return Err(EvaluateError::Trials { trials: trials.clone(), n_trials: self.n_trials });
+        if trials.is_empty() || trials.end > limits::TRIALS {
+            return Err(EvaluateError::Trials { trials: trials.clone() });
         }
         Ok(())
     }
@@ -230,8 +229,8 @@ mod tests {
         let mut genes = vec![0.5; d];
         let short = experiment.evaluate(&genes[1..], 0, 0..1);
         assert_eq!(short, Err(EvaluateError::GenotypeLength { expected: d, actual: d - 1 }));
-        for trials in [0..0, 5..6, 0..6] {
-            let expected = EvaluateError::Trials { trials: trials.clone(), n_trials: 5 };
+        for trials in [0..0, 1000..1001, 0..1001] {
+            let expected = EvaluateError::Trials { trials: trials.clone() };
             assert_eq!(experiment.evaluate(&genes, 0, trials), Err(expected));
         }
         genes[3] = 1.5;

@@ -44,6 +44,13 @@ pub use experiment::{EvaluateError, Experiment};
 pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
 pub use torus::Vec2;
 
+/// The address of the held-out trials that belong to a generation: worlds and
+/// noise that evolution never meets, for an honest look at what it found.
+pub const fn held_out(generation: u64) -> u64 {
+    // Generations of a run stay far below.
+    generation | 1 << 63
+}
+
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work
 /// together only if they agree on it.

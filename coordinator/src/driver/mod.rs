@@ -5,9 +5,11 @@
 //! (evolution's arithmetic, the disk) runs beside it.
 
 mod advance;
+mod round;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
+use sim_core::config::ExperimentConfig;
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinSet,
@@ -19,7 +21,6 @@ use tracing::{debug, error, info, warn};
 use crate::{
     clock,
     engine::{Command, Engine, Item, ItemResult},
-    evolution::Asked,
     ids::{ExperimentId, WorkerId},
     shared_store::SharedStore,
     store::ExperimentState,
@@ -27,6 +28,7 @@ use crate::{
 };
 
 use advance::{Advance, Advanced, Outcome};
+use round::Round;
 
 /// Events that wait for the loop; whoever sends more waits.
 const EVENT_QUEUE_LEN: usize = 1024;
@@ -131,9 +133,9 @@ struct ConnectedWorker {
 
 /// An experiment that has not ended.
 struct Running {
-    runnable: Runnable,
-    /// The generation that is being judged; none while it is being learnt from.
-    asked: Option<Asked>,
+    config: ExperimentConfig,
+    /// What is being judged; none while conclusions are drawn and stored.
+    round: Option<Round>,
     /// Who waits for it to end.
     cancellations: Vec<oneshot::Sender<()>>,
 }
@@ -226,20 +228,19 @@ impl Driver {
             generation = runnable.evolution.n_generations(), generations,
             "experiment starts"
         );
-        self.engine.on_experiment_started(id, Arc::clone(&runnable.spec));
-        let asked = runnable.evolution.ask();
-        self.experiments.insert(id, Running { runnable, asked: None, cancellations: Vec::new() });
-        self.judge(id, asked);
+        self.engine.on_experiment_started(id, runnable.spec);
+        let config = runnable.config;
+        self.experiments.insert(id, Running { config, round: None, cancellations: Vec::new() });
+        self.judge(id, Round::generation(runnable.evolution));
     }
 
-    /// Has the fleet judge a generation.
-    fn judge(&mut self, id: ExperimentId, asked: Asked) {
+    /// Has the fleet judge a round.
+    fn judge(&mut self, id: ExperimentId, round: Round) {
         let Some(running) = self.experiments.get_mut(&id) else { return };
-        let n_trials = running.runnable.config.algorithm.num_evaluations;
-        let genotypes = asked.genotypes.clone();
-        let generation = asked.generation;
-        running.asked = Some(asked);
-        self.engine.on_generation_asked(clock::now(), id, generation, genotypes, n_trials);
+        let n_trials = round.n_trials(&running.config);
+        let (address, genotypes) = (round.address(), round.genotypes());
+        running.round = Some(round);
+        self.engine.on_generation_asked(clock::now(), id, address, genotypes, n_trials);
     }
 
     fn carry_out(&mut self, command: Command) {
@@ -263,15 +264,14 @@ impl Driver {
             }
             Command::FinishGeneration { experiment, judged } => {
                 let Some(running) = self.experiments.get_mut(&experiment) else { return };
-                let Some(asked) = running.asked.take() else { return };
+                let Some(round) = running.round.take() else { return };
                 debug!(%experiment, generation = judged.generation, "generation judged");
                 let advance = Advance {
                     store: self.store.clone(),
                     shutdown: self.shutdown.clone(),
                     id: experiment,
-                    config: running.runnable.config.clone(),
-                    evolution: running.runnable.evolution.clone(),
-                    asked,
+                    config: running.config.clone(),
+                    round,
                     judged,
                 };
                 self.advancing.spawn(advance.run());
@@ -286,10 +286,9 @@ impl Driver {
         let id = advanced.id;
         let Some(running) = self.experiments.get_mut(&id) else { return };
         match advanced.outcome {
-            Outcome::Continues { evolution, asked } => {
-                running.runnable.evolution = *evolution;
+            Outcome::Continues(round) => {
                 if running.cancellations.is_empty() {
-                    self.judge(id, asked);
+                    self.judge(id, *round);
                 } else {
                     self.end(id, ExperimentState::Cancelled, CANCELLED.to_owned());
                 }
@@ -311,7 +310,7 @@ impl Driver {
         };
         running.cancellations.push(reply);
         // A generation that is being stored is stored first.
-        if running.asked.is_some() {
+        if running.round.is_some() {
             self.end(id, ExperimentState::Cancelled, CANCELLED.to_owned());
         }
     }

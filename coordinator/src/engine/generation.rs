@@ -20,7 +20,7 @@ pub struct Task {
 /// A generation that is being judged.
 #[derive(Debug)]
 pub struct GenerationInProgress {
-    /// Index of the generation.
+    /// Index of the generation, or address of held-out trials.
     pub number: u64,
     /// One per individual.
     pub genotypes: Vec<Arc<Genotype>>,
@@ -69,6 +69,14 @@ impl GenerationInProgress {
     #[cfg(test)]
     pub fn n_trials_left(&self) -> usize {
         self.n_trials_left
+    }
+
+    /// What it is called in messages.
+    pub fn name(&self) -> String {
+        match self.number.checked_sub(sim_core::held_out(0)) {
+            Some(generation) => format!("the re-evaluation after generation {generation}"),
+            None => format!("generation {}", self.number),
+        }
     }
 
     /// Whether all fitness is known.

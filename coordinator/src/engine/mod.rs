@@ -327,9 +327,12 @@ impl Engine {
             task.n_failed_attempts += 1;
             if task.n_failed_attempts >= MAX_ATTEMPTS {
                 let reason = format!(
-                    "individual {} of generation {}, trials {}..{}, failed {MAX_ATTEMPTS} times; \
+                    "individual {} of {}, trials {}..{}, failed {MAX_ATTEMPTS} times; \
                      at last {blame}",
-                    task.individual, generation.number, task.trials.start, task.trials.end,
+                    task.individual,
+                    generation.name(),
+                    task.trials.start,
+                    task.trials.end,
                 );
                 self.forget_experiment(id);
                 self.commands.push_back(Command::FailExperiment { experiment: id, reason });

@@ -7,6 +7,11 @@
 //! Link g is SHA-256 of link g-1 (32 bytes), g (u64), every gene of every
 //! individual, every fitness of every trial of every individual (f64, bit for
 //! bit); numbers little-endian, individuals in index order.
+//!
+//! Re-evaluations of champions have a chain of their own, which hangs on that one.
+//! It starts with 32 zero bytes; the next link is SHA-256 of the link before it,
+//! the link of the latest generation, every gene of every candidate, every fitness
+//! of every trial of every candidate.
 
 use std::{fmt, str::FromStr};
 
@@ -17,7 +22,7 @@ use sim_core::config::ExperimentConfig;
 use super::Genotype;
 
 /// One link of the chain.
-#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Digest([u8; 32]);
 
@@ -42,6 +47,23 @@ impl Digest {
         hash.update(self.0);
         hash.update(generation.to_le_bytes());
         for value in genotypes.iter().chain(trial_fitness).flatten() {
+            hash.update(value.to_bits().to_le_bytes());
+        }
+        Self(hash.finalize().into())
+    }
+
+    /// The link after this one in the chain of re-evaluations, after the
+    /// generation of link `generation`.
+    pub fn next_champion<'a>(
+        self,
+        generation: Self,
+        genotypes: impl Iterator<Item = &'a [f64]>,
+        trial_fitness: &'a [Vec<f64>],
+    ) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(self.0);
+        hash.update(generation.0);
+        for value in genotypes.flatten().chain(trial_fitness.iter().flatten()) {
             hash.update(value.to_bits().to_le_bytes());
         }
         Self(hash.finalize().into())

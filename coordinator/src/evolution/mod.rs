@@ -10,6 +10,7 @@
 //! checkpoint asks the same genotypes again.
 
 mod algorithms;
+mod champion;
 mod digest;
 mod ranking;
 mod statistics;
@@ -22,6 +23,7 @@ use sim_core::{
     random::{Purpose, Stream},
 };
 
+pub use champion::{Champion, HeldOut, Origin, Reevaluation};
 pub use digest::Digest;
 pub use statistics::Statistics;
 
@@ -41,7 +43,11 @@ pub struct Evolution {
     /// genotype.
     populations: Vec<Algorithm>,
     champion: Option<Champion>,
+    /// The best individual since the last re-evaluation.
+    challenger: Option<Champion>,
     digest: Digest,
+    /// Covers every re-evaluation so far, and the generations before it.
+    champion_digest: Digest,
 }
 
 /// A generation to be judged.
@@ -55,21 +61,6 @@ pub struct Asked {
     samples: Vec<Sample>,
 }
 
-/// The best individual so far, by its mean fitness over the trials it met.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Champion {
-    /// Generation it lived in.
-    pub generation: u64,
-    /// Its index there.
-    pub individual: u32,
-    /// Mean of `trial_fitness`.
-    pub fitness: f64,
-    /// One value per trial.
-    pub trial_fitness: Vec<f64>,
-    /// Its genes.
-    pub genotype: Genotype,
-}
-
 /// What became of a generation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GenerationRecord {
@@ -81,8 +72,6 @@ pub struct GenerationRecord {
     pub n_non_finite: usize,
     /// Link of the digest chain.
     pub digest: Digest,
-    /// Whether the champion is of this generation.
-    pub has_new_champion: bool,
 }
 
 /// Why evolution cannot go on.
@@ -123,7 +112,9 @@ impl Evolution {
             n_generations: 0,
             populations,
             champion: None,
+            challenger: None,
             digest: Digest::of_config(config),
+            champion_digest: Digest::default(),
         })
     }
 
@@ -132,14 +123,21 @@ impl Evolution {
         self.n_generations
     }
 
-    /// The best individual so far; none before the first `tell`.
+    /// The champion so far: the best on held-out trials, or, before the first
+    /// re-evaluation, the best individual of all. None before the first `tell`.
     pub fn champion(&self) -> Option<&Champion> {
         self.champion.as_ref()
     }
 
-    /// The digest chain's last link.
+    /// The last link of the generations' digest chain.
     pub fn digest(&self) -> Digest {
         self.digest
+    }
+
+    /// The last link of the re-evaluations' digest chain; it covers the
+    /// generations before them, too.
+    pub fn champion_digest(&self) -> Digest {
+        self.champion_digest
     }
 
     /// Draws the next generation. Asking twice gives the same.
@@ -183,16 +181,18 @@ impl Evolution {
         for (population, sample) in self.populations.iter_mut().zip(&asked.samples) {
             population.learn(sample, &ranking, &fitness);
         }
-        let has_new_champion =
-            self.champion.as_ref().is_none_or(|champion| fitness[best] > champion.fitness);
-        if has_new_champion {
-            self.champion = Some(Champion {
+        let best_before = self.challenger.as_ref().and_then(Champion::fitness);
+        if best_before.is_none_or(|best_before| fitness[best] > best_before) {
+            self.challenger = Some(Champion {
                 generation,
-                individual: best as u32,
-                fitness: fitness[best],
-                trial_fitness: trial_fitness[best].clone(),
+                origin: Origin::Individual(best as u32),
                 genotype: asked.genotypes[best].clone(),
+                trial_fitness: trial_fitness[best].clone(),
+                held_out: None,
             });
+            if self.champion.as_ref().is_none_or(|champion| champion.held_out.is_none()) {
+                self.champion.clone_from(&self.challenger);
+            }
         }
         self.digest = self.digest.next(generation, &asked.genotypes, trial_fitness);
         self.n_generations += 1;
@@ -201,8 +201,35 @@ impl Evolution {
             statistics: Statistics::of(&fitness),
             n_non_finite: fitness.iter().filter(|value| !value.is_finite()).count(),
             digest: self.digest,
-            has_new_champion,
         })
+    }
+
+    /// Who is to be judged on held-out trials, after the latest generation.
+    pub fn reevaluation(&self) -> Option<Reevaluation> {
+        let generation = self.n_generations.checked_sub(1)?;
+        let incumbent = self.champion.clone().filter(|champion| champion.held_out.is_some());
+        let means: Option<Vec<Genotype>> = self.populations.iter().map(Algorithm::mean).collect();
+        let mean = means.map(|means| Champion {
+            generation,
+            origin: Origin::Mean,
+            genotype: means.concat(),
+            trial_fitness: Vec::new(),
+            held_out: None,
+        });
+        let candidates = incumbent.into_iter().chain(self.challenger.clone()).chain(mean).collect();
+        Some(Reevaluation { generation, candidates })
+    }
+
+    /// Makes the best of a [`reevaluation`](Self::reevaluation) the champion. If
+    /// none of them has a finite fitness, the champion stays.
+    pub fn crown(&mut self, reevaluation: &Reevaluation, trial_fitness: &[Vec<f64>]) {
+        if let Some(champion) = reevaluation.decide(trial_fitness) {
+            self.champion = Some(champion);
+        }
+        self.challenger = None;
+        let genotypes = reevaluation.candidates.iter().map(|candidate| &candidate.genotype[..]);
+        self.champion_digest =
+            self.champion_digest.next_champion(self.digest, genotypes, trial_fitness);
     }
 }
 

@@ -10,6 +10,7 @@ use tonic::Status;
 use crate::{
     driver::ToWorker,
     engine::{Item, ItemResult},
+    evolution::HeldOut,
     ids::ItemId,
     store::{Event, EventKind, Experiment, ExperimentState, Generation},
 };
@@ -98,6 +99,7 @@ pub fn experiment(experiment: Experiment) -> v1::Experiment {
         latest: experiment.latest.map(generation),
         champion_fitness: experiment.champion_fitness,
         config_digest: experiment.config_digest,
+        digest: experiment.digest,
     }
 }
 
@@ -127,6 +129,16 @@ impl ConfigSummary {
             algorithm: text(&algorithm["name"]),
             population_size: algorithm["population_size"].as_u64().unwrap_or_default() as u32,
         }
+    }
+}
+
+/// Held-out fitness for clients.
+pub fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
+    v1::HeldOutFitness {
+        mean: held_out.mean,
+        ci95: held_out.ci95,
+        trials: held_out.n_trials,
+        generation: held_out.generation,
     }
 }
 

@@ -21,6 +21,7 @@ use tracing::info;
 use crate::{
     clock,
     driver::{Event, EventSender},
+    evolution::Origin,
     ids::ExperimentId,
     shared_store::SharedStore,
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
@@ -194,8 +195,12 @@ impl ExperimentService for Experiments {
         Ok(Response::new(GetChampionResponse {
             experiment_id: id.0,
             generation: champion.generation,
-            individual: champion.individual,
-            fitness: champion.fitness,
+            individual: match champion.origin {
+                Origin::Individual(individual) => Some(individual),
+                Origin::Mean => None,
+            },
+            fitness: champion.fitness(),
+            held_out: champion.held_out.map(convert::held_out),
             trial_fitness: champion.trial_fitness,
             genotype: champion.genotype,
             network_json: network,

@@ -4,6 +4,7 @@
 //! Every method that changes something is one transaction, on disk when it
 //! returns.
 
+mod champions;
 mod records;
 mod schema;
 
@@ -106,8 +107,10 @@ pub struct GenerationCommit<'a> {
     pub generation: &'a Generation,
     /// Evolution after it, as JSON.
     pub checkpoint: &'a str,
-    /// The champion, if it is of this generation.
-    pub new_champion: Option<&'a Champion>,
+    /// The champion so far.
+    pub champion: Option<&'a Champion>,
+    /// Covers all generations and re-evaluations so far.
+    pub digest: &'a str,
     /// Things worth a line.
     pub notices: &'a [String],
     /// Whether this was the last generation, and why.
@@ -215,18 +218,12 @@ impl Store {
             "UPDATE checkpoints SET state = ?2 WHERE experiment_id = ?1",
             params![id.0, commit.checkpoint],
         )?;
-        if let Some(champion) = commit.new_champion {
-            transaction.execute(
-                "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-                params![
-                    id.0,
-                    champion.generation,
-                    champion.individual,
-                    champion.fitness,
-                    json(&champion.trial_fitness),
-                    json(&champion.genotype)
-                ],
-            )?;
+        transaction.execute(
+            "UPDATE experiments SET digest = ?2 WHERE id = ?1",
+            params![id.0, commit.digest],
+        )?;
+        if let Some(champion) = commit.champion {
+            champions::put(&transaction, id, champion)?;
         }
         for notice in commit.notices {
             add_notice(&transaction, id, now_ms, notice)?;
@@ -286,31 +283,7 @@ impl Store {
 
     /// The champion so far; none before the first generation.
     pub fn champion(&self, id: ExperimentId) -> Result<Option<Champion>> {
-        let mut statement = self.connection.prepare_cached(
-            "SELECT generation, individual, fitness, trial_fitness, genotype
-             FROM champions WHERE experiment_id = ?1",
-        )?;
-        let row = statement
-            .query_row([id.0], |row| {
-                Ok((
-                    row.get(0)?,
-                    row.get(1)?,
-                    row.get(2)?,
-                    row.get::<_, String>(3)?,
-                    row.get::<_, String>(4)?,
-                ))
-            })
-            .optional()?;
-        let Some((generation, individual, fitness, trial_fitness, genotype)) = row else {
-            return Ok(None);
-        };
-        let list = |text: &str| {
-            serde_json::from_str(text)
-                .map_err(|error| StoreError::Corrupt(format!("champion of {id}: {error}")))
-        };
-        let trial_fitness = list(&trial_fitness)?;
-        let genotype = list(&genotype)?;
-        Ok(Some(Champion { generation, individual, fitness, trial_fitness, genotype }))
+        champions::get(&self.connection, id)
     }
 
     /// At most `limit` events from `from_sequence` on.
@@ -349,7 +322,7 @@ impl Store {
 
 const SELECT_EXPERIMENT: &str =
     "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
-            e.submitted_at_ms, c.fitness,
+            e.submitted_at_ms, e.digest, c.held_out_mean, c.trial_fitness,
             g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
             g.duration_ms, g.episodes, g.workers, g.idle_share
      FROM experiments e
@@ -363,6 +336,12 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
     let Some(state) = ExperimentState::from_name(&state) else {
         return Ok(Err(StoreError::Corrupt(format!("experiment {id} has state \"{state}\""))));
     };
+    let trial_fitness: Option<String> = row.get(10)?;
+    let champion_fitness = match (row.get(9)?, trial_fitness) {
+        (Some(held_out), _) => Some(held_out),
+        (None, Some(trial_fitness)) => champions::mean(&trial_fitness),
+        (None, None) => None,
+    };
     Ok(Ok(Experiment {
         id,
         config_json: row.get(1)?,
@@ -372,8 +351,9 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
         state,
         reason: row.get(6)?,
         submitted_at_ms: row.get(7)?,
-        champion_fitness: row.get(8)?,
-        latest: read_generation(row, 9)?,
+        digest: row.get(8)?,
+        champion_fitness,
+        latest: read_generation(row, 11)?,
     }))
 }
 
@@ -443,10 +423,6 @@ fn add_notice(
         params![id.0, now_ms, text],
     )?;
     Ok(())
-}
-
-fn json(values: &[f64]) -> String {
-    serde_json::to_string(values).expect("numbers serialise")
 }
 
 #[cfg(test)]

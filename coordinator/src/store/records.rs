@@ -75,7 +75,10 @@ pub struct Experiment {
     pub submitted_at_ms: u64,
     /// Latest completed generation.
     pub latest: Option<Generation>,
-    /// Fitness of the champion so far.
+    /// Covers all generations and re-evaluations so far; empty before the first.
+    pub digest: String,
+    /// Fitness of the champion so far: on held-out trials, or, before the first
+    /// re-evaluation, on those for which it was chosen.
     pub champion_fitness: Option<f64>,
 }
 

@@ -20,7 +20,9 @@ const MIGRATIONS: &[&str] = &["
         genotype_len INTEGER NOT NULL,
         state TEXT NOT NULL CHECK (state IN ('running', 'completed', 'failed', 'cancelled')),
         reason TEXT NOT NULL DEFAULT '',
-        submitted_at_ms INTEGER NOT NULL
+        submitted_at_ms INTEGER NOT NULL,
+        -- Covers all generations and re-evaluations so far.
+        digest TEXT NOT NULL DEFAULT ''
     ) STRICT;
 
     CREATE TABLE generations (
@@ -46,12 +48,18 @@ const MIGRATIONS: &[&str] = &["
 
     CREATE TABLE champions (
         experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+        -- After which generation it was found.
         generation INTEGER NOT NULL,
-        individual INTEGER NOT NULL,
-        fitness REAL NOT NULL,
+        -- NULL: the mean of the distribution.
+        individual INTEGER,
         -- JSON lists of numbers.
         trial_fitness TEXT NOT NULL,
-        genotype TEXT NOT NULL
+        genotype TEXT NOT NULL,
+        -- NULL before the first re-evaluation.
+        held_out_mean REAL,
+        held_out_ci95 REAL,
+        held_out_trials INTEGER,
+        held_out_generation INTEGER
     ) STRICT;
 
     CREATE TABLE events (

@@ -1,7 +1,7 @@
 use std::fs;
 
 use crate::{
-    evolution::{Champion, Evolution, Statistics},
+    evolution::{Champion, Evolution, HeldOut, Origin, Statistics},
     submission::{Submission, checkpoint_json},
 };
 
@@ -39,10 +39,10 @@ fn generation(generation: u64) -> Generation {
 fn commit(store: &mut Store, id: ExperimentId, number: u64, completed: Option<&str>) -> Result<()> {
     let champion = Champion {
         generation: number,
-        individual: 3,
-        fitness: 0.7,
-        trial_fitness: vec![0.6, 0.8],
+        origin: Origin::Individual(3),
         genotype: vec![0.1, 1.0 / 3.0],
+        trial_fitness: vec![0.5, 0.75],
+        held_out: None,
     };
     store.commit_generation(
         id,
@@ -50,7 +50,8 @@ fn commit(store: &mut Store, id: ExperimentId, number: u64, completed: Option<&s
         &GenerationCommit {
             generation: &generation(number),
             checkpoint: &format!("after {number}"),
-            new_champion: Some(&champion),
+            champion: Some(&champion),
+            digest: "link",
             notices: &["look".to_owned()],
             completed,
         },
@@ -78,11 +79,43 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
     assert!(experiment.config_json.contains(&u64::MAX.to_string()), "the seed keeps its value");
     assert_eq!(experiment.state, ExperimentState::Running);
     assert_eq!(experiment.latest, Some(generation(1)));
-    assert_eq!(experiment.champion_fitness, Some(0.7));
+    assert_eq!(experiment.champion_fitness, Some(0.625));
+    assert_eq!(experiment.digest, "link");
     assert_eq!(store.checkpoint(id).unwrap().unwrap(), "after 1");
     let champion = store.champion(id).unwrap().unwrap();
     assert_eq!(champion.genotype, [0.1, 1.0 / 3.0]);
     assert_eq!(champion.generation, 1);
+}
+
+#[test]
+fn a_champion_keeps_its_origin_and_its_held_out_fitness() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    let held_out = HeldOut { mean: 0.1 + 0.2, ci95: 1.0 / 3.0, n_trials: 50, generation: 4 };
+    let champion = Champion {
+        generation: 3,
+        origin: Origin::Mean,
+        genotype: vec![1.0 / 3.0],
+        trial_fitness: Vec::new(),
+        held_out: Some(held_out),
+    };
+    store
+        .commit_generation(
+            id,
+            1,
+            &GenerationCommit {
+                generation: &generation(4),
+                checkpoint: "",
+                champion: Some(&champion),
+                digest: "link",
+                notices: &[],
+                completed: None,
+            },
+        )
+        .unwrap();
+    assert_eq!(store.champion(id).unwrap(), Some(champion));
+    let experiment = store.experiment(id).unwrap().unwrap();
+    assert_eq!(experiment.champion_fitness, Some(held_out.mean));
 }
 
 #[test]

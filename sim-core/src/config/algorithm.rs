@@ -7,7 +7,10 @@ use super::{GenotypeQuery, NamedMap, limits, schema};
 
 /// Evolution and evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("champion_every, champion_trials")
+)]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm.
     pub name: AlgorithmName,
@@ -31,6 +34,13 @@ pub struct AlgorithmConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(default, with = "f64")]
     pub target_fitness: Option<f64>,
+    /// Generations between re-evaluations of the champion; default 10. There is
+    /// one at the end, too.
+    #[schemars(range(min = 1, max = limits::GENERATIONS))]
+    pub champion_every: u64,
+    /// Held-out trials of a re-evaluation; default 50.
+    #[schemars(range(min = 1, max = limits::TRIALS))]
+    pub champion_trials: u32,
     /// Populations, in genotype order; several evolve cooperatively.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub populations: NamedMap<PopulationConfig>,

@@ -237,6 +237,8 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
         num_evaluations: 5,
         fitness_function,
         target_fitness: None,
+        champion_every: 10,
+        champion_trials: 50,
         populations: named([(
             "p1",
             PopulationConfig {

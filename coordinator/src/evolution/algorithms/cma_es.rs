@@ -80,6 +80,10 @@ impl Roots {
 }
 
 impl Strategy for CmaEs {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mean)
+    }
+
     /// g_i = clip(m + sigma * C^(1/2) z_i), z_i ~ N(0, I). The normals of a
     /// clipped individual are C^(-1/2) (g_i - m) / sigma, those it would have been
     /// drawn from.

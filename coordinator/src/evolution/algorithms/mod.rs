@@ -42,6 +42,11 @@ pub struct Sample {
 /// An algorithm between two generations. Its state is plain numbers: whoever
 /// restores it draws and learns the same bits.
 pub trait Strategy {
+    /// The mean of the distribution, if the algorithm has one.
+    fn mean(&self) -> Option<&[f64]> {
+        None
+    }
+
     /// Draws `population_size` individuals. A pure function of the state and
     /// the stream.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
@@ -130,6 +135,12 @@ impl Algorithm {
             AlgorithmParams::CmaEs(params) => Self::CmaEs(CmaEs::new(params, d)),
             AlgorithmParams::OpenAiEs(params) => Self::OpenAiEs(OpenAiEs::new(params, d)),
         })
+    }
+
+    /// The mean of its distribution as a genotype, if it has one.
+    pub fn mean(&self) -> Option<Genotype> {
+        let mean = self.strategy().mean()?;
+        Some(mean.iter().map(|gene| gene.clamp(0.0, 1.0)).collect())
     }
 
     fn strategy(&self) -> &dyn Strategy {

@@ -49,6 +49,10 @@ impl OpenAiEs {
 }
 
 impl Strategy for OpenAiEs {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mu)
+    }
+
     /// g_2k = clip(mu + sigma * e_k), g_2k+1 = clip(mu - sigma * e_k),
     /// e_k ~ N(0, I). The last individual of an odd population is mu itself: it
     /// takes its place in the ranking and adds nothing to the gradient.

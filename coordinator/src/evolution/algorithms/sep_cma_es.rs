@@ -38,6 +38,10 @@ impl SepCmaEs {
 }
 
 impl Strategy for SepCmaEs {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mean)
+    }
+
     /// g_i = clip(m + sigma * C^(1/2) z_i), z_i ~ N(0, I). The normal of a clipped
     /// gene is the one that it would have been drawn from.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {

@@ -34,6 +34,10 @@ impl Snes {
 }
 
 impl Strategy for Snes {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mu)
+    }
+
     /// g_i = clip(mu + sigma * s_i), s_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let d = self.mu.len();

@@ -53,6 +53,10 @@ impl Xnes {
 }
 
 impl Strategy for Xnes {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mu)
+    }
+
     /// g_i = clip(mu + sigma * B s_i), s_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let shape = self.shape();

@@ -25,6 +25,8 @@ fn evolution_of(populations: Vec<Algorithm>, population_size: usize) -> Evolutio
         n_generations: 0,
         populations,
         champion: None,
+        challenger: None,
+        champion_digest: Digest::default(),
         digest: "00".repeat(32).parse().unwrap(),
     }
 }
@@ -72,15 +74,49 @@ fn the_champion_is_the_best_mean_so_far_and_the_first_of_equals() {
     let mut evolution = evolution(3, &[2]);
     let asked = evolution.ask();
     let genotypes = asked.genotypes.clone();
-    let record = evolution.tell(asked, &[vec![0.0, 2.0], vec![3.0, 1.0], vec![2.0, 2.0]]).unwrap();
-    assert!(record.has_new_champion);
+    evolution.tell(asked, &[vec![0.0, 2.0], vec![3.0, 1.0], vec![2.0, 2.0]]).unwrap();
     let champion = evolution.champion().unwrap().clone();
-    assert_eq!((champion.generation, champion.individual, champion.fitness), (0, 1, 2.0));
+    assert_eq!((champion.generation, champion.origin), (0, Origin::Individual(1)));
+    assert_eq!(champion.fitness(), Some(2.0));
     assert_eq!(champion.genotype, genotypes[1]);
     let asked = evolution.ask();
-    let record = evolution.tell(asked, &[vec![2.0, 2.0], vec![0.0, 0.0], vec![1.0, 1.0]]).unwrap();
-    assert!(!record.has_new_champion);
+    evolution.tell(asked, &[vec![2.0, 2.0], vec![0.0, 0.0], vec![1.0, 1.0]]).unwrap();
     assert_eq!(evolution.champion(), Some(&champion));
+}
+
+#[test]
+fn champions_are_kept_by_their_held_out_fitness() {
+    let mut evolution = evolution(3, &[2]);
+    assert_eq!(evolution.reevaluation(), None, "there is nobody before the first generation");
+    let tell = |evolution: &mut Evolution, best: f64| {
+        let asked = evolution.ask();
+        evolution.tell(asked, &[vec![0.0], vec![best], vec![-1.0]]).unwrap();
+    };
+    tell(&mut evolution, 9.0);
+    tell(&mut evolution, 5.0);
+
+    let first = evolution.reevaluation().unwrap();
+    let origins: Vec<Origin> = first.candidates.iter().map(|c| c.origin).collect();
+    assert_eq!(origins, [Origin::Individual(1), Origin::Mean]);
+    assert_eq!((first.generation, first.candidates[0].generation), (1, 0));
+    let digest = evolution.digest();
+    evolution.crown(&first, &[vec![4.0, 6.0], vec![1.0, 1.0]]);
+    let champion = evolution.champion().unwrap().clone();
+    assert_eq!(champion.held_out.unwrap().mean, 5.0);
+    assert_eq!(evolution.digest(), digest, "the generations' chain is not touched");
+
+    // A better estimate alone does not make a champion any more.
+    tell(&mut evolution, 99.0);
+    assert_eq!(evolution.champion(), Some(&champion));
+    let second = evolution.reevaluation().unwrap();
+    assert_eq!(second.candidates[0], champion);
+    assert_eq!(second.candidates[1].fitness(), Some(99.0));
+    let mut other = evolution.clone();
+    evolution.crown(&second, &[vec![3.0, 3.0], vec![2.0, 2.0], vec![7.0, 8.0]]);
+    assert_eq!(evolution.champion().unwrap().origin, Origin::Mean);
+    other.crown(&second, &[vec![3.0, 3.0], vec![2.0, 2.0], vec![f64::NAN, 8.0]]);
+    assert_eq!(other.champion().unwrap().held_out.unwrap().mean, 3.0);
+    assert_ne!(other.champion_digest(), evolution.champion_digest());
 }
 
 #[test]
@@ -92,7 +128,7 @@ fn fitness_that_is_not_finite_ranks_last_and_is_counted() {
     assert_eq!(record.n_non_finite, 2);
     let expected = Statistics { best: 3.0, mean: 2.0, min: 1.0, standard_deviation: 1.0 };
     assert_eq!(record.statistics, expected);
-    assert_eq!(evolution.champion().unwrap().individual, 3);
+    assert_eq!(evolution.champion().unwrap().origin, Origin::Individual(3));
 }
 
 #[test]
