@@ -1,4 +1,5 @@
 //! What people see: results, errors that say what to do, exit codes.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, process::Command};
 

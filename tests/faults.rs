@@ -2,6 +2,7 @@
 //!
 //! Every test asserts that its kill hit what it was aimed at, and that the
 //! digests of all generations equal those of an undisturbed run.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{sync::OnceLock, time::Duration};
 

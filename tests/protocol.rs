@@ -1,4 +1,5 @@
 //! The wire protocol, spoken by hand.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use harness::{CoordinatorProcess, Experiment};
 use swarm_proto::{

@@ -13,6 +13,10 @@ use crate::network::Phenotype;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 
+/// Lanes that are simulated side by side: enough to share the weights, few enough
+/// to stay in the cache.
+const MAX_LANES: usize = 256;
+
 /// Simulates one episode per trial and returns their fitness, in order.
 pub(crate) fn run(
     experiment: &Experiment,
@@ -20,11 +24,17 @@ pub(crate) fn run(
     generation: u64,
     trials: Range<u32>,
 ) -> Result<Vec<f64>, EvaluateError> {
-    let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
-    for step in 0..experiment.n_steps {
-        episodes.step(step, |_, _, _| {})?;
+    let n_at_once = (MAX_LANES / experiment.world.n_robots().max(1)).max(1);
+    let mut fitness = Vec::with_capacity(trials.len());
+    for first in trials.clone().step_by(n_at_once) {
+        let last = trials.end.min(first.saturating_add(n_at_once as u32));
+        let mut episodes = Episodes::new(experiment, phenotype, generation, first..last)?;
+        for step in 0..experiment.n_steps {
+            episodes.step(step, |_, _, _| {})?;
+        }
+        fitness.extend(episodes.trials.iter().map(Trial::fitness));
     }
-    Ok(episodes.trials.iter().map(Trial::fitness).collect())
+    Ok(fitness)
 }
 
 /// Simulates the episode of one trial and shows each of its steps to `observe`.

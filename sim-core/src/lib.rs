@@ -3,6 +3,13 @@
 //!
 //! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
 //! same inputs give the same bits on every machine.
+//!
+//! Where things are: `experiment` compiles a configuration into a `network`, a
+//! codec of genotypes (`genotype`) and a `world`; `episode` steps the trials of a
+//! genotype side by side, `trial` has the phases of a step, and `swarm` the state
+//! of its robots. A phase is a module each: `senses` and `sensors`,
+//! `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`.
+//! `random` and `torus` lie below everything.
 
 mod alpha_shape;
 mod border;

@@ -1,38 +1,43 @@
 //! `algorithm`: what evolves, by which rule, and on which task.
 
-use std::fmt;
-use std::str::FromStr;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use serde::{Deserialize, Serialize, Serializer};
-
-use super::NamedMap;
+use super::{GenotypeQuery, NamedMap, limits, schema};
 
 /// Evolution and evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm.
     pub name: AlgorithmName,
     /// Name of the world object whose controller evolves.
     pub evolvable_object: String,
     /// Individuals per generation, P.
+    #[schemars(range(min = 1, max = limits::POPULATION))]
     pub population_size: u32,
     /// Number of generations.
+    #[schemars(range(min = 1, max = limits::GENERATIONS))]
     pub generations: u64,
     /// Environment steps per trial, T_E.
+    #[schemars(range(min = 1, max = limits::STEPS))]
     pub evaluation_steps: u32,
     /// Trials per individual.
+    #[schemars(range(min = 1, max = limits::TRIALS))]
     pub num_evaluations: u32,
     /// Fitness of a trial.
     pub fitness_function: FitnessFunction,
     /// Stop when the mean fitness of a generation reaches this.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(default, with = "f64")]
     pub target_fitness: Option<f64>,
     /// Populations, in genotype order; several evolve cooperatively.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub populations: NamedMap<PopulationConfig>,
 }
 
 /// Evolutionary algorithms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum AlgorithmName {
     /// Genetic algorithm.
     #[serde(rename = "GA")]
@@ -55,7 +60,7 @@ pub enum AlgorithmName {
 }
 
 /// Fitness functions; see `fitness`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FitnessFunction {
     /// Experiment A: one robot, and the same one, has its LED on.
@@ -73,171 +78,34 @@ pub enum FitnessFunction {
 }
 
 /// One population: its segment of the genotype and its algorithm's parameters.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("params"),
+    transform = schema::params_without_params
+)]
 pub struct PopulationConfig {
     /// What its genes encode, in genotype order.
+    #[schemars(length(min = 1, max = limits::ENTRIES))]
     pub objects: Vec<GenotypeQuery>,
     /// Upper bound of the decoded values, per query.
+    #[schemars(schema_with = "schema::number_or_numbers")]
     pub max_vals: Vec<f64>,
     /// Lower bound of the decoded values, per query.
+    #[schemars(schema_with = "schema::number_or_numbers")]
     pub min_vals: Vec<f64>,
     /// Parameters of the algorithm; of the variant that `algorithm.name` names.
     pub params: AlgorithmParams,
 }
 
-/// Names a part of the network's parameters (Table 4.1).
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum GenotypeQuery {
-    /// `synapses:weights:...`
-    Weights(SynapseSelector),
-    /// `neurons:PARAMETER:...`
-    Neurons(NeuronParameter, EnsembleSelector),
-}
-
-/// The last part of `synapses:weights:...`. Kinds refer to the *presynaptic*
-/// side.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SynapseSelector {
-    /// Every trainable synapse.
-    All,
-    /// From stimuli.
-    Sensory,
-    /// From ensembles that drive no output.
-    Hidden,
-    /// From ensembles that drive an output.
-    Motor,
-    /// From the ensemble (or stimulus) of this name, or in the synapse group of
-    /// this name.
-    Named(String),
-}
-
-/// The middle part of `neurons:...:...`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NeuronParameter {
-    /// beta
-    Bias,
-    /// tau, decoded on a logarithmic scale: 2 * 10^x.
-    Tau,
-    /// g
-    Gain,
-}
-
-/// The last part of `neurons:...:...`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum EnsembleSelector {
-    /// Every ensemble.
-    All,
-    /// One ensemble.
-    Named(String),
-}
-
-impl SynapseSelector {
-    /// As it stands in a query.
-    pub fn as_str(&self) -> &str {
-        match self {
-            Self::All => "all",
-            Self::Sensory => "sensory",
-            Self::Hidden => "hidden",
-            Self::Motor => "motor",
-            Self::Named(name) => name,
-        }
-    }
-}
-
-impl EnsembleSelector {
-    /// As it stands in a query.
-    pub fn as_str(&self) -> &str {
-        match self {
-            Self::All => "all",
-            Self::Named(name) => name,
-        }
-    }
-}
-
-impl fmt::Display for NeuronParameter {
-    /// As it stands in a query.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Bias => "bias",
-            Self::Tau => "tau",
-            Self::Gain => "gain",
-        })
-    }
-}
-
-impl fmt::Display for GenotypeQuery {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Weights(selector) => write!(f, "synapses:weights:{}", selector.as_str()),
-            Self::Neurons(parameter, selector) => {
-                write!(f, "neurons:{parameter}:{}", selector.as_str())
-            }
-        }
-    }
-}
-
-/// A text that is no query.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ParseQueryError {
-    /// It names something of the original simulator that this one lacks.
-    #[error("not supported: `{0}`")]
-    Unsupported(String),
-    /// It has another form.
-    #[error(
-        "expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `bias`, `tau` or `gain`"
-    )]
-    Malformed,
-}
-
-impl FromStr for GenotypeQuery {
-    type Err = ParseQueryError;
-
-    /// Table 4.1; `gains` is another name of `gain`, as in section 4.3.
-    fn from_str(text: &str) -> Result<Self, ParseQueryError> {
-        let mut parts = text.splitn(3, ':');
-        let mut next = || parts.next().filter(|part| !part.is_empty());
-        let (Some(part), Some(parameter), Some(selector)) = (next(), next(), next()) else {
-            return Err(ParseQueryError::Malformed);
-        };
-        let parameter = match (part, parameter) {
-            ("synapses", "weights") => {
-                return Ok(Self::Weights(match selector {
-                    "all" => SynapseSelector::All,
-                    "sensory" => SynapseSelector::Sensory,
-                    "hidden" => SynapseSelector::Hidden,
-                    "motor" => SynapseSelector::Motor,
-                    name => SynapseSelector::Named(name.to_owned()),
-                }));
-            }
-            ("neurons", "bias") => NeuronParameter::Bias,
-            ("neurons", "tau") => NeuronParameter::Tau,
-            ("neurons", "gain" | "gains") => NeuronParameter::Gain,
-            ("synapses", "delays")
-            | ("neurons", "decoding")
-            | ("encoders" | "encoding" | "decoders" | "decoding", "weights") => {
-                return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
-            }
-            _ => return Err(ParseQueryError::Malformed),
-        };
-        Ok(Self::Neurons(
-            parameter,
-            match selector {
-                "all" => EnsembleSelector::All,
-                name => EnsembleSelector::Named(name.to_owned()),
-            },
-        ))
-    }
-}
-
-impl Serialize for GenotypeQuery {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+/// Keys of the genetic algorithm that files of the original simulator may have
+/// for any algorithm.
+pub(super) const GENETIC_KEYS: &str = "selection_operator, mating_operator, crossover_operator, \
+    crossover_prob, mutation_operator, mutation_prob, num_elite";
 
 /// Parameters of an algorithm. `algorithm.name` says which variant applies, so
 /// the canonical form carries no tag.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum AlgorithmParams {
     /// [`AlgorithmName::Ga`]
@@ -253,25 +121,31 @@ pub enum AlgorithmParams {
 }
 
 /// Genetic algorithm (Table 3.4).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default, deny_unknown_fields, transform = schema::encoded)]
 pub struct GaParams {
     /// How parents are chosen.
     pub selection_operator: SelectionOperator,
     /// Contestants of a tournament, drawn with replacement; default 3.
+    #[schemars(range(min = 1, max = limits::POPULATION))]
     pub tournament_size: u32,
     /// How parents are paired.
     pub mating_operator: MatingOperator,
     /// How two parents yield two children.
     pub crossover_operator: CrossoverOperator,
     /// BLX-alpha's alpha; default 0.5.
+    #[schemars(range(min = 0))]
     pub alpha: f64,
     /// Probability that a pair is crossed; default 0.9.
+    #[schemars(range(min = 0, max = 1))]
     pub crossover_prob: f64,
     /// How a gene mutates.
     pub mutation_operator: MutationOperator,
     /// Probability that a gene mutates; default 0.05.
+    #[schemars(range(min = 0, max = 1))]
     pub mutation_prob: f64,
     /// Standard deviation of Gaussian mutation; default sqrt(0.3).
+    #[schemars(range(min = 0))]
     pub mutation_sigma: f64,
     /// Individuals that survive unchanged; default 3.
     pub num_elite: u32,
@@ -295,7 +169,7 @@ impl Default for GaParams {
 }
 
 /// Selection operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SelectionOperator {
     /// The best of K drawn uniformly.
@@ -311,7 +185,7 @@ pub enum SelectionOperator {
 }
 
 /// Mating operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatingOperator {
     /// Uniformly random pairs.
@@ -319,7 +193,7 @@ pub enum MatingOperator {
 }
 
 /// Crossover operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CrossoverOperator {
     /// BLX-alpha.
@@ -338,7 +212,7 @@ pub enum CrossoverOperator {
 }
 
 /// Mutation operators of the GA.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MutationOperator {
     /// Adds N(0, mutation_sigma^2).
@@ -348,16 +222,26 @@ pub enum MutationOperator {
 }
 
 /// SNES (Algorithm 3).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct SnesParams {
     /// Learning rate of mu; default 1.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_mu: f64,
     /// Learning rate of sigma; none: (3 + ln d) / (5 sqrt d).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_sigma: Option<f64>,
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First standard deviation of every gene; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -368,19 +252,30 @@ impl Default for SnesParams {
 }
 
 /// xNES (Algorithm 2).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct XnesParams {
     /// Learning rate of mu; default 1.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_mu: f64,
     /// Learning rate of sigma; none: (9 + 3 ln d) / (5 d sqrt d).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_sigma: Option<f64>,
     /// Learning rate of the shape B; none: as `eta_sigma`.
     #[serde(rename = "eta_B", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub eta_b: Option<f64>,
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First standard deviation of every gene; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -391,11 +286,19 @@ impl Default for XnesParams {
 }
 
 /// CMA-ES and sep-CMA-ES.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct CmaEsParams {
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// First step size; default 0.2.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma_init: f64,
 }
 
@@ -406,19 +309,31 @@ impl Default for CmaEsParams {
 }
 
 /// OpenAI-ES.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::encoded,
+    transform = schema::ignored(GENETIC_KEYS)
+)]
 pub struct OpenAiEsParams {
     /// First mean of every gene; default 0.5.
+    #[schemars(range(min = 0, max = 1))]
     pub mu_init: f64,
     /// Standard deviation of the perturbations; default 0.1.
+    #[schemars(range(max = 1), extend("exclusiveMinimum" = 0))]
     pub sigma: f64,
     /// Adam's step size; default 0.02.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub learning_rate: f64,
     /// Adam's decay of the first moment; default 0.9.
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub beta1: f64,
     /// Adam's decay of the second moment; default 0.999.
+    #[schemars(range(min = 0), extend("exclusiveMaximum" = 1))]
     pub beta2: f64,
     /// L2 pull towards `mu_init` per generation; default 0.
+    #[schemars(range(min = 0, max = 1))]
     pub weight_decay: f64,
 }
 

@@ -10,18 +10,28 @@
 
 mod algorithm;
 mod check;
+mod equipment;
 pub mod limits;
 mod problem;
+mod query;
 mod read;
+mod robot;
+mod schema;
 #[cfg(test)]
 mod tests;
 mod topology;
 mod world;
 
+use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::json;
 
 pub use algorithm::*;
+pub use equipment::*;
 pub use problem::{ConfigError, Problem};
+pub use query::*;
+pub use robot::*;
+pub use schema::json_schema;
 pub use topology::*;
 pub use world::*;
 
@@ -29,11 +39,19 @@ pub use world::*;
 pub type NamedMap<T> = indexmap::IndexMap<String, T>;
 
 /// A whole experiment: network, evolution, world.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("name, seed"),
+    transform = schema::property("$schema", json!({"type": "string"})),
+    transform = schema::property("checkpoint_file", json!({"type": ["string", "null"]})),
+    transform = schema::ignored("num_processes, render")
+)]
 pub struct ExperimentConfig {
     /// Name for display; does not influence the run.
     pub name: String,
     /// Master seed of all randomness.
+    #[schemars(extend("default" = 0))]
     pub seed: u64,
     /// The neural network's structure.
     pub topology: TopologyConfig,

@@ -1,8 +1,10 @@
 //! `topology`: stimuli, ensembles, synapse groups, outputs and their decoding.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-use super::NamedMap;
+use super::{NamedMap, limits, schema};
 
 /// Of [`TopologyConfig::dt`].
 pub(super) const DEFAULT_DT: f64 = 0.1;
@@ -12,37 +14,58 @@ pub(super) const DEFAULT_TIME_SCALE: u32 = 20;
 pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
 
 /// Structure of the CTRNN; its trainable values come from the genotype.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("dt, time_scale, seed"),
+    transform = schema::property("encoding", schema::encoding()),
+    transform = schema::property("neuron_model", schema::neuron_model()),
+    transform = schema::property("neurons", schema::neurons()),
+    transform = schema::property("synapse_model", json!({"const": "static_synapse"})),
+    transform = schema::ignored("synapse_params")
+)]
 pub struct TopologyConfig {
     /// Euler step of the network, seconds; default 0.1.
+    #[schemars(extend("default" = DEFAULT_DT, "exclusiveMinimum" = 0))]
     pub dt: f64,
     /// Network substeps per environment step; default 20.
+    #[schemars(range(min = 1, max = limits::TIME_SCALE), extend("default" = DEFAULT_TIME_SCALE))]
     pub time_scale: u32,
     /// Seed of the random connections (and of fixed weights); default 821.
+    #[schemars(extend("default" = DEFAULT_CONNECTION_SEED))]
     pub seed: u64,
     /// Inputs, in the order in which they are stacked.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub stimuli: NamedMap<StimulusConfig>,
     /// Groups of neurons, in the order in which they are numbered.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub ensembles: NamedMap<EnsembleConfig>,
     /// Which ensemble drives which actuator.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub outputs: NamedMap<OutputConfig>,
     /// Groups of synapses.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub synapses: NamedMap<SynapseGroupConfig>,
     /// How activities become actions; one entry per output, same names.
+    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub decoding: NamedMap<DecodingConfig>,
 }
 
 /// One named input of the network.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct StimulusConfig {
     /// Number of values; equals the length of the reading.
+    #[schemars(range(min = 1, max = limits::INPUTS))]
     pub n: u32,
     /// Where the values come from.
     pub sensor: SensorQuery,
 }
 
 /// A reading of a robot, by the name that config files use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 pub enum SensorQuery {
     /// Message of the chosen frame; `msg_length` values.
     #[serde(rename = "wireless_receiver:msg")]
@@ -71,9 +94,11 @@ pub enum SensorQuery {
 }
 
 /// One group of neurons.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, transform = schema::optional("activation, params"))]
 pub struct EnsembleConfig {
     /// Number of neurons.
+    #[schemars(range(min = 1, max = limits::NEURONS))]
     pub n: u32,
     /// Activation function F; default sigmoid.
     pub activation: Activation,
@@ -82,7 +107,7 @@ pub struct EnsembleConfig {
 }
 
 /// Activation function of an ensemble.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
     /// 1 / (1 + exp(-x)), range (0, 1).
@@ -92,10 +117,16 @@ pub enum Activation {
 }
 
 /// Neuron parameters outside the genotype.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::property("activation", json!({"$ref": "#/$defs/Activation"}))
+)]
 pub struct NeuronParams {
     /// Time constant, seconds; default 2 (the middle of Table 3.3's scale,
     /// 2 * 10^0).
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tau: f64,
     /// Gain g; default 1.
     pub gain: f64,
@@ -110,7 +141,11 @@ impl Default for NeuronParams {
 }
 
 /// Connects an ensemble to an actuator.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::property("enc", json!({"enum": ["real", "cat"]}))
+)]
 pub struct OutputConfig {
     /// Name of the ensemble.
     pub ensemble: String,
@@ -119,7 +154,9 @@ pub struct OutputConfig {
 }
 
 /// An actuator, by the name that config files use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 pub enum ActuatorQuery {
     /// Wheels: 2 neurons (right, left), or 1 for rotation in place (w, -w).
     #[serde(rename = "wheel_actuator")]
@@ -137,22 +174,32 @@ pub enum ActuatorQuery {
 
 /// One group of synapses: every (pre, post) pair of neurons exists with
 /// probability `p`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    deny_unknown_fields,
+    transform = schema::optional("trainable, p"),
+    transform = schema::ignored("neuroTX, ntx_fixed")
+)]
 pub struct SynapseGroupConfig {
     /// Names of stimuli or ensembles.
+    #[schemars(schema_with = "schema::names")]
     pub pre: Vec<String>,
     /// Names of ensembles.
+    #[schemars(schema_with = "schema::names")]
     pub post: Vec<String>,
     /// Whether the genotype may hold its weights, default true; fixed weights are
     /// drawn from U(-1, 1) with `topology.seed`.
+    #[schemars(extend("default" = true))]
     pub trainable: bool,
     /// Connection probability; default 1.
+    #[schemars(range(min = 0, max = 1), extend("default" = 1))]
     pub p: f64,
 }
 
 /// How the activities of an output's ensemble become an action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(tag = "scheme", content = "params")]
+#[schemars(deny_unknown_fields, transform = schema::decodings)]
 pub enum DecodingConfig {
     /// The activities themselves.
     IdentityDecoding {},

@@ -71,6 +71,19 @@ fn watching_and_company_change_no_bit() {
 }
 
 #[test]
+fn many_trials_are_as_many_fitnesses_in_order() {
+    let mut config = experiment_a();
+    (config.algorithm.evaluation_steps, config.algorithm.num_evaluations) = (30, 60);
+    let experiment = Experiment::compile(&config).unwrap();
+    let genotype = genotype(experiment.genotype_len(), 18);
+    let together = experiment.evaluate(&genotype, 0, 1..60).unwrap();
+    let alone =
+        (1..60).map(|trial| experiment.evaluate(&genotype, 0, trial..trial + 1).unwrap()[0]);
+    assert_eq!(together, alone.collect::<Vec<_>>());
+    assert!(together.iter().any(|&fitness| fitness > 0.0));
+}
+
+#[test]
 fn fitness_is_the_mean_of_the_steps_that_count() {
     for config in &experiments() {
         let (steps, summary) = watch(config, 1, 0);

@@ -2,6 +2,7 @@
 //! them. Each stage reports all it finds; nothing is accepted in part.
 
 mod algorithm;
+mod names;
 mod node;
 mod parse;
 mod population;
@@ -11,10 +12,11 @@ mod topology;
 mod variant;
 mod world;
 
-pub(super) use node::suggestion;
+pub(super) use names::suggestion;
 pub(super) use report::{Path, Report};
 
-use node::{Node, Object, check_name};
+use names::check_name;
+use node::{Node, Object};
 
 use super::check::check;
 use super::{ConfigError, ExperimentConfig, Problem};
@@ -38,12 +40,17 @@ pub(super) fn read(
 }
 
 fn experiment(o: &mut Object<'_>, default_name: &str) -> ExperimentConfig {
+    // Tells an editor where the schema is.
+    o.optional("$schema").map(Node::string);
     let name = o.optional("name").map(Node::name);
     let checkpoint = o.optional("checkpoint_file").filter(|node| !node.is_null()).map(Node::name);
     let config = ExperimentConfig {
         name: name.or(checkpoint).unwrap_or_else(|| {
             if let Err(message) = check_name(default_name) {
-                o.problem(format!("no `name`, and the default does not serve: {message}"));
+                o.problem(
+                    "name",
+                    format!("`name` is missing, and the default does not serve: {message}"),
+                );
             }
             default_name.to_owned()
         }),

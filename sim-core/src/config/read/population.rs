@@ -1,6 +1,8 @@
 //! Reads one entry of `algorithm.populations`.
 
 use super::node::{Node, Object};
+use crate::config::algorithm::GENETIC_KEYS;
+use crate::config::schema::split;
 use crate::config::{
     AlgorithmName, AlgorithmParams, CmaEsParams, CrossoverOperator, EnsembleSelector, GaParams,
     GenotypeQuery, MatingOperator, MutationOperator, NeuronParameter, OpenAiEsParams,
@@ -55,15 +57,7 @@ fn params_of(o: &mut Places<'_, '_>, algorithm: AlgorithmName) -> AlgorithmParam
     }
     if algorithm != AlgorithmName::Ga {
         // The original fills these in for every algorithm.
-        for key in [
-            "selection_operator",
-            "mating_operator",
-            "crossover_operator",
-            "crossover_prob",
-            "mutation_operator",
-            "mutation_prob",
-            "num_elite",
-        ] {
+        for key in split(GENETIC_KEYS) {
             o.ignored(key, "only the genetic algorithm has it");
         }
     }

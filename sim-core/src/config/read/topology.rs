@@ -1,6 +1,7 @@
 //! Reads `topology`.
 
-use super::node::{Node, Object, suggestion};
+use super::names::suggestion;
+use super::node::{Node, Object};
 use crate::config::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
 use crate::config::{
     Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronParams,
@@ -95,7 +96,7 @@ fn ensemble(o: &mut Object<'_>) -> EnsembleConfig {
     if let (Some(outer), Some(inner)) = (outer, inner)
         && outer != inner
     {
-        o.problem("`activation` and `params.activation` differ");
+        o.problem("activation", "`params` has another one");
     }
     EnsembleConfig { n, activation: outer.or(inner).unwrap_or(Activation::Sigmoid), params }
 }

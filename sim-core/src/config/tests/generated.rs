@@ -2,8 +2,11 @@
 
 use std::thread;
 
+use serde_json::json;
+
 use super::generator::{Dice, damage, experiment};
 use super::{accept, read};
+use crate::Experiment;
 
 /// Files that are right, and damaged variants of each.
 const N_FILES: u64 = 5_000;
@@ -53,4 +56,23 @@ fn n_accepted_variants(index: u64) -> u64 {
         }
     }
     n_accepted
+}
+
+/// Compiling may still refuse what only it can find, such as a query of a group
+/// whose synapses all happen not to exist.
+#[test]
+fn accepted_files_can_be_simulated() {
+    let (mut n_simulated, n) = (0, 500);
+    for index in 0..n {
+        let mut file = experiment(&mut Dice::new(index));
+        file["algorithm"]["evaluation_steps"] = json!(101);
+        let (config, _) = read(&file.to_string()).unwrap();
+        if let Ok(experiment) = Experiment::compile(&config) {
+            let genotype = vec![0.5; experiment.genotype_len()];
+            let fitness = experiment.evaluate(&genotype, 0, 0..1).unwrap();
+            assert!(fitness[0].is_finite(), "{file}");
+            n_simulated += 1;
+        }
+    }
+    assert!(n_simulated * 10 > n * 9, "{n_simulated} of {n}");
 }

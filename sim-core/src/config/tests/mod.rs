@@ -5,6 +5,7 @@ mod generator;
 mod hostile;
 mod problems;
 mod reference;
+mod schema;
 mod shipped;
 mod values;
 

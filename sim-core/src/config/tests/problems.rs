@@ -1,6 +1,7 @@
 //! What a wrong file hears: every problem, where it is, what would be right.
 
 use super::{BASE, edited, refuse};
+use crate::config::ExperimentConfig;
 
 /// [`BASE`] with several passages replaced.
 fn edited_often(edits: &[(&str, &str)]) -> String {
@@ -75,7 +76,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""activation": "tanh""#, r#""activation": "relu""#,
      "line 15: topology.ensembles.OUT_WHEELS.activation: unknown name `relu`; known: `sigmoid`, `tanh`"),
     (r#""activation": "tanh""#, r#""activation": "tanh", "params": {"activation": "sigmoid"}"#,
-     "line 15: topology.ensembles.OUT_WHEELS: `activation` and `params.activation` differ"),
+     "line 15: topology.ensembles.OUT_WHEELS.activation: `params` has another one"),
     (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": ["MSG", "LIHGT"]"#,
      "line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIHGT`; did you mean `LIGHT`?"),
     (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": ["MSG", "MSG"]"#,
@@ -198,6 +199,16 @@ fn a_query_with_two_meanings_is_ambiguous() {
         refuse(&text),
         "line 43: algorithm.populations.weights.objects[0]: ambiguous: `H` is a synapse group, and \
          an ensemble or stimulus"
+    );
+}
+
+#[test]
+fn a_file_without_a_name_needs_a_default_that_is_one() {
+    let text = edited(r#""name": "base","#, "");
+    let error = ExperimentConfig::from_json(&text, "").unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "line 1: `name` is missing, and the default does not serve: a name must not be empty"
     );
 }
 

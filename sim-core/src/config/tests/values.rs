@@ -4,7 +4,7 @@ use super::{BASE, accept, edited, read};
 use crate::config::{
     Activation, AlgorithmName, AlgorithmParams, GaParams, Initializer, LightController,
     LightSourceConfig, NeuronParams, ObjectConfig, RobotController, SnesParams,
-    UncontrollableRotationConfig,
+    UncontrollableRotationConfig, json_schema,
 };
 
 #[test]
@@ -188,6 +188,15 @@ fn the_canonical_form_is_a_file_of_the_same_meaning() {
     let again = accept(&canonical);
     assert_eq!(again, config);
     assert_eq!(again.to_canonical_json(), canonical);
+}
+
+#[test]
+fn a_file_may_name_its_schema() {
+    let name = r#""name": "base","#;
+    let text = edited(name, r#""$schema": "experiment.schema.json", "name": "base","#);
+    assert_eq!(accept(&text), accept(BASE));
+    let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(jsonschema::is_valid(&json_schema(), &file));
 }
 
 #[test]

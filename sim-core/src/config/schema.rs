@@ -1,0 +1,187 @@
+//! The JSON Schema of experiment files, for editors and other programs.
+//!
+//! It is derived from the types. They describe the canonical form; what a file
+//! may say beyond that (keys left out, other forms, keys of the original
+//! simulator) is added by the attributes on them, in the words defined here.
+
+use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
+use serde_json::{Map, Value, json};
+
+use super::{
+    CmaEsParams, ExperimentConfig, GaParams, OpenAiEsParams, SnesParams, XnesParams, limits,
+};
+
+/// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema,
+/// draft 2020-12). What it cannot express (names that resolve, sizes that agree,
+/// costs) only the reader checks.
+pub fn json_schema() -> Value {
+    schema_for!(ExperimentConfig).to_value()
+}
+
+/// The keys in a list such as "a, b": attributes take no array.
+pub(super) fn split(keys: &'static str) -> impl Iterator<Item = &'static str> {
+    keys.split(", ")
+}
+
+/// Keys that may be left out; so may `params` if nothing in it is required.
+pub(super) fn optional(keys: &'static str) -> impl Fn(&mut Schema) {
+    move |schema| {
+        not_required(schema.ensure_object(), keys);
+        let params = schema.pointer_mut("/properties/params").and_then(Value::as_object_mut);
+        if let Some(params) = params {
+            not_required(params, keys);
+            if !params.contains_key("required") {
+                not_required(schema.ensure_object(), "params");
+            }
+        }
+    }
+}
+
+fn not_required(schema: &mut Map<String, Value>, keys: &'static str) {
+    if let Some(Value::Array(required)) = schema.get_mut("required") {
+        required.retain(|key| !split(keys).any(|optional| key == optional));
+        if required.is_empty() {
+            schema.remove("required");
+        }
+    }
+}
+
+/// A key that the type lacks.
+pub(super) fn property(key: &str, value: Value) -> impl Fn(&mut Schema) {
+    move |schema| add_property(schema, key, value.clone())
+}
+
+/// Keys without effect.
+pub(super) fn ignored(keys: &'static str) -> impl Fn(&mut Schema) {
+    move |schema| {
+        for key in split(keys) {
+            add_property(schema, key, json!({"description": "Accepted and ignored."}));
+        }
+    }
+}
+
+fn add_property(schema: &mut Schema, key: &str, value: Value) {
+    let properties = schema.ensure_object().entry("properties").or_insert_with(|| json!({}));
+    if let Value::Object(properties) = properties {
+        properties.insert(key.to_owned(), value);
+    }
+}
+
+/// Another name of a variant.
+pub(super) fn also(name: &str) -> impl Fn(&mut Schema) {
+    move |schema| {
+        if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
+            variants.push(json!({"type": "string", "const": name}));
+        }
+    }
+}
+
+/// A variant without its parameters, or null for none.
+pub(super) fn or_name_or_null(schema: &mut Schema) {
+    let variants = schema.get("oneOf").and_then(Value::as_array);
+    let names = variants.into_iter().flatten().filter_map(|v| v.pointer("/properties/name/const"));
+    let names: Vec<Value> = names.cloned().collect();
+    if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
+        variants.push(json!({"enum": names}));
+        variants.push(json!({"type": "null"}));
+    }
+}
+
+/// Every decoding may say `is_cat`, and has no parameter that it must state.
+pub(super) fn decodings(schema: &mut Schema) {
+    if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
+        for variant in variants {
+            if let Some(Value::Object(params)) = variant.pointer_mut("/properties/params") {
+                params.remove("required");
+                let properties = params.entry("properties").or_insert_with(|| json!({}));
+                properties["is_cat"] = json!({"type": "boolean"});
+            }
+            if let Value::Object(variant) = variant {
+                not_required(variant, "params");
+            }
+        }
+    }
+}
+
+/// The only encoding of genes.
+pub(super) fn encoded(schema: &mut Schema) {
+    add_property(schema, "encoding", json!({"const": "real"}));
+}
+
+/// An algorithm's parameters may stand in the population itself (section 4.3).
+pub(super) fn params_without_params(schema: &mut Schema) {
+    for params in [
+        schema_for!(GaParams),
+        schema_for!(SnesParams),
+        schema_for!(XnesParams),
+        schema_for!(CmaEsParams),
+        schema_for!(OpenAiEsParams),
+    ] {
+        let properties = params.get("properties").and_then(Value::as_object);
+        for (key, value) in properties.into_iter().flatten() {
+            // The first description is the genetic algorithm's, which uses them all.
+            if schema.pointer(&format!("/properties/{key}")).is_none() {
+                add_property(schema, key, value.clone());
+            }
+        }
+    }
+}
+
+/// One name, or several.
+pub(super) fn names(_: &mut SchemaGenerator) -> Schema {
+    let name = json!({"type": "string"});
+    json_schema!({"anyOf": [
+        name,
+        {"type": "array", "items": name, "minItems": 1, "maxItems": limits::ENTRIES},
+    ]})
+}
+
+/// One number for all queries, or one each.
+pub(super) fn number_or_numbers(_: &mut SchemaGenerator) -> Schema {
+    let number = json!({"type": "number"});
+    json_schema!({"anyOf": [number, {"type": "array", "items": number}]})
+}
+
+/// A number of robots, or all.
+pub(super) fn affected_robots(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"anyOf": [
+        {"type": "integer", "minimum": 0, "maximum": limits::ROBOTS},
+        {"const": "all"},
+    ], "default": "all"})
+}
+
+/// A quantity >= 0.
+pub(super) fn amount(description: &str) -> Value {
+    json!({"type": "number", "minimum": 0, "description": description})
+}
+
+/// The names of the only neuron model.
+pub(super) fn neuron_model() -> Value {
+    json!({"enum": ["rate_model", "ctrnn"]})
+}
+
+/// The same in the form of Appendix A.
+pub(super) fn neurons() -> Value {
+    json!({
+        "type": "object",
+        "properties": {"model": neuron_model()},
+        "required": ["model"],
+        "additionalProperties": false,
+    })
+}
+
+/// How stimuli are encoded: not at all.
+pub(super) fn encoding() -> Value {
+    json!({
+        "type": "object",
+        "additionalProperties": {
+            "type": "object",
+            "properties": {
+                "scheme": {"const": "IdentityEncoding"},
+                "receptive_field": {"description": "Accepted and ignored."},
+            },
+            "required": ["scheme"],
+            "additionalProperties": false,
+        },
+    })
+}
