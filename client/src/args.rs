@@ -57,6 +57,9 @@ pub enum Command {
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
     },
+    /// Print the JSON Schema of experiment files, for editors that complete and
+    /// check them.
+    Schema,
     /// Simulate single episodes here, and show how well a genotype does.
     ///
     /// Fitness and measures are the same, bit for bit, as in evolution: a champion
@@ -219,6 +222,7 @@ Examples:
   swarmctl watch 3 --output json | jq .best
   swarmctl champion 3 > champion.json
   swarmctl validate experiments/*.json
+  swarmctl schema > experiment.schema.json
   swarmctl simulate experiment.json --genotype champion.json --trace trace.csv
 
 JSON lines of run, watch and submit --watch: one per generation (numbered from

@@ -52,6 +52,9 @@ async fn execute(args: Args) -> Result<(), Error> {
     let command = match args.command {
         // A signal ends these at once: there is nothing to put in order.
         Command::Validate { files } => return validate::validate(&files, &mut progress),
+        Command::Schema => {
+            return progress.print(&json::document(&sim_core::config::json_schema()));
+        }
         Command::Simulate(simulation) => {
             return simulate::simulate(&args.coordinator, &simulation, &mut progress).await;
         }
