@@ -178,22 +178,22 @@ pub struct SimulateArgs {
     ///
     /// One row per trial, step and robot. Columns:
     ///
-    ///   trial, step, robot    numbers, from 0
-    ///   object                the robot's object in the experiment file
-    ///   x_cm, y_cm            position at the end of the step
-    ///   heading_rad           heading at the end of the step, in [0, 2 pi)
+    ///   trial, step, robot       numbers, from 0
+    ///   object                   the robot's object in the experiment file
+    ///   x_cm, y_cm               position at the end of the step
+    ///   heading_rad              heading at the end of the step, in [0, 2 pi)
     ///   wheel_right, wheel_left  actions, in [-1, 1]
-    ///   led                   colour, 0 off
-    ///   mode                  send or relay
-    ///   message_0, ...        own message; on the air if the mode is send
-    ///   frame_originator      robot whose message was received; empty if none was
-    ///   frame_hops            emissions of that message, from 1
-    ///   frame_sector          sector that received it
-    ///   frame_signal          its strength, in (0, 1]
-    ///   stimulus_NAME_0, ...  inputs of the controller, in the file's order
-    ///   light_0_x_cm, light_0_y_cm, ...  positions of the lights during the step
-    ///   step_fitness          fitness of the step; empty if it does not count
-    ///   metric_NAME, ...      measures of the task in this step
+    ///   led                      colour, 0 off
+    ///   mode                     send or relay
+    ///   message_0, ...           own message; on the air if the mode is send
+    ///   frame_originator         robot whose message was received; empty if none
+    ///   frame_hops               emissions of that message, from 1
+    ///   frame_sector             sector that received it, from 0
+    ///   frame_signal             its strength, in (0, 1]
+    ///   stimulus_NAME_0, ...     inputs of the controller
+    ///   light_0_x_cm, ...        positions of the lights during the step
+    ///   step_fitness             fitness of the step; empty if it does not count
+    ///   metric_NAME, ...         measures of the task in this step
     ///
     /// The last three kinds are the same for all robots of a step.
     #[arg(long, value_name = "FILE", verbatim_doc_comment)]
