@@ -9,23 +9,23 @@
 //! [`Evolution`] itself. `ask` is a pure function of it, so whoever restores a
 //! checkpoint asks the same genotypes again.
 
+mod algorithms;
 mod digest;
 mod ranking;
-mod snes;
 mod statistics;
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use sim_core::{
-    config::{AlgorithmParams, ConfigError, ExperimentConfig, PopulationConfig, Problem},
+    config::{ConfigError, ExperimentConfig, Problem},
     random::{Purpose, Stream},
 };
 
 pub use digest::Digest;
 pub use statistics::Statistics;
 
-use snes::Snes;
+use algorithms::{Algorithm, Sample, Strategy as _, Unsuitable};
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
@@ -37,32 +37,11 @@ pub struct Evolution {
     population_size: usize,
     /// Generations told so far; also the index of the next one to ask.
     n_generations: u64,
-    populations: Vec<Population>,
+    /// One algorithm per population; it evolves the population's segment of the
+    /// genotype.
+    populations: Vec<Algorithm>,
     champion: Option<Champion>,
     digest: Digest,
-}
-
-/// One population: the algorithm that evolves one segment of the genotype.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Population {
-    segment: Range<usize>,
-    algorithm: Algorithm,
-}
-
-/// The algorithms, each with its state.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-enum Algorithm {
-    Snes(Snes),
-}
-
-/// What an algorithm draws for one generation.
-#[derive(Debug, Clone, PartialEq)]
-struct Sample {
-    /// Genes of each individual, within \[0, 1\].
-    genotypes: Vec<Genotype>,
-    /// The standard normal draws behind them, for algorithms that learn from
-    /// those.
-    normals: Vec<Vec<f64>>,
 }
 
 /// A generation to be judged.
@@ -122,16 +101,27 @@ pub enum EvolutionError {
 
 impl Evolution {
     /// The start of an evolution. `segments`: the genes of each population, in
-    /// the order of `algorithm.populations`.
+    /// the order of `algorithm.populations`. Reports every population that its
+    /// algorithm cannot evolve.
     pub fn new(config: &ExperimentConfig, segments: &[Range<usize>]) -> Result<Self, ConfigError> {
-        let populations = config.algorithm.populations.values().zip(segments);
+        let population_size = config.algorithm.population_size as usize;
+        let mut populations = Vec::new();
+        let mut problems = Vec::new();
+        for ((name, population), segment) in config.algorithm.populations.iter().zip(segments) {
+            let (params, d) = (&population.params, segment.len());
+            match Algorithm::new(config.algorithm.name, params, d, population_size) {
+                Ok(algorithm) => populations.push(algorithm),
+                Err(unsuitable) => problems.push(problem(name, &unsuitable)),
+            }
+        }
+        if !problems.is_empty() {
+            return Err(ConfigError { problems });
+        }
         Ok(Self {
             seed: config.seed,
-            population_size: config.algorithm.population_size as usize,
+            population_size,
             n_generations: 0,
-            populations: populations
-                .map(|(population, segment)| Population::new(config, population, segment.clone()))
-                .collect::<Result<_, _>>()?,
+            populations,
             champion: None,
             digest: Digest::of_config(config),
         })
@@ -161,11 +151,14 @@ impl Evolution {
             .map(|(idx, population)| {
                 let purpose = Purpose::Evolution;
                 let mut rng = Stream::new(self.seed, self.n_generations, 0, purpose, idx as u64);
-                population.algorithm.sample(self.population_size, &mut rng)
+                population.sample(self.population_size, &mut rng)
             })
             .collect();
         let genotypes = (0..self.population_size)
-            .map(|i| samples.iter().flat_map(|sample| &sample.genotypes[i]).copied().collect())
+            .map(|i| {
+                let parts: Vec<&[f64]> = samples.iter().map(|s| &s.genotypes[i][..]).collect();
+                parts.concat()
+            })
             .collect();
         Asked { generation: self.n_generations, genotypes, samples }
     }
@@ -188,7 +181,7 @@ impl Evolution {
         }
 
         for (population, sample) in self.populations.iter_mut().zip(&asked.samples) {
-            population.algorithm.learn(sample, &ranking);
+            population.learn(sample, &ranking, &fitness);
         }
         let has_new_champion =
             self.champion.as_ref().is_none_or(|champion| fitness[best] > champion.fitness);
@@ -213,46 +206,16 @@ impl Evolution {
     }
 }
 
-impl Population {
-    fn new(
-        config: &ExperimentConfig,
-        population: &PopulationConfig,
-        segment: Range<usize>,
-    ) -> Result<Self, ConfigError> {
-        let algorithm = match &population.params {
-            AlgorithmParams::Snes(params) => Algorithm::Snes(Snes::new(params, segment.len())),
-            AlgorithmParams::Ga(_)
-            | AlgorithmParams::Xnes(_)
-            | AlgorithmParams::CmaEs(_)
-            | AlgorithmParams::OpenAiEs(_) => {
-                return Err(ConfigError {
-                    problems: vec![Problem {
-                        path: "algorithm.name".to_owned(),
-                        line: None,
-                        message: format!(
-                            "{:?} is not supported; use \"SNES\"",
-                            config.algorithm.name
-                        ),
-                    }],
-                });
-            }
-        };
-        Ok(Self { segment, algorithm })
-    }
-}
-
-impl Algorithm {
-    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        match self {
-            Self::Snes(snes) => snes.sample(population_size, rng),
-        }
-    }
-
-    fn learn(&mut self, sample: &Sample, ranking: &[usize]) {
-        match self {
-            Self::Snes(snes) => snes.learn(sample, ranking),
-        }
-    }
+/// Where in the configuration, and what.
+fn problem(population: &str, unsuitable: &Unsuitable) -> Problem {
+    let population = format!("algorithm.populations.{population}");
+    let path = match unsuitable {
+        Unsuitable::NoGenes => population,
+        Unsuitable::OnlyElite { .. } => format!("{population}.params.num_elite"),
+        Unsuitable::TooFewIndividuals => "algorithm.population_size".to_owned(),
+        Unsuitable::TooManyGenes { .. } => "algorithm.name".to_owned(),
+    };
+    Problem { path, line: None, message: unsuitable.to_string() }
 }
 
 /// Plain mean, summed in order.

@@ -20,11 +20,20 @@ pub fn ranking(fitness: &[f64]) -> Vec<usize> {
 /// Utility of rank k = 1..=n, best first:
 /// u_k = max(0, ln(n/2 + 1) - ln k) / sum - 1/n. They sum to 0.
 /// Wierstra et al. 2014, section 3.1.
-pub fn utilities(n: usize) -> Vec<f64> {
+fn utilities(n: usize) -> Vec<f64> {
     let reference = libm::log(n as f64 / 2.0 + 1.0);
     let raw: Vec<f64> = (1..=n).map(|k| (reference - libm::log(k as f64)).max(0.0)).collect();
     let sum: f64 = raw.iter().sum();
     raw.into_iter().map(|u| u / sum - 1.0 / n as f64).collect()
+}
+
+/// The utility of each individual, by its place in the ranking.
+pub fn utility_per_individual(ranking: &[usize]) -> Vec<f64> {
+    let mut utility_of = vec![0.0; ranking.len()];
+    for (&individual, utility) in ranking.iter().zip(utilities(ranking.len())) {
+        utility_of[individual] = utility;
+    }
+    utility_of
 }
 
 #[cfg(test)]

@@ -1,0 +1,177 @@
+//! The evolutionary algorithms, all behind one interface: draw a generation,
+//! learn from its fitness.
+
+mod cma_es;
+mod cumulation;
+mod ga;
+mod linalg;
+mod openai_es;
+mod sep_cma_es;
+mod snes;
+mod xnes;
+
+use serde::{Deserialize, Serialize};
+use sim_core::{
+    config::{AlgorithmName, AlgorithmParams},
+    random::Stream,
+};
+
+use super::Genotype;
+use cma_es::CmaEs;
+use ga::Ga;
+use openai_es::OpenAiEs;
+use sep_cma_es::SepCmaEs;
+use snes::Snes;
+use xnes::Xnes;
+
+/// Genes that an algorithm with a d x d matrix may have. One generation of 100
+/// individuals costs the coordinator about two seconds there and grows with the
+/// cube of d; the checkpoint reaches 20 MB.
+pub const FULL_MATRIX_GENES_MAX: usize = 1000;
+
+/// What an algorithm draws for one generation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Genes of each individual, within \[0, 1\].
+    pub genotypes: Vec<Genotype>,
+    /// The standard normal draws behind each individual, for algorithms that
+    /// learn from those; else empty.
+    pub normals: Vec<Vec<f64>>,
+}
+
+/// An algorithm between two generations. Its state is plain numbers: whoever
+/// restores it draws and learns the same bits.
+pub trait Strategy {
+    /// Draws `population_size` individuals. A pure function of the state and
+    /// the stream.
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
+
+    /// Learns from a generation that [`sample`](Self::sample) drew from this
+    /// state.
+    ///
+    /// `fitness`: one value per individual; at least one is finite. `ranking`:
+    /// indices of the individuals, best first, those whose fitness is not finite
+    /// last (see [`ranking`](super::ranking::ranking)).
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]);
+}
+
+/// The algorithms, each with its state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Algorithm {
+    /// Genetic algorithm.
+    Ga(Ga),
+    /// Separable natural evolution strategy.
+    Snes(Snes),
+    /// Exponential natural evolution strategy.
+    Xnes(Xnes),
+    /// Covariance matrix adaptation.
+    CmaEs(CmaEs),
+    /// Covariance matrix adaptation with a diagonal matrix.
+    SepCmaEs(SepCmaEs),
+    /// OpenAI's evolution strategy.
+    OpenAiEs(OpenAiEs),
+}
+
+/// Why an algorithm cannot evolve a population: a limit that depends on more
+/// than one key of the configuration.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unsuitable {
+    /// The segment is empty.
+    #[error("the population has no genes: nothing that its `objects` name exists")]
+    NoGenes,
+    /// Nobody would be bred.
+    #[error("must be below population_size ({population_size}), is {n_elite}")]
+    OnlyElite {
+        /// `num_elite`.
+        n_elite: usize,
+        /// P.
+        population_size: usize,
+    },
+    /// There is nothing to compare.
+    #[error("this algorithm compares individuals: at least 2 are needed")]
+    TooFewIndividuals,
+    /// A matrix of this size costs too much.
+    #[error(
+        "a population of {d} genes is too large for this algorithm, whose cost grows with the cube \
+         of the genes (at most {FULL_MATRIX_GENES_MAX}); use \"sep-CMA-ES\" or \"SNES\""
+    )]
+    TooManyGenes {
+        /// Genes of the population.
+        d: usize,
+    },
+}
+
+impl Algorithm {
+    /// An algorithm at its start. `d`: genes of the population.
+    pub fn new(
+        name: AlgorithmName,
+        params: &AlgorithmParams,
+        d: usize,
+        population_size: usize,
+    ) -> Result<Self, Unsuitable> {
+        if d == 0 {
+            return Err(Unsuitable::NoGenes);
+        }
+        let compares = matches!(params, AlgorithmParams::CmaEs(_) | AlgorithmParams::OpenAiEs(_));
+        if compares && population_size < 2 {
+            return Err(Unsuitable::TooFewIndividuals);
+        }
+        let has_full_matrix = matches!(name, AlgorithmName::Xnes | AlgorithmName::CmaEs);
+        if has_full_matrix && d > FULL_MATRIX_GENES_MAX {
+            return Err(Unsuitable::TooManyGenes { d });
+        }
+        Ok(match params {
+            AlgorithmParams::Ga(params) => Self::Ga(Ga::new(params, d, population_size)?),
+            AlgorithmParams::Snes(params) => Self::Snes(Snes::new(params, d)),
+            AlgorithmParams::Xnes(params) => Self::Xnes(Xnes::new(params, d)),
+            AlgorithmParams::CmaEs(params) if name == AlgorithmName::SepCmaEs => {
+                Self::SepCmaEs(SepCmaEs::new(params, d))
+            }
+            AlgorithmParams::CmaEs(params) => Self::CmaEs(CmaEs::new(params, d)),
+            AlgorithmParams::OpenAiEs(params) => Self::OpenAiEs(OpenAiEs::new(params, d)),
+        })
+    }
+
+    fn strategy(&self) -> &dyn Strategy {
+        match self {
+            Self::Ga(ga) => ga,
+            Self::Snes(snes) => snes,
+            Self::Xnes(xnes) => xnes,
+            Self::CmaEs(cma_es) => cma_es,
+            Self::SepCmaEs(sep_cma_es) => sep_cma_es,
+            Self::OpenAiEs(openai_es) => openai_es,
+        }
+    }
+
+    fn strategy_mut(&mut self) -> &mut dyn Strategy {
+        match self {
+            Self::Ga(ga) => ga,
+            Self::Snes(snes) => snes,
+            Self::Xnes(xnes) => xnes,
+            Self::CmaEs(cma_es) => cma_es,
+            Self::SepCmaEs(sep_cma_es) => sep_cma_es,
+            Self::OpenAiEs(openai_es) => openai_es,
+        }
+    }
+}
+
+impl Strategy for Algorithm {
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        self.strategy().sample(population_size, rng)
+    }
+
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
+        self.strategy_mut().learn(sample, ranking, fitness);
+    }
+}
+
+/// `n` vectors of `d` independent standard normals, in this order.
+fn draw_normals(n: usize, d: usize, rng: &mut Stream) -> Vec<Vec<f64>> {
+    (0..n).map(|_| (0..d).map(|_| rng.normal()).collect()).collect()
+}
+
+/// e^x, but finite: an update with a learning rate beyond reason must not make
+/// NaN of 0 * infinity.
+fn finite_exp(x: f64) -> f64 {
+    libm::exp(x).min(f64::MAX)
+}

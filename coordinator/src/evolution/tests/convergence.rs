@@ -1,0 +1,1 @@
+//! Every algorithm finds the optimum of functions that it should.
