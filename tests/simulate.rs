@@ -166,6 +166,13 @@ fn a_file_is_validated_with_all_its_problems() {
 }
 
 #[test]
+fn every_shipped_experiment_is_valid() {
+    let outcome = swarmctl([PathBuf::from("validate")].into_iter().chain(shipped()));
+    let reports: Value = serde_json::from_str(&outcome.expect_success().stdout).unwrap();
+    assert!(reports.as_array().unwrap().iter().all(|report| report["ok"] == true));
+}
+
+#[test]
 fn the_schema_knows_the_keys_of_experiment_files() {
     let outcome = swarmctl(["schema"]).expect_success();
     let schema: Value = serde_json::from_str(&outcome.stdout).unwrap();

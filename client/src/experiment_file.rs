@@ -149,9 +149,14 @@ pub mod tests {
 
     use super::*;
 
-    /// A shipped experiment, small and evolved by SNES.
+    /// An experiment of the project.
+    pub fn shipped(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../configs/{name}.json"))
+    }
+
+    /// The smallest of them, evolved by SNES.
     pub fn quickstart() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/quickstart.json")
+        shipped("quickstart")
     }
 
     #[test]

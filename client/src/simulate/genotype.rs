@@ -69,7 +69,19 @@ fn random(compiled: &Compiled) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use coordinator::evolution::Evolution;
+
     use super::*;
+    use crate::experiment_file::{ExperimentFile, Overrides, tests::shipped};
+
+    #[test]
+    fn a_random_genotype_is_the_first_that_a_ga_evaluates() {
+        let file = ExperimentFile::read(&shipped("leader_selection_ga")).unwrap();
+        let compiled = file.compile(&Overrides { seed: Some(7), ..Overrides::default() }).unwrap();
+        let segments = compiled.experiment.population_segments();
+        let evolution = Evolution::new(&compiled.config, segments).unwrap();
+        assert_eq!(random(&compiled), evolution.ask().genotypes[0][..]);
+    }
 
     #[test]
     fn genes_stand_alone_or_in_an_object() {
