@@ -4,6 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum, value_parser};
 
+use crate::{
+    error::Error,
+    experiment_file::{Compiled, ExperimentFile, Overrides},
+};
+
 /// Evolves controllers for swarms of robots.
 #[derive(Debug, Parser)]
 #[command(name = "swarmctl", version, after_help = AFTER_HELP)]
@@ -44,6 +49,22 @@ pub enum Command {
     /// experiment to its end. Interrupted, it loses at most one generation: the
     /// same command continues it.
     Run(RunArgs),
+    /// Check experiment files, here and without a coordinator.
+    ///
+    /// Prints a line per good file, and every problem of every bad one.
+    Validate {
+        /// The experiment files.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+    },
+    /// Print the JSON Schema of experiment files, for editors that complete and
+    /// check them.
+    Schema,
+    /// Simulate single episodes here, and show how well a genotype does.
+    ///
+    /// Fitness and measures are the same, bit for bit, as in evolution: a champion
+    /// in the worlds of its generation gets the fitness that is stored with it.
+    Simulate(SimulateArgs),
     #[command(flatten)]
     Remote(RemoteCommand),
 }
@@ -110,12 +131,99 @@ pub struct ExperimentArgs {
     pub seed: Option<u64>,
 }
 
+impl ExperimentArgs {
+    /// What to change.
+    pub fn overrides(&self) -> Overrides {
+        let Self { seed, generations, .. } = *self;
+        Overrides { seed, generations, ..Overrides::default() }
+    }
+
+    /// The file, if the experiment can be evolved.
+    pub fn checked_file(&self) -> Result<ExperimentFile, Error> {
+        let file = ExperimentFile::read(&self.config);
+        let checked = file.and_then(|file| file.check(&self.overrides()).map(|_| file));
+        checked.map_err(|error| Error::invalid(&self.config, &error))
+    }
+}
+
+/// What to simulate.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct SimulateArgs {
+    /// The experiment file.
+    pub config: PathBuf,
+    /// File of the genotype: a JSON list of genes, or an object with a `genotype`,
+    /// such as a champion file.
+    ///
+    /// Without it, and without --experiment, genes are drawn uniformly from the
+    /// streams (seed, generation 0, trial 0, evolution, population): the first
+    /// individual of a GA.
+    #[arg(long, value_name = "FILE", conflicts_with = "experiment")]
+    pub genotype: Option<PathBuf>,
+    /// Take the champion of this experiment of the coordinator.
+    #[arg(long, value_name = "ID")]
+    pub experiment: Option<u64>,
+    /// Seed of all randomness, instead of the file's.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Generation, from 0, whose worlds to simulate.
+    #[arg(long, value_name = "G", default_value_t = 0)]
+    pub generation: u64,
+    /// Number of trials, instead of the file's.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    pub trials: Option<u32>,
+    /// Number of steps per trial, instead of the file's.
+    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
+    pub steps: Option<u32>,
+    /// Write everything that every robot does to this CSV file.
+    ///
+    /// One row per trial, step and robot. Columns:
+    ///
+    ///   trial, step, robot       numbers, from 0
+    ///   object                   the robot's object in the experiment file
+    ///   x_cm, y_cm               position at the end of the step
+    ///   heading_rad              heading at the end of the step, in [0, 2 pi)
+    ///   wheel_right, wheel_left  actions, in [-1, 1]
+    ///   led                      colour, 0 off
+    ///   mode                     send or relay
+    ///   message_0, ...           own message; on the air if the mode is send
+    ///   frame_originator         robot whose message was received; empty if none
+    ///   frame_hops               emissions of that message, from 1
+    ///   frame_sector             sector that received it, from 0
+    ///   frame_signal             its strength, in (0, 1]
+    ///   stimulus_NAME_0, ...     inputs of the controller
+    ///   light_0_x_cm, ...        positions of the lights during the step
+    ///   step_fitness             fitness of the step; empty if it does not count
+    ///   metric_NAME, ...         measures of the task in this step
+    ///
+    /// The last three kinds are the same for all robots of a step.
+    #[arg(long, value_name = "FILE", verbatim_doc_comment)]
+    pub trace: Option<PathBuf>,
+}
+
+impl SimulateArgs {
+    /// What to change.
+    pub fn overrides(&self) -> Overrides {
+        let Self { seed, steps, trials, .. } = *self;
+        Overrides { seed, steps, trials, ..Overrides::default() }
+    }
+
+    /// What the file describes, changed.
+    pub fn compiled(&self) -> Result<Compiled, Error> {
+        let file = ExperimentFile::read(&self.config);
+        let compiled = file.and_then(|file| file.compile(&self.overrides()));
+        compiled.map_err(|error| Error::invalid(&self.config, &error))
+    }
+}
+
 const AFTER_HELP: &str = "\
 Examples:
   swarmctl run experiment.json --generations 20
   swarmctl submit experiment.json --seed 7 --watch
   swarmctl watch 3 --output json | jq .best
   swarmctl champion 3 > champion.json
+  swarmctl validate experiments/*.json
+  swarmctl schema > experiment.schema.json
+  swarmctl simulate experiment.json --genotype champion.json --trace trace.csv
 
 JSON lines of run, watch and submit --watch: one per generation (numbered from
 0), then one with state, digest and champion.
@@ -123,7 +231,7 @@ JSON lines of run, watch and submit --watch: one per generation (numbered from
 Exit codes:
   0    done
   1    internal error
-  2    bad input: arguments, experiment file, data directory
+  2    bad input: arguments, experiment file, genotype, data directory, trace file
   3    no such experiment, or it has no champion yet
   4    the coordinator cannot be reached
   5    the experiment failed or was cancelled (run, watch, submit --watch)

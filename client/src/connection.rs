@@ -61,6 +61,12 @@ impl Connection {
         Self { patience, ..self.clone() }
     }
 
+    /// The coordinator's address.
+    #[cfg(test)]
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
     /// How long to try.
     pub fn patience(&self) -> Duration {
         self.patience

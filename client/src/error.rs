@@ -1,7 +1,11 @@
 //! Everything that ends a command early: what to say, and the exit code.
 
-use std::{io, path::PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
+use sim_core::config::ConfigError;
 use tonic::{Code, Status};
 
 /// Why a command did not do what it was asked.
@@ -10,12 +14,12 @@ pub enum Error {
     /// Bad input; the message says what would be right.
     #[error("{0}")]
     Input(String),
-    /// An experiment file with problems, one per line.
+    /// An experiment file with problems.
     #[error("{} is not a valid experiment file", file.display())]
     Config {
         /// The file.
         file: PathBuf,
-        /// The coordinator's words.
+        /// One per line.
         problems: String,
     },
     /// The coordinator of `run` does not start, which is the data directory's
@@ -66,6 +70,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// What is wrong with an experiment file.
+    pub fn invalid(file: &Path, error: &ConfigError) -> Self {
+        Self::Config { file: file.into(), problems: error.to_string() }
+    }
+
     /// See `swarmctl --help`.
     pub fn exit_code(&self) -> u8 {
         match self {

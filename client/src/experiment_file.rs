@@ -1,20 +1,19 @@
-//! Experiment files on their way to the coordinator, which is who judges them.
+//! Experiment files: read, checked, and on their way to a coordinator.
 
 use std::{
     fs::File,
     io::{self, Read as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
+use coordinator::evolution::Evolution;
+use sim_core::{
+    Experiment,
+    config::{ConfigError, ExperimentConfig, Problem, limits},
+};
 use swarm_proto::v1::SubmitExperimentRequest;
 
-use crate::{
-    args::ExperimentArgs,
-    error::{Error, prefix_lines},
-};
-
-/// Largest file that is read.
-const BYTES_MAX: u64 = 1 << 20;
+use crate::error::{Error, prefix_lines};
 
 /// Longest default name that the protocol carries.
 const NAME_BYTES_MAX: usize = 128;
@@ -26,33 +25,65 @@ pub struct ExperimentFile {
     text: String,
 }
 
+/// What to change in an experiment.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Overrides {
+    pub seed: Option<u64>,
+    pub generations: Option<u64>,
+    pub steps: Option<u32>,
+    pub trials: Option<u32>,
+}
+
+/// An experiment that can be simulated.
+#[derive(Debug)]
+pub struct Compiled {
+    pub config: ExperimentConfig,
+    pub experiment: Experiment,
+    /// What the file says and nobody heeds, and what keeps its default.
+    pub warnings: Vec<Problem>,
+}
+
 impl ExperimentFile {
     /// Reads a file of UTF-8 text of at most 1 MiB.
-    pub fn read(path: &std::path::Path) -> Result<Self, Error> {
-        let problem =
-            |what: String| Error::Input(format!("cannot read {}: {what}", path.display()));
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let problem = |what: String| ConfigError {
+            problems: vec![unlocated(format!("cannot be read: {what}"))],
+        };
         let mut bytes = Vec::new();
         File::open(path)
-            .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes))
+            .and_then(|file| file.take(limits::FILE_BYTES as u64 + 1).read_to_end(&mut bytes))
             .map_err(|error: io::Error| problem(error.to_string()))?;
-        if bytes.len() as u64 > BYTES_MAX {
+        if bytes.len() > limits::FILE_BYTES {
             return Err(problem("an experiment file has at most 1 MiB".into()));
         }
         let text = String::from_utf8(bytes).map_err(|error| problem(error.to_string()))?;
         Ok(Self { path: path.into(), text })
     }
 
+    /// Makes sure, as the coordinator will, that the experiment can be evolved.
+    pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
+        let compiled = self.compile(overrides)?;
+        Evolution::new(&compiled.config, compiled.experiment.population_segments())?;
+        Ok(compiled)
+    }
+
+    /// Makes the experiment ready to be simulated.
+    pub fn compile(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
+        let (config, mut warnings) = ExperimentConfig::from_json(&self.text, &self.default_name())?;
+        let config = overrides.apply(config)?;
+        let experiment = Experiment::compile(&config)?;
+        warnings.extend(experiment.uncovered_parameters().iter().cloned().map(unlocated));
+        Ok(Compiled { config, experiment, warnings })
+    }
+
     /// The request to submit it; `request_id` makes it safe to repeat.
-    pub fn request(&self, args: &ExperimentArgs, request_id: String) -> SubmitExperimentRequest {
-        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= NAME_BYTES_MAX;
-        let name = stem.char_indices().take_while(fits).map(|(_, c)| c).collect();
+    pub fn request(&self, overrides: &Overrides, request_id: String) -> SubmitExperimentRequest {
         SubmitExperimentRequest {
             request_id,
             config_json: self.text.clone(),
-            default_name: name,
-            seed: args.seed,
-            generations: args.generations,
+            default_name: self.default_name(),
+            seed: overrides.seed,
+            generations: overrides.generations,
             resume_unfinished: false,
         }
     }
@@ -71,6 +102,40 @@ impl ExperimentFile {
         let prefix = format!("warning: {}", self.path.display());
         (!text.is_empty()).then(|| prefix_lines(&text, &prefix))
     }
+
+    /// The file's stem, as far as the protocol carries it.
+    fn default_name(&self) -> String {
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= NAME_BYTES_MAX;
+        stem.char_indices().take_while(fits).map(|(_, c)| c).collect()
+    }
+}
+
+impl Overrides {
+    /// The format's limits hold for what replaces parts of a file, too.
+    fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
+        if *self == Self::default() {
+            return Ok(config);
+        }
+        let algorithm = &mut config.algorithm;
+        config.seed = self.seed.unwrap_or(config.seed);
+        algorithm.generations = self.generations.unwrap_or(algorithm.generations);
+        algorithm.evaluation_steps = self.steps.unwrap_or(algorithm.evaluation_steps);
+        algorithm.num_evaluations = self.trials.unwrap_or(algorithm.num_evaluations);
+        match ExperimentConfig::from_json(&config.to_canonical_json(), &config.name) {
+            Ok((config, _)) => Ok(config),
+            Err(mut error) => {
+                // Lines of the canonical form mean nothing to anybody.
+                error.problems.iter_mut().for_each(|problem| problem.line = None);
+                Err(error)
+            }
+        }
+    }
+}
+
+/// A remark about a file as a whole.
+fn unlocated(message: String) -> Problem {
+    Problem { path: String::new(), line: None, message }
 }
 
 /// An id that nobody else chooses.
@@ -79,13 +144,19 @@ pub fn random_request_id(kind: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::{fs, path::Path};
+pub mod tests {
+    use std::fs;
 
     use super::*;
 
-    fn args(config: &Path) -> ExperimentArgs {
-        ExperimentArgs { config: config.into(), generations: Some(3), seed: None }
+    /// An experiment of the project.
+    pub fn shipped(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../configs/{name}.json"))
+    }
+
+    /// The smallest of them, evolved by SNES.
+    pub fn quickstart() -> PathBuf {
+        shipped("quickstart")
     }
 
     #[test]
@@ -93,7 +164,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("leader.selection.json");
         fs::write(&path, "{ \"seed\": 1 } // ü").unwrap();
-        let request = ExperimentFile::read(&path).unwrap().request(&args(&path), "id".into());
+        let overrides = Overrides { generations: Some(3), ..Overrides::default() };
+        let request = ExperimentFile::read(&path).unwrap().request(&overrides, "id".into());
         assert_eq!(request.config_json, "{ \"seed\": 1 } // ü");
         assert_eq!(request.default_name, "leader.selection");
         assert_eq!((request.generations, request.seed), (Some(3), None));
@@ -101,16 +173,14 @@ mod tests {
 
     #[test]
     fn a_long_file_name_gives_a_shorter_default_name() {
-        let file = ExperimentFile {
-            path: format!("x{}.json", "ü".repeat(100)).into(),
-            text: String::new(),
-        };
-        let request = file.request(&args(&file.path), String::new());
+        let path = format!("x{}.json", "ü".repeat(100)).into();
+        let file = ExperimentFile { path, text: String::new() };
+        let request = file.request(&Overrides::default(), String::new());
         assert_eq!(request.default_name, format!("x{}", "ü".repeat(63)));
     }
 
     #[test]
-    fn what_cannot_be_an_experiment_file_is_an_input_error() {
+    fn what_cannot_be_an_experiment_file_is_a_problem_of_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let missing = dir.path().join("missing");
         let binary = dir.path().join("binary");
@@ -119,12 +189,37 @@ mod tests {
         fs::write(&huge, vec![b' '; (1 << 20) + 1]).unwrap();
         for path in [dir.path(), &missing, &binary, &huge] {
             let error = ExperimentFile::read(path).unwrap_err();
-            assert_eq!(error.exit_code(), 2);
-            assert!(error.to_string().contains(&path.display().to_string()), "{error}");
+            assert!(error.to_string().starts_with("cannot be read: "), "{error}");
         }
         let largest = dir.path().join("largest");
         fs::write(&largest, vec![b' '; 1 << 20]).unwrap();
         assert!(ExperimentFile::read(&largest).is_ok());
+    }
+
+    #[test]
+    fn overrides_replace_what_the_file_says() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let overrides = Overrides {
+            seed: Some(u64::MAX),
+            generations: Some(2),
+            steps: Some(3),
+            trials: Some(4),
+        };
+        let config = file.check(&overrides).unwrap().config;
+        let algorithm = config.algorithm;
+        assert_eq!((config.seed, algorithm.generations), (u64::MAX, 2));
+        assert_eq!((algorithm.evaluation_steps, algorithm.num_evaluations), (3, 4));
+    }
+
+    #[test]
+    fn overrides_obey_the_limits_of_files() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let overrides =
+            Overrides { steps: Some(1 + limits::STEPS), trials: Some(0), ..Overrides::default() };
+        let error = file.check(&overrides).unwrap_err();
+        let expected = ["algorithm.evaluation_steps", "algorithm.num_evaluations"];
+        assert_eq!(error.problems.iter().map(|p| &*p.path).collect::<Vec<_>>(), expected);
+        assert!(error.problems.iter().all(|problem| problem.line.is_none()));
     }
 
     #[test]

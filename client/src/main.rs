@@ -1,5 +1,6 @@
 //! `swarmctl`: submit experiments, follow them, read what they found; or run one
-//! here and now, coordinator and workers included.
+//! here and now, coordinator and workers included; or check files and watch robots
+//! without any of them.
 
 mod args;
 mod connection;
@@ -14,8 +15,10 @@ mod logs;
 mod progress;
 mod query;
 mod run;
+mod simulate;
 mod submit;
 mod text;
+mod validate;
 mod watch;
 
 use std::{
@@ -45,13 +48,21 @@ async fn main() -> ExitCode {
 }
 
 async fn execute(args: Args) -> Result<(), Error> {
-    let interrupt = interrupt::token()?;
     let mut progress = Progress::new(args.output);
     let command = match args.command {
+        // A signal ends these at once: there is nothing to put in order.
+        Command::Validate { files } => return validate::validate(&files, &mut progress),
+        Command::Schema => {
+            return progress.print(&json::document(&sim_core::config::json_schema()));
+        }
+        Command::Simulate(simulation) => {
+            return simulate::simulate(&args.coordinator, &simulation, &mut progress).await;
+        }
         // Stops what it started before it ends.
-        Command::Run(args) => return run::run(&args, progress, interrupt).await,
+        Command::Run(args) => return run::run(&args, progress, interrupt::token()?).await,
         Command::Remote(command) => command,
     };
+    let interrupt = interrupt::token()?;
     let connection = Connection::new(&args.coordinator)?;
     let result = tokio::select! {
         biased;

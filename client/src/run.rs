@@ -31,7 +31,8 @@ pub async fn run(
     mut progress: Progress,
     interrupt: CancellationToken,
 ) -> Result<(), Error> {
-    let file = ExperimentFile::read(&args.experiment.config)?;
+    // Before anything is created.
+    let file = args.experiment.checked_file()?;
     let n_workers = args
         .workers
         .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
@@ -70,7 +71,7 @@ async fn evolve(
         .collect();
     let request = SubmitExperimentRequest {
         resume_unfinished: true,
-        ..file.request(&args.experiment, random_request_id("run"))
+        ..file.request(&args.experiment.overrides(), random_request_id("run"))
     };
     let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
     let experiment = present(response.experiment)?;

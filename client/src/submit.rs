@@ -4,7 +4,7 @@ use crate::{
     args::{OutputFormat, SubmitArgs},
     connection::{Connection, present},
     error::Error,
-    experiment_file::{ExperimentFile, random_request_id},
+    experiment_file::random_request_id,
     json,
     progress::Progress,
     text, watch,
@@ -16,8 +16,8 @@ pub async fn submit(
     args: &SubmitArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let file = ExperimentFile::read(&args.experiment.config)?;
-    let request = file.request(&args.experiment, random_request_id("submit"));
+    let file = args.experiment.checked_file()?;
+    let request = file.request(&args.experiment.overrides(), random_request_id("submit"));
     let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
     if let Some(warnings) = file.warnings(&response.warnings) {
         progress.remark(&warnings);
@@ -43,22 +43,15 @@ mod tests {
     use std::{fs, path::PathBuf};
 
     use swarm_proto::v1::Experiment;
-    use tempfile::TempDir;
     use tonic::Status;
 
     use super::*;
     use crate::{
         args::ExperimentArgs,
+        experiment_file::tests::quickstart,
         fake_coordinator::{FakeCoordinator, Script},
         progress::tests::Captured,
     };
-
-    fn file() -> (TempDir, PathBuf) {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("leader.json");
-        fs::write(&path, "{}").unwrap();
-        (dir, path)
-    }
 
     fn args(config: PathBuf) -> SubmitArgs {
         let experiment = ExperimentArgs { config, generations: None, seed: Some(7) };
@@ -73,10 +66,9 @@ mod tests {
             ..Script::default()
         })
         .await;
-        let (_dir, path) = file();
         let captured = Captured::default();
         let mut progress = captured.progress(OutputFormat::Json);
-        submit(&connection, &args(path), &mut progress).await.unwrap();
+        submit(&connection, &args(quickstart()), &mut progress).await.unwrap();
         let submitted = fake.script(|script| script.submitted.clone());
         assert_eq!(submitted.len(), 3);
         assert!(submitted[0].request_id.len() > 16);
@@ -93,11 +85,26 @@ mod tests {
             ..Script::default()
         })
         .await;
-        let (_dir, path) = file();
+        let path = quickstart();
         let mut progress = Captured::default().progress(OutputFormat::Text);
         let error = submit(&connection, &args(path.clone()), &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         let path = path.display();
         assert_eq!(error.report().unwrap(), format!("{path}: line 1: a\n{path}: line 2: b"));
+    }
+
+    #[tokio::test]
+    async fn a_bad_file_is_not_submitted() {
+        let (fake, connection) = FakeCoordinator::serve(Script::default()).await;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("bad.json");
+        fs::write(&path, "{}").unwrap();
+        let mut progress = Captured::default().progress(OutputFormat::Text);
+        let error = submit(&connection, &args(path), &mut progress).await.unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        for key in ["topology", "algorithm", "world"] {
+            assert!(error.report().unwrap().contains(key), "{}", error.report().unwrap());
+        }
+        assert!(fake.script(|script| script.submitted.is_empty()));
     }
 }

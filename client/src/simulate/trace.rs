@@ -1,0 +1,173 @@
+//! The trace: everything that every robot does, as CSV (RFC 4180).
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, Write as _},
+    path::{Path, PathBuf},
+};
+
+use indexmap::IndexSet;
+use sim_core::{
+    Mode, ReceivedFrame, RobotRecord, StepRecord,
+    config::{ExperimentConfig, RobotController},
+};
+
+use crate::error::Error;
+
+/// A CSV file in the making: one row per trial, step and robot.
+pub struct Trace {
+    path: PathBuf,
+    rows: Rows<BufWriter<File>>,
+    /// The first failure; nothing is written after it.
+    result: io::Result<()>,
+}
+
+impl Trace {
+    /// Creates the file, or empties it.
+    pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, Error> {
+        let file = File::create(path).map_err(|error| unwritable(path, &error))?;
+        let rows = Rows::new(BufWriter::new(file), config);
+        Ok(Self { path: path.into(), rows, result: Ok(()) })
+    }
+
+    /// Adds a step.
+    pub fn record(&mut self, trial: u32, record: &StepRecord) {
+        if self.result.is_ok() {
+            self.result = self.rows.write(trial, record);
+        }
+    }
+
+    /// Ends the file; returns its number of rows, or what went wrong at any time.
+    pub fn finish(self) -> Result<u64, Error> {
+        let Self { path, mut rows, result } = self;
+        let flushed = result.and_then(|()| rows.out.flush());
+        flushed.map(|()| rows.n_rows).map_err(|error| unwritable(&path, &error))
+    }
+}
+
+fn unwritable(path: &Path, error: &io::Error) -> Error {
+    Error::Input(format!("cannot write {}: {error}", path.display()))
+}
+
+/// The rows, on their way to a writer.
+struct Rows<W> {
+    out: W,
+    /// Per robot, the object that it belongs to.
+    robots: Vec<usize>,
+    objects: Vec<Object>,
+    /// Names of all inputs of all controllers.
+    stimuli: IndexSet<String>,
+    n_rows: u64,
+}
+
+/// What its robots have in common.
+struct Object {
+    name: String,
+    /// Per input of the controller, its place in `Rows::stimuli`.
+    inputs: Vec<usize>,
+}
+
+impl<W: io::Write> Rows<W> {
+    fn new(out: W, config: &ExperimentConfig) -> Self {
+        let (mut robots, mut objects, mut stimuli) = (Vec::new(), Vec::new(), IndexSet::new());
+        for (name, robot) in config.robots() {
+            let inputs: Vec<(&str, u32)> = match robot.controller {
+                RobotController::NeuralController => {
+                    let stimuli = config.topology.stimuli.iter();
+                    stimuli.map(|(name, stimulus)| (name.as_str(), stimulus.n)).collect()
+                }
+                RobotController::BraitenbergLightFollower => {
+                    let sensor = robot.sensors.light_sensor.iter();
+                    sensor.map(|sensor| ("light_sensor", sensor.n_sectors)).collect()
+                }
+            };
+            let inputs = inputs.iter().flat_map(|(name, n)| (0..*n).map(move |i| (name, i)));
+            let inputs = inputs.map(|(name, i)| stimuli.insert_full(format!("{name}_{i}")).0);
+            robots.extend((0..robot.num_instances).map(|_| objects.len()));
+            objects.push(Object { name: name.to_owned(), inputs: inputs.collect() });
+        }
+        Self { out, robots, objects, stimuli, n_rows: 0 }
+    }
+
+    fn write(&mut self, trial: u32, record: &StepRecord) -> io::Result<()> {
+        if self.n_rows == 0 {
+            writeln!(self.out, "{}", self.heading(record).join(","))?;
+        }
+        for (index, robot) in record.robots.iter().enumerate() {
+            let object = &self.objects[self.robots[index]];
+            let mut row = vec![
+                trial.to_string(),
+                record.step.to_string(),
+                index.to_string(),
+                quoted(&object.name),
+            ];
+            row.extend(robot_cells(robot));
+            let mut stimuli = vec![String::new(); self.stimuli.len()];
+            for (place, value) in object.inputs.iter().zip(&robot.stimuli) {
+                stimuli[*place] = number(*value);
+            }
+            row.extend(stimuli);
+            row.extend(record.lights.iter().flat_map(|light| [number(light.x), number(light.y)]));
+            row.push(record.fitness.map(number).unwrap_or_default());
+            row.extend(record.metrics.values().copied().map(number));
+            writeln!(self.out, "{}", row.join(","))?;
+            self.n_rows += 1;
+        }
+        Ok(())
+    }
+
+    /// Messages, lights and measures are the same in all steps of an experiment,
+    /// values aside.
+    fn heading(&self, record: &StepRecord) -> Vec<String> {
+        let place = ["trial", "step", "robot", "object", "x_cm", "y_cm", "heading_rad"];
+        let actions = ["wheel_right", "wheel_left", "led", "mode"];
+        let frame = ["frame_originator", "frame_hops", "frame_sector", "frame_signal"];
+        let message_len = record.robots.first().map_or(0, |robot| robot.message.len());
+        let mut heading: Vec<String> =
+            place.iter().chain(&actions).map(ToString::to_string).collect();
+        heading.extend((0..message_len).map(|i| format!("message_{i}")));
+        heading.extend(frame.map(String::from));
+        heading.extend(self.stimuli.iter().map(|input| quoted(&format!("stimulus_{input}"))));
+        let light = |i| [format!("light_{i}_x_cm"), format!("light_{i}_y_cm")];
+        heading.extend((0..record.lights.len()).flat_map(light));
+        heading.push("step_fitness".into());
+        heading.extend(record.metrics.keys().map(|name| format!("metric_{name}")));
+        heading
+    }
+}
+
+/// From the position to the received frame.
+fn robot_cells(robot: &RobotRecord) -> Vec<String> {
+    let [right, left] = robot.wheels;
+    let mut cells: Vec<String> =
+        [robot.position.x, robot.position.y, robot.heading, right, left].map(number).into();
+    cells.push(robot.led.to_string());
+    let mode = match robot.mode {
+        Mode::Send => "send",
+        Mode::Relay => "relay",
+    };
+    cells.push(mode.into());
+    cells.extend(robot.message.iter().copied().map(number));
+    cells.extend(robot.received.map_or_else(Default::default, |frame| {
+        let ReceivedFrame { originator, hops, sector, signal } = frame;
+        [originator.to_string(), hops.to_string(), sector.to_string(), number(signal)]
+    }));
+    cells
+}
+
+/// The shortest decimal that reads back to the same bits.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// A name, which may contain what separates cells but no control characters.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.into()
+    }
+}
+
+#[cfg(test)]
+mod tests;

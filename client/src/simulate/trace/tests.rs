@@ -1,0 +1,112 @@
+//! Rows of small swarms.
+
+use std::{fs, path::Path};
+
+use sim_core::Experiment;
+
+use super::*;
+use crate::experiment_file::tests::quickstart;
+
+/// The quickstart, shorter, with more objects before its own.
+fn config(objects: &str) -> ExperimentConfig {
+    let text = fs::read_to_string(quickstart()).unwrap();
+    let text = text
+        .replace("\"evaluation_steps\": 100", "\"evaluation_steps\": 30")
+        .replace("\"objects\": {", &format!("\"objects\": {{ {objects}"));
+    ExperimentConfig::from_json(&text, "").unwrap().0
+}
+
+/// Heading and rows of the first trial, and what they were made from.
+fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
+    let experiment = Experiment::compile(config).unwrap();
+    let genotype = vec![0.6; experiment.genotype_len()];
+    let (mut rows, mut records) = (Rows::new(Vec::new(), config), Vec::new());
+    let mut observe = |record| {
+        rows.write(4, &record).unwrap();
+        records.push(record);
+    };
+    experiment.simulate(&genotype, 0, 0, &mut observe).unwrap();
+    let text = String::from_utf8(rows.out).unwrap();
+    let cells = |line: &str| line.split(',').map(String::from).collect();
+    (text.lines().map(cells).collect(), records)
+}
+
+#[test]
+fn every_robot_has_a_row_in_every_step_and_numbers_read_back_exactly() {
+    let (rows, records) = trace(&config(""));
+    let (heading, rows) = rows.split_first().unwrap();
+    assert_eq!(rows.len(), 30 * 5);
+    let column = |name: &str| heading.iter().position(|cell| cell == name).unwrap();
+    let mut n_received = 0;
+    for (row, (step, robot)) in rows.iter().zip((0..30).flat_map(|s| (0..5).map(move |r| (s, r)))) {
+        assert_eq!(row.len(), heading.len());
+        let text = |name: &str| row[column(name)].as_str();
+        let bits = |name: &str| text(name).parse::<f64>().unwrap().to_bits();
+        let record = &records[step].robots[robot];
+        assert_eq!(row[..4], ["4".to_owned(), step.to_string(), robot.to_string(), "robot".into()]);
+        assert_eq!(bits("x_cm"), record.position.x.to_bits());
+        assert_eq!(bits("heading_rad"), record.heading.to_bits());
+        assert_eq!(bits("message_1"), record.message[1].to_bits());
+        assert_eq!(bits("stimulus_message_1"), record.stimuli[1].to_bits());
+        assert_eq!(bits("stimulus_direction_0"), record.stimuli[3].to_bits());
+        assert_eq!(text("led"), record.led.to_string());
+        let originator = record.received.map(|frame| frame.originator.to_string());
+        assert_eq!(text("frame_originator"), originator.unwrap_or_default());
+        n_received += usize::from(record.received.is_some());
+        let fitness = records[step].fitness.map(number).unwrap_or_default();
+        assert_eq!(text("step_fitness"), fitness);
+        assert_eq!(bits("metric_one_leader"), records[step].metrics["one_leader"].to_bits());
+    }
+    assert!(n_received > 0);
+}
+
+#[test]
+fn robots_with_other_controllers_have_columns_of_their_own_and_lights_have_places() {
+    let (rows, records) = trace(&config(
+        r#"
+        "follower": {
+            "type": "robot", "num_instances": 1, "controller": "braitenberg_light_follower",
+            "sensors": {"light_sensor": {"n_sectors": 2}},
+            "actuators": {"wheel_actuator": {}},
+            "initializers": {
+                "positions": {"name": "fixed", "params": {"values": [[500, 500]]}},
+                "orientations": {"name": "fixed", "params": {"values": [[0]]}}
+            }
+        },
+        "lamp": {
+            "type": "light_source", "num_instances": 1, "controller": null,
+            "initializers": {"positions": {"name": "fixed", "params": {"values": [[510, 490]]}}},
+            "params": {"range": 100, "color": "red"}
+        },"#,
+    ));
+    let heading = &rows[0];
+    let at = |row: &[String], name: &str| {
+        row[heading.iter().position(|cell| cell == name).unwrap()].clone()
+    };
+    let (robot, follower) = (&rows[2], &rows[1]);
+    assert_eq!(at(follower, "object"), "follower");
+    assert_eq!(at(follower, "stimulus_light_sensor_1"), number(records[0].robots[0].stimuli[1]));
+    assert_eq!(at(follower, "stimulus_message_0"), "");
+    assert_eq!(at(robot, "stimulus_light_sensor_1"), "");
+    assert_eq!(at(robot, "light_0_x_cm"), "510.0");
+    assert_eq!(at(robot, "light_0_y_cm"), "490.0");
+}
+
+#[test]
+fn names_cannot_break_rows() {
+    assert_eq!(quoted("robot"), "robot");
+    assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+}
+
+#[test]
+fn a_failure_is_reported_at_the_end() {
+    let full = Path::new("/dev/full");
+    if full.exists() {
+        let config = config("");
+        let mut trace = Trace::create(full, &config).unwrap();
+        let experiment = Experiment::compile(&config).unwrap();
+        let genotype = vec![0.5; experiment.genotype_len()];
+        experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, &record)).unwrap();
+        assert!(trace.finish().unwrap_err().to_string().starts_with("cannot write /dev/full: "));
+    }
+}
