@@ -66,7 +66,7 @@ fn a_champion_in_the_worlds_of_its_generation_has_the_fitness_that_is_stored() {
     let stored = fitness_bits(champion["trial_fitness"].as_array().unwrap(), |fitness| fitness);
     let again = fitness_bits(simulation["trials"].as_array().unwrap(), |trial| &trial["fitness"]);
     assert_eq!(again, stored);
-    assert_eq!(simulation["mean"]["fitness"], champion["fitness"]);
+    assert_eq!(simulation["mean"]["fitness"], champion["fitness_when_chosen"]);
 }
 
 #[test]

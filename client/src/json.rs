@@ -72,11 +72,42 @@ pub struct End<'a> {
     champion_file: Option<&'a str>,
 }
 
+/// A champion without its genes. `fitness` is the best that is known of it: that
+/// on held-out trials, or, before the first re-evaluation, that for which it was
+/// chosen.
 #[derive(Debug, Serialize)]
 struct ChampionSummary {
-    fitness: f64,
+    fitness: Option<f64>,
+    fitness_when_chosen: Option<f64>,
+    held_out: Option<HeldOut>,
     generation: u64,
-    individual: u32,
+    individual: Option<u32>,
+}
+
+impl From<&GetChampionResponse> for ChampionSummary {
+    fn from(champion: &GetChampionResponse) -> Self {
+        let held_out = champion.held_out.as_ref();
+        Self {
+            fitness: held_out.map(|held_out| held_out.mean).or(champion.fitness),
+            fitness_when_chosen: champion.fitness,
+            held_out: held_out.map(|held_out| HeldOut {
+                mean: held_out.mean,
+                ci95: held_out.ci95,
+                trials: held_out.trials,
+                generation: held_out.generation,
+            }),
+            generation: champion.generation,
+            individual: champion.individual,
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct HeldOut {
+    mean: f64,
+    ci95: f64,
+    trials: u32,
+    generation: u64,
 }
 
 impl<'a> End<'a> {
@@ -85,12 +116,8 @@ impl<'a> End<'a> {
             experiment: experiment.id,
             state: state_name(experiment.state()),
             reason: &experiment.reason,
-            digest: experiment.latest.as_ref().map(|latest| latest.digest.as_str()),
-            champion: champion.map(|champion| ChampionSummary {
-                fitness: champion.fitness,
-                generation: champion.generation,
-                individual: champion.individual,
-            }),
+            digest: Some(&*experiment.digest).filter(|digest| !digest.is_empty()),
+            champion: champion.map(ChampionSummary::from),
             champion_file: None,
         }
     }
@@ -145,9 +172,8 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
 #[derive(Debug, Serialize)]
 pub struct ChampionDocument<'a> {
     experiment: u64,
-    generation: u64,
-    individual: u32,
-    fitness: f64,
+    #[serde(flatten)]
+    summary: ChampionSummary,
     trial_fitness: &'a [f64],
     genotype: &'a [f64],
     network: serde_json::Value,
@@ -158,9 +184,7 @@ impl<'a> ChampionDocument<'a> {
     pub fn new(champion: &'a GetChampionResponse) -> serde_json::Result<Self> {
         Ok(Self {
             experiment: champion.experiment_id,
-            generation: champion.generation,
-            individual: champion.individual,
-            fitness: champion.fitness,
+            summary: champion.into(),
             trial_fitness: &champion.trial_fitness,
             genotype: &champion.genotype,
             network: serde_json::from_str(&champion.network_json)?,
@@ -171,6 +195,7 @@ impl<'a> ChampionDocument<'a> {
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
+    use swarm_proto::v1::HeldOutFitness;
 
     use super::*;
 
@@ -193,8 +218,9 @@ mod tests {
         GetChampionResponse {
             experiment_id: 3,
             generation: 7,
-            individual: 2,
-            fitness: 1.25,
+            individual: Some(2),
+            fitness: Some(1.25),
+            held_out: None,
             trial_fitness: vec![1.0, 1.5],
             genotype: vec![0.1, 1.0 / 3.0],
             network_json: r#"{"neurons":[{"tau":0.1}]}"#.into(),
@@ -229,7 +255,7 @@ mod tests {
         let experiment = Experiment {
             id: 3,
             state: ExperimentState::Completed.into(),
-            latest: Some(summary()),
+            digest: "1a2b".into(),
             ..Experiment::default()
         };
         let champion = champion();
@@ -240,9 +266,26 @@ mod tests {
                 "experiment": 3,
                 "state": "completed",
                 "digest": "1a2b",
-                "champion": {"fitness": 1.25, "generation": 7, "individual": 2},
+                "champion": {
+                    "fitness": 1.25,
+                    "fitness_when_chosen": 1.25,
+                    "held_out": null,
+                    "generation": 7,
+                    "individual": 2,
+                },
             })
         );
+    }
+
+    #[test]
+    fn the_fitness_of_a_champion_is_that_on_held_out_trials() {
+        let held_out = HeldOutFitness { mean: 1.0, ci95: 0.125, trials: 50, generation: 9 };
+        let champion = GetChampionResponse { held_out: Some(held_out), ..champion() };
+        let value = serde_json::to_value(ChampionSummary::from(&champion)).unwrap();
+        let held_out = json!({"mean": 1.0, "ci95": 0.125, "trials": 50, "generation": 9});
+        assert_eq!(value["held_out"], held_out);
+        assert_eq!(value["fitness"], 1.0);
+        assert_eq!(value["fitness_when_chosen"], 1.25);
     }
 
     #[test]

@@ -82,14 +82,31 @@ pub fn end(
         lines.push(row("mean of the last generation", &format!("{:.6}", latest.mean)));
     }
     if let Some(champion) = champion {
-        let GetChampionResponse { fitness, generation, individual, .. } = champion;
-        let text = format!("{fitness:.6} (generation {}, individual {individual})", generation + 1);
-        lines.push(row("champion", &text));
+        lines.push(row("champion", &champion_line(champion)));
     }
-    if let Some(latest) = &experiment.latest {
-        lines.push(row("digest", &latest.digest));
+    if !experiment.digest.is_empty() {
+        lines.push(row("digest", &experiment.digest));
     }
     lines.join("\n")
+}
+
+fn champion_line(champion: &GetChampionResponse) -> String {
+    let generation = champion.generation + 1;
+    let origin = match champion.individual {
+        Some(individual) => format!("generation {generation}, individual {individual}"),
+        None => format!("mean after generation {generation}"),
+    };
+    let chosen = champion.fitness.map(|fitness| format!("{fitness:.6} when chosen"));
+    match (&champion.held_out, chosen) {
+        (Some(held_out), chosen) => {
+            let chosen = chosen.map_or_else(String::new, |chosen| format!("{chosen}, "));
+            let (mean, ci95) = (held_out.mean, held_out.ci95);
+            let n = held_out.trials;
+            format!("{mean:.6} +- {ci95:.6} on {n} held-out trials ({chosen}{origin})")
+        }
+        (None, Some(chosen)) => format!("{chosen} ({origin})"),
+        (None, None) => origin,
+    }
 }
 
 /// Where `run` has left things.
@@ -172,6 +189,8 @@ pub fn shell_command(args: impl IntoIterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use swarm_proto::v1::HeldOutFitness;
+
     use super::*;
 
     fn summary(generation: u64) -> GenerationSummary {
@@ -200,6 +219,7 @@ mod tests {
             genotype_len: 455,
             latest: Some(summary(11)),
             champion_fitness: Some(2.0),
+            digest: "1a2b3c4d5e6f7a8b".into(),
             ..Experiment::default()
         }
     }
@@ -223,8 +243,9 @@ mod tests {
     fn the_end_tells_the_whole_story() {
         let champion = GetChampionResponse {
             generation: 6,
-            individual: 4,
-            fitness: 2.0,
+            individual: Some(4),
+            fitness: Some(2.0),
+            held_out: Some(HeldOutFitness { mean: 1.5, ci95: 0.25, trials: 50, generation: 11 }),
             ..GetChampionResponse::default()
         };
         let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion));
@@ -233,7 +254,7 @@ mod tests {
             "experiment 3 (leader) completed after 12 of 40 generations\n  \
              best of the first generation  0.500000\n  \
              mean of the last generation   0.456100\n  \
-             champion                      2.000000 (generation 7, individual 4)\n  \
+             champion                      1.500000 +- 0.250000 on 50 held-out trials (2.000000 when chosen, generation 7, individual 4)\n  \
              digest                        1a2b3c4d5e6f7a8b"
         );
     }

@@ -20,7 +20,7 @@ async fn events_are_shown_once_and_in_order_however_often_the_stream_breaks() {
         experiment: experiment(completed),
         champion: Some(GetChampionResponse {
             experiment_id: 3,
-            fitness: 2.5,
+            fitness: Some(2.5),
             ..Default::default()
         }),
         watches: [
