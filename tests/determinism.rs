@@ -49,6 +49,24 @@ fn separate_processes_and_one_process_give_the_same_bits() {
 }
 
 #[test]
+fn more_generations_continue_a_completed_run_to_the_same_bits() {
+    let experiment = Experiment::small(4);
+    let path = experiment.path();
+    let directory = tempfile::tempdir().unwrap();
+    let run = |generations: &str, data_dir: &std::path::Path| {
+        let args = ["run", path.to_str().unwrap(), "--generations", generations, "--data-dir"];
+        let args = args.into_iter().chain([data_dir.to_str().unwrap()]);
+        swarmctl(args).expect_success().json_lines()
+    };
+    let short = run("2", directory.path());
+    let raised = run("4", directory.path());
+    let at_once = run("4", &directory.path().join("other"));
+    assert_eq!(raised.last().unwrap()["experiment"], short.last().unwrap()["experiment"]);
+    assert_eq!(raised.len(), 5);
+    assert_eq!(timeless(&raised), timeless(&at_once));
+}
+
+#[test]
 fn another_seed_gives_other_bits() {
     let experiment = Experiment::small(1);
     let as_configured = run_embedded(&experiment, 2, &[]);

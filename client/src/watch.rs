@@ -93,7 +93,7 @@ enum StreamEnd {
 impl Follower<'_> {
     /// Returns the best fitness of the first generation, once all is over.
     async fn run(mut self) -> Result<Option<f64>, Error> {
-        let mut seen = Seen { next_sequence: 1, first_best: None };
+        let mut seen = Seen { next_sequence: 1, first_best: None, is_over: false };
         let mut backoff = backoff();
         let mut unreachable_since = None;
         loop {
@@ -138,10 +138,9 @@ impl Follower<'_> {
         loop {
             match events.message().await {
                 Ok(Some(response)) => {
-                    if self.show(present(response.event)?, seen)? {
-                        return Ok(StreamEnd::Final);
-                    }
+                    self.show(present(response.event)?, seen)?;
                 }
+                Ok(None) if seen.is_over => return Ok(StreamEnd::Final),
                 Ok(None) => return Ok(StreamEnd::Broken("it ended the stream".into())),
                 Err(status) if is_transient(&status) => {
                     return Ok(StreamEnd::Broken(reason(&status)));
@@ -151,10 +150,10 @@ impl Follower<'_> {
         }
     }
 
-    /// Shows an event once; true if it is the experiment's last.
-    fn show(&mut self, event: Event, seen: &mut Seen) -> Result<bool, Error> {
+    /// Shows an event once.
+    fn show(&mut self, event: Event, seen: &mut Seen) -> Result<(), Error> {
         if event.sequence < seen.next_sequence {
-            return Ok(false);
+            return Ok(());
         }
         seen.next_sequence = event.sequence + 1;
         match event.kind {
@@ -163,19 +162,18 @@ impl Follower<'_> {
                     seen.first_best = Some(summary.best);
                 }
                 self.progress.generation(&summary)?;
-                Ok(false)
             }
-            Some(Kind::StateChanged(change)) => Ok(!matches!(
-                change.state(),
-                ExperimentState::Running | ExperimentState::Unspecified
-            )),
-            Some(Kind::Notice(notice)) => {
-                self.progress.remark(&notice.message);
-                Ok(false)
+            Some(Kind::StateChanged(change)) => {
+                seen.is_over = !matches!(
+                    change.state(),
+                    ExperimentState::Running | ExperimentState::Unspecified
+                );
             }
+            Some(Kind::Notice(notice)) => self.progress.remark(&notice.message),
             // A kind of event from the future.
-            None => Ok(false),
+            None => {}
         }
+        Ok(())
     }
 }
 
@@ -183,6 +181,8 @@ impl Follower<'_> {
 struct Seen {
     next_sequence: u64,
     first_best: Option<f64>,
+    /// Whether the experiment has ended, as far as is known.
+    is_over: bool,
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ const FLIP_PROBABILITY: f64 = 0.01;
 const ORBIT_STEP: f64 = 0.01;
 /// Radius that an orbit tends to, cm.
 const ORBIT_RADIUS: f64 = 200.0;
-/// Steps in which an orbit's radius nearly reaches its limit.
+/// Time constant with which an orbit's radius tends to it, steps.
 const ORBIT_SETTLING: f64 = 50.0;
 /// Side of the square around the world's centre that targets are drawn from, cm.
 const TARGET_SQUARE: f64 = 200.0;

@@ -218,7 +218,7 @@ impl<'a> Trial<'a> {
     /// count.
     pub fn act(&mut self, step: u32) -> Option<f64> {
         let world = self.world;
-        // Nobody relays before there is something to relay.
+        // Frames have to spread before relaying them makes sense.
         if step < N_FIRST_STEPS_SENDING {
             self.swarm.modes.fill(Mode::Send);
         }

@@ -21,7 +21,7 @@ use tracing::info;
 use crate::{
     clock,
     driver::{Event, EventSender},
-    evolution::Origin,
+    evolution::{Evolution, Origin},
     ids::ExperimentId,
     shared_store::SharedStore,
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
@@ -86,23 +86,23 @@ impl ExperimentService for Experiments {
             })?
             .map_err(|error| Status::invalid_argument(problems(&error)))?;
 
-        let (stored, new) = self
+        let placement = self
             .store
-            .try_write(move |store| match place(store, &new, resume_unfinished)? {
-                Placement::TooMany => Ok((None, new)),
-                Placement::Existing(id) => Ok((store.experiment(id)?.map(|e| (e, false)), new)),
-                Placement::Created(id) => Ok((store.experiment(id)?.map(|e| (e, true)), new)),
-            })
+            .try_write(move |store| place(store, new, evolution, resume_unfinished))
             .await
             .map_err(store_status)?;
-        let Some((experiment, is_new)) = stored else {
-            return Err(Status::resource_exhausted(format!(
-                "{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some"
-            )));
+        let (id, runnable) = match placement {
+            Placement::Runs(runnable) => (runnable.id, Some(runnable)),
+            Placement::RunsAlready(id) => (id, None),
+            Placement::TooMany => {
+                return Err(Status::resource_exhausted(format!(
+                    "{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some"
+                )));
+            }
         };
-        if is_new {
-            info!(experiment = %experiment.id, name = new.config.name, "experiment submitted");
-            let runnable = Box::new(Runnable::new(experiment.id, new.config, evolution));
+        let experiment = self.find(id.0).await?;
+        if let Some(runnable) = runnable {
+            info!(experiment = %id, name = runnable.config.name, "experiment submitted");
             let ready = Event::ExperimentReady(runnable);
             self.events.send(ready).await.map_err(|_| shutting_down())?;
         }
@@ -219,32 +219,65 @@ impl Experiments {
 
 /// Where a submission ends up.
 enum Placement {
-    Created(ExperimentId),
-    Existing(ExperimentId),
+    /// The driver has to run it.
+    Runs(Box<Runnable>),
+    /// The driver knows it, or it has ended.
+    RunsAlready(ExperimentId),
     TooMany,
 }
 
 fn place(
     store: &mut Store,
-    new: &NewExperiment,
+    new: NewExperiment,
+    evolution: Evolution,
     resume_unfinished: bool,
 ) -> Result<Placement, StoreError> {
-    let mut unfinished = store.experiments()?;
-    unfinished.retain(|experiment| experiment.state == ExperimentState::Running);
-    if resume_unfinished {
-        let config_json = new.config.to_canonical_json();
-        if let Some(same) = unfinished.iter().find(|e| e.config_json == config_json) {
-            return Ok(Placement::Existing(same.id));
-        }
+    let experiments = store.experiments()?;
+    if resume_unfinished && let Some(placement) = resume(store, &experiments, &new)? {
+        return Ok(placement);
     }
-    if unfinished.len() >= UNFINISHED_MAX {
+    let is_unfinished = |e: &&store::Experiment| e.state == ExperimentState::Running;
+    if experiments.iter().filter(is_unfinished).count() >= UNFINISHED_MAX {
         return Ok(Placement::TooMany);
     }
-    let (id, is_new) = store.create(new, clock::unix_ms())?;
-    Ok(if is_new { Placement::Created(id) } else { Placement::Existing(id) })
+    let (id, is_new) = store.create(&new, clock::unix_ms())?;
+    Ok(if is_new {
+        Placement::Runs(Box::new(Runnable::new(id, new.config, evolution)))
+    } else {
+        Placement::RunsAlready(id)
+    })
 }
 
-/// Sends events until the one that ends the experiment.
+/// Looks for an experiment of the same bits that can go on: one that is
+/// unfinished, or one that was asked for fewer generations.
+fn resume(
+    store: &mut Store,
+    experiments: &[store::Experiment],
+    new: &NewExperiment,
+) -> Result<Option<Placement>, StoreError> {
+    let config_json = new.config.to_canonical_json();
+    let config_digest = new.config_digest.to_string();
+    for experiment in experiments.iter().rev() {
+        let id = experiment.id;
+        if experiment.state == ExperimentState::Running && experiment.config_json == config_json {
+            return Ok(Some(Placement::RunsAlready(id)));
+        }
+        let n_done = experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+        let can_go_on = experiment.state == ExperimentState::Completed
+            && experiment.reason.is_empty()
+            && experiment.config_digest == config_digest
+            && n_done < new.config.algorithm.generations;
+        if can_go_on && let Some(checkpoint) = store.checkpoint(id)? {
+            store.reopen(id, &config_json, clock::unix_ms())?;
+            let reopened = store::Experiment { config_json, ..experiment.clone() };
+            let runnable = Runnable::restore(&reopened, &checkpoint)?;
+            return Ok(Some(Placement::Runs(Box::new(runnable))));
+        }
+    }
+    Ok(None)
+}
+
+/// Sends events until the experiment is over.
 async fn watch(
     id: ExperimentId,
     mut next_sequence: u64,
@@ -254,18 +287,24 @@ async fn watch(
     let mut news = store.news();
     loop {
         news.mark_unchanged();
-        let page = store
-            .read(move |store| store.events(id, next_sequence, EVENT_PAGE_LEN))
+        let (page, is_over) = store
+            .read(move |store| {
+                let experiment = store.experiment(id)?;
+                let is_over = experiment.is_none_or(|e| e.state != ExperimentState::Running);
+                Ok((store.events(id, next_sequence, EVENT_PAGE_LEN)?, is_over))
+            })
             .await
             .map_err(store_status)?;
         let is_full = page.len() == EVENT_PAGE_LEN as usize;
         for event in page {
             next_sequence = event.sequence + 1;
-            let is_last = event.kind.is_last();
             let response = WatchExperimentResponse { event: Some(convert::event(event)) };
-            if outbox.send(Ok(response)).await.is_err() || is_last {
+            if outbox.send(Ok(response)).await.is_err() {
                 return Ok(());
             }
+        }
+        if !is_full && is_over {
+            return Ok(());
         }
         if !is_full && news.changed().await.is_err() {
             return Err(shutting_down());

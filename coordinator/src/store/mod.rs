@@ -255,6 +255,23 @@ impl Store {
         Ok(())
     }
 
+    /// Lets a completed experiment go on under a configuration that asks for
+    /// more generations.
+    pub fn reopen(&mut self, id: ExperimentId, config_json: &str, now_ms: u64) -> Result<()> {
+        let transaction = self.connection.transaction()?;
+        let n_changed = transaction.execute(
+            "UPDATE experiments SET state = 'running', reason = '', config = ?2
+             WHERE id = ?1 AND state = 'completed'",
+            params![id.0, config_json],
+        )?;
+        if n_changed > 0 {
+            let state = ExperimentState::Running;
+            add_state_event(&transaction, id, now_ms, state, "more generations")?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
     /// Reads one experiment.
     pub fn experiment(&self, id: ExperimentId) -> Result<Option<Experiment>> {
         if i64::try_from(id.0).is_err() {

@@ -127,10 +127,3 @@ pub enum EventKind {
     /// Something worth a line in a log.
     Notice(String),
 }
-
-impl EventKind {
-    /// Whether nothing can follow.
-    pub fn is_last(&self) -> bool {
-        matches!(self, Self::State { state, .. } if *state != ExperimentState::Running)
-    }
-}

@@ -164,8 +164,6 @@ fn events_tell_the_whole_story_in_order_and_from_any_number() {
     assert_eq!(kinds, expected);
     let sequences: Vec<u64> = events.iter().map(|event| event.sequence).collect();
     assert_eq!(sequences, [1, 2, 3, 4, 5, 6]);
-    let n_last = events.iter().filter(|event| event.kind.is_last()).count();
-    assert_eq!(n_last, 1);
 
     assert_eq!(store.events(id, 3, 2).unwrap(), events[2..4]);
     assert_eq!(store.events(id, 7, 100).unwrap(), []);
@@ -185,6 +183,24 @@ fn an_ended_experiment_takes_no_more_generations_and_ends_once() {
     assert_eq!(experiment.state, ExperimentState::Cancelled);
     assert_eq!(experiment.reason, "enough");
     assert_eq!(store.events(id, 1, 100).unwrap().len(), 2);
+}
+
+#[test]
+fn a_completed_experiment_can_be_given_more_generations_and_others_cannot() {
+    let (_directory, mut store) = open();
+    let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
+    commit(&mut store, ids[0], 0, Some("")).unwrap();
+    store.end(ids[1], 6, ExperimentState::Cancelled, "enough").unwrap();
+    let states = ids.map(|id| {
+        store.reopen(id, "longer", 7).unwrap();
+        store.experiment(id).unwrap().unwrap()
+    });
+    assert_eq!(states[0].state, ExperimentState::Running);
+    assert_eq!(states[0].config_json, "longer");
+    assert_eq!(states[1].state, ExperimentState::Cancelled);
+    assert_ne!(states[1].config_json, "longer");
+    assert_eq!(store.events(ids[1], 1, 100).unwrap().len(), 2, "nothing has happened to it");
+    commit(&mut store, ids[0], 1, None).unwrap();
 }
 
 #[test]

@@ -124,8 +124,8 @@ pub enum Activation {
     transform = schema::property("activation", json!({"$ref": "#/$defs/Activation"}))
 )]
 pub struct NeuronParams {
-    /// Time constant, seconds; default 2 (the middle of Table 3.3's scale,
-    /// 2 * 10^0).
+    /// Time constant, seconds; default 2, which is 2 * 10^0 on Table 3.3's
+    /// scale.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tau: f64,
     /// Gain g; default 1.

@@ -83,7 +83,8 @@ pub enum Initializer {
     /// A connected, compact random geometric graph.
     #[schemars(transform = schema::optional("max_rad, initial_pos"))]
     RandomGraph {
-        /// Distance from the centre at which steps turn tangential, cm.
+        /// Scale of the graph, cm: beyond half of it from the centre, steps turn
+        /// tangential.
         max_rad: f64,
         /// First robot, and centre, cm.
         initial_pos: [f64; 2],
