@@ -2,8 +2,7 @@
 //! and rank-mu updates and negative weights.
 //!
 //! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016,
-//! revised 2023); equation numbers are its own. Bounds after Hansen: "Injecting
-//! external solutions into CMA-ES", arXiv 1110.4181.
+//! revised 2023); equation numbers are its own.
 
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -14,15 +13,15 @@ use super::{
     cumulation::{Cumulation, Rates, damping},
     draw_normals,
     linalg::{Eigen, Symmetric},
+    mirror,
 };
 
-/// A Gaussian with mean m, within \[0, 1\], and covariance sigma^2 C.
+/// A Gaussian with mean m and covariance sigma^2 C, of points x in all of R^d.
 ///
-/// Bounds: an individual is evaluated at the point of the cube nearest to what
-/// was drawn, and the update learns from that same point, so the mean never
-/// leaves the cube. Where C is ill-conditioned such a point can be improbably far
-/// from the mean, measured by C; the update then learns from the point on the way
-/// to it at the distance sqrt(d) + 2d/(d + 2), the rule for points from elsewhere.
+/// Bounds: x stands for the genotype into which it is mirrored, so the algorithm
+/// maximises a function on R^d that has none. (If clipped points were learnt
+/// from, C would lose the directions in which they were clipped, and the search
+/// would end on a face of the cube where nothing is optimal.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CmaEs {
     mean: Vec<f64>,
@@ -34,13 +33,6 @@ pub struct CmaEs {
 /// rounding.
 const EIGENVALUE_RATIO_MIN: f64 = 1e-14;
 
-/// C^(1/2) and C^(-1/2).
-struct Roots {
-    eigen: Eigen,
-    deviations: DVector<f64>,
-    inverse_deviations: DVector<f64>,
-}
-
 impl CmaEs {
     /// The first distribution over `d` genes, with C = I.
     pub fn new(params: &CmaEsParams, d: usize) -> Self {
@@ -51,31 +43,12 @@ impl CmaEs {
         }
     }
 
-    fn roots(&self) -> Roots {
+    /// Eigenvectors of C and the square roots of its eigenvalues.
+    fn root(&self) -> (Eigen, DVector<f64>) {
         let eigen = Eigen::of(&self.covariance.to_dense());
         let min = EIGENVALUE_RATIO_MIN * eigen.values.max();
         let deviations = eigen.values.map(|value| value.max(min).sqrt());
-        let inverse_deviations = deviations.map(|deviation| 1.0 / deviation);
-        Roots { eigen, deviations, inverse_deviations }
-    }
-
-    /// (g - m) / sigma
-    fn step(&self, genotype: &[f64]) -> Vec<f64> {
-        let sigma = self.cumulation.sigma;
-        genotype.iter().zip(&self.mean).map(|(gene, mean)| (gene - mean) / sigma).collect()
-    }
-}
-
-impl Roots {
-    /// C^(1/2) `z`
-    fn colour(&self, z: &[f64]) -> DVector<f64> {
-        self.eigen.apply(&self.deviations, &DVector::from_column_slice(z))
-    }
-
-    /// C^(-1/2) `y`
-    fn whiten(&self, y: &[f64]) -> Vec<f64> {
-        let z = self.eigen.apply(&self.inverse_deviations, &DVector::from_column_slice(y));
-        z.as_slice().to_vec()
+        (eigen, deviations)
     }
 }
 
@@ -84,55 +57,35 @@ impl Strategy for CmaEs {
         Some(&self.mean)
     }
 
-    /// g_i = clip(m + sigma * C^(1/2) z_i), z_i ~ N(0, I). The normals of a
-    /// clipped individual are C^(-1/2) (g_i - m) / sigma, those it would have been
-    /// drawn from.
+    /// x_i = m + sigma * y_i, y_i = C^(1/2) z_i, z_i ~ N(0, I). With the symmetric
+    /// root, z_i is also C^(-1/2) y_i, so learning needs no root.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let roots = self.roots();
-        let mut normals = draw_normals(population_size, self.mean.len(), rng);
-        let mut genotypes = Vec::with_capacity(population_size);
-        for z in &mut normals {
-            let y = roots.colour(z);
-            let point = self.mean.iter().zip(&y).map(|(mean, y)| mean + self.cumulation.sigma * y);
-            let mut genotype: Vec<f64> = point.collect();
-            if genotype.iter().any(|gene| !(0.0..=1.0).contains(gene)) {
-                genotype.iter_mut().for_each(|gene| *gene = gene.clamp(0.0, 1.0));
-                *z = roots.whiten(&self.step(&genotype));
-            }
-            genotypes.push(genotype);
-        }
-        Sample { genotypes, normals }
+        let (eigen, deviations) = self.root();
+        let normals = draw_normals(population_size, self.mean.len(), rng);
+        let colour = |z: &Vec<f64>| eigen.apply(&deviations, &DVector::from_column_slice(z));
+        let steps: Vec<Vec<f64>> = normals.iter().map(|z| colour(z).as_slice().to_vec()).collect();
+        let sigma = self.cumulation.sigma;
+        let genotypes = steps
+            .iter()
+            .map(|y| self.mean.iter().zip(y).map(|(mean, y)| mirror(mean + sigma * y)).collect())
+            .collect();
+        Sample { genotypes, normals, steps }
     }
 
-    /// Eq. 41 to 47, with y_i = (g_i - m) / sigma and C^(-1/2) y_i from the
-    /// sample.
+    /// Eq. 41 to 47.
     fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
         let d = self.mean.len();
         let (weights, rates) = weights_and_rates(d, ranking.len());
-        let length_max = (d as f64).sqrt() + 2.0 * d as f64 / (d as f64 + 2.0);
-
-        // Steps, best first, with their squared lengths measured by C.
-        let mut steps = Vec::with_capacity(ranking.len());
         let mut y_mean = vec![0.0; d];
         let mut z_mean = vec![0.0; d];
-        for (&i, &weight) in ranking.iter().zip(&weights) {
-            let (genotype, z) = (&sample.genotypes[i], &sample.normals[i]);
-            let length = z.iter().map(|z| z * z).sum::<f64>().sqrt();
-            let is_on_bound = genotype.iter().any(|&gene| gene == 0.0 || gene == 1.0);
-            let scale = if is_on_bound { (length_max / length).min(1.0) } else { 1.0 };
-            let mut y = self.step(genotype);
-            y.iter_mut().for_each(|y| *y *= scale);
-            if weight > 0.0 {
-                for j in 0..d {
-                    y_mean[j] += weight * y[j];
-                    z_mean[j] += weight * scale * z[j];
-                }
+        for (&i, &weight) in ranking.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0) {
+            for j in 0..d {
+                y_mean[j] += weight * sample.steps[i][j];
+                z_mean[j] += weight * sample.normals[i][j];
             }
-            steps.push((y, (scale * length) * (scale * length)));
         }
-
         for (mean, y) in self.mean.iter_mut().zip(&y_mean) {
-            *mean = (*mean + self.cumulation.sigma * y).clamp(0.0, 1.0);
+            *mean += self.cumulation.sigma * y;
         }
         let delta_h_sigma = self.cumulation.update(&rates, &y_mean, &z_mean);
 
@@ -140,15 +93,14 @@ impl Strategy for CmaEs {
         let keep = 1.0 + rates.c_1 * delta_h_sigma - rates.c_1 - rates.c_mu * sum_of_weights;
         self.covariance.scale(keep);
         self.covariance.add_outer(rates.c_1, &self.cumulation.p_c);
-        for (&weight, (y, length_squared)) in weights.iter().zip(&steps) {
-            let weight = if weight >= 0.0 {
-                weight
-            } else if *length_squared > 0.0 {
-                weight * d as f64 / length_squared
+        for (&i, &weight) in ranking.iter().zip(&weights) {
+            let weight = if weight < 0.0 {
+                let z = &sample.normals[i];
+                weight * d as f64 / z.iter().map(|z| z * z).sum::<f64>()
             } else {
-                0.0
+                weight
             };
-            self.covariance.add_outer(rates.c_mu * weight, y);
+            self.covariance.add_outer(rates.c_mu * weight, &sample.steps[i]);
         }
         self.covariance.raise_diagonal(self.cumulation.variance_min());
     }
@@ -156,11 +108,16 @@ impl Strategy for CmaEs {
 
 #[cfg(test)]
 impl CmaEs {
-    /// A sample of given individuals.
-    pub fn sample_of(&self, genotypes: Vec<Vec<f64>>) -> Sample {
-        let roots = self.roots();
-        let normals = genotypes.iter().map(|g| roots.whiten(&self.step(g))).collect();
-        Sample { genotypes, normals }
+    /// A sample of given points x.
+    pub fn sample_of(&self, points: &[Vec<f64>]) -> Sample {
+        let (eigen, deviations) = self.root();
+        let sigma = self.cumulation.sigma;
+        let step = |x: &Vec<f64>| x.iter().zip(&self.mean).map(|(x, m)| (x - m) / sigma).collect();
+        let steps: Vec<Vec<f64>> = points.iter().map(step).collect();
+        let inverse = deviations.map(|deviation| 1.0 / deviation);
+        let whiten = |y: &Vec<f64>| eigen.apply(&inverse, &DVector::from_column_slice(y));
+        let normals = steps.iter().map(|y| whiten(y).as_slice().to_vec()).collect();
+        Sample { genotypes: Vec::new(), normals, steps }
     }
 }
 

@@ -37,6 +37,16 @@ pub struct Sample {
     /// The standard normal draws behind each individual, for algorithms that
     /// learn from those; else empty.
     pub normals: Vec<Vec<f64>>,
+    /// What correlation makes of the normals, for algorithms that learn from
+    /// both; else empty.
+    pub steps: Vec<Vec<f64>>,
+}
+
+impl Sample {
+    /// Individuals and the normals behind them.
+    pub fn new(genotypes: Vec<Genotype>, normals: Vec<Vec<f64>>) -> Self {
+        Self { genotypes, normals, steps: Vec::new() }
+    }
 }
 
 /// An algorithm between two generations. Its state is plain numbers: whoever
@@ -140,7 +150,7 @@ impl Algorithm {
     /// The mean of its distribution as a genotype, if it has one.
     pub fn mean(&self) -> Option<Genotype> {
         let mean = self.strategy().mean()?;
-        Some(mean.iter().map(|gene| gene.clamp(0.0, 1.0)).collect())
+        Some(mean.iter().map(|&gene| mirror(gene)).collect())
     }
 
     fn strategy(&self) -> &dyn Strategy {
@@ -181,8 +191,39 @@ fn draw_normals(n: usize, d: usize, rng: &mut Stream) -> Vec<Vec<f64>> {
     (0..n).map(|_| (0..d).map(|_| rng.normal()).collect()).collect()
 }
 
+/// `x` in \[0, 1\], by reflection at both ends.
+fn mirror(x: f64) -> f64 {
+    let x = x.abs();
+    let x = x - 2.0 * (x / 2.0).floor();
+    if x > 1.0 { 2.0 - x } else { x }
+}
+
 /// e^x, but finite: an update with a learning rate beyond reason must not make
 /// NaN of 0 * infinity.
 fn finite_exp(x: f64) -> f64 {
     libm::exp(x).min(f64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mirror;
+
+    #[test]
+    fn mirroring_reflects_at_both_ends_as_often_as_needed() {
+        for (x, expected) in [
+            (0.0, 0.0),
+            (0.25, 0.25),
+            (1.0, 1.0),
+            (1.25, 0.75),
+            (-0.25, 0.25),
+            (2.25, 0.25),
+            (-1.25, 0.75),
+            (1001.25, 0.75),
+        ] {
+            assert_eq!(mirror(x), expected, "{x}");
+        }
+        for x in [1e300, -1e300, 1.0f64.next_up(), 0.0f64.next_down()] {
+            assert!((0.0..=1.0).contains(&mirror(x)), "{x}");
+        }
+    }
 }

@@ -68,7 +68,7 @@ impl Strategy for OpenAiEs {
             .iter()
             .map(|e| (0..d).map(|j| (self.mu[j] + self.sigma * e[j]).clamp(0.0, 1.0)).collect())
             .collect();
-        Sample { genotypes, normals }
+        Sample::new(genotypes, normals)
     }
 
     /// With the centred ranks c = 1/2 (best) to -1/2 (worst), evenly spaced:

@@ -10,14 +10,11 @@ use sim_core::{config::CmaEsParams, random::Stream};
 use super::{
     Sample, Strategy,
     cumulation::{Cumulation, Rates, damping},
-    draw_normals,
+    draw_normals, mirror,
 };
 
-/// A Gaussian with mean m, within \[0, 1\], and covariance sigma^2 diag(C).
-///
-/// Bounds as in CMA-ES: an individual is evaluated at, and learnt from, the point
-/// of the cube nearest to what was drawn. With a diagonal C that point is never
-/// farther from the mean than what was drawn.
+/// A Gaussian with mean m and covariance sigma^2 diag(C), of points in all of
+/// R^d that are mirrored into genotypes, as in CMA-ES.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SepCmaEs {
     mean: Vec<f64>,
@@ -42,26 +39,17 @@ impl Strategy for SepCmaEs {
         Some(&self.mean)
     }
 
-    /// g_i = clip(m + sigma * C^(1/2) z_i), z_i ~ N(0, I). The normal of a clipped
-    /// gene is the one that it would have been drawn from.
+    /// x_i = m + sigma * C^(1/2) z_i, z_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let sigma = self.cumulation.sigma;
-        let deviations: Vec<f64> = self.variances.iter().map(|c| sigma * c.sqrt()).collect();
-        let mut normals = draw_normals(population_size, self.mean.len(), rng);
-        let mut genotypes = Vec::with_capacity(population_size);
-        for z in &mut normals {
-            let genes =
-                z.iter_mut().zip(&self.mean).zip(&deviations).map(|((z, mean), deviation)| {
-                    let point = mean + deviation * *z;
-                    let gene = point.clamp(0.0, 1.0);
-                    if gene != point {
-                        *z = (gene - mean) / deviation;
-                    }
-                    gene
-                });
-            genotypes.push(genes.collect());
-        }
-        Sample { genotypes, normals }
+        let deviation = |c: &f64| self.cumulation.sigma * c.sqrt();
+        let deviations: Vec<f64> = self.variances.iter().map(deviation).collect();
+        let normals = draw_normals(population_size, self.mean.len(), rng);
+        let gene = |j: usize, z: &f64| mirror(self.mean[j] + deviations[j] * z);
+        let genotypes = normals
+            .iter()
+            .map(|z| z.iter().enumerate().map(|(j, z)| gene(j, z)).collect())
+            .collect();
+        Sample::new(genotypes, normals)
     }
 
     /// As CMA-ES with the better half as parents (Eq. 41 to 47 of its tutorial),
@@ -80,7 +68,7 @@ impl Strategy for SepCmaEs {
         let y_mean: Vec<f64> =
             z_mean.iter().zip(&self.variances).map(|(z, c)| z * c.sqrt()).collect();
         for (mean, y) in self.mean.iter_mut().zip(&y_mean) {
-            *mean = (*mean + self.cumulation.sigma * y).clamp(0.0, 1.0);
+            *mean += self.cumulation.sigma * y;
         }
         let delta_h_sigma = self.cumulation.update(&rates, &y_mean, &z_mean);
         let keep = 1.0 + rates.c_1 * delta_h_sigma - rates.c_1 - rates.c_mu;
@@ -95,14 +83,14 @@ impl Strategy for SepCmaEs {
 
 #[cfg(test)]
 impl SepCmaEs {
-    /// A sample of given individuals.
-    pub fn sample_of(&self, genotypes: Vec<Vec<f64>>) -> Sample {
+    /// A sample of given points x.
+    pub fn sample_of(&self, points: &[Vec<f64>]) -> Sample {
         let sigma = self.cumulation.sigma;
-        let normals = genotypes.iter().map(|genotype| {
-            let genes = genotype.iter().zip(&self.mean).zip(&self.variances);
-            genes.map(|((gene, mean), c)| (gene - mean) / (sigma * c.sqrt())).collect()
-        });
-        Sample { normals: normals.collect(), genotypes }
+        let normal = |((x, m), c): ((&f64, &f64), &f64)| (x - m) / (sigma * c.sqrt());
+        let normals = points
+            .iter()
+            .map(|point| point.iter().zip(&self.mean).zip(&self.variances).map(normal).collect());
+        Sample::new(Vec::new(), normals.collect())
     }
 }
 

@@ -46,7 +46,7 @@ impl Strategy for Snes {
             .iter()
             .map(|s| (0..d).map(|j| (self.mu[j] + self.sigma[j] * s[j]).clamp(0.0, 1.0)).collect())
             .collect();
-        Sample { genotypes, normals }
+        Sample::new(genotypes, normals)
     }
 
     /// mu += eta_mu * sigma * sum_i u_i s_i;

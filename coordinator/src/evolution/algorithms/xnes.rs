@@ -11,11 +11,13 @@ use sim_core::{config::XnesParams, random::Stream};
 use super::{
     Sample, Strategy, draw_normals, finite_exp,
     linalg::{Eigen, Symmetric, product},
+    mirror,
 };
 use crate::evolution::ranking::utility_per_individual;
 
-/// A Gaussian with mean mu and covariance A A^T, A = sigma B, det B = 1. mu and
-/// sigma are kept in \[0, 1\].
+/// A Gaussian with mean mu and covariance A A^T, A = sigma B, det B = 1, of points
+/// in all of R^d that are mirrored into genotypes, as in CMA-ES. sigma is kept in
+/// \[0, 1\].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Xnes {
     mu: Vec<f64>,
@@ -57,7 +59,7 @@ impl Strategy for Xnes {
         Some(&self.mu)
     }
 
-    /// g_i = clip(mu + sigma * B s_i), s_i ~ N(0, I).
+    /// x_i = mu + sigma * B s_i, s_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let shape = self.shape();
         let normals = draw_normals(population_size, self.mu.len(), rng);
@@ -65,18 +67,17 @@ impl Strategy for Xnes {
             .iter()
             .map(|s| {
                 let step = &shape * DVector::from_column_slice(s);
-                let gene = |(mu, step): (&f64, &f64)| (mu + self.sigma * step).clamp(0.0, 1.0);
+                let gene = |(mu, step): (&f64, &f64)| mirror(mu + self.sigma * step);
                 self.mu.iter().zip(&step).map(gene).collect()
             })
             .collect();
-        Sample { genotypes, normals }
+        Sample::new(genotypes, normals)
     }
 
     /// With G_delta = sum_i u_i s_i, G_M = sum_i u_i (s_i s_i^T - I),
     /// G_sigma = tr(G_M) / d, G_B = G_M - G_sigma I:
     /// mu += eta_mu * sigma * B G_delta; sigma *= exp(eta_sigma / 2 * G_sigma);
     /// B *= expm(eta_B / 2 * G_B).
-    /// The draws enter as they were, not as clipping left them.
     fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
         let d = self.mu.len();
         let mut gradient_delta = DVector::zeros(d);
@@ -96,7 +97,7 @@ impl Strategy for Xnes {
         let shape = self.shape();
         let step = &shape * gradient_delta;
         for (mu, step) in self.mu.iter_mut().zip(&step) {
-            *mu = (*mu + self.eta_mu * self.sigma * step).clamp(0.0, 1.0);
+            *mu += self.eta_mu * self.sigma * step;
         }
         let factor = finite_exp(self.eta_sigma / 2.0 * gradient_sigma);
         self.sigma = (self.sigma * factor).clamp(0.0, 1.0);

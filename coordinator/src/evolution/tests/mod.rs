@@ -2,9 +2,13 @@ mod convergence;
 mod reference;
 mod suite;
 
-use sim_core::config::{AlgorithmName, AlgorithmParams, SnesParams};
+use sim_core::config::{
+    AlgorithmConfig, AlgorithmName, AlgorithmParams, FitnessFunction, NamedMap, PopulationConfig,
+    SnesParams, TopologyConfig, WorldConfig,
+};
 
 use super::*;
+use algorithms::FULL_MATRIX_GENES_MAX;
 
 const SNES: SnesParams = SnesParams { eta_mu: 1.0, eta_sigma: None, mu_init: 0.5, sigma_init: 0.2 };
 
@@ -158,4 +162,115 @@ fn every_bit_of_genotypes_and_fitness_enters_the_digest() {
     assert_ne!(of(0.5, 1.0), of(0.5, 1.0f64.next_down()));
     assert_ne!(of(0.0, 1.0), of(-0.0, 1.0));
     assert_ne!(start.next(0, &[], &[]), start.next(1, &[], &[]));
+}
+
+/// A configuration as far as evolution looks at it.
+fn config(
+    name: AlgorithmName,
+    population_size: u32,
+    populations: &[(&str, AlgorithmParams)],
+) -> ExperimentConfig {
+    let population = |params: &AlgorithmParams| PopulationConfig {
+        objects: Vec::new(),
+        max_vals: Vec::new(),
+        min_vals: Vec::new(),
+        params: params.clone(),
+    };
+    ExperimentConfig {
+        name: "test".to_owned(),
+        seed: 5,
+        topology: TopologyConfig {
+            dt: 0.1,
+            time_scale: 20,
+            seed: 821,
+            stimuli: NamedMap::new(),
+            ensembles: NamedMap::new(),
+            outputs: NamedMap::new(),
+            synapses: NamedMap::new(),
+            decoding: NamedMap::new(),
+        },
+        algorithm: AlgorithmConfig {
+            name,
+            evolvable_object: "robot".to_owned(),
+            population_size,
+            generations: 10,
+            evaluation_steps: 10,
+            num_evaluations: 1,
+            fitness_function: FitnessFunction::Grouping,
+            target_fitness: None,
+            champion_every: 10,
+            champion_trials: 50,
+            populations: populations
+                .iter()
+                .map(|(name, params)| ((*name).to_owned(), population(params)))
+                .collect(),
+        },
+        world: WorldConfig { height: 1000.0, width: 1000.0, objects: NamedMap::new() },
+    }
+}
+
+/// Paths and messages of what is wrong.
+fn problems(config: &ExperimentConfig, segments: &[Range<usize>]) -> Vec<(String, String)> {
+    let error = Evolution::new(config, segments).unwrap_err();
+    error.problems.into_iter().map(|problem| (problem.path, problem.message)).collect()
+}
+
+#[test]
+fn the_name_in_the_configuration_chooses_the_algorithm() {
+    let cma_es = AlgorithmParams::CmaEs(suite::CMA_ES);
+    for (name, params, expected) in [
+        (AlgorithmName::Ga, AlgorithmParams::Ga(suite::GA), "Ga"),
+        (AlgorithmName::Snes, AlgorithmParams::Snes(SNES), "Snes"),
+        (AlgorithmName::Xnes, AlgorithmParams::Xnes(suite::XNES), "Xnes"),
+        (AlgorithmName::CmaEs, cma_es.clone(), "CmaEs"),
+        (AlgorithmName::SepCmaEs, cma_es, "SepCmaEs"),
+        (AlgorithmName::OpenAiEs, AlgorithmParams::OpenAiEs(suite::OPENAI_ES), "OpenAiEs"),
+    ] {
+        let config = config(name, 6, &[("a", params.clone()), ("b", params)]);
+        let evolution = Evolution::new(&config, &[0..2, 2..5]).unwrap();
+        assert_eq!(evolution.ask().genotypes[0].len(), 5);
+        for algorithm in &evolution.populations {
+            let state = serde_json::to_value(algorithm).unwrap();
+            assert_eq!(state.as_object().unwrap().keys().collect::<Vec<_>>(), [expected]);
+        }
+    }
+}
+
+#[test]
+fn a_configuration_that_cannot_evolve_is_refused_with_every_place_and_reason() {
+    let elite =
+        |num_elite| AlgorithmParams::Ga(sim_core::config::GaParams { num_elite, ..suite::GA });
+    let three = [("a", elite(6)), ("b", elite(5)), ("c", elite(7))];
+    let expected = [
+        ("algorithm.populations.a.params.num_elite", "must be below population_size (6), is 6"),
+        ("algorithm.populations.c.params.num_elite", "must be below population_size (6), is 7"),
+    ];
+    let expected = expected.map(|(path, message)| (path.to_owned(), message.to_owned()));
+    assert_eq!(problems(&config(AlgorithmName::Ga, 6, &three), &[0..2, 2..4, 4..5]), expected);
+
+    let snes = [("a", AlgorithmParams::Snes(SNES))];
+    let empty = problems(&config(AlgorithmName::Snes, 6, &snes), &[0..0]);
+    assert_eq!(empty[0].0, "algorithm.populations.a");
+
+    let cma_es = [("a", AlgorithmParams::CmaEs(suite::CMA_ES))];
+    let alone = problems(&config(AlgorithmName::CmaEs, 1, &cma_es), &[0..2]);
+    assert_eq!(alone[0].0, "algorithm.population_size");
+}
+
+#[test]
+fn full_matrices_have_a_limit_and_the_error_names_what_has_none() {
+    let large = 0..FULL_MATRIX_GENES_MAX + 1;
+    let cma_es = [("a", AlgorithmParams::CmaEs(suite::CMA_ES))];
+    let xnes = [("a", AlgorithmParams::Xnes(suite::XNES))];
+    for (name, populations) in [(AlgorithmName::CmaEs, &cma_es), (AlgorithmName::Xnes, &xnes)] {
+        let config = config(name, 6, populations);
+        let [(path, message)] = &problems(&config, std::slice::from_ref(&large))[..] else {
+            panic!("one problem");
+        };
+        assert_eq!(path, "algorithm.name");
+        assert!(message.contains("1001") && message.contains("\"sep-CMA-ES\""), "{message}");
+        assert!(Evolution::new(&config, &[0..3]).is_ok());
+    }
+    let separable = config(AlgorithmName::SepCmaEs, 6, &cma_es);
+    assert!(Evolution::new(&separable, &[large]).is_ok());
 }

@@ -95,7 +95,7 @@ impl Strategy for Ga {
         } else {
             self.breed(population_size, rng)
         };
-        Sample { genotypes, normals: Vec::new() }
+        Sample::new(genotypes, Vec::new())
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
