@@ -187,7 +187,7 @@ pub mod tests {
         }
         let lines = captured.lines();
         assert_eq!(lines.len(), 2);
-        assert!(lines[1].starts_with("generation 2/2  "), "{lines:?}");
+        assert!(lines[1].starts_with("2/2  generation 1  "), "{lines:?}");
     }
 
     #[test]

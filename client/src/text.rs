@@ -9,12 +9,14 @@ use crate::json::state_name;
 /// Digits of a digest that tell runs apart at a glance.
 const DIGEST_DIGITS: usize = 12;
 
-/// One generation on one line.
+/// One generation on one line: how many are done, and its number, from 0, as in
+/// every other place.
 pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     let done = summary.generation + 1;
     let width = generations.to_string().len();
     format!(
-        "generation {done:>width$}/{generations}  {}  min {:.3}  {:.0} episodes/s  digest {}",
+        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s  digest {}",
+        summary.generation,
         fitness(summary),
         summary.min,
         episodes_per_s(summary),
@@ -91,9 +93,9 @@ pub fn end(
 }
 
 fn champion_line(champion: &GetChampionResponse) -> String {
-    let generation = champion.generation + 1;
+    let generation = champion.generation;
     let origin = match champion.individual {
-        Some(individual) => format!("generation {generation}, individual {individual}"),
+        Some(individual) => format!("individual {individual} of generation {generation}"),
         None => format!("mean after generation {generation}"),
     };
     let chosen = champion.fitness.map(|fitness| format!("{fitness:.6} when chosen"));
@@ -228,9 +230,9 @@ mod tests {
     fn a_generation_is_one_line() {
         assert_eq!(
             generation(&summary(11), 40),
-            "generation 12/40  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
+            "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
         );
-        assert!(generation(&summary(0), 100).starts_with("generation   1/100  "));
+        assert!(generation(&summary(0), 100).starts_with("  1/100  generation   0  "));
     }
 
     #[test]
@@ -254,7 +256,7 @@ mod tests {
             "experiment 3 (leader) completed after 12 of 40 generations\n  \
              best of the first generation  0.500000\n  \
              mean of the last generation   0.456100\n  \
-             champion                      1.500000 +- 0.250000 on 50 held-out trials (2.000000 when chosen, generation 7, individual 4)\n  \
+             champion                      1.500000 +- 0.250000 on 50 held-out trials (2.000000 when chosen, individual 4 of generation 6)\n  \
              digest                        1a2b3c4d5e6f7a8b"
         );
     }
