@@ -1,3 +1,5 @@
+//! The engine, driven through histories of a fleet.
+
 use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
