@@ -46,8 +46,11 @@ impl Digest {
         let mut hash = Sha256::new();
         hash.update(self.0);
         hash.update(generation.to_le_bytes());
-        for value in genotypes.iter().chain(trial_fitness).flatten() {
-            hash.update(value.to_bits().to_le_bytes());
+        let mut bytes = Vec::new();
+        for values in genotypes.iter().chain(trial_fitness) {
+            bytes.clear();
+            bytes.extend(values.iter().flat_map(|value| value.to_bits().to_le_bytes()));
+            hash.update(&bytes);
         }
         Self(hash.finalize().into())
     }

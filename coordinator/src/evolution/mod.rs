@@ -103,6 +103,8 @@ impl Evolution {
                 Err(unsuitable) => problems.push(problem(name, &unsuitable)),
             }
         }
+        // What concerns the whole experiment would be said once per population.
+        problems.dedup();
         if !problems.is_empty() {
             return Err(ConfigError { problems });
         }

@@ -214,7 +214,7 @@ pub enum CrossoverOperator {
     /// Tails swapped after one point.
     #[serde(rename = "onepoint")]
     OnePoint,
-    /// Pieces swapped between two points.
+    /// Every other piece swapped between three points.
     #[serde(rename = "multipoint")]
     MultiPoint,
     /// Simulated binary crossover.

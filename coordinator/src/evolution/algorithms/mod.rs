@@ -24,9 +24,9 @@ use sep_cma_es::SepCmaEs;
 use snes::Snes;
 use xnes::Xnes;
 
-/// Genes that an algorithm with a d x d matrix may have. One generation of 100
-/// individuals costs the coordinator about two seconds there and grows with the
-/// cube of d; the checkpoint reaches 20 MB.
+/// Genes that an algorithm with a d x d matrix may have. There, a generation of
+/// 100 individuals costs the coordinator half a second (CMA-ES) to one (xNES), and
+/// a checkpoint 10 to 20 MB; both grow fast, the time with the cube of d.
 pub const FULL_MATRIX_GENES_MAX: usize = 1000;
 
 /// What an algorithm draws for one generation.

@@ -91,14 +91,14 @@ impl Strategy for OpenAiEs {
         self.n_updates += 1;
         let correction1 = 1.0 - libm::pow(self.beta1, self.n_updates as f64);
         let correction2 = 1.0 - libm::pow(self.beta2, self.n_updates as f64);
-        for j in 0..d {
-            let pull = self.weight_decay * (self.mu[j] - self.mu_init);
-            let gradient = sum[j] / (n as f64 * self.sigma) - pull;
-            let (first, second) = (&mut self.first_moment[j], &mut self.second_moment[j]);
+        let moments = self.first_moment.iter_mut().zip(&mut self.second_moment);
+        for ((mu, sum), (first, second)) in self.mu.iter_mut().zip(&sum).zip(moments) {
+            let pull = self.weight_decay * (*mu - self.mu_init);
+            let gradient = sum / (n as f64 * self.sigma) - pull;
             *first = self.beta1 * *first + (1.0 - self.beta1) * gradient;
             *second = self.beta2 * *second + (1.0 - self.beta2) * gradient * gradient;
             let step = (*first / correction1) / ((*second / correction2).sqrt() + EPSILON);
-            self.mu[j] = (self.mu[j] + self.learning_rate * step).clamp(0.0, 1.0);
+            *mu = (*mu + self.learning_rate * step).clamp(0.0, 1.0);
         }
     }
 }
