@@ -1,3 +1,5 @@
+//! Evolution, and every algorithm, from outside.
+
 mod convergence;
 mod reference;
 mod suite;

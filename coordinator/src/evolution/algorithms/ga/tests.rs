@@ -1,3 +1,5 @@
+//! The operators' statistics and rules.
+
 use sim_core::{
     config::{CrossoverOperator, MutationOperator, SelectionOperator},
     random::Purpose,
