@@ -48,7 +48,7 @@ impl Advance {
         let concluding = task::spawn_blocking(move || (round.conclude(&config, &judged), config));
         let (next, config) = concluding.await.expect("conclusions do not panic");
         let outcome = match next {
-            Ok(Next::Judge(round)) => Outcome::Continues(Box::new(round)),
+            Ok(Next::Judge(round)) => Outcome::Continues(round),
             Ok(Next::Commit(complete)) => commit(&store, &shutdown, id, &config, *complete).await,
             Err(error) => Outcome::Failed(error.to_string()),
         };

@@ -13,7 +13,7 @@ use crate::{
 /// What the fleet judges at once.
 pub enum Round {
     /// The next generation.
-    Generation(Evolution, Asked),
+    Generation(Box<Evolution>, Asked),
     /// Candidates on held-out trials, after a generation that has been learnt
     /// from and is not committed yet.
     Reevaluation(Box<Learnt>, Reevaluation),
@@ -22,7 +22,7 @@ pub enum Round {
 /// What comes after a round.
 pub enum Next {
     /// Another round, before anything is committed.
-    Judge(Round),
+    Judge(Box<Round>),
     /// The generation is complete.
     Commit(Box<Complete>),
 }
@@ -59,7 +59,7 @@ impl Round {
     /// The next generation of an evolution.
     pub fn generation(evolution: Evolution) -> Self {
         let asked = evolution.ask();
-        Self::Generation(evolution, asked)
+        Self::Generation(Box::new(evolution), asked)
     }
 
     /// The generation, or the address of the held-out trials.
@@ -96,10 +96,10 @@ impl Round {
     ) -> Result<Next, EvolutionError> {
         match self {
             Self::Generation(evolution, asked) => {
-                let learnt = learn(config, evolution, asked, judged)?;
+                let learnt = learn(config, *evolution, asked, judged)?;
                 Ok(match learnt.evolution.reevaluation() {
                     Some(candidates) if learnt.over.is_some() || learnt.is_scheduled(config) => {
-                        Next::Judge(Self::Reevaluation(Box::new(learnt), candidates))
+                        Next::Judge(Box::new(Self::Reevaluation(Box::new(learnt), candidates)))
                     }
                     _ => Next::Commit(Box::new(learnt.complete(None))),
                 })
