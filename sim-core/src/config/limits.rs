@@ -36,7 +36,7 @@ pub const TRIALS_PER_GENERATION: u64 = 10_000_000;
 pub const GENES_PER_GENERATION: u64 = 50_000_000;
 /// Genes of a genotype whose algorithm keeps a full covariance or shape matrix
 /// (xNES, CMA-ES).
-pub const GENES_OF_FULL_MATRIX: u64 = 4_096;
+pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 
 /// Network substeps per environment step.
 pub const TIME_SCALE: u32 = 1_000;
