@@ -131,6 +131,8 @@ fn config(name: AlgorithmName, params: AlgorithmParams) -> ExperimentConfig {
             num_evaluations: N_TRIALS as u32,
             fitness_function: FitnessFunction::IdentifyLeader,
             target_fitness: None,
+            champion_every: 10,
+            champion_trials: 50,
             populations: NamedMap::from([("all".to_owned(), population)]),
         },
         world: WorldConfig { height: 1000.0, width: 1000.0, objects: NamedMap::new() },

@@ -15,6 +15,19 @@ use crate::store::{Store, StoreError};
 /// Pause between attempts to write while the disk does not take it.
 const RETRY_INTERVAL: Duration = Duration::from_secs(5);
 
+/// What became of a write.
+#[derive(Debug)]
+#[must_use]
+pub enum Written {
+    /// It is on disk.
+    Yes,
+    /// The experiment has ended, or the coordinator is shutting down: nothing is
+    /// lost.
+    NotWanted,
+    /// It cannot be written, now or later.
+    Never(StoreError),
+}
+
 /// A store that many tasks share.
 #[derive(Debug, Clone)]
 pub struct SharedStore {
@@ -66,29 +79,28 @@ impl SharedStore {
     }
 
     /// Writes something that must not be lost: while the disk does not take it,
-    /// tries again. Says whether it is on disk; if not, the store has logged why
-    /// and nothing further is to be done.
+    /// tries again.
     pub async fn write(
         &self,
         shutdown: &CancellationToken,
         operation: impl Fn(&mut Store) -> Result<(), StoreError> + Send + Sync + 'static,
-    ) -> bool {
+    ) -> Written {
         let operation = Arc::new(operation);
         loop {
             let attempt = Arc::clone(&operation);
             match self.try_write(move |store| attempt(store)).await {
-                Ok(()) => return true,
-                Err(StoreError::Ended(_)) => return false,
+                Ok(()) => return Written::Yes,
+                Err(StoreError::Ended(_)) => return Written::NotWanted,
                 Err(error @ StoreError::Unavailable(_)) => {
                     error!("{error}; trying again every {} s", RETRY_INTERVAL.as_secs());
                     tokio::select! {
                         () = tokio::time::sleep(RETRY_INTERVAL) => {}
-                        () = shutdown.cancelled() => return false,
+                        () = shutdown.cancelled() => return Written::NotWanted,
                     }
                 }
                 Err(error) => {
                     error!("{error}");
-                    return false;
+                    return Written::Never(error);
                 }
             }
         }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use sim_core::config::{ConfigError, ExperimentConfig};
 
 use crate::{
+    driver::Round,
     evolution::{Digest, Evolution},
     ids::ExperimentId,
     store::{self, NewExperiment, StoreError},
@@ -47,8 +48,8 @@ pub struct Runnable {
     pub config: ExperimentConfig,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
-    /// Where its evolution stands.
-    pub evolution: Evolution,
+    /// What is to be judged first.
+    pub round: Round,
 }
 
 impl Submission {
@@ -79,9 +80,11 @@ impl Submission {
 }
 
 impl Runnable {
-    /// A new experiment.
+    /// An experiment whose evolution stands somewhere. Asks for its next
+    /// generation, which may take a while.
     pub fn new(id: ExperimentId, config: ExperimentConfig, evolution: Evolution) -> Self {
-        Self { id, spec: config.to_canonical_json().into(), config, evolution }
+        let spec = config.to_canonical_json().into();
+        Self { id, spec, config, round: Round::generation(evolution) }
     }
 
     /// An experiment as the store has it.

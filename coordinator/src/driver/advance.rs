@@ -9,7 +9,7 @@ use crate::{
     clock,
     engine::JudgedGeneration,
     ids::ExperimentId,
-    shared_store::SharedStore,
+    shared_store::{SharedStore, Written},
     store::{Generation, GenerationCommit},
 };
 
@@ -20,6 +20,7 @@ pub struct Advance {
     pub store: SharedStore,
     pub shutdown: CancellationToken,
     pub id: ExperimentId,
+    pub incarnation: u64,
     pub config: ExperimentConfig,
     pub round: Round,
     pub judged: JudgedGeneration,
@@ -28,6 +29,7 @@ pub struct Advance {
 /// What became of it.
 pub struct Advanced {
     pub id: ExperimentId,
+    pub incarnation: u64,
     pub outcome: Outcome,
 }
 
@@ -35,7 +37,8 @@ pub struct Advanced {
 pub enum Outcome {
     /// There is another round to judge.
     Continues(Box<Round>),
-    /// It has ended, in the store too.
+    /// It has ended, or the coordinator does; the store knows all there is to
+    /// know.
     Ended,
     /// It cannot go on; the store does not know yet.
     Failed(String),
@@ -44,15 +47,19 @@ pub enum Outcome {
 impl Advance {
     /// Draws the conclusions and commits the generation if it is complete.
     pub async fn run(self) -> Advanced {
-        let Self { store, shutdown, id, config, round, judged } = self;
+        let Self { store, shutdown, id, incarnation, config, round, judged } = self;
         let concluding = task::spawn_blocking(move || (round.conclude(&config, &judged), config));
-        let (next, config) = concluding.await.expect("conclusions do not panic");
-        let outcome = match next {
-            Ok(Next::Judge(round)) => Outcome::Continues(round),
-            Ok(Next::Commit(complete)) => commit(&store, &shutdown, id, &config, *complete).await,
-            Err(error) => Outcome::Failed(error.to_string()),
+        let outcome = match concluding.await {
+            Ok((Ok(Next::Judge(round)), _)) => Outcome::Continues(round),
+            Ok((Ok(Next::Commit(complete)), config)) => {
+                commit(&store, &shutdown, id, &config, *complete).await
+            }
+            Ok((Err(error), _)) => Outcome::Failed(error.to_string()),
+            Err(panic) => {
+                Outcome::Failed(format!("evolution panicked ({panic}); please report this"))
+            }
         };
-        Advanced { id, outcome }
+        Advanced { id, incarnation, outcome }
     }
 }
 
@@ -66,7 +73,7 @@ async fn commit(
     let Complete { generation, checkpoint, champion, digest, notices, over, next } = complete;
     let (row, remarks, reason, link) =
         (generation.clone(), notices.clone(), over.clone(), digest.clone());
-    let is_committed = store
+    let written = store
         .write(shutdown, move |store| {
             store.commit_generation(
                 id,
@@ -82,8 +89,10 @@ async fn commit(
             )
         })
         .await;
-    if !is_committed {
-        return Outcome::Ended;
+    match written {
+        Written::Yes => {}
+        Written::NotWanted => return Outcome::Ended,
+        Written::Never(error) => return Outcome::Failed(error.to_string()),
     }
     log_generation(id, config, &generation);
     for notice in notices {

@@ -28,7 +28,7 @@ use crate::{
 };
 
 use advance::{Advance, Advanced, Outcome};
-use round::Round;
+pub use round::Round;
 
 /// Events that wait for the loop; whoever sends more waits.
 const EVENT_QUEUE_LEN: usize = 1024;
@@ -121,8 +121,11 @@ pub struct Driver {
     tick_interval: Duration,
     workers: BTreeMap<WorkerId, ConnectedWorker>,
     experiments: BTreeMap<ExperimentId, Running>,
+    n_started: u64,
     /// Generations that are being learnt from and stored.
     advancing: JoinSet<Advanced>,
+    /// Ends that are being stored.
+    ending: JoinSet<()>,
 }
 
 struct ConnectedWorker {
@@ -134,6 +137,9 @@ struct ConnectedWorker {
 /// An experiment that has not ended.
 struct Running {
     config: ExperimentConfig,
+    /// Tells this run of the experiment from one before more generations were
+    /// asked for.
+    incarnation: u64,
     /// What is being judged; none while conclusions are drawn and stored.
     round: Option<Round>,
     /// Who waits for it to end.
@@ -157,7 +163,9 @@ impl Driver {
             tick_interval: lease / 8,
             workers: BTreeMap::new(),
             experiments: BTreeMap::new(),
+            n_started: 0,
             advancing: JoinSet::new(),
+            ending: JoinSet::new(),
         }
     }
 
@@ -173,6 +181,7 @@ impl Driver {
                     Ok(advanced) => self.on_advanced(advanced),
                     Err(error) => error!("storing a generation panicked: {error}; please report this"),
                 },
+                Some(_) = self.ending.join_next() => {}
                 _ = ticks.tick() => self.engine.on_tick(clock::now()),
             }
             while let Some(command) = self.engine.poll_command() {
@@ -182,6 +191,7 @@ impl Driver {
         // Dropping the links ends the workers' streams.
         self.workers.clear();
         while self.advancing.join_next().await.is_some() {}
+        while self.ending.join_next().await.is_some() {}
     }
 
     fn on_event(&mut self, event: Event) {
@@ -225,13 +235,19 @@ impl Driver {
         let generations = runnable.config.algorithm.generations;
         info!(
             experiment = %id, name = runnable.config.name, seed = runnable.config.seed,
-            generation = runnable.evolution.n_generations(), generations,
+            generation = runnable.round.address(), generations,
             "experiment starts"
         );
         self.engine.on_experiment_started(id, runnable.spec);
-        let config = runnable.config;
-        self.experiments.insert(id, Running { config, round: None, cancellations: Vec::new() });
-        self.judge(id, Round::generation(runnable.evolution));
+        self.n_started += 1;
+        let running = Running {
+            config: runnable.config,
+            incarnation: self.n_started,
+            round: None,
+            cancellations: Vec::new(),
+        };
+        self.experiments.insert(id, running);
+        self.judge(id, runnable.round);
     }
 
     /// Has the fleet judge a round.
@@ -270,6 +286,7 @@ impl Driver {
                     store: self.store.clone(),
                     shutdown: self.shutdown.clone(),
                     id: experiment,
+                    incarnation: running.incarnation,
                     config: running.config.clone(),
                     round,
                     judged,
@@ -285,6 +302,9 @@ impl Driver {
     fn on_advanced(&mut self, advanced: Advanced) {
         let id = advanced.id;
         let Some(running) = self.experiments.get_mut(&id) else { return };
+        if running.incarnation != advanced.incarnation {
+            return;
+        }
         match advanced.outcome {
             Outcome::Continues(round) => {
                 if running.cancellations.is_empty() {
@@ -337,15 +357,16 @@ impl Driver {
         replies: Vec<oneshot::Sender<()>>,
     ) {
         let (store, shutdown) = (self.store.clone(), self.shutdown.clone());
-        self.advancing.spawn(async move {
-            store
+        self.ending.spawn(async move {
+            // What keeps it from being written has been logged; at the next start
+            // the experiment goes on, and can be ended again.
+            let _ = store
                 .write(&shutdown, move |store| store.end(id, clock::unix_ms(), state, &reason))
                 .await;
             for reply in replies {
                 // Whoever has stopped waiting need not be told.
                 let _ = reply.send(());
             }
-            Advanced { id, outcome: Outcome::Ended }
         });
     }
 

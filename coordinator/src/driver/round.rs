@@ -11,6 +11,7 @@ use crate::{
 };
 
 /// What the fleet judges at once.
+#[derive(Debug)]
 pub enum Round {
     /// The next generation.
     Generation(Box<Evolution>, Asked),

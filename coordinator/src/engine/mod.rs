@@ -208,7 +208,7 @@ impl Engine {
     /// A worker's stream has ended. Its work goes to others; returns how many
     /// items that are.
     pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
-        let n_items_requeued = self.forget_worker(now, id);
+        let n_items_requeued = self.forget_worker(now, id, Some("was lost"));
         self.assign();
         n_items_requeued
     }
@@ -278,7 +278,8 @@ impl Engine {
             .map(|(&id, _)| id)
             .collect();
         for id in silent {
-            self.disconnect(now, id, format!("silent for {} s", lease.as_secs_f64()));
+            // Silence is the network's fault, or a pause's, not an item's.
+            self.disconnect(now, id, None, format!("silent for {} s", lease.as_secs_f64()));
         }
         self.assign();
     }
@@ -293,7 +294,8 @@ impl Engine {
             && fitness.len() != n_trials
         {
             let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
-            self.disconnect(now, id, reason);
+            let blame = format!("was dropped: {reason}");
+            self.disconnect(now, id, Some(&blame), reason);
             return;
         }
         let (experiment_id, task) = self.take_assignment(id, result.id);
@@ -402,24 +404,26 @@ impl Engine {
         (assignment.experiment, assignment.task)
     }
 
-    fn disconnect(&mut self, now: Instant, id: WorkerId, reason: String) {
-        let n_items_requeued = self.forget_worker(now, id);
+    fn disconnect(&mut self, now: Instant, id: WorkerId, blame: Option<&str>, reason: String) {
+        let n_items_requeued = self.forget_worker(now, id, blame);
         self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
     }
 
-    fn forget_worker(&mut self, now: Instant, id: WorkerId) -> usize {
+    /// `blame`: what happened to it that the items it was computing may have
+    /// caused, if they may.
+    fn forget_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
         self.available.remove(&(worker.load(), id));
         self.fleet_time.set_slots(now, |n_slots| n_slots - worker.n_slots);
         // Only what it was computing can have taken it down: its oldest items,
         // one per slot. A worker that said goodbye was not taken down.
         let n_suspects = if worker.is_draining { 0 } else { worker.n_slots };
-        let blame = format!("its worker \"{}\" was lost", worker.name);
         let n_items = worker.in_flight.len();
         // Later items first, so that the earliest ends up at the queue's front.
         for (age_rank, (_, assignment)) in worker.in_flight.into_iter().enumerate().rev() {
-            let blame = (age_rank < n_suspects).then_some(blame.as_str());
-            self.retry(assignment.experiment, assignment.task, blame);
+            let blame = blame.filter(|_| age_rank < n_suspects);
+            let blame = blame.map(|blame| format!("its worker \"{}\" {blame}", worker.name));
+            self.retry(assignment.experiment, assignment.task, blame.as_deref());
         }
         n_items
     }

@@ -63,16 +63,17 @@ fn item(item: &Item) -> v1::Item {
     }
 }
 
-/// A worker's result; none if it says neither fitness nor failure.
-pub fn item_result(result: v1::ItemResult) -> Option<ItemResult> {
-    Some(ItemResult {
+/// A worker's result.
+pub fn item_result(result: v1::ItemResult) -> ItemResult {
+    ItemResult {
         id: ItemId(result.item_id),
-        outcome: match result.outcome? {
-            Outcome::Fitness(fitness) => Ok(fitness.values),
-            Outcome::Failure(failure) => Err(printable(&failure.message)),
+        outcome: match result.outcome {
+            Some(Outcome::Fitness(fitness)) => Ok(fitness.values),
+            Some(Outcome::Failure(failure)) => Err(printable(&failure.message)),
+            None => Err("neither fitness nor failure".to_owned()),
         },
         compute_time: Duration::from_micros(result.compute_us),
-    })
+    }
 }
 
 /// Text from the network, fit for a log: bounded, on one line.

@@ -86,26 +86,32 @@ impl ExperimentService for Experiments {
             })?
             .map_err(|error| Status::invalid_argument(problems(&error)))?;
 
-        let placement = self
-            .store
-            .try_write(move |store| place(store, new, evolution, resume_unfinished))
-            .await
-            .map_err(store_status)?;
-        let (id, runnable) = match placement {
-            Placement::Runs(runnable) => (runnable.id, Some(runnable)),
-            Placement::RunsAlready(id) => (id, None),
-            Placement::TooMany => {
-                return Err(Status::resource_exhausted(format!(
+        // In a task of its own: what is stored must reach the driver even if the
+        // client goes away meanwhile.
+        let (store, events) = (self.store.clone(), self.events.clone());
+        let placing = tokio::spawn(async move {
+            let placement = store
+                .try_write(move |store| place(store, new, evolution, resume_unfinished))
+                .await
+                .map_err(store_status)?;
+            match placement {
+                Placement::Runs(runnable) => {
+                    let id = runnable.id;
+                    info!(experiment = %id, name = runnable.config.name, "experiment submitted");
+                    let ready = Event::ExperimentReady(runnable);
+                    events.send(ready).await.map_err(|_| shutting_down())?;
+                    Ok(id)
+                }
+                Placement::RunsAlready(id) => Ok(id),
+                Placement::TooMany => Err(Status::resource_exhausted(format!(
                     "{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some"
-                )));
+                ))),
             }
-        };
+        });
+        let id = placing.await.map_err(|_| {
+            Status::internal("storing the experiment panicked; please report this")
+        })??;
         let experiment = self.find(id.0).await?;
-        if let Some(runnable) = runnable {
-            info!(experiment = %id, name = runnable.config.name, "experiment submitted");
-            let ready = Event::ExperimentReady(runnable);
-            self.events.send(ready).await.map_err(|_| shutting_down())?;
-        }
         let experiment = Some(convert::experiment(experiment));
         Ok(Response::new(SubmitExperimentResponse { experiment, warnings }))
     }
@@ -164,10 +170,14 @@ impl ExperimentService for Experiments {
             let cancel = Event::CancelRequested { experiment: id, reply };
             self.events.send(cancel).await.map_err(|_| shutting_down())?;
             // Not answered: it has ended in another way meanwhile, as the store
-            // will tell.
+            // will tell, or the coordinator is about to.
             let _ = ended.await;
         }
-        let experiment = Some(convert::experiment(self.find(id.0).await?));
+        let experiment = self.find(id.0).await?;
+        if experiment.state == ExperimentState::Running {
+            return Err(shutting_down());
+        }
+        let experiment = Some(convert::experiment(experiment));
         Ok(Response::new(CancelExperimentResponse { experiment }))
     }
 
@@ -184,6 +194,14 @@ impl ExperimentService for Experiments {
                 "experiment {id} has no champion yet: its first generation is not complete"
             )));
         };
+        if experiment.fingerprint != sim_core::FINGERPRINT {
+            return Err(Status::failed_precondition(format!(
+                "experiment {id} was computed with \"{}\", this is \"{}\"; \
+                 its network can be decoded with that release only",
+                experiment.fingerprint,
+                sim_core::FINGERPRINT
+            )));
+        }
         let genotype = champion.genotype.clone();
         let network =
             task::spawn_blocking(move || network_json(&experiment.config_json, &genotype))
@@ -232,6 +250,11 @@ fn place(
     evolution: Evolution,
     resume_unfinished: bool,
 ) -> Result<Placement, StoreError> {
+    if let Some(request_id) = &new.request_id
+        && let Some(id) = store.experiment_of_request(request_id)?
+    {
+        return Ok(Placement::RunsAlready(id));
+    }
     let experiments = store.experiments()?;
     if resume_unfinished && let Some(placement) = resume(store, &experiments, &new)? {
         return Ok(placement);
@@ -256,25 +279,36 @@ fn resume(
     new: &NewExperiment,
 ) -> Result<Option<Placement>, StoreError> {
     let config_json = new.config.to_canonical_json();
+    // The digest tells versions of the simulation apart.
     let config_digest = new.config_digest.to_string();
-    for experiment in experiments.iter().rev() {
-        let id = experiment.id;
-        if experiment.state == ExperimentState::Running && experiment.config_json == config_json {
-            return Ok(Some(Placement::RunsAlready(id)));
-        }
+    let same_bits = experiments.iter().rev().filter(|e| e.config_digest == config_digest);
+    let is_running = |e: &&store::Experiment| e.state == ExperimentState::Running;
+    if let Some(same) = same_bits.clone().filter(is_running).find(|e| e.config_json == config_json)
+    {
+        return Ok(Some(Placement::RunsAlready(same.id)));
+    }
+    for experiment in same_bits {
         let n_done = experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1);
         let can_go_on = experiment.state == ExperimentState::Completed
             && experiment.reason.is_empty()
-            && experiment.config_digest == config_digest
-            && n_done < new.config.algorithm.generations;
-        if can_go_on && let Some(checkpoint) = store.checkpoint(id)? {
-            store.reopen(id, &config_json, clock::unix_ms())?;
-            let reopened = store::Experiment { config_json, ..experiment.clone() };
+            && n_done < new.config.algorithm.generations
+            && differs_in_generations_only(&experiment.config_json, &new.config);
+        if can_go_on && let Some(checkpoint) = store.checkpoint(experiment.id)? {
+            let reopened =
+                store::Experiment { config_json: config_json.clone(), ..experiment.clone() };
             let runnable = Runnable::restore(&reopened, &checkpoint)?;
+            store.reopen(experiment.id, &config_json, clock::unix_ms())?;
             return Ok(Some(Placement::Runs(Box::new(runnable))));
         }
     }
     Ok(None)
+}
+
+fn differs_in_generations_only(config_json: &str, config: &ExperimentConfig) -> bool {
+    ExperimentConfig::from_json(config_json, "").is_ok_and(|(mut other, _)| {
+        other.algorithm.generations = config.algorithm.generations;
+        other == *config
+    })
 }
 
 /// Sends events until the experiment is over.

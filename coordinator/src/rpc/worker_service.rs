@@ -108,7 +108,7 @@ async fn listen(
             Message::Heartbeat(_) => WorkerMessage::Heartbeat,
             Message::Draining(_) => WorkerMessage::Draining,
             Message::Results(results) => WorkerMessage::Results(
-                results.results.into_iter().filter_map(convert::item_result).collect(),
+                results.results.into_iter().map(convert::item_result).collect(),
             ),
             Message::Hello(_) => break "it said Hello twice".to_owned(),
         };

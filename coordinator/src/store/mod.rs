@@ -72,7 +72,7 @@ pub enum StoreError {
     )]
     Corrupt(String),
     /// The disk is full, or cannot be read or written; try again later.
-    #[error("the database cannot be read or written: {0}; is there room on the disk?")]
+    #[error("the database cannot be read or written: {0}; is the disk full, or read-only?")]
     Unavailable(rusqlite::Error),
     /// The experiment has ended meanwhile.
     #[error("experiment {0} has ended")]
@@ -88,6 +88,14 @@ impl From<rusqlite::Error> for StoreError {
             CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
             ReadOnly, SystemIoFailure,
         };
+        if matches!(
+            error,
+            rusqlite::Error::FromSqlConversionFailure(..)
+                | rusqlite::Error::IntegralValueOutOfRange(..)
+                | rusqlite::Error::InvalidColumnType(..)
+        ) {
+            return Self::Corrupt(error.to_string());
+        }
         match error.sqlite_error_code() {
             Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
             Some(
@@ -141,19 +149,12 @@ impl Store {
     /// Adds an experiment. If `request_id` has been used before, nothing is
     /// added and the id of that experiment is returned.
     pub fn create(&mut self, new: &NewExperiment, now_ms: u64) -> Result<(ExperimentId, bool)> {
-        let transaction = self.connection.transaction()?;
-        if let Some(request_id) = &new.request_id {
-            let existing = transaction
-                .query_row(
-                    "SELECT id FROM experiments WHERE request_id = ?1",
-                    [request_id],
-                    |row| row.get(0).map(ExperimentId),
-                )
-                .optional()?;
-            if let Some(id) = existing {
-                return Ok((id, false));
-            }
+        if let Some(request_id) = &new.request_id
+            && let Some(id) = self.experiment_of_request(request_id)?
+        {
+            return Ok((id, false));
         }
+        let transaction = self.connection.transaction()?;
         transaction.execute(
             "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
                                       genotype_len, state, submitted_at_ms)
@@ -177,6 +178,13 @@ impl Store {
         add_state_event(&transaction, id, now_ms, state, "submitted")?;
         transaction.commit()?;
         Ok((id, true))
+    }
+
+    /// The experiment that was created under a client's key.
+    pub fn experiment_of_request(&self, request_id: &str) -> Result<Option<ExperimentId>> {
+        let mut statement =
+            self.connection.prepare_cached("SELECT id FROM experiments WHERE request_id = ?1")?;
+        Ok(statement.query_row([request_id], |row| row.get(0).map(ExperimentId)).optional()?)
     }
 
     /// Commits a generation with everything that belongs to it;

@@ -75,7 +75,8 @@ pub struct Experiment {
     pub submitted_at_ms: u64,
     /// Latest completed generation.
     pub latest: Option<Generation>,
-    /// Covers all generations and re-evaluations so far; empty before the first.
+    /// The link that the latest generation ended with, of the re-evaluations'
+    /// digest chain or the generations'; empty before the first.
     pub digest: String,
     /// Fitness of the champion so far: on held-out trials, or, before the first
     /// re-evaluation, on those for which it was chosen.

@@ -21,7 +21,7 @@ const MIGRATIONS: &[&str] = &["
         state TEXT NOT NULL CHECK (state IN ('running', 'completed', 'failed', 'cancelled')),
         reason TEXT NOT NULL DEFAULT '',
         submitted_at_ms INTEGER NOT NULL,
-        -- Covers all generations and re-evaluations so far.
+        -- The last link of the digest chain of re-evaluations, or of generations.
         digest TEXT NOT NULL DEFAULT ''
     ) STRICT;
 
