@@ -22,6 +22,7 @@ mod worker;
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
+    mem,
     ops::Range,
     sync::Arc,
     time::{Duration, Instant},
@@ -44,6 +45,7 @@ pub const MAX_ATTEMPTS: u32 = 3;
 #[derive(Debug)]
 pub struct Engine {
     lease: Duration,
+    last_tick: Instant,
     n_workers_seen: u64,
     n_items_assigned: u64,
     workers: BTreeMap<WorkerId, Worker>,
@@ -171,6 +173,7 @@ impl Engine {
     pub fn new(now: Instant, lease: Duration) -> Self {
         Self {
             lease,
+            last_tick: now,
             n_workers_seen: 0,
             n_items_assigned: 0,
             workers: BTreeMap::new(),
@@ -271,6 +274,12 @@ impl Engine {
     /// Time has passed. Call several times per lease.
     pub fn on_tick(&mut self, now: Instant) {
         let lease = self.lease;
+        // If the coordinator itself has paused (a suspended laptop, a debugger),
+        // that is not its workers' silence.
+        let pause = now.saturating_duration_since(mem::replace(&mut self.last_tick, now));
+        if pause > lease / 2 {
+            self.workers.values_mut().for_each(|worker| worker.last_heard += pause);
+        }
         let silent: Vec<WorkerId> = self
             .workers
             .iter()

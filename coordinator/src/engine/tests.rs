@@ -240,6 +240,37 @@ fn a_silent_worker_is_dropped_after_its_lease_and_a_busy_one_is_not() {
 }
 
 #[test]
+fn a_pause_of_the_coordinator_is_not_its_workers_silence() {
+    let mut fleet = Fleet::new();
+    let id = fleet.join(1);
+    fleet.start(EXPERIMENT, 2, 1);
+    fleet.now += LEASE * 100;
+    fleet.engine.on_tick(fleet.now);
+    fleet.carry_out();
+    assert!(fleet.workers.contains_key(&id));
+    fleet.run();
+    fleet.assert_judged(2, 1);
+}
+
+#[test]
+fn silence_is_not_blamed_on_items() {
+    let mut fleet = Fleet::new();
+    fleet.start(EXPERIMENT, 1, 1);
+    for _ in 0..2 * MAX_ATTEMPTS {
+        fleet.join(1);
+        for _ in 0..4 {
+            fleet.now += LEASE / 4;
+            fleet.engine.on_tick(fleet.now);
+            fleet.carry_out();
+        }
+        assert!(fleet.workers.is_empty());
+    }
+    fleet.join(1);
+    fleet.run();
+    fleet.assert_judged(1, 1);
+}
+
+#[test]
 fn a_draining_worker_gets_nothing_more_and_is_not_blamed() {
     let mut fleet = Fleet::new();
     fleet.start(EXPERIMENT, 1, 1);
@@ -423,9 +454,11 @@ proptest! {
                     fleet.carry_out();
                 },
                 Happening::FallSilent => {
-                    fleet.now += LEASE;
-                    fleet.engine.on_tick(fleet.now);
-                    fleet.carry_out();
+                    for _ in 0..4 {
+                        fleet.now += LEASE / 4;
+                        fleet.engine.on_tick(fleet.now);
+                        fleet.carry_out();
+                    }
                     prop_assert!(fleet.workers.is_empty());
                 }
             }
