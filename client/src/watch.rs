@@ -17,6 +17,8 @@ use crate::{
 
 /// How long a coordinator may be away.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// A stream that lasted so long was contact, even if nothing happened.
+const LASTING: Duration = Duration::from_secs(5);
 
 /// An experiment that has ended.
 #[derive(Debug)]
@@ -100,13 +102,14 @@ impl Follower<'_> {
             let reason = match self.connection.events(self.experiment_id, seen.next_sequence).await
             {
                 Ok(events) => {
-                    unreachable_since = None;
-                    let sequence = seen.next_sequence;
+                    let (opened, sequence) = (Instant::now(), seen.next_sequence);
                     match self.read(events, &mut seen).await? {
                         StreamEnd::Final => return Ok(seen.first_best),
                         StreamEnd::Broken(reason) => {
-                            if seen.next_sequence > sequence {
+                            // A stream that opens and breaks at once is no contact.
+                            if seen.next_sequence > sequence || opened.elapsed() > LASTING {
                                 backoff.reset();
+                                unreachable_since = None;
                             }
                             reason
                         }
