@@ -60,6 +60,21 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
 }
 
 #[test]
+fn a_run_ends_early_at_its_target_fitness() {
+    let directory = tempfile::tempdir().unwrap();
+    let experiment = Experiment::small(50).edit(|e| {
+        e["algorithm"]["target_fitness"] = json!(0.0);
+    });
+    let path = experiment.path();
+    let args = ["run", path.to_str().unwrap(), "--data-dir", directory.path().to_str().unwrap()];
+    let lines = swarmctl(args).expect_success().json_lines();
+    assert_eq!(lines.len(), 2, "the mean of the first generation is not negative");
+    let last = lines.last().unwrap();
+    assert_eq!(last["state"], "completed");
+    assert!(last["reason"].as_str().unwrap().contains("reached the target"), "{last}");
+}
+
+#[test]
 fn a_bad_file_lists_every_problem_and_creates_nothing() {
     let coordinator = CoordinatorProcess::start();
     let experiment = Experiment::small(1).edit(|e| {
