@@ -122,7 +122,7 @@ pub struct Driver {
     workers: BTreeMap<WorkerId, ConnectedWorker>,
     experiments: BTreeMap<ExperimentId, Running>,
     n_started: u64,
-    /// Generations that are being learnt from and stored.
+    /// Judged rounds whose conclusions are being drawn and stored.
     advancing: JoinSet<Advanced>,
     /// Ends that are being stored.
     ending: JoinSet<()>,

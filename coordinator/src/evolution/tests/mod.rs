@@ -123,6 +123,11 @@ fn champions_are_kept_by_their_held_out_fitness() {
     other.crown(&second, &[vec![3.0, 3.0], vec![2.0, 2.0], vec![f64::NAN, 8.0]]);
     assert_eq!(other.champion().unwrap().held_out.unwrap().mean, 3.0);
     assert_ne!(other.champion_digest(), evolution.champion_digest());
+
+    // Who has lost once does not come back: the next challenger is of later birth.
+    tell(&mut evolution, 1.0);
+    let third = evolution.reevaluation().unwrap();
+    assert_eq!((third.candidates[1].fitness(), third.candidates[1].generation), (Some(1.0), 3));
 }
 
 #[test]
