@@ -2,9 +2,6 @@
 
 use crate::torus::{Torus, Vec2, wrap_angle};
 
-/// Below this turning rate the motion is a straight line, rad/s.
-const STRAIGHT: f64 = 1e-9;
-
 /// A robot's wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Drive {
@@ -29,19 +26,21 @@ impl Drive {
         let [right, left] = wheels.map(|action| action * self.max_speed);
         let speed = 0.5 * (right + left);
         let turn = (right - left) / self.axle_length;
-        let turned = heading + turn * self.step_duration;
-        let (sin, cos) = libm::sincos(heading);
-        let way = if turn.abs() < STRAIGHT {
-            let length = speed * self.step_duration;
-            Vec2 { x: length * cos, y: length * sin }
-        } else {
-            let radius = speed / turn;
-            let (sin_turned, cos_turned) = libm::sincos(turned);
-            Vec2 { x: radius * (sin_turned - sin), y: -radius * (cos_turned - cos) }
-        };
+        let turn = turn * self.step_duration;
+        // The chord of the arc: 2 r sin(turn / 2), with r = length / turn, in the
+        // direction half-way between the headings.
+        let chord = speed * self.step_duration * sinc(0.5 * turn);
+        let way = if chord == 0.0 { Vec2::default() } else { Vec2::unit(heading + 0.5 * turn) };
+        let way = Vec2 { x: chord * way.x, y: chord * way.y };
         let position = torus.wrap(Vec2 { x: position.x + way.x, y: position.y + way.y });
-        (position, wrap_angle(turned))
+        (position, wrap_angle(heading + turn))
     }
+}
+
+/// sin(x) / x
+fn sinc(x: f64) -> f64 {
+    // The next term of the series is below half an ulp of 1.
+    if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { libm::sin(x) / x }
 }
 
 #[cfg(test)]

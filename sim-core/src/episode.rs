@@ -17,24 +17,29 @@ use crate::trial::Trial;
 /// to stay in the cache.
 const MAX_LANES: usize = 256;
 
-/// Simulates one episode per trial and returns their fitness, in order.
+/// Simulates one episode per trial and returns their fitness, in order; none if
+/// `keep_going`, asked before every step, has said no.
 pub(crate) fn run(
     experiment: &Experiment,
     phenotype: &Phenotype,
     generation: u64,
     trials: Range<u32>,
-) -> Result<Vec<f64>, EvaluateError> {
+    keep_going: &dyn Fn() -> bool,
+) -> Result<Option<Vec<f64>>, EvaluateError> {
     let n_at_once = (MAX_LANES / experiment.world.n_robots().max(1)).max(1);
     let mut fitness = Vec::with_capacity(trials.len());
     for first in trials.clone().step_by(n_at_once) {
         let last = trials.end.min(first.saturating_add(n_at_once as u32));
         let mut episodes = Episodes::new(experiment, phenotype, generation, first..last)?;
         for step in 0..experiment.n_steps {
+            if !keep_going() {
+                return Ok(None);
+            }
             episodes.step(step, |_, _, _| {})?;
         }
         fitness.extend(episodes.trials.iter().map(Trial::fitness));
     }
-    Ok(fitness)
+    Ok(Some(fitness))
 }
 
 /// Simulates the episode of one trial and shows each of its steps to `observe`.
@@ -128,9 +133,12 @@ impl<'a> Brain<'a> {
         let n_lanes = n_trials * group.robots.len();
         let n_inputs = group.stimuli.last().map_or(0, |(_, inputs)| inputs.end);
         let controller: Box<dyn Controller> = match group.controller {
-            RobotController::NeuralController => {
-                Box::new(NeuralController::new(&experiment.network, phenotype, n_lanes))
-            }
+            RobotController::NeuralController => Box::new(NeuralController::new(
+                experiment.isa,
+                &experiment.network,
+                phenotype,
+                n_lanes,
+            )),
             RobotController::BraitenbergLightFollower => {
                 Box::new(BraitenbergLightFollower::new(n_inputs, n_lanes))
             }
@@ -158,7 +166,7 @@ impl<'a> Brain<'a> {
     /// Adds the stimuli of the first trial's robots.
     fn record(&self, record: &mut StepRecord) {
         for (lane, robot) in record.robots[self.robots.clone()].iter_mut().enumerate() {
-            robot.stimuli = self.stimuli.column(lane).collect();
+            robot.stimuli = self.stimuli.column(lane).map(f64::from).collect();
         }
     }
 }

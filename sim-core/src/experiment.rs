@@ -5,7 +5,8 @@ use std::ops::Range;
 use crate::config::{ConfigError, ExperimentConfig, FitnessFunction, limits};
 use crate::episode;
 use crate::genotype::Codec;
-use crate::network::Network;
+use crate::isa::Isa;
+use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
@@ -17,6 +18,7 @@ const N_TRIED_TRIALS: u32 = 8;
 /// A compiled experiment: (genotype, generation, trials) -> fitness.
 #[derive(Debug, Clone)]
 pub struct Experiment {
+    pub(crate) isa: Isa,
     pub(crate) seed: u64,
     pub(crate) n_steps: u32,
     n_trials: u32,
@@ -82,6 +84,7 @@ impl Experiment {
             World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
         problems.check()?;
         let experiment = Self {
+            isa: Isa::best(),
             seed: config.seed,
             n_steps: algorithm.evaluation_steps,
             n_trials: algorithm.num_evaluations,
@@ -102,6 +105,13 @@ impl Experiment {
         }
         problems.check()?;
         Ok(experiment)
+    }
+
+    /// The same experiment, simulated with other vector instructions than the
+    /// processor's best. No bit of any result changes.
+    #[must_use]
+    pub fn with_isa(self, isa: Isa) -> Self {
+        Self { isa, ..self }
     }
 
     /// Length d of a genotype.
@@ -132,9 +142,22 @@ impl Experiment {
         generation: u64,
         trials: Range<u32>,
     ) -> Result<Vec<f64>, EvaluateError> {
-        self.check_genotype(genotype)?;
+        let fitness = self.evaluate_while(genotype, generation, trials, &|| true)?;
+        Ok(fitness.expect("nothing stopped it"))
+    }
+
+    /// As [`evaluate`](Self::evaluate), but asks before every environment step
+    /// whether to go on; none if it was stopped.
+    pub fn evaluate_while(
+        &self,
+        genotype: &[f64],
+        generation: u64,
+        trials: Range<u32>,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, EvaluateError> {
+        let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
-        episode::run(self, &self.codec.decode(genotype), generation, trials)
+        episode::run(self, &phenotype, generation, trials, keep_going)
     }
 
     /// Simulates the episode of one trial and shows each of its steps to
@@ -147,16 +170,21 @@ impl Experiment {
         trial: u32,
         observe: &mut dyn FnMut(StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
-        self.check_genotype(genotype)?;
+        let phenotype = self.phenotype(genotype)?;
         self.check_trials(&(trial..trial.saturating_add(1)))?;
-        episode::watch(self, &self.codec.decode(genotype), generation, trial, observe)
+        episode::watch(self, &phenotype, generation, trial, observe)
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with
     /// `tau`, `bias`, `gain` and activation, synapses with weights.
     pub fn network_json(&self, genotype: &[f64]) -> Result<serde_json::Value, EvaluateError> {
+        Ok(self.network.to_json(&self.phenotype(genotype)?))
+    }
+
+    /// Decodes a genotype.
+    pub(crate) fn phenotype(&self, genotype: &[f64]) -> Result<Phenotype, EvaluateError> {
         self.check_genotype(genotype)?;
-        Ok(self.network.to_json(&self.codec.decode(genotype)))
+        Ok(self.codec.decode(genotype))
     }
 
     fn check_trials(&self, trials: &Range<u32>) -> Result<(), EvaluateError> {
@@ -191,6 +219,18 @@ mod tests {
         assert!((445..=465).contains(&d), "{d}");
         assert_eq!(experiment.population_segments(), std::slice::from_ref(&(0..d)));
         assert!(experiment.uncovered_parameters().is_empty());
+    }
+
+    #[test]
+    fn an_evaluation_stops_when_it_is_told_to() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let genotype = genotype(experiment.genotype_len(), 1);
+        let n_asked = std::cell::Cell::new(0);
+        let keep_going = || n_asked.replace(n_asked.get() + 1) < 7;
+        assert_eq!(experiment.evaluate_while(&genotype, 0, 0..2, &keep_going), Ok(None));
+        assert_eq!(n_asked.get(), 8, "asked before every step");
+        let whole = experiment.evaluate(&genotype, 0, 0..2).unwrap();
+        assert_eq!(experiment.evaluate_while(&genotype, 0, 0..2, &|| true), Ok(Some(whole)));
     }
 
     #[test]

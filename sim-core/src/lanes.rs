@@ -1,57 +1,50 @@
 //! Matrices whose innermost index is the lane: one lane per simulated robot.
 //!
 //! All robots of all trials of a genotype share one network, so that a weight is
-//! read once and applied to every lane. Lanes are padded to whole blocks; the
+//! read once and applied to every lane. Rows are padded to whole vectors; the
 //! padding holds values like any other, and nobody reads them.
 
-/// Lanes per block: one 512-bit register of f64.
-pub(crate) const BLOCK: usize = 8;
-
-/// A block of neighbouring lanes.
-pub(crate) type Block = [f64; BLOCK];
+/// Lanes per row are a multiple of this: one 512-bit vector of f32.
+const PADDING: usize = 16;
 
 /// A matrix `[row][lane]`.
 #[derive(Debug, Clone)]
 pub(crate) struct Lanes {
-    /// Blocks per row.
-    n_blocks: usize,
-    blocks: Vec<Block>,
+    /// Lanes per row, with padding.
+    row_len: usize,
+    values: Vec<f32>,
 }
 
 impl Lanes {
     /// All zero.
     pub fn new(n_rows: usize, n_lanes: usize) -> Self {
-        let n_blocks = n_lanes.div_ceil(BLOCK);
-        Self { n_blocks, blocks: vec![[0.0; BLOCK]; n_rows * n_blocks] }
+        let row_len = n_lanes.next_multiple_of(PADDING);
+        Self { row_len, values: vec![0.0; n_rows * row_len] }
     }
 
-    /// One row, as blocks.
-    pub fn row(&self, row: usize) -> &[Block] {
-        &self.blocks[row * self.n_blocks..][..self.n_blocks]
+    /// One row, with its padding.
+    pub fn row(&self, row: usize) -> &[f32] {
+        &self.values[row * self.row_len..][..self.row_len]
     }
 
-    /// One row, as blocks.
-    pub fn row_mut(&mut self, row: usize) -> &mut [Block] {
-        &mut self.blocks[row * self.n_blocks..][..self.n_blocks]
+    /// One row, with its padding.
+    pub fn row_mut(&mut self, row: usize) -> &mut [f32] {
+        &mut self.values[row * self.row_len..][..self.row_len]
     }
 
     /// One value.
-    pub fn get(&self, row: usize, lane: usize) -> f64 {
-        self.blocks[row * self.n_blocks + lane / BLOCK][lane % BLOCK]
+    pub fn get(&self, row: usize, lane: usize) -> f32 {
+        self.values[row * self.row_len + lane]
     }
 
     /// The values of one lane, row by row.
-    pub fn column(&self, lane: usize) -> impl Iterator<Item = f64> {
-        self.blocks
-            .iter()
-            .skip(lane / BLOCK)
-            .step_by(self.n_blocks.max(1))
-            .map(move |b| b[lane % BLOCK])
+    pub fn column(&self, lane: usize) -> impl Iterator<Item = f32> {
+        self.values.iter().skip(lane).step_by(self.row_len.max(1)).copied()
     }
 
     /// Sets one value.
-    pub fn set(&mut self, row: usize, lane: usize, value: f64) {
-        self.blocks[row * self.n_blocks + lane / BLOCK][lane % BLOCK] = value;
+    pub fn set(&mut self, row: usize, lane: usize, value: f32) {
+        self.values[row * self.row_len + lane] = value;
     }
 }
 
@@ -64,14 +57,14 @@ mod tests {
         let mut lanes = Lanes::new(3, 11);
         for row in 0..3 {
             for lane in 0..11 {
-                lanes.set(row, lane, (row * 11 + lane) as f64);
+                lanes.set(row, lane, (row * 11 + lane) as f32);
             }
         }
         for row in 0..3 {
             for lane in 0..11 {
-                assert_eq!(lanes.get(row, lane), (row * 11 + lane) as f64);
+                assert_eq!(lanes.get(row, lane), (row * 11 + lane) as f32);
             }
-            assert_eq!(lanes.row(row)[1][2], (row * 11 + 10) as f64);
+            assert_eq!(lanes.row(row)[10], (row * 11 + 10) as f32);
         }
         assert_eq!(lanes.column(9).collect::<Vec<_>>(), [9.0, 20.0, 31.0]);
     }

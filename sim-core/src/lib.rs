@@ -12,19 +12,24 @@
 //! `random` and `torus` lie below everything.
 
 mod alpha_shape;
+#[doc(hidden)]
+pub mod bench;
 mod border;
 mod communication;
 pub mod config;
 mod controllers;
 mod drive;
 mod episode;
+mod exp2;
 mod experiment;
 mod fitness;
 mod genotype;
 mod initializers;
+mod isa;
 mod lanes;
 mod leadership;
 mod lights;
+mod neighbours;
 mod network;
 mod perturbations;
 mod problems;
@@ -41,6 +46,7 @@ mod world;
 
 pub use communication::Mode;
 pub use experiment::{EvaluateError, Experiment};
+pub use isa::{Isa, UnknownIsa};
 pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
 pub use torus::Vec2;
 
@@ -54,4 +60,4 @@ pub const fn held_out(generation: u64) -> u64 {
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work
 /// together only if they agree on it.
-pub const FINGERPRINT: &str = concat!("sim-core ", env!("CARGO_PKG_VERSION"), " format 1");
+pub const FINGERPRINT: &str = concat!("sim-core ", env!("CARGO_PKG_VERSION"), " format 2");

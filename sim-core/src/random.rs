@@ -19,8 +19,11 @@
 //!   distributions would use the platform's as soon as any dependency asks for
 //!   their `std` feature.
 
+use pulp::{Simd, WithSimd};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+
+use crate::isa::Isa;
 
 /// What a stream is for. The numbers are part of the format of a run: never
 /// reuse one for something else.
@@ -88,11 +91,30 @@ impl Stream {
         self.uniform() < p
     }
 
+    /// Passes over `n` draws of any kind.
+    pub(crate) fn skip(&mut self, n: usize) {
+        for _ in 0..n {
+            self.0.next_u64();
+        }
+    }
+
     /// Standard normal.
     pub fn normal(&mut self) -> f64 {
+        standard_normal_quantile(self.probability())
+    }
+
+    /// Fills `values` with what [`normal`](Self::normal) would draw one by one, to
+    /// the bit, in less than half the time.
+    pub fn fill_normal(&mut self, values: &mut [f64]) {
+        values.fill_with(|| self.probability());
+        Isa::best().run(StandardNormalQuantiles(values));
+    }
+
+    /// Uniform in (0, 1).
+    fn probability(&mut self) -> f64 {
         // 52 bits, so that adding a half is exact and the quantile stays finite.
         let k = self.0.next_u64() >> 12;
-        standard_normal_quantile((k as f64 + 0.5) * TWO_POW_MINUS_52)
+        (k as f64 + 0.5) * TWO_POW_MINUS_52
     }
 }
 
@@ -117,9 +139,8 @@ const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
 /// routine PPND16, relative accuracy about 1e-16.
 fn standard_normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
-    if q.abs() <= 0.425 {
-        let r = 0.180625 - q * q;
-        return q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r);
+    if is_central(q) {
+        return central_quantile(q);
     }
     let tail = if q < 0.0 { p } else { 1.0 - p };
     let r = (-libm::log(tail)).sqrt();
@@ -133,7 +154,40 @@ fn standard_normal_quantile(p: f64) -> f64 {
     if q < 0.0 { -magnitude } else { magnitude }
 }
 
+/// Whether `p` = q + 0.5 is not in a tail: 85 of 100 are not.
+fn is_central(q: f64) -> bool {
+    q.abs() <= 0.425
+}
+
+#[inline(always)]
+fn central_quantile(q: f64) -> f64 {
+    let r = 0.180625 - q * q;
+    q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
+}
+
+/// Replaces probabilities by their quantiles. All of them are taken to be central
+/// first: without a branch, the compiler computes several at once.
+struct StandardNormalQuantiles<'a>(&'a mut [f64]);
+
+impl WithSimd for StandardNormalQuantiles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        const N: usize = 64;
+        for values in self.0.chunks_mut(N) {
+            let mut probabilities = [0.5; N];
+            probabilities[..values.len()].copy_from_slice(values);
+            let quantiles = probabilities.map(|p| central_quantile(p - 0.5));
+            for ((value, p), central) in values.iter_mut().zip(probabilities).zip(quantiles) {
+                *value = if is_central(p - 0.5) { central } else { standard_normal_quantile(p) };
+            }
+        }
+    }
+}
+
 /// Polynomial with the coefficients of x^0, x^1, ...
+#[inline(always)]
 fn horner(coefficients: &[f64; 8], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
 }
@@ -216,6 +270,25 @@ mod tests {
         ] {
             let q = standard_normal_quantile(p);
             assert!((q - expected).abs() <= 1e-14 * expected.abs().max(1.0), "{p}: {q} {expected}");
+        }
+    }
+
+    #[test]
+    fn many_normals_at_once_are_those_drawn_one_by_one() {
+        for n in [0, 1, 63, 64, 65, 10_000] {
+            let stream = Stream::new(n, 1, 0, Purpose::Evolution, 2);
+            let mut one_by_one = stream.clone();
+            let expected: Vec<u64> = (0..n).map(|_| one_by_one.normal().to_bits()).collect();
+            for isa in Isa::available() {
+                let mut stream = stream.clone();
+                let mut values: Vec<f64> = (0..n).map(|_| stream.probability()).collect();
+                isa.run(StandardNormalQuantiles(&mut values));
+                let bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();
+                assert_eq!(bits, expected, "{n} by {isa}");
+            }
+            let mut at_once = stream;
+            at_once.fill_normal(&mut vec![0.0; n as usize]);
+            assert_eq!(at_once.uniform(), one_by_one.uniform(), "as many draws");
         }
     }
 

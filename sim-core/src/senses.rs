@@ -2,11 +2,12 @@
 
 use crate::communication::Mode;
 use crate::config::SensorQuery;
+use crate::neighbours::Neighbours;
 use crate::random::Stream;
 use crate::sensors::Viewpoint;
 use crate::swarm::Swarm;
-use crate::torus::Vec2;
-use crate::world::{RobotGroup, World};
+use crate::torus::{Torus, Vec2};
+use crate::world::RobotGroup;
 
 /// Readings of the robots of one group in one trial, beside those of the radio;
 /// empty without the sensor.
@@ -19,6 +20,19 @@ pub(crate) struct Senses {
     /// `[robot]`
     ground: Vec<f64>,
     n_robots: usize,
+}
+
+/// What there is to sense beside frames.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surroundings<'a> {
+    /// The plane.
+    pub torus: &'a Torus,
+    /// Who is near whom.
+    pub neighbours: &'a Neighbours,
+    /// Positions of all lights.
+    pub lights: &'a [Vec2],
+    /// Centres of all ground areas.
+    pub areas: &'a [Vec2],
 }
 
 /// A reading of one robot.
@@ -96,27 +110,32 @@ impl Senses {
     /// stream, the light sensor's first.
     pub fn update(
         &mut self,
-        world: &World,
         group: &RobotGroup,
         swarm: &Swarm,
-        lights: &[Vec2],
-        areas: &[Vec2],
+        surroundings: Surroundings<'_>,
         noise: &mut [Stream],
     ) {
+        let Surroundings { torus, neighbours, lights, areas } = surroundings;
         for (index, robot) in group.robots.clone().enumerate() {
             let position = swarm.positions[robot];
-            let from = Viewpoint { torus: &world.torus, position, heading: swarm.headings[robot] };
+            let from = Viewpoint { torus, position, heading: swarm.headings[robot] };
             let noise = &mut noise[robot];
             if let Some(sensor) = &group.light_sensor {
                 let readings = &mut self.light[index * sensor.n_sectors..][..sensor.n_sectors];
-                sensor.sense(from, lights, noise, readings);
+                if swarm.photosensitive[robot] {
+                    sensor.sense(from, lights, noise, readings);
+                } else if group.distance_sensor.is_some() {
+                    // Nobody looks at the readings, but the other sensor's noise
+                    // comes after theirs.
+                    sensor.skip(noise);
+                }
             }
             if let Some(sensor) = &group.distance_sensor {
                 let readings = &mut self.distance[index * sensor.n_sectors..][..sensor.n_sectors];
-                sensor.sense(from, &swarm.positions, robot, noise, readings);
+                sensor.sense(neighbours.of(robot), from.heading, noise, readings);
             }
             if let Some(sensor) = &group.ground_sensor {
-                self.ground[index] = sensor.sense(&world.torus, position, areas);
+                self.ground[index] = sensor.sense(torus, position, areas);
             }
         }
     }

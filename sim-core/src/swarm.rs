@@ -30,8 +30,10 @@ pub(crate) struct Swarm {
     pub message_len: usize,
     /// Whether the controller gets light readings.
     pub photosensitive: Vec<bool>,
-    /// Whether any robot changed its place or heading in this step.
+    /// Whether any robot changed its place in this step.
     pub moved: bool,
+    /// Whether any robot changed its heading in this step.
+    pub turned: bool,
 }
 
 /// A frame taken from the air.
@@ -63,6 +65,7 @@ impl Swarm {
             message_len,
             photosensitive: vec![false; n],
             moved: true,
+            turned: true,
         }
     }
 

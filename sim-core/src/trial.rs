@@ -1,17 +1,21 @@
 //! One trial of an experiment: the phases of its environment steps, except what
 //! controllers do.
 
+use std::mem;
+
 use crate::communication::{Mode, Radio};
 use crate::config::SensorQuery;
 use crate::controllers::Controller;
 use crate::experiment::{EvaluateError, Experiment};
 use crate::fitness::{self, Fitness, Moment};
+use crate::isa::Isa;
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
+use crate::neighbours::Neighbours;
 use crate::perturbations::Perturbations;
 use crate::random::{Purpose, Stream};
 use crate::record::{Metrics, StepRecord};
-use crate::senses::Senses;
+use crate::senses::{Senses, Surroundings};
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::{Fixtures, Site, World};
@@ -23,7 +27,9 @@ const N_FIRST_STEPS_SENDING: u32 = 10;
 pub(crate) struct Trial<'a> {
     world: &'a World,
     address: Address,
+    isa: Isa,
     swarm: Swarm,
+    neighbours: Neighbours,
     radio: Radio,
     lights: Vec<Vec2>,
     light_paths: Vec<LightPath>,
@@ -148,7 +154,9 @@ impl<'a> Trial<'a> {
         Ok(Self {
             world,
             address,
+            isa: experiment.isa,
             swarm,
+            neighbours: Neighbours::new(world.sensing_range(), n_robots),
             radio,
             lights,
             light_paths,
@@ -165,7 +173,8 @@ impl<'a> Trial<'a> {
     /// Start of a step: every robot senses, from positions and headings now and
     /// from the frames that are on the air.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
-        let mut relocated = std::mem::replace(&mut self.swarm.moved, false);
+        let mut moved = mem::replace(&mut self.swarm.moved, false);
+        let turned = mem::replace(&mut self.swarm.turned, false);
         // Robots whose topology switches find themselves elsewhere.
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             if state.perturbations.switches_topology(step) {
@@ -173,17 +182,26 @@ impl<'a> Trial<'a> {
                 let positions = self.address.place(&group.site, torus, &mut state.positions)?;
                 self.swarm.positions[group.robots.clone()].copy_from_slice(&positions);
                 self.swarm.moved = true;
-                relocated = true;
+                moved = true;
             }
         }
-        // Who hears whom changes only when somebody moves.
-        if relocated {
-            self.radio.relocate(self.world, &self.swarm);
+        // Who is near whom changes only when somebody moves, and who hears whom
+        // when somebody moves or turns.
+        if moved {
+            self.neighbours.update(&self.world.torus, &self.swarm.positions);
+        }
+        if moved || turned {
+            self.radio.listen(self.world, &self.neighbours, &self.swarm);
         }
         self.radio.receive(self.world, &mut self.swarm);
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
-            let (swarm, noise) = (&self.swarm, &mut self.noise);
-            state.senses.update(self.world, group, swarm, &self.lights, &self.areas, noise);
+            let surroundings = Surroundings {
+                torus: &self.world.torus,
+                neighbours: &self.neighbours,
+                lights: &self.lights,
+                areas: &self.areas,
+            };
+            state.senses.update(group, &self.swarm, surroundings, &mut self.noise);
         }
         Ok(())
     }
@@ -199,7 +217,7 @@ impl<'a> Trial<'a> {
                 let reading = state.senses.reading(*query, &self.swarm, index, robot);
                 for (input, &value) in inputs.clone().zip(reading.values()) {
                     let value = if inhibited { 0.0 } else { value };
-                    stimuli.set(input, first_lane + index, value);
+                    stimuli.set(input, first_lane + index, value as f32);
                 }
             }
         }
@@ -230,9 +248,7 @@ impl<'a> Trial<'a> {
         self.drive();
         // Every transmitter puts its frame on the air.
         for group in &world.groups {
-            for robot in group.robots.clone() {
-                self.radio.emit(world, &mut self.swarm, group.quantiser.as_ref(), robot);
-            }
+            self.radio.emit(self.isa, world, &mut self.swarm, group);
         }
         // The step is judged.
         let fitness = self.fitness.step(&Moment::new(world, &self.swarm, &self.lights, step));
@@ -274,13 +290,11 @@ impl<'a> Trial<'a> {
         for group in &self.world.groups {
             let Some(drive) = &group.drive else { continue };
             for robot in group.robots.clone().filter(|&robot| swarm.wheels[robot] != [0.0; 2]) {
-                (swarm.positions[robot], swarm.headings[robot]) = drive.advance(
-                    &self.world.torus,
-                    swarm.positions[robot],
-                    swarm.headings[robot],
-                    swarm.wheels[robot],
-                );
-                swarm.moved = true;
+                let (position, heading) = (swarm.positions[robot], swarm.headings[robot]);
+                let pose = drive.advance(&self.world.torus, position, heading, swarm.wheels[robot]);
+                swarm.moved |= pose.0 != position;
+                swarm.turned |= pose.1 != heading;
+                (swarm.positions[robot], swarm.headings[robot]) = pose;
             }
         }
     }

@@ -160,6 +160,14 @@ impl World {
         }
     }
 
+    /// Distance beyond which no robot senses another one, cm.
+    pub fn sensing_range(&self) -> f64 {
+        let receivers = self.antennas.iter().filter_map(|antenna| antenna.receiver);
+        let sensors = self.groups.iter().filter_map(|group| group.distance_sensor.as_ref());
+        let ranges = receivers.map(|receiver| receiver.range);
+        ranges.chain(sensors.map(|sensor| sensor.range)).fold(0.0, f64::max)
+    }
+
     fn add_lights(
         &mut self,
         index: usize,

@@ -17,16 +17,15 @@ use reference::Episode;
 
 /// Largest difference between two fitness values that count as equal.
 ///
-/// The two implementations add in different orders and take their exponentials
-/// from different libraries, so activities differ in their last bits. That moves
-/// what is continuous (headings, positions) a little: relative errors of 4e-16,
-/// put into the reference's network, sensors or wheels, moved no fitness here by
-/// more than 6e-12. And it changes what is drawn (an LED, a symbol, a sector) or
-/// compared (a range) only if a number falls into a gap of that width, which
-/// millions of draws, the same ones in every run, are unlikely to do. Genotypes
-/// and positions are chosen to stay clear of both; where a tie is the point, its
-/// angles are exact.
-const TOLERANCE: f64 = 1e-9;
+/// The simulator's networks and quantisers compute in f32, the reference in f64,
+/// so activities differ by some 1e-7. That moves what is continuous (headings,
+/// positions) a little, and it changes what is drawn (an LED, a symbol, a sector)
+/// or compared (a range) only if a number falls into a gap of that width; from
+/// then on trajectories part. Among the draws of an episode, the same ones in
+/// every run, that is unlikely, the more so the fewer they are: episodes of robots
+/// that move are kept short. Genotypes and positions are chosen to stay clear of
+/// ties; where a tie is the point, its angles are exact.
+const TOLERANCE: f64 = 1e-5;
 
 /// Asserts that simulator and reference give the same fitness in these trials,
 /// and returns the reference's episodes.

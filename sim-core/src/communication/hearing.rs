@@ -1,10 +1,11 @@
 //! Who hears whom, in which sector and how strongly. It depends on positions and
-//! headings alone, so it is computed again only when a robot has moved.
+//! headings alone, so it is computed again only when a robot has moved or turned.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
+use crate::neighbours::{Neighbour, Neighbours};
 use crate::sensors::Decay;
-use crate::torus::{Torus, Vec2, angular_difference, sector_angle, wrap_angle};
+use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
 
 /// A border between sectors belongs to both in spite of rounding, radians.
 const BORDER: f64 = 1e-12;
@@ -34,13 +35,12 @@ pub(crate) struct Receiver {
 /// The strongest emitter in a sector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Heard {
-    /// The robot that is heard.
-    pub emitter: usize,
-    /// How strongly.
-    pub strength: f64,
-    /// Direction from the emitter to the listener, as the emitter's sector
-    /// that faces it: (cos, sin) in the emitter's own frame.
-    pub sending_direction: Vec2,
+    /// The robot that is heard, as the listener has it nearby.
+    pub emitter: Neighbour,
+    /// How far off the sector's direction it is, radians.
+    phi: f64,
+    /// Logarithm of its strength.
+    loudness: f64,
 }
 
 /// The strongest emitter in every sector of every robot. Every emitter puts a
@@ -49,6 +49,10 @@ pub(crate) struct Heard {
 pub(crate) struct Hearing {
     /// `[robot][sector]`
     sectors: Vec<Option<Heard>>,
+    /// Direction of each sector in its robot's own frame, `[robot][sector]`.
+    angles: Vec<f64>,
+    /// (cos, sin) of `angles`.
+    directions: Vec<Vec2>,
     /// First sector of each robot, and the end.
     first: Vec<usize>,
 }
@@ -57,12 +61,14 @@ impl Hearing {
     /// Nobody hears anyone yet.
     pub fn new(antennas: &[Antenna]) -> Self {
         let mut first = vec![0];
-        let mut n_sectors = 0;
+        let mut angles = Vec::new();
         for antenna in antennas {
-            n_sectors += antenna.receiver.map_or(0, |receiver| receiver.n_sectors);
-            first.push(n_sectors);
+            let n_sectors = antenna.receiver.map_or(0, |receiver| receiver.n_sectors);
+            angles.extend((0..n_sectors).map(|sector| sector_angle(sector, n_sectors)));
+            first.push(angles.len());
         }
-        Self { sectors: vec![None; n_sectors], first }
+        let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
+        Self { sectors: vec![None; angles.len()], angles, directions, first }
     }
 
     /// The sectors of one robot.
@@ -70,39 +76,57 @@ impl Hearing {
         &self.sectors[self.first[robot]..self.first[robot + 1]]
     }
 
-    /// Computes everything from positions and headings.
-    pub fn update(
-        &mut self,
-        torus: &Torus,
-        antennas: &[Antenna],
-        positions: &[Vec2],
-        headings: &[f64],
-    ) {
+    /// (cos, sin) of a robot's sector in its own frame.
+    pub fn direction(&self, robot: usize, sector: usize) -> Vec2 {
+        self.directions[self.first[robot] + sector]
+    }
+
+    /// (cos, sin) of the emitter's sector that faces the listener, in the emitter's
+    /// own frame.
+    pub fn sending_direction(&self, listener: usize, heard: &Heard, headings: &[f64]) -> Vec2 {
+        // What cannot listen has as many sectors as its listener.
+        let emitter = heard.emitter.robot;
+        let listens = self.first[emitter] < self.first[emitter + 1];
+        let robot = if listens { emitter } else { listener };
+        let angles = &self.angles[self.first[robot]..self.first[robot + 1]];
+        let bearing = wrap_angle(heard.emitter.reverse_bearing() - headings[emitter]);
+        self.direction(robot, facing(bearing, angles))
+    }
+
+    /// Computes everything from who is near whom and from headings.
+    pub fn update(&mut self, antennas: &[Antenna], neighbours: &Neighbours, headings: &[f64]) {
         self.sectors.fill(None);
         for (robot, antenna) in antennas.iter().enumerate() {
             let Some(receiver) = antenna.receiver else { continue };
-            let sectors = &mut self.sectors[self.first[robot]..self.first[robot + 1]];
-            for (emitter, other) in antennas.iter().enumerate() {
-                let Some(reach) = other.emits_within else { continue };
-                let away = torus.displacement(positions[robot], positions[emitter]);
-                let rho = away.norm();
-                if emitter == robot || rho > receiver.range.min(reach) {
+            let own = self.first[robot]..self.first[robot + 1];
+            let (sectors, angles) = (&mut self.sectors[own.clone()], &self.angles[own]);
+            let half_width = PI / receiver.n_sectors as f64;
+            let sectors_per_radian = receiver.n_sectors as f64 / TAU;
+            for &emitter in neighbours.of(robot) {
+                let Some(reach) = antennas[emitter.robot].emits_within else { continue };
+                if emitter.rho > receiver.range.min(reach) {
                     continue;
                 }
-                let bearing = wrap_angle(away.angle() - headings[robot]);
-                let back = Vec2::new(-away.x, -away.y);
-                let sending = wrap_angle(back.angle() - headings[emitter]);
-                let n_sending = other.receiver.map_or(receiver.n_sectors, |r| r.n_sectors);
-                for (sector, strongest) in sectors.iter_mut().enumerate() {
-                    let angle = sector_angle(sector, receiver.n_sectors);
-                    let phi = angular_difference(bearing, angle);
-                    if phi > PI / receiver.n_sectors as f64 + BORDER {
-                        continue;
+                let bearing = wrap_angle(emitter.bearing - headings[robot]);
+                let mut hear_in = |sector: usize, phi: f64| {
+                    let loudness = receiver.decay.loudness(emitter.rho, phi);
+                    let strongest = &mut sectors[sector];
+                    if strongest.is_none_or(|heard| loudness > heard.loudness) {
+                        *strongest = Some(Heard { emitter, phi, loudness });
                     }
-                    let strength = receiver.decay.strength(rho, phi);
-                    if strongest.is_none_or(|heard| strength > heard.strength) {
-                        let sending_direction = facing(sending, n_sending);
-                        *strongest = Some(Heard { emitter, strength, sending_direction });
+                };
+                let nearest = (bearing * sectors_per_radian + 0.5) as usize;
+                let nearest = if nearest < receiver.n_sectors { nearest } else { 0 };
+                let phi = angular_difference(bearing, angles[nearest]);
+                if phi < half_width - BORDER {
+                    hear_in(nearest, phi);
+                    continue;
+                }
+                // On a border.
+                for (sector, &angle) in angles.iter().enumerate() {
+                    let phi = angular_difference(bearing, angle);
+                    if phi <= half_width + BORDER {
+                        hear_in(sector, phi);
                     }
                 }
             }
@@ -110,18 +134,24 @@ impl Hearing {
     }
 }
 
-/// (cos, sin) of the sector of `n_sectors` that is nearest to an angle in
+impl Heard {
+    /// Strength of its frames.
+    pub fn strength(&self, decay: Decay) -> f64 {
+        decay.strength(self.emitter.rho, self.phi)
+    }
+}
+
+/// The sector, of those with the given directions, that is nearest to an angle in
 /// \[0, 2 pi); on ties the one of the lower index.
-fn facing(angle: f64, n_sectors: usize) -> Vec2 {
-    let mut nearest = (f64::INFINITY, 0.0);
-    for sector in 0..n_sectors {
-        let direction = sector_angle(sector, n_sectors);
+fn facing(angle: f64, sectors: &[f64]) -> usize {
+    let mut nearest = (f64::INFINITY, 0);
+    for (sector, &direction) in sectors.iter().enumerate() {
         let difference = angular_difference(angle, direction);
         if difference < nearest.0 - BORDER {
-            nearest = (difference, direction);
+            nearest = (difference, sector);
         }
     }
-    Vec2::unit(nearest.1)
+    nearest.1
 }
 
 #[cfg(test)]
@@ -129,6 +159,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     use super::*;
+    use crate::torus::Torus;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
     const ANTENNA: Antenna = Antenna {
@@ -145,12 +176,14 @@ mod tests {
         let positions: Vec<Vec2> = robots.iter().map(|&(x, y, _)| Vec2::new(x, y)).collect();
         let headings: Vec<f64> = robots.iter().map(|&(_, _, heading)| heading).collect();
         let mut hearing = Hearing::new(antennas);
-        hearing.update(&TORUS, antennas, &positions, &headings);
+        let mut neighbours = Neighbours::new(100.0, robots.len());
+        neighbours.update(&TORUS, &positions);
+        hearing.update(antennas, &neighbours, &headings);
         hearing
     }
 
     fn emitters(hearing: &Hearing, robot: usize) -> Vec<Option<usize>> {
-        hearing.of(robot).iter().map(|heard| heard.map(|heard| heard.emitter)).collect()
+        hearing.of(robot).iter().map(|heard| heard.map(|heard| heard.emitter.robot)).collect()
     }
 
     #[test]
@@ -161,10 +194,12 @@ mod tests {
         assert_eq!(emitters(&hearing, 0), [None, Some(1), None, None]);
         let heard = hearing.of(0)[1].unwrap();
         let phi = FRAC_PI_2 - libm::atan2(4.0, 3.0);
-        assert!((heard.strength - libm::exp(-2.5 - phi)).abs() < 1e-15);
+        let strength = heard.strength(ANTENNA.receiver.unwrap().decay);
+        assert!((strength - libm::exp(-2.5 - phi)).abs() < 1e-15);
         // Seen from the other: 143.13 degrees to its left, nearest to 180.
-        assert!((heard.sending_direction.x + 1.0).abs() < 1e-15);
-        assert!(heard.sending_direction.y.abs() < 1e-15);
+        let sending_direction = hearing.sending_direction(0, &heard, &[0.0, FRAC_PI_2]);
+        assert!((sending_direction.x + 1.0).abs() < 1e-15);
+        assert!(sending_direction.y.abs() < 1e-15);
         assert_eq!(emitters(&hearing, 1), [None, None, Some(0), None]);
     }
 
@@ -201,7 +236,7 @@ mod tests {
     fn robots_at_one_point_hear_each_other_ahead() {
         let hearing = hearing(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
         assert_eq!(emitters(&hearing, 0), [Some(1), None, None, None]);
-        assert_eq!(hearing.of(0)[0].unwrap().strength, 1.0);
+        assert_eq!(hearing.of(0)[0].unwrap().loudness, 0.0);
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! All robots' radios in one trial: what is on the air, who hears it, and what
 //! chance decides.
 
+use super::Mode;
 use super::frame::{Ether, Origin};
 use super::hearing::Hearing;
-use super::{Mode, Quantiser};
+use super::quantisation::Scratch;
+use crate::isa::Isa;
+use crate::neighbours::Neighbours;
 use crate::random::Stream;
 use crate::swarm::{Received, Swarm};
-use crate::torus::{Vec2, sector_angle};
-use crate::world::World;
+use crate::torus::Vec2;
+use crate::world::{RobotGroup, World};
 
 /// State of the wireless link.
 #[derive(Debug)]
@@ -18,8 +21,9 @@ pub(crate) struct Radio {
     reception: Vec<Stream>,
     /// Per robot.
     quantisation: Vec<Stream>,
-    /// Scratch of the quantiser.
-    weights: Vec<f64>,
+    /// What the quantiser's draws are, for a group.
+    u: Vec<f64>,
+    scratch: Scratch,
 }
 
 impl Radio {
@@ -30,13 +34,14 @@ impl Radio {
             hearing: Hearing::new(&world.antennas),
             reception,
             quantisation,
-            weights: Vec::new(),
+            u: Vec::new(),
+            scratch: Scratch::default(),
         }
     }
 
-    /// Robots have taken their places, or moved.
-    pub fn relocate(&mut self, world: &World, swarm: &Swarm) {
-        self.hearing.update(&world.torus, &world.antennas, &swarm.positions, &swarm.headings);
+    /// Robots have taken their places, moved or turned.
+    pub fn listen(&mut self, world: &World, neighbours: &Neighbours, swarm: &Swarm) {
+        self.hearing.update(&world.antennas, neighbours, &swarm.headings);
     }
 
     /// Every receiver takes a frame from the air: one uniformly chosen among the
@@ -50,7 +55,7 @@ impl Radio {
             let sectors = self.hearing.of(robot).iter().enumerate();
             let mut valid = sectors.filter_map(|(sector, heard)| {
                 let heard = heard.as_ref()?;
-                let origin = ether.origin(heard.emitter).filter(accepted)?;
+                let origin = ether.origin(heard.emitter.robot).filter(accepted)?;
                 Some((sector, heard, origin))
             });
             // One draw per step, needed or not.
@@ -64,37 +69,43 @@ impl Radio {
                 message.fill(0.0);
                 continue;
             };
-            message.copy_from_slice(ether.message(heard.emitter));
+            message.copy_from_slice(ether.message(heard.emitter.robot));
             // The first to hear a frame sees the direction in which it was sent.
-            let sending_direction =
-                if origin.hops == 1 { heard.sending_direction } else { origin.sending_direction };
+            let sending_direction = match origin.hops {
+                1 => self.hearing.sending_direction(robot, heard, &swarm.headings),
+                _ => origin.sending_direction,
+            };
             swarm.received[robot] = Some(Received {
                 sector,
-                signal: heard.strength,
-                receiving_direction: Vec2::unit(sector_angle(sector, receiver.n_sectors)),
+                signal: heard.strength(receiver.decay),
+                receiving_direction: self.hearing.direction(robot, sector),
                 origin: Origin { sending_direction, ..*origin },
             });
         }
     }
 
-    /// Puts a robot's frame on the air: its own message, quantised, or the frame
-    /// that it received in this step. A robot without transmitter stays silent.
-    pub fn emit(
-        &mut self,
-        world: &World,
-        swarm: &mut Swarm,
-        quantiser: Option<&Quantiser>,
-        robot: usize,
-    ) {
-        if world.antennas[robot].emits_within.is_none() {
-            return;
+    /// Puts the frames of a group of robots on the air.
+    pub fn emit(&mut self, isa: Isa, world: &World, swarm: &mut Swarm, group: &RobotGroup) {
+        if let Some(quantiser) = &group.quantiser {
+            // One draw per step and robot, needed or not.
+            let streams = &mut self.quantisation[group.robots.clone()];
+            self.u.clear();
+            self.u.extend(streams.iter_mut().map(Stream::uniform));
+            let messages =
+                group.robots.start * swarm.message_len..group.robots.end * swarm.message_len;
+            quantiser.quantise(isa, &mut swarm.messages[messages], &self.u, &mut self.scratch);
         }
+        for robot in group.robots.clone() {
+            if world.antennas[robot].emits_within.is_some() {
+                self.emit_frame(swarm, robot);
+            }
+        }
+    }
+
+    /// Puts a robot's frame on the air: its own message, or the frame that it
+    /// received in this step.
+    fn emit_frame(&mut self, swarm: &Swarm, robot: usize) {
         let message = swarm.message_range(robot);
-        if let Some(quantiser) = quantiser {
-            // One draw per step, needed or not.
-            let u = self.quantisation[robot].uniform();
-            quantiser.quantise(&mut swarm.messages[message.clone()], u, &mut self.weights);
-        }
         match swarm.modes[robot] {
             Mode::Send => {
                 let origin =

@@ -107,10 +107,11 @@ pub struct EnsembleConfig {
 }
 
 /// Activation function of an ensemble.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
     /// 1 / (1 + exp(-x)), range (0, 1).
+    #[default]
     Sigmoid,
     /// Hyperbolic tangent, range (-1, 1).
     Tanh,

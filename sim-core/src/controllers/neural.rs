@@ -1,6 +1,7 @@
 //! Robots run by the network that a genotype encodes.
 
 use super::{Action, Controller};
+use crate::isa::Isa;
 use crate::lanes::Lanes;
 use crate::network::ctrnn::Ctrnn;
 use crate::network::decoding::Output;
@@ -18,8 +19,8 @@ pub(crate) struct NeuralController<'a> {
 
 impl<'a> NeuralController<'a> {
     /// At rest in every lane.
-    pub fn new(network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
-        let ctrnn = Ctrnn::new(network, phenotype, n_lanes);
+    pub fn new(isa: Isa, network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
+        let ctrnn = Ctrnn::new(isa, network, phenotype, n_lanes);
         Self { ctrnn, outputs: &network.outputs, weights: Vec::new() }
     }
 }

@@ -20,7 +20,7 @@ pub(crate) struct Moment<'a> {
     pub torus: &'a Torus,
     /// Environment step, from 0.
     pub step: u32,
-    /// Whether any robot changed its place or heading in this step.
+    /// Whether any robot changed its place in this step.
     pub moved: bool,
     /// Positions of the robots.
     pub positions: &'a [Vec2],

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{Fitness, Moment, mean};
 use crate::record::Metrics;
-use crate::torus::{Vec2, angular_difference};
+use crate::torus::{Vec2, angular_difference, wrap_angle};
 
 /// Steps that `alignment` does not judge.
 const N_FIRST_STEPS: u32 = 100;
@@ -48,13 +48,7 @@ impl Fitness for Alignment {
         if moment.step < N_FIRST_STEPS {
             return None;
         }
-        let mut spread = 0.0;
-        for (robot, &a) in moment.headings.iter().enumerate() {
-            for &b in &moment.headings[..robot] {
-                spread = f64::max(spread, angular_difference(a, b));
-            }
-        }
-        let aligned = (1.0 - spread / MAX_SPREAD).clamp(0.0, 1.0);
+        let aligned = (1.0 - spread(moment.headings) / MAX_SPREAD).clamp(0.0, 1.0);
         let calm = mean(moment.wheels.iter().map(|[right, _]| (1.0 - right.abs()).clamp(0.0, 1.0)));
         Some(aligned * calm)
     }
@@ -62,6 +56,24 @@ impl Fitness for Alignment {
     fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
         metrics.insert("misalignment", misalignment(moment.headings));
     }
+}
+
+/// The largest difference of two headings, as far as it is below `MAX_SPREAD`;
+/// else something that is not.
+fn spread(headings: &[f64]) -> f64 {
+    let Some(&first) = headings.first() else { return 0.0 };
+    let (mut least, mut most) = (0.0, 0.0);
+    for &heading in headings {
+        // On the short way around, in [-pi, pi].
+        let turn = wrap_angle(heading - first + PI) - PI;
+        if turn.abs() >= MAX_SPREAD {
+            return MAX_SPREAD;
+        }
+        least = f64::min(least, turn);
+        most = f64::max(most, turn);
+    }
+    // All within a right angle or so of the first one: the circle does not matter.
+    most - least
 }
 
 #[cfg(test)]
@@ -72,7 +84,6 @@ mod tests {
 
     use super::*;
     use crate::fitness::metrics;
-    use crate::torus::wrap_angle;
 
     fn moment<'a>(headings: &'a [f64], wheels: &'a [[f64; 2]], step: u32) -> Moment<'a> {
         Moment { headings, wheels, step, ..Moment::EMPTY }

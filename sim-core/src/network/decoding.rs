@@ -79,15 +79,16 @@ impl Output {
         match self.actuator {
             ActuatorQuery::Message => {
                 for (component, neuron) in action.message.iter_mut().zip(self.neurons.clone()) {
-                    *component = self.decoder.value(activities.get(neuron, lane), stream);
+                    *component =
+                        self.decoder.value(f64::from(activities.get(neuron, lane)), stream);
                 }
             }
             ActuatorQuery::Wheels => {
-                let right = self.decoder.value(activities.get(first, lane), stream);
+                let right = self.decoder.value(f64::from(activities.get(first, lane)), stream);
                 let left = if self.neurons.len() == 1 {
                     -right
                 } else {
-                    self.decoder.value(activities.get(first + 1, lane), stream)
+                    self.decoder.value(f64::from(activities.get(first + 1, lane)), stream)
                 };
                 *action.wheels = [right.clamp(-1.0, 1.0), left.clamp(-1.0, 1.0)];
             }
@@ -107,10 +108,11 @@ impl Output {
         weights: &mut Vec<f64>,
     ) -> u32 {
         if self.decoder != Decoder::Softmax {
-            return self.decoder.value(activities.get(self.neurons.start, lane), stream) as u32;
+            return self.decoder.value(f64::from(activities.get(self.neurons.start, lane)), stream)
+                as u32;
         }
         weights.clear();
-        weights.extend(self.neurons.clone().map(|neuron| activities.get(neuron, lane)));
+        weights.extend(self.neurons.clone().map(|neuron| f64::from(activities.get(neuron, lane))));
         let max = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         for weight in &mut *weights {
             *weight = libm::exp(*weight - max);
@@ -144,7 +146,7 @@ mod tests {
     ) -> ([f64; 2], u32, Mode, [f64; 2]) {
         let mut lanes = Lanes::new(activities.len(), 1);
         for (neuron, &u) in activities.iter().enumerate() {
-            lanes.set(neuron, 0, u);
+            lanes.set(neuron, 0, u as f32);
         }
         let (mut wheels, mut led, mut mode, mut message) = ([0.0; 2], 0, Mode::Send, [0.0; 2]);
         let mut action =
@@ -163,7 +165,10 @@ mod tests {
         let mut s = stream();
         let two = [0.25, -1.5];
         assert_eq!(decode(ActuatorQuery::Wheels, Decoder::Identity, &two, &mut s).0, [0.25, -1.0]);
-        assert_eq!(decode(ActuatorQuery::Wheels, Decoder::Identity, &[0.4], &mut s).0, [0.4, -0.4]);
+        assert_eq!(
+            decode(ActuatorQuery::Wheels, Decoder::Identity, &[0.375], &mut s).0,
+            [0.375, -0.375]
+        );
         assert_eq!(decode(ActuatorQuery::Message, Decoder::Identity, &two, &mut s).3, two);
         assert_eq!(decode(ActuatorQuery::Message, Decoder::Threshold, &two, &mut s).3, [0.0; 2]);
         assert_eq!(s.uniform(), stream().uniform(), "nothing was drawn");

@@ -1,8 +1,9 @@
 //! Distance sensor: per sector the nearness of the nearest robot.
 
-use super::{Decay, Viewpoint, perturb};
+use super::{Decay, perturb, take_sectors};
+use crate::neighbours::Neighbour;
 use crate::random::Stream;
-use crate::torus::Vec2;
+use crate::torus::wrap_angle;
 
 /// A distance sensor.
 #[derive(Debug, Clone)]
@@ -18,19 +19,18 @@ pub(crate) struct DistanceSensor {
 }
 
 impl DistanceSensor {
-    /// Readings per sector, in \[0, 1\]; `robots` are the positions of all robots
-    /// and `own` the index of this one.
+    /// Readings per sector, in \[0, 1\], of a robot with this heading.
     pub fn sense(
         &self,
-        from: Viewpoint<'_>,
-        robots: &[Vec2],
-        own: usize,
+        neighbours: &[Neighbour],
+        heading: f64,
         noise: &mut Stream,
         readings: &mut [f64],
     ) {
         readings.fill(0.0);
-        for (_, &other) in robots.iter().enumerate().filter(|&(robot, _)| robot != own) {
-            from.view(other, self.range, self.decay, readings, f64::max);
+        for neighbour in neighbours.iter().filter(|neighbour| neighbour.rho <= self.range) {
+            let bearing = wrap_angle(neighbour.bearing - heading);
+            take_sectors(neighbour.rho, bearing, self.decay, readings, f64::max);
         }
         perturb(readings, self.noise_deviation, noise);
     }
@@ -41,8 +41,9 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
+    use crate::neighbours::Neighbours;
     use crate::random::Purpose;
-    use crate::torus::Torus;
+    use crate::torus::{Torus, Vec2};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 
@@ -56,10 +57,11 @@ mod tests {
         let own = Vec2::new(990.0, 500.0);
         let mut robots: Vec<Vec2> = others.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
         robots.insert(1, own);
-        let from = Viewpoint { torus: &TORUS, position: own, heading: 0.0 };
+        let mut neighbours = Neighbours::new(100.0, robots.len());
+        neighbours.update(&TORUS, &robots);
         let mut readings = vec![7.0; 4];
         let mut noise = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        sensor.sense(from, &robots, 1, &mut noise, &mut readings);
+        sensor.sense(neighbours.of(1), 0.0, &mut noise, &mut readings);
         readings
     }
 

@@ -32,6 +32,13 @@ impl LightSensor {
         }
         perturb(readings, self.noise_deviation, noise);
     }
+
+    /// Passes over the noise of one step.
+    pub fn skip(&self, noise: &mut Stream) {
+        if self.noise_deviation > 0.0 {
+            noise.skip(self.n_sectors);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -24,7 +24,12 @@ pub(crate) struct Decay {
 impl Decay {
     /// Strength, in (0, 1\], at distance `rho` and angle `phi` off the sector.
     pub fn strength(&self, rho: f64, phi: f64) -> f64 {
-        libm::exp(-self.rho * rho - self.phi * phi)
+        libm::exp(self.loudness(rho, phi))
+    }
+
+    /// Logarithm of the strength.
+    pub fn loudness(&self, rho: f64, phi: f64) -> f64 {
+        -self.rho * rho - self.phi * phi
     }
 }
 
@@ -52,15 +57,26 @@ impl Viewpoint<'_> {
     ) {
         let away = self.torus.displacement(self.position, target);
         let rho = away.norm();
-        if rho > reach {
-            return;
+        if rho <= reach {
+            let bearing = wrap_angle(away.angle() - self.heading);
+            take_sectors(rho, bearing, decay, readings, take);
         }
-        let bearing = wrap_angle(away.angle() - self.heading);
-        let n_sectors = readings.len();
-        for (sector, reading) in readings.iter_mut().enumerate() {
-            let phi = angular_difference(bearing, sector_angle(sector, n_sectors));
-            *reading = take(*reading, decay.strength(rho, phi));
-        }
+    }
+}
+
+/// Hands each sector's strength of something at distance `rho` and in direction
+/// `bearing`, in the robot's own frame, to `take`.
+fn take_sectors(
+    rho: f64,
+    bearing: f64,
+    decay: Decay,
+    readings: &mut [f64],
+    take: impl Fn(f64, f64) -> f64,
+) {
+    let n_sectors = readings.len();
+    for (sector, reading) in readings.iter_mut().enumerate() {
+        let phi = angular_difference(bearing, sector_angle(sector, n_sectors));
+        *reading = take(*reading, decay.strength(rho, phi));
     }
 }
 

@@ -18,7 +18,8 @@ fn full_experiments_agree() {
     let episodes = assert_agreement(&config, &random_genotype(&config, 15), 0, 0..2);
     assert!(episodes.iter().any(|episode| episode.witness.n_relayed_receptions > 0));
 
-    let config = experiment_d();
+    let mut config = experiment_d();
+    config.algorithm.evaluation_steps = 300;
     for genotype in [random_genotype(&config, 0), gentle_genotype(&config, 1)] {
         let episodes = assert_agreement(&config, &genotype, 0, 0..2);
         assert!(spread(episodes.iter().map(|episode| episode.fitness)) > 0.0);

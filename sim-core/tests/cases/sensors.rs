@@ -101,7 +101,7 @@ fn every_sensor_agrees_with_and_without_noise() {
 #[test]
 fn lights_on_every_path_agree() {
     let mut config = all_sensors();
-    config.algorithm.evaluation_steps = 150;
+    config.algorithm.evaluation_steps = 80;
     let alone = fitness(&assert_varied_agreement(&config));
     let lights = [
         ("still", LightController::Static {}, "blue", 90.0),

@@ -1,0 +1,207 @@
+//! How fast the simulation is, beside a naive scalar f64 transcription of the same
+//! equations (the one that the tests compare it with) and beside the most that the
+//! processor's multiply-adds allow.
+//!
+//! The two sides of a ratio take turns, so that a machine that slows down slows
+//! both; figures are medians. `SWARM_ISA` chooses the vector instructions, and an
+//! argument the sections: `cargo bench -p sim-core -- kernel`.
+#![allow(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
+
+#[allow(dead_code, unused_imports, reason = "the tests need more of it")]
+#[path = "../tests/configs/mod.rs"]
+mod configs;
+#[allow(dead_code, unused_imports, reason = "the tests need more of it")]
+#[path = "../tests/reference/mod.rs"]
+mod reference;
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
+use sim_core::config::{ExperimentConfig, Initializer};
+use sim_core::random::{Purpose, Stream};
+use sim_core::{Experiment, Isa};
+
+use configs::{experiment_a, experiment_b, experiment_c, experiment_d, swarm_mut};
+
+/// Rounds of which the median counts.
+const N_ROUNDS: usize = 9;
+/// Duration of one measurement, about.
+const MEASUREMENT: Duration = Duration::from_millis(100);
+/// Trials of a genotype, side by side as in the experiments.
+const N_TRIALS: u32 = 5;
+/// Robot-steps of a reference episode, about: enough for its setting up not to
+/// matter.
+const REFERENCE_ROBOT_STEPS: u32 = 3_000;
+
+fn main() {
+    let sections: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wants = |name: &str| sections.is_empty() || sections.iter().any(|s| name.contains(s));
+    let isas = match std::env::var("SWARM_ISA") {
+        Ok(name) => vec![name.parse::<Isa>().unwrap_or_else(|error| panic!("SWARM_ISA: {error}"))],
+        Err(_) => Isa::available(),
+    };
+    let best = *isas.last().expect("every processor has the portable level");
+    if wants("kernel") {
+        kernel(&isas);
+    }
+    if wants("episodes") {
+        episodes(best);
+    }
+    if wants("sizes") {
+        sizes(best);
+    }
+}
+
+/// The network alone.
+fn kernel(isas: &[Isa]) {
+    println!("kernel: network of experiment A, 50 lanes");
+    println!(
+        "{:10} {:>16} {:>16} {:>10} {:>24}",
+        "", "ns/lane-substep", "reference", "ratio", "share of peak mul-adds"
+    );
+    let config = experiment_a();
+    let genotype = genotype(&config, 1);
+    for &isa in isas {
+        let experiment = compile(&config, isa);
+        let (n_synapses, n_substeps) = network_size(&experiment);
+        let n_lanes = 50;
+        let mut load = NetworkLoad::new(&experiment, &genotype, n_lanes).expect("a valid genotype");
+        let [step, reference, peak] = medians([
+            &mut || seconds_per(|| load.step()),
+            &mut || reference_step(&config, &genotype),
+            &mut || {
+                const N: usize = 1_000;
+                seconds_per(|| multiply_adds(isa, N)) / multiply_adds(isa, N) as f64
+            },
+        ]);
+        let per_lane_substep = step / (n_lanes as f64 * f64::from(n_substeps));
+        let reference = reference / f64::from(n_substeps);
+        println!(
+            "{:10} {:16.2} {:16.1} {:9.1}x {:23.0}%",
+            isa.name(),
+            per_lane_substep * 1e9,
+            reference * 1e9,
+            reference / per_lane_substep,
+            100.0 * n_synapses as f64 * peak / per_lane_substep,
+        );
+    }
+}
+
+/// Whole episodes of the four experiments.
+fn episodes(isa: Isa) {
+    println!("\nepisodes ({isa}): all {N_TRIALS} trials of a genotype, per robot and step");
+    header();
+    for config in [experiment_a(), experiment_b(), experiment_c(), experiment_d()] {
+        let name = format!("{} ({} robots)", config.name, n_robots(&config));
+        compare(&name, &config, isa);
+    }
+}
+
+/// Swarms of different sizes and one density.
+fn sizes(isa: Isa) {
+    println!("\nsizes ({isa}): robots that stand (A) and robots that move (D)");
+    header();
+    for mut config in [experiment_a(), experiment_d()] {
+        for n in [10, 20, 50, 200, 1000] {
+            resize(&mut config, n);
+            config.algorithm.evaluation_steps = 100;
+            compare(&format!("{} ({n} robots)", config.name), &config, isa);
+        }
+    }
+}
+
+/// `n` robots in a square that gives each the room that 10 have in experiment D.
+fn resize(config: &mut ExperimentConfig, n: u32) {
+    let scale = f64::from(n).sqrt() / 10_f64.sqrt();
+    let center = 500.0 * scale.max(1.0);
+    (config.world.width, config.world.height) = (2.0 * center, 2.0 * center);
+    let swarm = swarm_mut(config);
+    swarm.num_instances = n;
+    let (low, high) = (center - 100.0 * scale, center + 100.0 * scale);
+    swarm.initializers.positions = Initializer::RandomUniform { low, high, size: 2 };
+}
+
+fn header() {
+    println!("{:20} {:>16} {:>16} {:>10}", "", "us/robot-step", "reference", "ratio");
+}
+
+fn compare(name: &str, config: &ExperimentConfig, isa: Isa) {
+    let experiment = compile(config, isa);
+    let genotypes: Vec<Vec<f64>> = (0..8).map(|seed| genotype(config, seed)).collect();
+    let n_robots = n_robots(config);
+    let robot_steps = f64::from(n_robots * config.algorithm.evaluation_steps * N_TRIALS);
+    let mut short = config.clone();
+    short.algorithm.evaluation_steps =
+        (REFERENCE_ROBOT_STEPS / n_robots).clamp(3, config.algorithm.evaluation_steps);
+    let mut turn = 0;
+    let [simulation, reference] = medians([
+        &mut || {
+            seconds_per(|| {
+                turn += 1;
+                let genotype = &genotypes[turn % genotypes.len()];
+                black_box(experiment.evaluate(genotype, 0, 0..N_TRIALS).expect("it is valid"))
+            }) / robot_steps
+        },
+        &mut || {
+            let start = Instant::now();
+            black_box(reference::run(&short, &genotypes[0], 0, 0));
+            let steps = n_robots * short.algorithm.evaluation_steps;
+            start.elapsed().as_secs_f64() / f64::from(steps)
+        },
+    ]);
+    println!(
+        "{name:20} {:16.3} {:16.1} {:9.1}x",
+        simulation * 1e6,
+        reference * 1e6,
+        reference / simulation,
+    );
+}
+
+/// The naive network of one robot in the naive world, whose own cost hardly counts.
+fn reference_step(config: &ExperimentConfig, genotype: &[f64]) -> f64 {
+    let mut short = config.clone();
+    short.algorithm.evaluation_steps = REFERENCE_ROBOT_STEPS / n_robots(config);
+    let start = Instant::now();
+    black_box(reference::run(&short, genotype, 0, 0));
+    start.elapsed().as_secs_f64() / f64::from(REFERENCE_ROBOT_STEPS)
+}
+
+/// Seconds per call, over about the duration of a measurement.
+fn seconds_per<T>(mut work: impl FnMut() -> T) -> f64 {
+    let start = Instant::now();
+    let mut n = 0;
+    while start.elapsed() < MEASUREMENT {
+        black_box(work());
+        n += 1;
+    }
+    start.elapsed().as_secs_f64() / f64::from(n)
+}
+
+/// The median of each measurement, taken in turns.
+fn medians<const N: usize>(mut measurements: [&mut dyn FnMut() -> f64; N]) -> [f64; N] {
+    let mut samples = [const { Vec::new() }; N];
+    for _ in 0..N_ROUNDS {
+        for (samples, measure) in samples.iter_mut().zip(&mut measurements) {
+            samples.push(measure());
+        }
+    }
+    samples.map(|mut samples| {
+        samples.sort_by(f64::total_cmp);
+        samples[samples.len() / 2]
+    })
+}
+
+fn compile(config: &ExperimentConfig, isa: Isa) -> Experiment {
+    Experiment::compile(config).expect("the configuration is valid").with_isa(isa)
+}
+
+fn n_robots(config: &ExperimentConfig) -> u32 {
+    config.robots().map(|(_, robot)| robot.num_instances).sum()
+}
+
+/// Genes from U(0, 1).
+fn genotype(config: &ExperimentConfig, seed: u64) -> Vec<f64> {
+    let mut stream = Stream::new(seed, 0, 0, Purpose::Evolution, 0);
+    reference::genes(config).iter().map(|_| stream.uniform()).collect()
+}

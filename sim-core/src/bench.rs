@@ -1,0 +1,81 @@
+//! What benchmarks measure beside whole episodes. Not part of the interface.
+
+use std::hint::black_box;
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
+
+use crate::experiment::{EvaluateError, Experiment};
+use crate::isa::Isa;
+use crate::lanes::Lanes;
+use crate::network::ctrnn::Ctrnn;
+
+/// The network of a genotype, at work without robots.
+#[derive(Debug)]
+pub struct NetworkLoad {
+    ctrnn: Ctrnn,
+    stimuli: Lanes,
+}
+
+impl NetworkLoad {
+    /// In `n_lanes` lanes with different stimuli.
+    pub fn new(
+        experiment: &Experiment,
+        genotype: &[f64],
+        n_lanes: usize,
+    ) -> Result<Self, EvaluateError> {
+        let phenotype = experiment.phenotype(genotype)?;
+        let network = &experiment.network;
+        let n_inputs = network.stimuli.values().last().map_or(0, |stimulus| stimulus.inputs.end);
+        let mut stimuli = Lanes::new(n_inputs, n_lanes);
+        for input in 0..n_inputs {
+            for lane in 0..n_lanes {
+                stimuli.set(input, lane, ((lane + 3 * input) % 11) as f32 / 11.0);
+            }
+        }
+        Ok(Self { ctrnn: Ctrnn::new(experiment.isa, network, &phenotype, n_lanes), stimuli })
+    }
+
+    /// One environment step.
+    pub fn step(&mut self) {
+        self.ctrnn.step(black_box(&self.stimuli));
+    }
+}
+
+/// Synapses between neurons, and substeps per environment step.
+pub fn network_size(experiment: &Experiment) -> (usize, u32) {
+    let network = &experiment.network;
+    let is_recurrent = |synapse: &&crate::network::connections::Synapse| {
+        matches!(synapse.pre, crate::network::connections::Source::Neuron(_))
+    };
+    (network.synapses.iter().filter(is_recurrent).count(), network.n_substeps)
+}
+
+/// Does as many multiply-adds of f32 vectors as a processor can, `rounds` times
+/// 12, and returns how many scalar ones that are.
+pub fn multiply_adds(isa: Isa, rounds: usize) -> usize {
+    struct MultiplyAdds(Range<usize>);
+    impl WithSimd for MultiplyAdds {
+        type Output = f32;
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> f32 {
+            let factor = simd.splat_f32s(black_box(0.999));
+            let term = simd.splat_f32s(black_box(0.001));
+            // Enough independent chains to hide the latency.
+            let mut chains = [simd.splat_f32s(1.0); N_CHAINS];
+            for _ in self.0 {
+                for chain in &mut chains {
+                    *chain = simd.mul_add_f32s(*chain, factor, term);
+                }
+            }
+            let mut sum = chains[0];
+            for chain in chains {
+                sum = simd.add_f32s(sum, chain);
+            }
+            simd.reduce_sum_f32s(sum)
+        }
+    }
+    const N_CHAINS: usize = 12;
+    black_box(isa.run(MultiplyAdds(0..rounds)));
+    rounds * N_CHAINS * isa.vector_len()
+}

@@ -1,0 +1,49 @@
+//! 2^y in f32, from IEEE arithmetic with fused multiply-adds alone, so that all
+//! instruction sets agree on it in every bit.
+
+use std::f32::consts::LN_2;
+
+use pulp::Simd;
+
+/// 2^y is computed for |y| up to here; beyond, it stays.
+pub(crate) const MAX_EXPONENT: f32 = 63.0;
+/// Adding it rounds to an integer and leaves that integer, plus the bias of
+/// exponents, in the lowest bits.
+const ROUND: f32 = 12_582_912.0 + 127.0;
+/// Bits of a significand.
+const SIGNIFICAND_BITS: u32 = 23;
+/// (2^f - 1) / f for |f| <= 1/2, lowest power first: minimax for the relative
+/// error of 2^f, which is 2.0e-9.
+const COEFFICIENTS: [f32; 6] =
+    [LN_2, 0.240_226_48, 0.055_503_324, 0.009_618_437, 0.001_339_887_4, 0.000_153_533_69];
+
+/// s * (1 + q * f) = 2^y, with s a power of two and |f| at most one half.
+pub(crate) struct Exp2<V> {
+    pub s: V,
+    pub q: V,
+    pub f: V,
+}
+
+/// 2^y in parts, from which more than 2^y can be computed without loss.
+#[inline(always)]
+pub(crate) fn exp2_parts<S: Simd>(simd: S, y: S::f32s) -> Exp2<S::f32s> {
+    let round = simd.splat_f32s(ROUND);
+    let y = simd.min_f32s(y, simd.splat_f32s(MAX_EXPONENT));
+    let y = simd.max_f32s(y, simd.splat_f32s(-MAX_EXPONENT));
+    let rounded = simd.add_f32s(y, round);
+    let f = simd.sub_f32s(y, simd.sub_f32s(rounded, round));
+    let mut q = simd.splat_f32s(COEFFICIENTS[COEFFICIENTS.len() - 1]);
+    for power in (0..COEFFICIENTS.len() - 1).rev() {
+        q = simd.mul_add_f32s(q, f, simd.splat_f32s(COEFFICIENTS[power]));
+    }
+    let exponent = simd.transmute_u32s_f32s(rounded);
+    let s = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(SIGNIFICAND_BITS));
+    Exp2 { s: simd.transmute_f32s_u32s(s), q, f }
+}
+
+/// 2^y.
+#[inline(always)]
+pub(crate) fn exp2<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
+    let Exp2 { s, q, f } = exp2_parts(simd, y);
+    simd.mul_f32s(s, simd.mul_add_f32s(q, f, simd.splat_f32s(1.0)))
+}

@@ -1,0 +1,135 @@
+//! The network against its equations, and against itself on other processors.
+
+use super::*;
+use crate::config::ExperimentConfig;
+use crate::problems::Problems;
+use crate::testing::experiment_a;
+
+/// The equation as it stands, in f64, for one robot.
+fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut [f64]) -> Vec<f64> {
+    let activities = |v: &[f64]| -> Vec<f64> {
+        let mut u = Vec::new();
+        for ensemble in network.ensembles.values() {
+            u.extend(ensemble.neurons.clone().map(|i| {
+                let x = phenotype.gain[i] * (v[i] + phenotype.bias[i]);
+                match ensemble.activation {
+                    Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
+                    Activation::Tanh => libm::tanh(x),
+                }
+            }));
+        }
+        u
+    };
+    for _ in 0..network.n_substeps {
+        let u = activities(v);
+        let mut drive = vec![0.0; v.len()];
+        for (synapse, weight) in network.synapses.iter().zip(&phenotype.weights) {
+            drive[synapse.post] += weight
+                * match synapse.pre {
+                    Source::Input(input) => stimuli[input],
+                    Source::Neuron(neuron) => u[neuron],
+                };
+        }
+        for i in 0..v.len() {
+            v[i] += network.dt / phenotype.tau[i] * (drive[i] - v[i]);
+        }
+    }
+    activities(v)
+}
+
+/// The network of a configuration, and the phenotype of one of its genotypes.
+fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
+    let mut problems = Problems::default();
+    let network = Network::compile(&config.topology, &mut problems);
+    let codec = crate::genotype::Codec::compile(config, &network, &mut problems);
+    problems.check().unwrap();
+    let phenotype = codec.decode(&crate::testing::genotype(codec.genotype_len(), 5));
+    (network, phenotype)
+}
+
+/// Experiment A's network, and variants with every kind of pair: one ensemble of
+/// `tanh`, and an odd number of neurons.
+fn networks() -> [(Network, Phenotype); 3] {
+    let mut tanh = experiment_a();
+    tanh.topology.ensembles["H2"].activation = Activation::Tanh;
+    let mut odd = tanh.clone();
+    odd.topology.ensembles["H1"].n = 7;
+    odd.topology.ensembles["H2"].n = 9;
+    [experiment_a(), tanh, odd].map(|config| compiled(&config))
+}
+
+fn stimulus(step: usize, lane: usize, input: usize) -> f64 {
+    libm::sin((lane + 3 * input + 7 * step) as f64)
+}
+
+/// Stimuli of one step in some lanes.
+fn stimuli(step: usize, lanes: std::ops::Range<usize>) -> Lanes {
+    let n_inputs = 5;
+    let mut stimuli = Lanes::new(n_inputs, lanes.len());
+    for (index, lane) in lanes.enumerate() {
+        for input in 0..n_inputs {
+            stimuli.set(input, index, stimulus(step, lane, input) as f32);
+        }
+    }
+    stimuli
+}
+
+/// Activities `[neuron]` of one lane after some steps with the given lanes.
+fn bits(
+    (network, phenotype): &(Network, Phenotype),
+    isa: Isa,
+    lanes: std::ops::Range<usize>,
+    lane: usize,
+) -> Vec<u32> {
+    let mut ctrnn = Ctrnn::new(isa, network, phenotype, lanes.len());
+    for step in 0..3 {
+        ctrnn.step(&stimuli(step, lanes.clone()));
+    }
+    ctrnn.activity().column(lane - lanes.start).map(f32::to_bits).collect()
+}
+
+#[test]
+fn every_lane_follows_the_equation() {
+    for (network, phenotype) in networks() {
+        let n_lanes = 11;
+        let mut ctrnn = Ctrnn::new(Isa::best(), &network, &phenotype, n_lanes);
+        let mut v = vec![vec![0.0; network.n_neurons()]; n_lanes];
+        for step in 0..5 {
+            ctrnn.step(&stimuli(step, 0..n_lanes));
+            for (lane, v) in v.iter_mut().enumerate() {
+                let phi: Vec<f64> = (0..5).map(|input| stimulus(step, lane, input)).collect();
+                let u = reference(&network, &phenotype, &phi, v);
+                for (neuron, u) in u.into_iter().enumerate() {
+                    let difference = (f64::from(ctrnn.activity().get(neuron, lane)) - u).abs();
+                    assert!(difference < 1e-5, "step {step}, lane {lane}: {difference}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn instruction_sets_agree_in_every_bit() {
+    for network in networks() {
+        for n_lanes in [1, 15, 50, 100] {
+            for lane in [0, n_lanes / 2, n_lanes - 1] {
+                let expected = bits(&network, Isa::best(), 0..n_lanes, lane);
+                for isa in Isa::available() {
+                    assert_eq!(bits(&network, isa, 0..n_lanes, lane), expected, "{isa}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lane_does_not_depend_on_its_place_or_its_neighbours() {
+    for network in networks() {
+        for isa in Isa::available() {
+            let alone = bits(&network, isa, 70..71, 70);
+            for lanes in [70..71, 69..71, 60..80, 0..71, 37..170] {
+                assert_eq!(bits(&network, isa, lanes.clone(), 70), alone, "{isa}, {lanes:?}");
+            }
+        }
+    }
+}
