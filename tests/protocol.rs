@@ -1,64 +1,17 @@
 //! The wire protocol, spoken by hand.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use harness::{CoordinatorProcess, Experiment};
+use harness::{CoordinatorProcess, Experiment, HandWorker, hello};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
-        Hello, ItemBatch, ItemFailure, ItemResult, ItemResults, SubmitExperimentRequest,
-        SubmitExperimentResponse, WorkRequest, WorkResponse,
-        experiment_service_client::ExperimentServiceClient, item_result::Outcome, work_request,
-        work_response, worker_service_client::WorkerServiceClient,
+        ExperimentState, Hello, ItemFailure, ListWorkersRequest, SubmitExperimentRequest,
+        SubmitExperimentResponse, WatchExperimentRequest, event::Kind,
+        experiment_service_client::ExperimentServiceClient,
+        fleet_service_client::FleetServiceClient, item_result::Outcome, work_response,
     },
 };
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::ReceiverStream;
-use tonic::{Code, Status, Streaming, transport::Channel};
-
-fn hello() -> Hello {
-    Hello {
-        protocol_version: PROTOCOL_VERSION,
-        sim_core_fingerprint: sim_core::FINGERPRINT.to_owned(),
-        name: "by hand".to_owned(),
-        slots: 1,
-    }
-}
-
-/// A worker whose every word is chosen by the test.
-struct HandWorker {
-    outbox: mpsc::Sender<WorkRequest>,
-    inbox: Streaming<WorkResponse>,
-}
-
-impl HandWorker {
-    async fn connect(url: &str, hello: Hello) -> Result<Self, Status> {
-        let mut client = WorkerServiceClient::connect(url.to_owned()).await.unwrap();
-        let (outbox, requests) = mpsc::channel(16);
-        let worker = client.work(ReceiverStream::new(requests));
-        let message = Some(work_request::Message::Hello(hello));
-        outbox.send(WorkRequest { message }).await.unwrap();
-        Ok(Self { outbox, inbox: worker.await?.into_inner() })
-    }
-
-    async fn receive(&mut self) -> Result<work_response::Message, Status> {
-        Ok(self.inbox.message().await?.expect("the stream goes on").message.expect("known kind"))
-    }
-
-    async fn receive_batch(&mut self) -> Result<ItemBatch, Status> {
-        loop {
-            if let work_response::Message::Batch(batch) = self.receive().await? {
-                return Ok(batch);
-            }
-        }
-    }
-
-    async fn answer(&self, item_id: u64, outcome: Outcome) {
-        let result = ItemResult { item_id, outcome: Some(outcome), compute_us: 1 };
-        let results = ItemResults { results: vec![result] };
-        let message = Some(work_request::Message::Results(results));
-        self.outbox.send(WorkRequest { message }).await.unwrap();
-    }
-}
+use tonic::{Code, Status, transport::Channel};
 
 async fn submit(
     url: &str,
@@ -103,6 +56,7 @@ async fn impossible_introductions_are_refused() {
         Hello { slots: 0, ..hello() },
         Hello { slots: u32::MAX, ..hello() },
         Hello { name: "x".repeat(1000), ..hello() },
+        Hello { version: "x".repeat(1000), ..hello() },
     ] {
         let Err(status) = HandWorker::connect(&coordinator.url(), hello).await else {
             panic!("it was let in")
@@ -172,8 +126,7 @@ async fn a_worker_that_returns_the_wrong_number_of_values_is_dropped() {
     coordinator.submit(&Experiment::small(1).path());
     let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
     let batch = worker.receive_batch().await.unwrap();
-    let fitness = swarm_proto::v1::TrialFitness { values: vec![1.0; 99] };
-    worker.answer(batch.items[0].item_id, Outcome::Fitness(fitness)).await;
+    worker.answer_fitness(batch.items[0].item_id, vec![1.0; 99]).await;
     let status = loop {
         match worker.receive().await {
             Ok(_) => {}
@@ -194,4 +147,66 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
     assert_eq!(lost["reason"], "silent for 1 s");
     assert_eq!(lost["items_requeued"], 2);
     assert_eq!(worker.receive().await.unwrap_err().code(), Code::Aborted);
+}
+
+#[tokio::test]
+async fn workers_that_differ_pause_the_experiment_and_are_named() {
+    let coordinator = CoordinatorProcess::start_with(&["--audit-fraction", "1"]);
+    let experiment_id = coordinator.submit(&Experiment::small(1).path());
+    for (name, value) in [("ada", 1.0), ("bob", 2.0)] {
+        let hello = Hello { name: name.to_owned(), ..hello() };
+        let mut worker = HandWorker::connect(&coordinator.url(), hello).await.unwrap();
+        tokio::spawn(async move {
+            while let Ok(message) = worker.receive().await {
+                let work_response::Message::Batch(batch) = message else { continue };
+                for item in batch.items {
+                    let values = vec![value; item.trial_count as usize];
+                    worker.answer_fitness(item.item_id, values).await;
+                }
+            }
+        });
+    }
+
+    let mut client = ExperimentServiceClient::connect(coordinator.url()).await.unwrap();
+    let request = WatchExperimentRequest { experiment_id, from_sequence: 0 };
+    let mut events = client.watch_experiment(request).await.unwrap().into_inner();
+    let mut notices = Vec::new();
+    let paused = loop {
+        match events.message().await.unwrap().unwrap().event.unwrap().kind.unwrap() {
+            Kind::Notice(notice) => notices.push(notice.message),
+            Kind::StateChanged(change) if change.state() == ExperimentState::Paused => {
+                break change;
+            }
+            _ => {}
+        }
+    };
+    assert_eq!(notices, [&*paused.reason]);
+    assert!(paused.reason.contains("\"ada\"") && paused.reason.contains("\"bob\""), "{paused:?}");
+    coordinator
+        .process
+        .wait_for("alarm", |line| line["level"] == "ERROR" && line["reason"] == *paused.reason);
+    let mut fleet = FleetServiceClient::connect(coordinator.url()).await.unwrap();
+    let workers = fleet.list_workers(ListWorkersRequest {}).await.unwrap().into_inner().workers;
+    assert!(workers.iter().all(|worker| worker.distrusted == paused.reason), "{workers:?}");
+}
+
+#[tokio::test]
+async fn there_is_a_limit_to_unfinished_experiments() {
+    let coordinator = CoordinatorProcess::start();
+    let text = Experiment::small(1).text();
+    submit(&coordinator.url(), "", text.clone()).await.unwrap();
+    coordinator
+        .database()
+        .execute_batch(
+            "WITH RECURSIVE n (i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM n WHERE i < 1000)
+             INSERT INTO experiments
+             SELECT n.i, NULL, name, config, config_digest, fingerprint, genotype_len,
+                    CASE WHEN n.i % 2 = 0 THEN 'paused' ELSE 'running' END, reason,
+                    submitted_at_ms, digest, priority
+             FROM experiments, n",
+        )
+        .unwrap();
+    let status = submit(&coordinator.url(), "", text).await.unwrap_err();
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    assert!(status.message().contains("1000 experiments are unfinished"), "{status}");
 }

@@ -6,7 +6,10 @@ use std::{
 };
 
 use sim_core::config::ConfigError;
+use swarm_transport::tls_trouble;
 use tonic::{Code, Status};
+
+use crate::text::with_reason;
 
 /// Why a command did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
@@ -31,24 +34,55 @@ pub enum Error {
     NotFound(String),
     /// No answer.
     #[error(
-        "cannot reach the coordinator at {address}: {reason}; start it with `coordinator` or pass \
-         --coordinator"
+        "cannot reach a coordinator at {address}: {reason}; start one with `coordinator`, or say \
+         where it is with --coordinator, SWARM_COORDINATOR or the settings file"
     )]
     Unreachable {
-        /// The coordinator's address.
+        /// Where it should be.
         address: String,
         /// The cause.
         reason: String,
     },
-    /// The experiment ended otherwise than by completing.
-    #[error("experiment {id} {}", with_reason(.state, .reason))]
-    Ended {
+    /// The token is not the right one.
+    #[error("the coordinator at {address} does not let this client in: {refusal}")]
+    Denied {
+        /// The coordinator's address.
+        address: String,
+        /// The coordinator's reason.
+        refusal: String,
+    },
+    /// No TLS where there should be, or the wrong kind.
+    #[error("no TLS connection to the coordinator at {address}: {trouble}")]
+    Tls {
+        /// The coordinator's address.
+        address: String,
+        /// What is wrong and what to do.
+        trouble: String,
+    },
+    /// Something else answers, or a coordinator that does not know the request.
+    #[error("{0}")]
+    Foreign(String),
+    /// The experiment failed.
+    #[error("{}", with_reason(&format!("experiment {id} failed"), reason))]
+    Failed {
         /// Number of the experiment.
         id: u64,
-        /// `failed` or `cancelled`.
-        state: &'static str,
         /// Why; may be empty.
         reason: String,
+    },
+    /// Somebody cancelled the experiment.
+    #[error("{}", with_reason(&format!("experiment {id} was cancelled"), reason))]
+    Cancelled {
+        /// Number of the experiment.
+        id: u64,
+        /// Why; may be empty.
+        reason: String,
+    },
+    /// The experiment goes on, and the patience of `wait` is over.
+    #[error("experiment {id} has not ended; `swarmctl explain {id}` says what it waits for")]
+    TimedOut {
+        /// Number of the experiment.
+        id: u64,
     },
     /// A signal; the text says what becomes of the experiment.
     #[error("interrupted; {0}")]
@@ -75,6 +109,14 @@ impl Error {
         Self::Config { file: file.into(), problems: error.to_string() }
     }
 
+    /// That something else answers where a coordinator should.
+    pub fn foreign(address: &str, greeting: &str) -> Self {
+        Self::Foreign(format!(
+            "what answers at {address} is not a coordinator: it says \"{greeting}\"; is this the \
+             right port?"
+        ))
+    }
+
     /// See `swarmctl --help`.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -83,7 +125,12 @@ impl Error {
             Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
             Self::NotFound(_) => 3,
             Self::Unreachable { .. } => 4,
-            Self::Ended { .. } => 5,
+            Self::Failed { .. } => 5,
+            Self::Cancelled { .. } => 6,
+            Self::Denied { .. } => 7,
+            Self::Tls { .. } => 8,
+            Self::Foreign(_) => 9,
+            Self::TimedOut { .. } => 10,
             Self::Interrupted(_) => 130,
         }
     }
@@ -109,12 +156,23 @@ impl Error {
     /// A coordinator's refusal, or its silence.
     pub fn from_status(status: &Status, address: &str) -> Self {
         let message = status.message();
+        if let Some(trouble) = tls_trouble(status) {
+            return Self::Tls { address: address.into(), trouble };
+        }
         match status.code() {
             _ if is_transport(status) => {
                 Self::Unreachable { address: address.into(), reason: reason(status) }
             }
+            Code::Unimplemented => Self::Foreign(format!(
+                "the coordinator at {address} does not know this request; it is of another version \
+                 than this swarmctl ({}), or another service",
+                env!("CARGO_PKG_VERSION")
+            )),
             Code::NotFound | Code::FailedPrecondition => Self::NotFound(message.into()),
             Code::InvalidArgument => Self::Input(message.into()),
+            Code::Unauthenticated | Code::PermissionDenied => {
+                Self::Denied { address: address.into(), refusal: message.into() }
+            }
             code => {
                 let text = if message.is_empty() { code.description() } else { message };
                 Self::Internal(format!("the coordinator at {address} answered: {text}"))
@@ -126,6 +184,9 @@ impl Error {
 /// Whether the same request may succeed later, without anyone's doing.
 pub fn is_transient(status: &Status) -> bool {
     let code = status.code();
+    if tls_trouble(status).is_some() {
+        return false;
+    }
     is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
 }
 
@@ -154,11 +215,6 @@ pub fn prefix_lines(text: &str, name: &impl std::fmt::Display) -> String {
     lines.join("\n")
 }
 
-fn with_reason(state: &str, reason: &str) -> String {
-    let verb = if state == "failed" { "failed" } else { "was cancelled" };
-    if reason.is_empty() { verb.into() } else { format!("{verb}: {reason}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,21 +228,25 @@ mod tests {
     #[test]
     fn exit_codes_follow_status_codes() {
         assert_eq!(exit_code(Status::internal("a bug")), 1);
-        assert_eq!(exit_code(Status::unimplemented("")), 1);
+        assert_eq!(exit_code(Status::unimplemented("")), 9);
         assert_eq!(exit_code(Status::invalid_argument("no")), 2);
         assert_eq!(exit_code(Status::not_found("no experiment 3")), 3);
         assert_eq!(exit_code(Status::failed_precondition("no champion yet")), 3);
         assert_eq!(exit_code(Status::unavailable("")), 4);
+        assert_eq!(exit_code(Status::unauthenticated("no token")), 7);
+        assert_eq!(exit_code(Status::permission_denied("wrong token")), 7);
         assert_eq!(exit_code(Status::from_error("broken".into())), 4);
     }
 
     #[test]
     fn exit_codes_of_what_happens_here() {
-        let ended = Error::Ended { id: 3, state: "failed", reason: "item 7".into() };
-        assert_eq!(ended.exit_code(), 5);
-        assert_eq!(ended.report().unwrap(), "error: experiment 3 failed: item 7");
-        let cancelled = Error::Ended { id: 3, state: "cancelled", reason: String::new() };
+        let failed = Error::Failed { id: 3, reason: "item 7".into() };
+        assert_eq!(failed.exit_code(), 5);
+        assert_eq!(failed.report().unwrap(), "error: experiment 3 failed: item 7");
+        let cancelled = Error::Cancelled { id: 3, reason: String::new() };
+        assert_eq!(cancelled.exit_code(), 6);
         assert_eq!(cancelled.report().unwrap(), "error: experiment 3 was cancelled");
+        assert_eq!(Error::TimedOut { id: 3 }.exit_code(), 10);
         assert_eq!(Error::Interrupted("x".into()).exit_code(), 130);
         assert_eq!(Error::Input("x".into()).exit_code(), 2);
     }

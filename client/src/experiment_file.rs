@@ -85,6 +85,7 @@ impl ExperimentFile {
             seed: overrides.seed,
             generations: overrides.generations,
             resume_unfinished: false,
+            priority: None,
         }
     }
 

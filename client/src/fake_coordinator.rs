@@ -8,17 +8,24 @@ use std::{
 };
 
 use swarm_proto::v1::{
-    CancelExperimentRequest, CancelExperimentResponse, Event, Experiment, ExperimentState,
-    GenerationSummary, GetChampionRequest, GetChampionResponse, GetExperimentRequest,
-    GetExperimentResponse, ListExperimentsRequest, ListExperimentsResponse, StateChange,
+    CancelExperimentRequest, CancelExperimentResponse, CompletedGeneration, Event, Experiment,
+    ExperimentState, ExplainExperimentRequest, ExplainExperimentResponse, GenerationSummary,
+    GetChampionRequest, GetChampionResponse, GetExperimentRequest, GetExperimentResponse,
+    ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
+    ListGenerationsRequest, ListGenerationsResponse, ListWorkersRequest, ListWorkersResponse,
+    PauseExperimentRequest, PauseExperimentResponse, ResumeExperimentRequest,
+    ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse, StateChange,
     SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
-    WatchExperimentResponse,
+    WatchExperimentResponse, Worker,
     event::Kind,
     experiment_service_server::{ExperimentService, ExperimentServiceServer},
+    fleet_service_server::{FleetService, FleetServiceServer},
 };
 use tokio::net::TcpListener;
 use tokio_stream::{Stream, wrappers::TcpListenerStream};
 use tonic::{Request, Response, Status, transport::Server};
+
+use swarm_transport::Credentials;
 
 use crate::connection::Connection;
 
@@ -28,6 +35,11 @@ pub struct Script {
     /// The one experiment that there is.
     pub experiment: Experiment,
     pub champion: Option<GetChampionResponse>,
+    /// What has happened to it, from event 1 on without gaps.
+    pub past: Vec<Event>,
+    /// What there is to say about it.
+    pub explanation: ExplainExperimentResponse,
+    pub workers: Vec<Worker>,
     /// For each `Watch` in turn: its events, and what then ends the stream if
     /// not the end of events.
     pub watches: VecDeque<(Vec<Event>, Option<Status>)>,
@@ -47,10 +59,12 @@ impl FakeCoordinator {
         let fake = Self(Arc::new(Mutex::new(script)));
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = format!("http://{}", listener.local_addr().unwrap());
-        let service = ExperimentServiceServer::new(fake.clone());
-        let incoming = TcpListenerStream::new(listener);
-        tokio::spawn(Server::builder().add_service(service).serve_with_incoming(incoming));
-        (fake, Connection::new(&address).unwrap())
+        let server = Server::builder()
+            .add_service(ExperimentServiceServer::new(fake.clone()))
+            .add_service(FleetServiceServer::new(fake.clone()))
+            .serve_with_incoming(TcpListenerStream::new(listener));
+        tokio::spawn(server);
+        (fake, Connection::new(&address, &Credentials::default()).unwrap())
     }
 
     pub fn script<T>(&self, read: impl FnOnce(&mut Script) -> T) -> T {
@@ -72,7 +86,7 @@ pub async fn unreachable_connection() -> Connection {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = format!("http://{}", listener.local_addr().unwrap());
     drop(listener);
-    Connection::new(&address).unwrap().with_patience(Duration::ZERO)
+    Connection::new(&address, &Credentials::default()).unwrap().with_patience(Duration::ZERO)
 }
 
 pub fn generation(sequence: u64, generation: u64) -> Event {
@@ -139,8 +153,46 @@ impl ExperimentService for FakeCoordinator {
         &self,
         request: Request<CancelExperimentRequest>,
     ) -> Result<Response<CancelExperimentResponse>, Status> {
-        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        let experiment_id = request.into_inner().experiment_id;
+        self.experiment(experiment_id)?;
+        self.script(|script| script.experiment.set_state(ExperimentState::Cancelled));
+        let experiment = self.experiment(experiment_id)?;
         Ok(Response::new(CancelExperimentResponse { experiment }))
+    }
+
+    async fn pause_experiment(
+        &self,
+        request: Request<PauseExperimentRequest>,
+    ) -> Result<Response<PauseExperimentResponse>, Status> {
+        let PauseExperimentRequest { experiment_id, reason } = request.into_inner();
+        self.script(|script| {
+            script.experiment.set_state(ExperimentState::Paused);
+            script.experiment.reason = format!("paused by a client: {reason}");
+        });
+        let experiment = self.experiment(experiment_id)?;
+        Ok(Response::new(PauseExperimentResponse { experiment }))
+    }
+
+    async fn resume_experiment(
+        &self,
+        request: Request<ResumeExperimentRequest>,
+    ) -> Result<Response<ResumeExperimentResponse>, Status> {
+        self.script(|script| {
+            script.experiment.set_state(ExperimentState::Running);
+            script.experiment.reason.clear();
+        });
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        Ok(Response::new(ResumeExperimentResponse { experiment }))
+    }
+
+    async fn set_priority(
+        &self,
+        request: Request<SetPriorityRequest>,
+    ) -> Result<Response<SetPriorityResponse>, Status> {
+        let SetPriorityRequest { experiment_id, priority } = request.into_inner();
+        self.script(|script| script.experiment.priority = priority);
+        let experiment = self.experiment(experiment_id)?;
+        Ok(Response::new(SetPriorityResponse { experiment }))
     }
 
     async fn get_champion(
@@ -150,5 +202,64 @@ impl ExperimentService for FakeCoordinator {
         self.experiment(request.into_inner().experiment_id)?;
         let no_champion = || Status::failed_precondition("there is no champion yet");
         self.script(|script| script.champion.clone()).map(Response::new).ok_or_else(no_champion)
+    }
+
+    async fn explain_experiment(
+        &self,
+        request: Request<ExplainExperimentRequest>,
+    ) -> Result<Response<ExplainExperimentResponse>, Status> {
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        let explanation = self.script(|script| script.explanation.clone());
+        Ok(Response::new(ExplainExperimentResponse { experiment, ..explanation }))
+    }
+
+    async fn list_generations(
+        &self,
+        request: Request<ListGenerationsRequest>,
+    ) -> Result<Response<ListGenerationsResponse>, Status> {
+        let request = request.into_inner();
+        self.experiment(request.experiment_id)?;
+        let mut completed: VecDeque<CompletedGeneration> = self.script(|script| {
+            let completed = script.past.iter().filter_map(|event| match &event.kind {
+                Some(Kind::GenerationCompleted(summary)) => Some(CompletedGeneration {
+                    summary: Some(summary.clone()),
+                    completed_at_ms: event.at_ms,
+                }),
+                _ => None,
+            });
+            completed.skip(request.from_generation as usize).collect()
+        });
+        // Pages of one.
+        let generations: Vec<CompletedGeneration> = completed.pop_front().into_iter().collect();
+        let next_generation = (!completed.is_empty()).then_some(request.from_generation + 1);
+        Ok(Response::new(ListGenerationsResponse { generations, next_generation }))
+    }
+
+    async fn list_events(
+        &self,
+        request: Request<ListEventsRequest>,
+    ) -> Result<Response<ListEventsResponse>, Status> {
+        let request = request.into_inner();
+        self.experiment(request.experiment_id)?;
+        // Pages of one.
+        let event = self.script(|script| {
+            let wanted = |event: &&Event| event.sequence >= request.from_sequence;
+            script.past.iter().find(wanted).cloned()
+        });
+        Ok(Response::new(ListEventsResponse {
+            events: event.into_iter().collect(),
+            ..Default::default()
+        }))
+    }
+}
+
+#[tonic::async_trait]
+impl FleetService for FakeCoordinator {
+    async fn list_workers(
+        &self,
+        _: Request<ListWorkersRequest>,
+    ) -> Result<Response<ListWorkersResponse>, Status> {
+        let workers = self.script(|script| script.workers.clone());
+        Ok(Response::new(ListWorkersResponse { workers }))
     }
 }

@@ -2,7 +2,9 @@
 //! that is not finite is `null`.
 
 use serde::Serialize;
-use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, GetChampionResponse};
+use swarm_proto::v1::{
+    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
+};
 
 /// A value on one line.
 pub fn line(value: &impl Serialize) -> String {
@@ -19,16 +21,62 @@ pub fn state_name(state: ExperimentState) -> &'static str {
     match state {
         ExperimentState::Unspecified => "unknown",
         ExperimentState::Running => "running",
+        ExperimentState::Paused => "paused",
         ExperimentState::Completed => "completed",
         ExperimentState::Failed => "failed",
         ExperimentState::Cancelled => "cancelled",
     }
 }
 
-/// A generation, as `run` and `watch` print it.
+/// Whether an experiment in this state goes on no more.
+pub fn has_ended(state: ExperimentState) -> bool {
+    use ExperimentState::{Cancelled, Completed, Failed};
+    matches!(state, Completed | Failed | Cancelled)
+}
+
+/// An event, as `logs` prints it.
+#[derive(Debug, Serialize)]
+pub struct LogLine<'a> {
+    at_ms: u64,
+    experiment: u64,
+    name: &'a str,
+    sequence: u64,
+    #[serde(flatten)]
+    kind: Option<LogKind<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum LogKind<'a> {
+    Generation(Summary<'a>),
+    State { state: &'static str, reason: &'a str },
+    Notice { message: &'a str },
+}
+
+impl<'a> LogLine<'a> {
+    pub fn new(experiment: &'a Experiment, event: &'a Event) -> Self {
+        let kind = event.kind.as_ref().map(|kind| match kind {
+            Kind::GenerationCompleted(summary) => LogKind::Generation(summary.into()),
+            Kind::StateChanged(change) => {
+                LogKind::State { state: state_name(change.state()), reason: &change.reason }
+            }
+            Kind::Notice(notice) => LogKind::Notice { message: &notice.message },
+        });
+        let Experiment { id, name, .. } = experiment;
+        Self { at_ms: event.at_ms, experiment: *id, name, sequence: event.sequence, kind }
+    }
+}
+
+/// A generation, as `run`, `watch` and `history` print it.
 #[derive(Debug, Serialize)]
 pub struct Generation<'a> {
     experiment: u64,
+    #[serde(flatten)]
+    summary: Summary<'a>,
+}
+
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
     generation: u64,
     best: f64,
     mean: f64,
@@ -43,8 +91,13 @@ pub struct Generation<'a> {
 
 impl<'a> Generation<'a> {
     pub fn new(experiment_id: u64, summary: &'a GenerationSummary) -> Self {
+        Self { experiment: experiment_id, summary: summary.into() }
+    }
+}
+
+impl<'a> From<&'a GenerationSummary> for Summary<'a> {
+    fn from(summary: &'a GenerationSummary) -> Self {
         Self {
-            experiment: experiment_id,
             generation: summary.generation,
             best: summary.best,
             mean: summary.mean,
@@ -141,6 +194,7 @@ pub struct ExperimentDocument<'a> {
     algorithm: &'a str,
     population_size: u32,
     genotype_len: u32,
+    priority: u32,
     submitted_at_ms: u64,
     champion_fitness: Option<f64>,
     config_digest: &'a str,
@@ -160,6 +214,7 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
             algorithm: &experiment.algorithm,
             population_size: experiment.population_size,
             genotype_len: experiment.genotype_len,
+            priority: experiment.priority,
             submitted_at_ms: experiment.submitted_at_ms,
             champion_fitness: experiment.champion_fitness,
             config_digest: &experiment.config_digest,

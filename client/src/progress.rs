@@ -8,9 +8,16 @@ use std::{
 };
 
 use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationSummary};
 
-use crate::{args::OutputFormat, error::Error, json, text};
+use crate::{
+    args::OutputFormat,
+    error::Error,
+    json,
+    table::{self, Screen, Table},
+    text,
+};
 
 /// Generations over which the estimate of the remaining time averages.
 const ETA_WINDOW: usize = 20;
@@ -19,6 +26,8 @@ const ETA_WINDOW: usize = 20;
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
+    screen: Screen,
+    /// Whether a bar can be shown.
     has_terminal: bool,
     /// Hidden unless an experiment is followed on a terminal.
     bar: ProgressBar,
@@ -32,7 +41,8 @@ impl Progress {
     /// Prints to this process's standard output.
     pub fn new(format: OutputFormat) -> Self {
         let has_terminal = io::stdout().is_terminal() && io::stderr().is_terminal();
-        Self { has_terminal, ..Self::to(format, Box::new(io::stdout())) }
+        let screen = Screen::of_stdout();
+        Self { has_terminal, screen, ..Self::to(format, Box::new(io::stdout())) }
     }
 
     /// Prints to something that is not a terminal.
@@ -40,6 +50,7 @@ impl Progress {
         Self {
             format,
             stdout,
+            screen: Screen::default(),
             has_terminal: false,
             bar: ProgressBar::hidden(),
             experiment_id: 0,
@@ -48,9 +59,33 @@ impl Progress {
         }
     }
 
-    /// What standard output is for.
-    pub fn format(&self) -> OutputFormat {
-        self.format
+    /// Whether standard output is for programs.
+    pub fn is_json(&self) -> bool {
+        self.format == OutputFormat::Json
+    }
+
+    /// What standard output is shown on.
+    pub fn screen(&self) -> Screen {
+        self.screen
+    }
+
+    /// Records, in the format that was asked for. `empty` is for people if there
+    /// is none.
+    pub fn print_table(
+        &mut self,
+        table: &Table,
+        csv_keys: &[&str],
+        records: &[impl Serialize],
+        empty: &str,
+    ) -> Result<(), Error> {
+        let text = match self.format {
+            OutputFormat::Json => json::document(&records),
+            OutputFormat::Csv => table::csv(csv_keys, records),
+            OutputFormat::Table | OutputFormat::Wide if records.is_empty() => empty.to_owned(),
+            OutputFormat::Table => table.to_text(self.screen),
+            OutputFormat::Wide => table.to_wide_text(self.screen),
+        };
+        self.print(&text)
     }
 
     /// A line, or several, on standard output.
@@ -76,7 +111,7 @@ impl Progress {
     pub fn begin(&mut self, experiment: &Experiment) {
         self.experiment_id = experiment.id;
         self.generations = experiment.generations;
-        if self.has_terminal && self.format == OutputFormat::Text {
+        if self.has_terminal && !self.is_json() {
             let style = ProgressStyle::with_template("{prefix} {bar:24} {pos}/{len}  {msg}")
                 .expect("the template is valid");
             self.bar.set_style(style);
@@ -96,7 +131,7 @@ impl Progress {
             OutputFormat::Json => {
                 self.print(&json::line(&json::Generation::new(self.experiment_id, summary)))
             }
-            OutputFormat::Text if self.has_terminal => {
+            _ if self.has_terminal => {
                 let done = summary.generation + 1;
                 let eta = remaining(&self.durations_ms, self.generations.saturating_sub(done));
                 let fitness = text::fitness(summary);
@@ -104,7 +139,7 @@ impl Progress {
                 self.bar.set_message(format!("{fitness}  ETA {}", FormattedDuration(eta)));
                 Ok(())
             }
-            OutputFormat::Text => self.print(&text::generation(summary, self.generations)),
+            _ => self.print(&text::generation(summary, self.generations)),
         }
     }
 
@@ -180,7 +215,7 @@ pub mod tests {
     #[test]
     fn without_a_terminal_each_generation_is_a_line() {
         let captured = Captured::default();
-        let mut progress = captured.progress(OutputFormat::Text);
+        let mut progress = captured.progress(OutputFormat::Table);
         progress.begin(&Experiment { id: 1, generations: 2, ..Experiment::default() });
         for generation in 0..2 {
             progress.generation(&GenerationSummary { generation, ..Default::default() }).unwrap();
@@ -204,7 +239,7 @@ pub mod tests {
 
     #[test]
     fn a_closed_pipe_ends_the_output_quietly() {
-        let mut progress = Progress::to(OutputFormat::Text, Box::new(Closed));
+        let mut progress = Progress::to(OutputFormat::Table, Box::new(Closed));
         assert!(matches!(progress.print("x"), Err(Error::OutputClosed)));
     }
 }

@@ -1,10 +1,12 @@
-//! What `--output text` prints.
+//! What people read.
 
 use std::path::Path;
 
-use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, GetChampionResponse};
+use swarm_proto::v1::{
+    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
+};
 
-use crate::json::state_name;
+use crate::{clock, json::state_name};
 
 /// Digits of a digest that tell runs apart at a glance.
 const DIGEST_DIGITS: usize = 12;
@@ -29,12 +31,47 @@ pub fn fitness(summary: &GenerationSummary) -> String {
     format!("best {:.3}  mean {:.3}", summary.best, summary.mean)
 }
 
-fn episodes_per_s(summary: &GenerationSummary) -> f64 {
+/// Speed of a generation.
+pub fn episodes_per_s(summary: &GenerationSummary) -> f64 {
     summary.episodes as f64 * 1000.0 / summary.duration_ms.max(1) as f64
 }
 
-fn short(digest: &str) -> &str {
+/// As much of a digest as people compare.
+pub fn short(digest: &str) -> &str {
     digest.get(..DIGEST_DIGITS).unwrap_or(digest)
+}
+
+/// "1 item", "2 items".
+pub fn counted(number: u64, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+/// A share of 1.
+pub fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// What happened, when and to which experiment, on one line.
+pub fn log_line(experiment: &Experiment, event: &Event) -> String {
+    let what = match &event.kind {
+        Some(Kind::GenerationCompleted(summary)) => format!(
+            "generation {}: {}  min {:.3}  {:.0} episodes/s  digest {}",
+            summary.generation,
+            fitness(summary),
+            summary.min,
+            episodes_per_s(summary),
+            short(&summary.digest),
+        ),
+        Some(Kind::StateChanged(change)) => with_reason(state_name(change.state()), &change.reason),
+        Some(Kind::Notice(notice)) => notice.message.clone(),
+        None => "something that this version of swarmctl does not know".into(),
+    };
+    format!("{}  {}  {what}", clock::utc(event.at_ms), title(experiment))
+}
+
+/// "failed: because".
+pub fn with_reason(what: &str, reason: &str) -> String {
+    if reason.is_empty() { what.into() } else { format!("{what}: {reason}") }
 }
 
 /// "experiment 3 (leader)".
@@ -57,17 +94,14 @@ pub fn submitted(experiment: &Experiment) -> String {
 
 /// Where an experiment stands, on one line.
 pub fn standing(experiment: &Experiment) -> String {
-    let mut text = format!(
+    let text = format!(
         "{} {} after {} of {} generations",
         title(experiment),
         state_name(experiment.state()),
         experiment.generations_done,
         experiment.generations,
     );
-    if !experiment.reason.is_empty() {
-        text += &format!(": {}", experiment.reason);
-    }
-    text
+    with_reason(&text, &experiment.reason)
 }
 
 /// What an experiment has come to.
@@ -122,47 +156,6 @@ pub fn files(data_dir: &Path, champion_file: Option<&Path>) -> String {
 
 fn row(name: &str, value: &str) -> String {
     format!("  {name:<30}{value}")
-}
-
-/// All experiments, one per line under a heading.
-pub fn table(experiments: &[Experiment]) -> String {
-    if experiments.is_empty() {
-        return "no experiments yet".into();
-    }
-    let heading =
-        ["id", "state", "generations", "champion", "seed", "algorithm", "name"].map(String::from);
-    let rows = experiments.iter().map(|experiment| {
-        [
-            experiment.id.to_string(),
-            state_name(experiment.state()).into(),
-            format!("{}/{}", experiment.generations_done, experiment.generations),
-            experiment.champion_fitness.map_or("-".into(), |fitness| format!("{fitness:.3}")),
-            experiment.seed.to_string(),
-            experiment.algorithm.clone(),
-            experiment.name.clone(),
-        ]
-    });
-    aligned(&std::iter::once(heading).chain(rows).collect::<Vec<_>>())
-}
-
-/// Rows of equally many cells, as columns.
-pub fn aligned<R: AsRef<[String]>>(rows: &[R]) -> String {
-    let n_columns = rows.first().map_or(0, |row| row.as_ref().len());
-    let widths: Vec<usize> = (0..n_columns)
-        .map(|column| {
-            let cells = rows.iter().map(|row| row.as_ref()[column].chars().count());
-            cells.max().unwrap_or(0)
-        })
-        .collect();
-    let lines: Vec<String> = rows
-        .iter()
-        .map(|row| {
-            let cells = row.as_ref().iter().zip(&widths);
-            let cells: Vec<String> = cells.map(|(cell, width)| format!("{cell:<width$}")).collect();
-            cells.join("  ").trim_end().to_owned()
-        })
-        .collect();
-    lines.join("\n")
 }
 
 /// What became of a request to cancel.
@@ -259,21 +252,6 @@ mod tests {
              champion                      1.500000 +- 0.250000 on 50 held-out trials (2.000000 when chosen, individual 4 of generation 6)\n  \
              digest                        1a2b3c4d5e6f7a8b"
         );
-    }
-
-    #[test]
-    fn the_table_is_aligned() {
-        let mut other = experiment(ExperimentState::Running);
-        other.id = 10;
-        other.champion_fitness = None;
-        let text = table(&[experiment(ExperimentState::Completed), other]);
-        assert_eq!(
-            text,
-            "id  state      generations  champion  seed  algorithm  name\n\
-             3   completed  12/40        2.000     7     SNES       leader\n\
-             10  running    12/40        -         7     SNES       leader"
-        );
-        assert_eq!(table(&[]), "no experiments yet");
     }
 
     #[test]

@@ -6,16 +6,26 @@
 //! - [`store`]: SQLite, one transaction per generation
 //! - `driver`: the loop that connects the three with the network
 //! - `rpc`: gRPC services, translation only
+//! - `listener`, `gate`: who gets as far as the services
+//! - [`limits`]: every bound on what the network can ask for
 
+mod access;
 mod clock;
 mod driver;
 pub mod engine;
 pub mod evolution;
+mod failpoint;
+mod gate;
 pub mod ids;
+pub mod limits;
+mod listener;
+pub mod priority;
 mod rpc;
 mod server;
 mod shared_store;
 pub mod store;
 mod submission;
+mod throttle;
 
-pub use server::{Coordinator, CoordinatorConfig, StartError};
+pub use access::{Access, AccessError, Role, Tls, Tokens};
+pub use server::{Coordinator, CoordinatorConfig, RunError, StartError};

@@ -1,5 +1,7 @@
 //! The coordinator as a program.
 
+mod access_args;
+
 use std::{
     io::{self, IsTerminal as _},
     net::SocketAddr,
@@ -8,6 +10,7 @@ use std::{
     time::Duration,
 };
 
+use access_args::{AccessArgs, AccessInputError};
 use clap::{Parser, ValueEnum};
 use coordinator::{Coordinator, CoordinatorConfig, StartError};
 use tokio::signal::unix::{SignalKind, signal};
@@ -23,16 +26,22 @@ use tracing_subscriber::EnvFilter;
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Args {
-    /// Address to listen on. There is no authentication: keep it on loopback or
-    /// on a network whose every member you trust.
+    /// Address to listen on. Other than loopback, it takes tokens, and TLS or
+    /// --plaintext.
     #[arg(long, env = "SWARM_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
     /// Directory for the database; created if need be.
     #[arg(long, env = "SWARM_DATA_DIR", default_value = "swarm-data")]
     data_dir: PathBuf,
+    #[command(flatten)]
+    access: AccessArgs,
     /// Seconds of silence after which a worker's items go to others.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     lease: u32,
+    /// Share of the individuals, 0 to 1, that are computed by a second worker, too:
+    /// if the bits differ, one of the two is faulty, and the experiment is paused.
+    #[arg(long, default_value_t = 0.0, value_parser = fraction)]
+    audit_fraction: f64,
     /// Form of the log lines.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
@@ -44,13 +53,21 @@ struct Args {
 const EXIT_CODES: &str = "\
 Exit codes:
   0  stopped by a signal
-  1  internal error
-  2  bad input: address in use, data directory unusable, wrong arguments";
+  1  internal error; what was committed is safe, the next start goes on from there
+  2  bad input: address in use, or open to a network without tokens or TLS; token,
+     certificate or data directory unusable; wrong arguments
+
+docs/security.md says how to make tokens and certificates.";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum LogFormat {
     Text,
     Json,
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    let fraction: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=1.0).contains(&fraction) { Ok(fraction) } else { Err("not within 0..=1".to_owned()) }
 }
 
 #[tokio::main]
@@ -75,7 +92,7 @@ async fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error!("{error:#}");
-            let is_input = error.is::<StartError>();
+            let is_input = error.is::<StartError>() || error.is::<AccessInputError>();
             ExitCode::from(if is_input { 2 } else { 1 })
         }
     }
@@ -86,15 +103,18 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     let lease = Duration::from_secs(args.lease.into());
-    let coordinator = Coordinator::start(CoordinatorConfig {
+    let mut coordinator = Coordinator::start(CoordinatorConfig {
         heartbeat_interval: lease / 5,
         lease,
+        access: args.access.load()?,
+        audit_fraction: args.audit_fraction,
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })
     .await?;
     tokio::select! {
         _ = terminate.recv() => {}
         _ = interrupt.recv() => {}
+        error = coordinator.failure() => return Err(error.into()),
     }
     info!("coordinator stops");
     coordinator.shutdown().await;

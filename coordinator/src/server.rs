@@ -6,29 +6,29 @@ use swarm_proto::{
     FILE_DESCRIPTOR_SET,
     v1::{
         experiment_service_server::ExperimentServiceServer,
-        worker_service_server::WorkerServiceServer,
+        fleet_service_server::FleetServiceServer, worker_service_server::WorkerServiceServer,
     },
 };
-use tokio::{net::TcpListener, task::JoinHandle};
-use tokio_stream::wrappers::TcpListenerStream;
+use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX, tls_trouble};
+use tokio::{net::TcpListener, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Server;
 use tracing::{error, info, warn};
 
 use crate::{
+    access::{Access, AccessError},
     driver::{self, Driver, Event, EventSender},
-    rpc::{Experiments, WelcomeTimes, Workers},
+    engine::EngineConfig,
+    gate::Gate,
+    limits::{
+        CALLS_PER_CONNECTION_MAX, CONNECTIONS_MAX, HEADERS_LEN_MAX, KEEPALIVE, SHUTDOWN_GRACE,
+    },
+    listener,
+    rpc::{Experiments, Fleet, WelcomeTimes, Workers},
     shared_store::SharedStore,
-    store::{Experiment, ExperimentState, Store, StoreError},
+    store::{Experiment, Store, StoreError},
     submission::Runnable,
 };
-
-/// Largest message from the network, bytes.
-const MESSAGE_LEN_MAX: usize = 16 << 20;
-/// Time for open streams to end at shutdown.
-const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
-/// A peer that does not answer pings for so long is gone.
-const KEEPALIVE: Duration = Duration::from_secs(20);
 
 /// How to run a coordinator.
 #[derive(Debug, Clone)]
@@ -41,19 +41,37 @@ pub struct CoordinatorConfig {
     pub heartbeat_interval: Duration,
     /// Silence after which a worker loses its items.
     pub lease: Duration,
+    /// Share of the individuals, 0 to 1, that two workers compute, so that a faulty
+    /// one is found.
+    pub audit_fraction: f64,
+    /// Who may connect.
+    pub access: Access,
 }
 
 impl CoordinatorConfig {
-    /// The usual times: a heartbeat every 2 s, a lease of 10 s.
+    /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits. Access is
+    /// open, and so for loopback only.
     pub fn new(listen: SocketAddr, data_dir: PathBuf) -> Self {
-        let (heartbeat_interval, lease) = (Duration::from_secs(2), Duration::from_secs(10));
-        Self { listen, data_dir, heartbeat_interval, lease }
+        Self {
+            listen,
+            data_dir,
+            heartbeat_interval: Duration::from_secs(2),
+            lease: Duration::from_secs(10),
+            audit_fraction: 0.0,
+            access: Access::default(),
+        }
     }
 }
 
 /// Why a coordinator does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
+    /// The address is open to more than this machine, and access to everybody.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// The certificate, its key or the authorities cannot be used.
+    #[error("the TLS files cannot be used: {0}")]
+    Tls(String),
     /// The address cannot be listened on.
     #[error("cannot listen on {address}: {source}; is another coordinator running there?")]
     Listen {
@@ -70,19 +88,48 @@ pub enum StartError {
     Panicked,
 }
 
+/// Why a running coordinator cannot go on. What it has committed is safe; started
+/// again, it goes on from there.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A bug.
+    #[error(
+        "the driver ended ({0}); please report this. \
+         Started again, the coordinator goes on from the last completed generation"
+    )]
+    Driver(String),
+    /// Connections are no longer accepted.
+    #[error("the server ended ({0}); start the coordinator again")]
+    Server(String),
+}
+
 /// A coordinator that runs in the background.
 #[derive(Debug)]
 pub struct Coordinator {
     local_addr: SocketAddr,
     shutdown: CancellationToken,
-    driver: JoinHandle<()>,
-    server: JoinHandle<Result<(), tonic::transport::Error>>,
+    /// One task; none once its end is known. So is `server`.
+    driver: JoinSet<()>,
+    server: JoinSet<Result<(), tonic::transport::Error>>,
 }
 
 impl Coordinator {
     /// Opens the store, goes on with unfinished experiments, listens.
     pub async fn start(config: CoordinatorConfig) -> Result<Self, StartError> {
         let address = config.listen;
+        let Access { tokens, tls, .. } = config.access.clone();
+        config.access.check(address)?;
+        let mut server = Server::builder()
+            .http2_keepalive_interval(Some(KEEPALIVE))
+            .http2_keepalive_timeout(Some(KEEPALIVE))
+            .http2_max_header_list_size(HEADERS_LEN_MAX)
+            .max_concurrent_streams(CALLS_PER_CONNECTION_MAX);
+        let is_encrypted = tls.is_some();
+        if let Some(tls) = tls {
+            server = server
+                .tls_config(tls.to_tonic())
+                .map_err(|error| StartError::Tls(cause(&error)))?;
+        }
         let listen_error = |source| StartError::Listen { address, source };
         let listener = TcpListener::bind(address).await.map_err(listen_error)?;
         let local_addr = listener.local_addr().map_err(listen_error)?;
@@ -94,41 +141,59 @@ impl Coordinator {
 
         let shutdown = CancellationToken::new();
         let (events, event_queue) = driver::channel();
-        let driver = Driver::new(store.clone(), event_queue, config.lease, shutdown.clone());
-        let driver = tokio::spawn(driver.run());
+        let engine = EngineConfig {
+            audit_fraction: config.audit_fraction,
+            ..EngineConfig::new(config.lease)
+        };
+        let mut driver = JoinSet::new();
+        driver.spawn(Driver::new(store.clone(), event_queue, engine, shutdown.clone()).run());
         resume_unfinished(&store, &events).await?;
 
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let workers = Workers { events: events.clone(), times, shutdown: shutdown.clone() };
+        let fleet = Fleet { events: events.clone() };
         let experiments = Experiments { events, store, shutdown: shutdown.clone() };
         let (health_reporter, health) = tonic_health::server::health_reporter();
         health_reporter.set_serving::<ExperimentServiceServer<Experiments>>().await;
+        health_reporter.set_serving::<FleetServiceServer<Fleet>>().await;
         health_reporter.set_serving::<WorkerServiceServer<Workers>>().await;
         let reflection = tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
             .build_v1()
             .expect("the descriptors come from the build");
-        let server = Server::builder()
-            .tcp_nodelay(true)
-            .http2_keepalive_interval(Some(KEEPALIVE))
-            .http2_keepalive_timeout(Some(KEEPALIVE))
+        let has_tokens = tokens.is_some();
+        let workers = WorkerServiceServer::new(workers)
+            .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
+        let fleet = FleetServiceServer::new(fleet)
+            .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
+        let experiments = ExperimentServiceServer::new(experiments)
+            .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
+        let serving = server
+            .layer(Gate::new(tokens))
             .add_service(health)
             .add_service(reflection)
-            .add_service(
-                WorkerServiceServer::new(workers).max_decoding_message_size(MESSAGE_LEN_MAX),
-            )
-            .add_service(
-                ExperimentServiceServer::new(experiments)
-                    .max_decoding_message_size(MESSAGE_LEN_MAX),
-            )
+            .add_service(workers)
+            .add_service(fleet)
+            .add_service(experiments)
             .serve_with_incoming_shutdown(
-                TcpListenerStream::new(listener),
+                listener::accept(listener, CONNECTIONS_MAX, shutdown.clone()),
                 shutdown.clone().cancelled_owned(),
             );
-        let server = tokio::spawn(server);
-        info!(address = %local_addr, data_dir = %config.data_dir.display(), "coordinator listens");
+        let mut server = JoinSet::new();
+        server.spawn(serving);
+        info!(
+            address = %local_addr, data_dir = %config.data_dir.display(),
+            tls = is_encrypted, tokens = has_tokens,
+            "coordinator listens"
+        );
+        if !is_encrypted && !local_addr.ip().to_canonical().is_loopback() {
+            warn!("there is no TLS: every member of the network can read all traffic, tokens too");
+        }
         Ok(Self { local_addr, shutdown, driver, server })
     }
 
@@ -137,19 +202,39 @@ impl Coordinator {
         self.local_addr
     }
 
+    /// Waits for a part of it to end, which none does before [`Self::shutdown`].
+    pub async fn failure(&mut self) -> RunError {
+        tokio::select! {
+            Some(ended) = self.driver.join_next() => RunError::Driver(match ended {
+                Ok(()) => "nobody asked it to".to_owned(),
+                Err(error) => error.to_string(),
+            }),
+            Some(ended) = self.server.join_next() => RunError::Server(match ended {
+                Ok(Ok(())) => "nobody asked it to".to_owned(),
+                Ok(Err(error)) => error.to_string(),
+                Err(error) => error.to_string(),
+            }),
+            else => std::future::pending().await,
+        }
+    }
+
     /// Stops: what is being stored is stored, streams are ended. Nothing that
     /// was committed is lost; generations that were being judged are judged
     /// again at the next start.
-    pub async fn shutdown(self) {
+    pub async fn shutdown(mut self) {
         self.shutdown.cancel();
-        if let Err(error) = self.driver.await {
+        if let Some(Err(error)) = self.driver.join_next().await {
             error!("the driver panicked: {error}; please report this");
         }
-        let abort = self.server.abort_handle();
-        if tokio::time::timeout(SHUTDOWN_GRACE, self.server).await.is_err() {
-            abort.abort();
-        }
+        // If that takes too long, dropping the task ends it.
+        let _ = tokio::time::timeout(SHUTDOWN_GRACE, self.server.join_next()).await;
     }
+}
+
+/// What is wrong with the TLS files.
+fn cause(error: &tonic::transport::Error) -> String {
+    let source = || std::error::Error::source(error).map(ToString::to_string);
+    tls_trouble(error).or_else(source).unwrap_or_else(|| error.to_string())
 }
 
 /// Hands every unfinished experiment that this program can compute to the
@@ -158,7 +243,7 @@ async fn resume_unfinished(store: &SharedStore, events: &EventSender) -> Result<
     let unfinished: Vec<(Experiment, Option<String>)> = store
         .read(|store| {
             let mut experiments = store.experiments()?;
-            experiments.retain(|experiment| experiment.state == ExperimentState::Running);
+            experiments.retain(|experiment| experiment.state.is_unfinished());
             experiments
                 .into_iter()
                 .map(|experiment| {

@@ -8,12 +8,24 @@ use std::{
 
 use tokio::{sync::watch, task};
 use tokio_util::sync::CancellationToken;
-use tracing::error;
+use tracing::{error, info};
 
 use crate::store::{Store, StoreError};
 
-/// Pause between attempts to write while the disk does not take it.
-const RETRY_INTERVAL: Duration = Duration::from_secs(5);
+/// Pause before the second attempt to write; it doubles with every further one.
+const RETRY_DELAY_MIN: Duration = Duration::from_millis(250);
+/// Longest pause between attempts.
+const RETRY_DELAY_MAX: Duration = Duration::from_secs(5);
+
+/// Which failures of a write are worth another attempt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Retry {
+    /// Those that pass once the disk takes writes again.
+    WhileUnavailable,
+    /// All: there is no other way to go on. Whoever repairs the database lets it
+    /// through.
+    Always,
+}
 
 /// What became of a write.
 #[derive(Debug)]
@@ -34,17 +46,28 @@ pub struct SharedStore {
     store: Arc<Mutex<Store>>,
     /// Counts writes.
     news: Arc<watch::Sender<u64>>,
+    /// Why the latest write did not reach the disk, if it did not.
+    trouble: Arc<Mutex<Option<String>>>,
 }
 
 impl SharedStore {
     /// Shares a store.
     pub fn new(store: Store) -> Self {
-        Self { store: Arc::new(Mutex::new(store)), news: Arc::new(watch::Sender::new(0)) }
+        Self {
+            store: Arc::new(Mutex::new(store)),
+            news: Arc::new(watch::Sender::new(0)),
+            trouble: Arc::default(),
+        }
     }
 
     /// Changes whenever something has been written.
     pub fn news(&self) -> watch::Receiver<u64> {
         self.news.subscribe()
+    }
+
+    /// Why the latest write did not reach the disk, if it did not.
+    pub fn trouble(&self) -> Option<String> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Reads.
@@ -61,6 +84,11 @@ impl SharedStore {
         operation: impl FnOnce(&mut Store) -> Result<T, StoreError> + Send + 'static,
     ) -> Result<T, StoreError> {
         let result = self.call(operation).await;
+        let trouble = match &result {
+            Err(error @ StoreError::Unavailable(_)) => Some(error.to_string()),
+            _ => None,
+        };
+        *self.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
         self.news.send_modify(|count| *count += 1);
         result
     }
@@ -78,31 +106,46 @@ impl SharedStore {
         .expect("store operations do not panic")
     }
 
-    /// Writes something that must not be lost: while the disk does not take it,
-    /// tries again.
+    /// Writes something that must not be lost, `what` in the log: tries again, as
+    /// `retry` says, for as long as it takes.
     pub async fn write(
         &self,
         shutdown: &CancellationToken,
+        what: &str,
+        retry: Retry,
         operation: impl Fn(&mut Store) -> Result<(), StoreError> + Send + Sync + 'static,
     ) -> Written {
         let operation = Arc::new(operation);
+        let mut delay = RETRY_DELAY_MIN;
+        let mut has_failed = false;
         loop {
             let attempt = Arc::clone(&operation);
             match self.try_write(move |store| attempt(store)).await {
+                Ok(()) if has_failed => {
+                    info!("{what} is stored; the database takes writes again");
+                    return Written::Yes;
+                }
                 Ok(()) => return Written::Yes,
                 Err(StoreError::Ended(_)) => return Written::NotWanted,
-                Err(error @ StoreError::Unavailable(_)) => {
-                    error!("{error}; trying again every {} s", RETRY_INTERVAL.as_secs());
+                Err(error)
+                    if retry == Retry::Always || matches!(error, StoreError::Unavailable(_)) =>
+                {
+                    has_failed = true;
+                    error!("{what} waits: {error}; trying again in {} s", delay.as_secs_f64());
                     tokio::select! {
-                        () = tokio::time::sleep(RETRY_INTERVAL) => {}
+                        () = tokio::time::sleep(delay) => {}
                         () = shutdown.cancelled() => return Written::NotWanted,
                     }
+                    delay = (2 * delay).min(RETRY_DELAY_MAX);
                 }
                 Err(error) => {
-                    error!("{error}");
+                    error!("{what} cannot be stored: {error}");
                     return Written::Never(error);
                 }
             }
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

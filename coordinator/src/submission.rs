@@ -9,7 +9,8 @@ use crate::{
     driver::Round,
     evolution::{Digest, Evolution},
     ids::ExperimentId,
-    store::{self, NewExperiment, StoreError},
+    priority::Priority,
+    store::{self, ExperimentState, NewExperiment, StoreError},
 };
 
 /// What a client submits.
@@ -25,6 +26,8 @@ pub struct Submission {
     pub seed: Option<u64>,
     /// Replaces the file's number of generations.
     pub generations: Option<u64>,
+    /// Its share of the fleet.
+    pub priority: Priority,
 }
 
 /// A submission that has passed all checks.
@@ -50,6 +53,10 @@ pub struct Runnable {
     pub spec: Arc<str>,
     /// What is to be judged first.
     pub round: Round,
+    /// Its share of the fleet.
+    pub priority: Priority,
+    /// Whether it waits to be resumed.
+    pub is_paused: bool,
 }
 
 impl Submission {
@@ -73,6 +80,7 @@ impl Submission {
             config_digest: Digest::of_config(&config),
             genotype_len: experiment.genotype_len(),
             checkpoint: checkpoint_json(&evolution),
+            priority: self.priority,
             config,
         };
         Ok(Checked { new, evolution, warnings })
@@ -80,11 +88,17 @@ impl Submission {
 }
 
 impl Runnable {
-    /// An experiment whose evolution stands somewhere. Asks for its next
-    /// generation, which may take a while.
-    pub fn new(id: ExperimentId, config: ExperimentConfig, evolution: Evolution) -> Self {
+    /// An experiment whose evolution stands somewhere, and that is not paused.
+    /// Asks for its next generation, which may take a while.
+    pub fn new(
+        id: ExperimentId,
+        config: ExperimentConfig,
+        evolution: Evolution,
+        priority: Priority,
+    ) -> Self {
         let spec = config.to_canonical_json().into();
-        Self { id, spec, config, round: Round::generation(evolution) }
+        let round = Round::generation(evolution);
+        Self { id, spec, config, round, priority, is_paused: false }
     }
 
     /// An experiment as the store has it.
@@ -97,7 +111,8 @@ impl Runnable {
             .map_err(|error| corrupt("configuration", &error))?;
         let evolution =
             serde_json::from_str(checkpoint).map_err(|error| corrupt("checkpoint", &error))?;
-        Ok(Self::new(id, config, evolution))
+        let is_paused = experiment.state == ExperimentState::Paused;
+        Ok(Self { is_paused, ..Self::new(id, config, evolution, experiment.priority) })
     }
 }
 

@@ -8,7 +8,10 @@ pub mod v1 {
 }
 
 /// Version of the worker protocol. Coordinator and worker must agree.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
+
+/// Most items per slot that a worker is given before it has answered any.
+pub const ITEMS_PER_SLOT_MAX: usize = 16;
 
 /// The encoded descriptors of the package, for gRPC reflection.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/swarm.v1.bin"));

@@ -30,10 +30,21 @@ impl Experiment {
         value["seed"] = json!(7);
         let algorithm = &mut value["algorithm"];
         algorithm["generations"] = json!(generations);
-        algorithm["population_size"] = json!(16);
-        algorithm["evaluation_steps"] = json!(80);
+        algorithm["population_size"] = json!(12);
+        algorithm["evaluation_steps"] = json!(1000);
         algorithm["num_evaluations"] = json!(3);
+        algorithm["champion_trials"] = json!(8);
         Self::of(value)
+    }
+
+    /// A smaller one still: a generation takes less than a tenth of a second.
+    pub fn tiny(generations: u64) -> Self {
+        Self::small(generations).edit(|value| {
+            let algorithm = &mut value["algorithm"];
+            algorithm["population_size"] = json!(10);
+            algorithm["evaluation_steps"] = json!(500);
+            algorithm["num_evaluations"] = json!(2);
+        })
     }
 
     /// Any content.

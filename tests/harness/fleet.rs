@@ -6,11 +6,10 @@ use std::{
 };
 
 use rusqlite::Connection;
-use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::{
-    LogLine, LoggingProcess, Outcome, binary,
+    Experiment, LogLine, LoggingProcess, Outcome, binary,
     process::{Source, swarmctl},
 };
 
@@ -23,7 +22,10 @@ pub struct CoordinatorProcess {
     /// The process.
     pub process: LoggingProcess,
     address: String,
-    data_dir: TempDir,
+    args: Vec<String>,
+    data_dir: PathBuf,
+    /// Removes the directory.
+    _temporary: Option<TempDir>,
 }
 
 impl CoordinatorProcess {
@@ -34,14 +36,38 @@ impl CoordinatorProcess {
 
     /// Starts a coordinator with more arguments.
     pub fn start_with(args: &[&str]) -> Self {
-        let data_dir = tempfile::tempdir().expect("a temporary directory");
-        let (process, address) = spawn("127.0.0.1:0", data_dir.path(), args);
-        Self { process, address, data_dir }
+        let temporary = tempfile::tempdir().expect("a temporary directory");
+        let data_dir = temporary.path().to_owned();
+        Self::launch(data_dir, Some(temporary), args, None)
     }
 
-    /// Starts a killed coordinator again: same data, same address.
+    /// Starts a coordinator that dies at a step; see its module `failpoint`.
+    #[cfg(debug_assertions)]
+    pub fn start_armed(failpoint: &str) -> Self {
+        let temporary = tempfile::tempdir().expect("a temporary directory");
+        let data_dir = temporary.path().to_owned();
+        Self::launch(data_dir, Some(temporary), &[], Some(failpoint))
+    }
+
+    /// Starts a coordinator on a data directory.
+    pub fn start_in(data_dir: &Path) -> Self {
+        Self::launch(data_dir.to_owned(), None, &[], None)
+    }
+
+    fn launch(
+        data_dir: PathBuf,
+        temporary: Option<TempDir>,
+        args: &[&str],
+        failpoint: Option<&str>,
+    ) -> Self {
+        let args: Vec<String> = args.iter().map(|&arg| arg.to_owned()).collect();
+        let (process, address) = spawn("127.0.0.1:0", &data_dir, &args, failpoint);
+        Self { process, address, args, data_dir, _temporary: temporary }
+    }
+
+    /// Starts a coordinator that has ended again: same data, same address.
     pub fn restart(&mut self) {
-        (self.process, self.address) = spawn(&self.address, self.data_dir.path(), &[]);
+        (self.process, self.address) = spawn(&self.address, &self.data_dir, &self.args, None);
     }
 
     /// Its URL.
@@ -55,13 +81,22 @@ impl CoordinatorProcess {
     }
 
     /// Its data directory.
-    pub fn data_dir(&self) -> PathBuf {
-        self.data_dir.path().to_owned()
+    pub fn data_dir(&self) -> &Path {
+        &self.data_dir
     }
 
     /// A connection of its own to the coordinator's database.
     pub fn database(&self) -> Connection {
-        Connection::open(self.data_dir.path().join("swarmevo.sqlite3")).expect("the database opens")
+        Connection::open(self.data_dir.join("swarmevo.sqlite3")).expect("the database opens")
+    }
+
+    /// Generations of an experiment in the database.
+    pub fn n_committed(&self, id: u64) -> u64 {
+        self.database()
+            .query_row("SELECT count(*) FROM generations WHERE experiment_id = ?1", [id], |row| {
+                row.get(0)
+            })
+            .expect("the database can be read")
     }
 
     /// Runs `swarmctl --output json ARGS` against it.
@@ -73,8 +108,7 @@ impl CoordinatorProcess {
     /// Submits an experiment file; returns the experiment's id.
     pub fn submit(&self, path: &Path) -> u64 {
         let path = path.to_str().expect("UTF-8");
-        let outcome = self.swarmctl(&["submit", path]).expect_success();
-        let submitted: Value = serde_json::from_str(&outcome.stdout).expect("a JSON document");
+        let submitted = self.swarmctl(&["submit", path]).expect_success().json();
         submitted["id"].as_u64().expect("an id")
     }
 
@@ -93,13 +127,29 @@ impl CoordinatorProcess {
     }
 }
 
-fn spawn(listen: &str, data_dir: &Path, args: &[&str]) -> (LoggingProcess, String) {
+/// Runs a coordinator that does not start, or that nobody stops, to its end.
+pub fn run_coordinator(listen: &str, data_dir: &Path) -> Outcome {
     let mut command = Command::new(binary("coordinator"));
+    command.args(["--listen", listen, "--data-dir"]).arg(data_dir);
+    Outcome::of(&mut command)
+}
+
+fn spawn(
+    listen: &str,
+    data_dir: &Path,
+    args: &[String],
+    failpoint: Option<&str>,
+) -> (LoggingProcess, String) {
+    let mut command = Command::new(binary("coordinator"));
+    command.args(["--log-format", "json", "--data-dir"]).arg(data_dir);
+    for (option, default) in [("--listen", listen), ("--log-level", "info,coordinator=debug")] {
+        if !args.iter().any(|arg| arg == option) {
+            command.args([option, default]);
+        }
+    }
     command
-        .args(["--listen", listen, "--log-format", "json"])
-        .args(["--log-level", "info,coordinator=debug", "--data-dir"])
-        .arg(data_dir)
         .args(args)
+        .envs(failpoint.map(|failpoint| ("SWARM_FAILPOINT", failpoint)))
         .stdout(Stdio::null());
     let process = LoggingProcess::spawn(command, Source::Stderr);
     let line = process.wait_for("address", |line| line["message"] == LISTENS);
@@ -119,10 +169,16 @@ pub struct WorkerProcess {
 impl WorkerProcess {
     /// Starts a worker.
     pub fn start(coordinator: &CoordinatorProcess, name: &str) -> Self {
+        Self::start_with(&coordinator.url(), name, &[])
+    }
+
+    /// Starts a worker of the coordinator at `url` with more arguments.
+    pub fn start_with(url: &str, name: &str, args: &[&str]) -> Self {
         let mut command = Command::new(binary("worker"));
         command
-            .args(["--coordinator", &coordinator.url(), "--name", name, "--slots", "1"])
+            .args(["--coordinator", url, "--name", name, "--slots", "1"])
             .args(["--log-format", "json"])
+            .args(args)
             .stdout(Stdio::null());
         let process = LoggingProcess::spawn(command, Source::Stderr);
         Self { process, name: name.to_owned() }
@@ -141,18 +197,47 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Waits for the end of the experiment; returns the digest of each
-    /// generation, and the last line.
-    pub fn finish(mut self) -> (Vec<String>, Value) {
+    /// Waits for the experiment to complete.
+    pub fn finish(self) -> Finished {
+        let (code, finished) = self.end();
+        assert_eq!(code, Some(0), "{}", finished.last);
+        assert_eq!(finished.last["state"], "completed", "{}", finished.last);
+        finished
+    }
+
+    /// Waits for the end of the experiment; returns the exit code, too.
+    pub fn end(mut self) -> (Option<i32>, Finished) {
         let status = self.process.wait();
-        let mut lines = self.process.lines();
-        let last = lines.pop().expect("a last line");
-        assert!(status.success(), "{last}");
-        assert_eq!(last["state"], "completed", "{last}");
-        for (i, line) in lines.iter().enumerate() {
+        let mut generations = self.process.lines();
+        let last = generations.pop().expect("a last line");
+        for (i, line) in generations.iter().enumerate() {
             assert_eq!(line["generation"], i, "each generation once, in order");
         }
-        let digest = |line: &Value| line["digest"].as_str().expect("text").to_owned();
-        (lines.iter().map(digest).collect(), last)
+        (status.code(), Finished { generations, last })
     }
+}
+
+/// What a watcher has seen of an experiment.
+#[derive(Debug)]
+pub struct Finished {
+    /// A line per generation.
+    pub generations: Vec<LogLine>,
+    /// The end.
+    pub last: LogLine,
+}
+
+impl Finished {
+    /// The digest of each generation, and of everything.
+    pub fn digests(&self) -> Vec<String> {
+        let lines = self.generations.iter().chain([&self.last]);
+        lines.map(|line| line["digest"].as_str().expect("text").to_owned()).collect()
+    }
+}
+
+/// The digests of an experiment with which nothing interferes.
+pub fn undisturbed(experiment: &Experiment) -> Vec<String> {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let id = coordinator.submit(&experiment.path());
+    coordinator.watch(id).finish().digests()
 }

@@ -6,9 +6,15 @@
 mod binaries;
 mod experiment;
 mod fleet;
+mod hand_worker;
+mod mount;
 mod process;
+mod proxy;
 
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
-pub use fleet::{CoordinatorProcess, Watch, WorkerProcess};
+pub use fleet::{CoordinatorProcess, Finished, Watch, WorkerProcess, run_coordinator, undisturbed};
+pub use hand_worker::{HandWorker, hello};
+pub use mount::SmallDisk;
 pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};
+pub use proxy::{Direction, Proxy, Traffic};

@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::binary;
 
 /// Only a program that hangs takes so long.
-const DEADLINE: Duration = Duration::from_secs(120);
+pub(crate) const DEADLINE: Duration = Duration::from_secs(120);
 
 /// Why the lock of the lines may be trusted.
 const POISONED: &str = "nothing panics while it holds the lines";
@@ -107,6 +107,11 @@ impl LoggingProcess {
         }
     }
 
+    /// Its process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// All lines so far.
     pub fn lines(&self) -> Vec<LogLine> {
         self.lines.read.lock().expect(POISONED).0.clone()
@@ -172,6 +177,11 @@ impl Outcome {
     pub fn expect_success(self) -> Self {
         assert_eq!(self.code, Some(0), "{self:#?}");
         self
+    }
+
+    /// Standard output as one JSON document.
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).expect("a JSON document")
     }
 
     /// Standard output as JSON lines.

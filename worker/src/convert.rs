@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use sim_core::{Experiment, config::ExperimentConfig};
+use sim_core::{Experiment, Isa, config::ExperimentConfig};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},
@@ -16,20 +16,21 @@ use crate::{
 
 /// Makes a specification computable. It is compiled by the slot that computes
 /// its first item, once; what is wrong with it is the failure of each item.
-pub(crate) fn evaluator(config_json: String) -> Evaluator {
+pub(crate) fn evaluator(config_json: String, isa: Isa) -> Evaluator {
     let compiled = OnceLock::new();
-    Arc::new(move |item: &Item| {
+    Arc::new(move |item: &Item, keep_going: &dyn Fn() -> bool| {
         let experiment: &Experiment =
-            compiled.get_or_init(|| compile(&config_json)).as_ref().map_err(String::clone)?;
+            compiled.get_or_init(|| compile(&config_json, isa)).as_ref().map_err(String::clone)?;
         experiment
-            .evaluate(&item.genotype, item.generation, item.trials.clone())
+            .evaluate_while(&item.genotype, item.generation, item.trials.clone(), keep_going)
             .map_err(|error| error.to_string())
     })
 }
 
-fn compile(config_json: &str) -> Result<Experiment, String> {
+fn compile(config_json: &str, isa: Isa) -> Result<Experiment, String> {
     ExperimentConfig::from_json(config_json, "")
         .and_then(|(config, _warnings)| Experiment::compile(&config))
+        .map(|experiment| experiment.with_isa(isa))
         .map_err(|error| format!("the experiment's specification is not valid: {error}"))
 }
 
@@ -65,12 +66,14 @@ pub(crate) fn failure(item_id: u64, message: String) -> v1::ItemResult {
     v1::ItemResult { item_id, outcome: Some(outcome), compute_us: 0 }
 }
 
-pub(crate) fn hello(config: &WorkerConfig) -> v1::WorkRequest {
+pub(crate) fn hello(config: &WorkerConfig, process_id: u64) -> v1::WorkRequest {
     request(Message::Hello(v1::Hello {
         protocol_version: PROTOCOL_VERSION,
         sim_core_fingerprint: sim_core::FINGERPRINT.into(),
         name: config.name.clone(),
         slots: u32::try_from(config.slots).expect("slots are checked to be at most SLOTS_MAX"),
+        version: env!("CARGO_PKG_VERSION").into(),
+        process_id,
     }))
 }
 

@@ -10,8 +10,9 @@ mod session;
 
 use std::{io, time::Duration};
 
+use sim_core::Isa;
+use swarm_transport::{Credentials, Link, LinkError};
 use tokio_util::sync::CancellationToken;
-use tonic::transport::Endpoint;
 use tracing::{info, warn};
 
 pub use crate::backoff::Backoff;
@@ -41,6 +42,10 @@ pub struct WorkerConfig {
     pub retry_delay_min: Duration,
     /// Largest upper bound of that delay.
     pub retry_delay_max: Duration,
+    /// What the coordinator may ask for.
+    pub credentials: Credentials,
+    /// Vector instructions to compute with. They decide how fast it is, and no bit.
+    pub isa: Isa,
 }
 
 impl WorkerConfig {
@@ -52,6 +57,8 @@ impl WorkerConfig {
             slots,
             retry_delay_min: Duration::from_millis(250),
             retry_delay_max: Duration::from_secs(10),
+            credentials: Credentials::default(),
+            isa: Isa::best(),
         }
     }
 }
@@ -60,16 +67,10 @@ impl WorkerConfig {
 /// connection) is retried and never gets here.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkerError {
-    /// The coordinator's address is none. Fix the input.
-    #[error(
-        "`{address}` is not the address of a coordinator ({reason}); expected something like http://127.0.0.1:7700"
-    )]
-    Address {
-        /// The address.
-        address: String,
-        /// What is wrong with it.
-        reason: String,
-    },
+    /// The coordinator's address is none, or the credentials do not fit it. Fix the
+    /// input.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// A name that the protocol cannot carry. Fix the input.
     #[error("a worker's name has 1 to {NAME_BYTES_MAX} bytes, this one has {0}")]
     Name(usize),
@@ -90,6 +91,15 @@ pub enum WorkerError {
         /// The coordinator's reason, which names its version.
         refusal: String,
     },
+    /// The coordinator wants another token, or another certificate. Fix the
+    /// credentials.
+    #[error("the coordinator at {address} does not let this worker in: {refusal}")]
+    Denied {
+        /// Address of the coordinator.
+        address: String,
+        /// The coordinator's reason.
+        refusal: String,
+    },
     /// The operating system gave no thread.
     #[error("cannot start the threads that compute: {0}")]
     Threads(#[from] io::Error),
@@ -98,7 +108,7 @@ pub enum WorkerError {
 impl WorkerError {
     /// Whether the configuration is at fault.
     pub fn is_input(&self) -> bool {
-        matches!(self, Self::Address { .. } | Self::Name(_) | Self::Slots(_))
+        matches!(self, Self::Link(_) | Self::Name(_) | Self::Slots(_))
     }
 }
 
@@ -108,23 +118,26 @@ impl WorkerError {
 /// A coordinator that is not up, or goes away, is tried again without end, after
 /// random delays that grow.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
-    run_with(config, shutdown, convert::evaluator).await
+    let isa = config.isa;
+    run_with(config, shutdown, move |config_json| convert::evaluator(config_json, isa)).await
 }
 
 /// [`run`] with another way to make a specification computable.
 async fn run_with(
     config: WorkerConfig,
     shutdown: CancellationToken,
-    evaluator: fn(String) -> Evaluator,
+    evaluator: impl Fn(String) -> Evaluator + Sync,
 ) -> Result<(), WorkerError> {
-    let endpoint = endpoint(&config)?;
+    let link = link(&config)?;
     let pool = Pool::start(config.slots)?;
+    // 0 means that it is not known.
+    let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
     loop {
         let opened = tokio::select! {
             biased;
             () = shutdown.cancelled() => return Ok(()),
-            opened = Session::open(&endpoint, &config) => opened,
+            opened = Session::open(&link, &config, process_id) => opened,
         };
         let (what, reason) = match opened {
             Ok(session) => {
@@ -135,9 +148,9 @@ async fn run_with(
                     slots = config.slots,
                     "connected"
                 );
-                let ended = session.serve(&pool, &shutdown, evaluator).await;
-                // What is queued was assigned on this stream: it is not ours any more.
-                pool.drop_queued(|_| true);
+                let ended = session.serve(&pool, &shutdown, &evaluator).await;
+                // What is left was assigned on this stream: it is not ours any more.
+                pool.cancel(|_| true);
                 match ended {
                     Ended::Drained => return Ok(()),
                     Ended::Lost { reason, worked } => {
@@ -150,6 +163,9 @@ async fn run_with(
             }
             Err(OpenError::VersionMismatch(refusal)) => {
                 return Err(WorkerError::VersionMismatch { address: config.coordinator, refusal });
+            }
+            Err(OpenError::Denied(refusal)) => {
+                return Err(WorkerError::Denied { address: config.coordinator, refusal });
             }
             Err(OpenError::Refused(reason)) => ("refused", reason),
             Err(OpenError::Unreachable(reason)) => ("cannot connect", reason),
@@ -171,26 +187,22 @@ async fn run_with(
 }
 
 /// Checks the configuration and describes the connection.
-fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
+fn link(config: &WorkerConfig) -> Result<Link, WorkerError> {
     if !(1..=NAME_BYTES_MAX).contains(&config.name.len()) {
         return Err(WorkerError::Name(config.name.len()));
     }
     if !(1..=SLOTS_MAX).contains(&config.slots) {
         return Err(WorkerError::Slots(config.slots));
     }
-    let not_an_address =
-        |reason: String| WorkerError::Address { address: config.coordinator.clone(), reason };
-    let endpoint = Endpoint::from_shared(config.coordinator.clone())
-        .map_err(|error| not_an_address(session::with_causes(&error)))?;
-    if endpoint.uri().scheme_str() != Some("http") || endpoint.uri().host().is_none() {
-        return Err(not_an_address("it does not start with http:// and a host".into()));
-    }
-    Ok(endpoint
+    let mut link = Link::new(&config.coordinator, &config.credentials)?;
+    link.endpoint = link
+        .endpoint
         .connect_timeout(Duration::from_secs(5))
         // A coordinator whose machine vanished closes nothing: only pings find out.
         .http2_keep_alive_interval(Duration::from_secs(10))
         .keep_alive_timeout(Duration::from_secs(10))
-        .keep_alive_while_idle(true))
+        .keep_alive_while_idle(true);
+    Ok(link)
 }
 
 #[cfg(test)]
@@ -198,7 +210,7 @@ mod tests {
     use super::*;
 
     fn rejection(coordinator: &str, name: &str, slots: usize) -> WorkerError {
-        endpoint(&WorkerConfig::new(coordinator, name, slots)).unwrap_err()
+        link(&WorkerConfig::new(coordinator, name, slots)).unwrap_err()
     }
 
     #[test]
@@ -216,7 +228,7 @@ mod tests {
         ] {
             assert!(error.is_input(), "{error}");
         }
-        assert!(endpoint(&WorkerConfig::new(url, "w", 4096)).is_ok());
+        assert!(link(&WorkerConfig::new(url, "w", 4096)).is_ok());
     }
 
     #[test]

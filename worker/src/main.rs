@@ -2,9 +2,11 @@
 
 mod telemetry;
 
-use std::{env, fs, process::ExitCode, thread};
+use std::{env, fs, path::PathBuf, process::ExitCode, thread};
 
 use clap::Parser;
+use sim_core::Isa;
+use swarm_transport::CredentialArgs;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
@@ -15,6 +17,7 @@ use crate::telemetry::LogFormat;
 const EXIT_INTERNAL: u8 = 1;
 const EXIT_INPUT: u8 = 2;
 const EXIT_VERSION_MISMATCH: u8 = 6;
+const EXIT_DENIED: u8 = 7;
 const EXIT_INTERRUPTED: i32 = 130;
 
 /// Computes the fitness of genotypes for a coordinator.
@@ -28,12 +31,22 @@ struct Args {
     /// Address of the coordinator.
     #[arg(long, env = "SWARM_COORDINATOR", default_value = "http://127.0.0.1:7700")]
     coordinator: String,
+    /// File of the worker token, if the coordinator wants one; or put the token
+    /// itself into SWARM_WORKER_TOKEN.
+    #[arg(long, value_name = "FILE", env = "SWARM_WORKER_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
+    #[command(flatten)]
+    credentials: CredentialArgs,
     /// Name in the coordinator's log [default: the host's name and the process id]
     #[arg(long)]
     name: Option<String>,
     /// Number of items computed at the same time [default: the number of cores]
     #[arg(long)]
     slots: Option<usize>,
+    /// Vector instructions: portable, avx2, avx512 or neon. They change how fast it
+    /// is, and no bit [default: the best of this processor]
+    #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
+    isa: Option<Isa>,
     /// How log lines look.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
@@ -47,8 +60,9 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    stopped by a signal
   1    internal error
-  2    bad arguments
+  2    bad arguments; token or certificate unusable
   6    coordinator and worker are of different versions
+  7    the coordinator does not accept the token
   130  ended at once by a second signal";
 
 #[tokio::main]
@@ -65,7 +79,18 @@ async fn main() -> ExitCode {
     }
     let name = args.name.unwrap_or_else(default_name);
     let slots = args.slots.unwrap_or_else(|| thread::available_parallelism().map_or(1, Into::into));
-    match worker::run(WorkerConfig::new(args.coordinator, name, slots), shutdown).await {
+    let credentials = args.credentials.load(args.token_file.as_deref(), "SWARM_WORKER_TOKEN");
+    let credentials = match credentials {
+        Ok(credentials) => credentials,
+        Err(error) => {
+            error!("{error}");
+            return EXIT_INPUT.into();
+        }
+    };
+    let isa = args.isa.unwrap_or_else(Isa::best);
+    let config =
+        WorkerConfig { credentials, isa, ..WorkerConfig::new(args.coordinator, name, slots) };
+    match worker::run(config, shutdown).await {
         Ok(()) => {
             info!("stopped");
             ExitCode::SUCCESS
@@ -74,6 +99,7 @@ async fn main() -> ExitCode {
             error!("{error}");
             match error {
                 WorkerError::VersionMismatch { .. } => EXIT_VERSION_MISMATCH.into(),
+                WorkerError::Denied { .. } => EXIT_DENIED.into(),
                 error if error.is_input() => EXIT_INPUT.into(),
                 _ => EXIT_INTERNAL.into(),
             }

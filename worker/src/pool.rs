@@ -4,14 +4,18 @@
 use std::{
     any::Any,
     collections::VecDeque,
-    fmt, io,
+    fmt, io, mem,
     ops::Range,
     panic::{self, AssertUnwindSafe},
-    sync::{Arc, Condvar, Mutex, MutexGuard},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
     thread,
     time::{Duration, Instant},
 };
 
+use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 
 /// One genotype and the trials to run it on.
@@ -24,8 +28,10 @@ pub(crate) struct Item {
     pub(crate) genotype: Vec<f64>,
 }
 
-/// Computes the fitness of an item, one per trial, or says why it cannot.
-pub(crate) type Evaluator = Arc<dyn Fn(&Item) -> Result<Vec<f64>, String> + Send + Sync>;
+/// Computes the fitness of an item, one per trial, or says why it cannot. Asks now
+/// and then whether to go on; none if it was stopped.
+pub(crate) type Evaluator =
+    Arc<dyn Fn(&Item, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
 
 /// What became of an item.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +67,16 @@ struct Shared {
 #[derive(Default)]
 struct Queue {
     tasks: VecDeque<Task>,
+    /// What the slots are computing.
+    running: Vec<Arc<Running>>,
     closed: bool,
+}
+
+/// An item in a slot.
+struct Running {
+    item: Item,
+    /// Nobody wants its outcome any more.
+    cancelled: AtomicBool,
 }
 
 impl fmt::Debug for Queue {
@@ -72,12 +87,12 @@ impl fmt::Debug for Queue {
 }
 
 impl Pool {
-    /// Starts `slots` threads; the queue holds twice as many tasks, the
-    /// coordinator's credit.
+    /// Starts `slots` threads; the queue holds as many tasks as the coordinator may
+    /// send ahead.
     pub(crate) fn start(slots: usize) -> io::Result<Self> {
         let shared = Arc::new(Shared { queue: Mutex::default(), changed: Condvar::new() });
         // Built first, so that the threads that did start end if one does not.
-        let pool = Self { shared, capacity: 2 * slots };
+        let pool = Self { shared, capacity: ITEMS_PER_SLOT_MAX * slots };
         for slot in 0..slots {
             let shared = Arc::clone(&pool.shared);
             thread::Builder::new().name(format!("slot-{slot}")).spawn(move || shared.work())?;
@@ -101,13 +116,21 @@ impl Pool {
         Ok(())
     }
 
-    /// Drops those tasks that wait and match, and returns their number. What is
-    /// being computed goes on.
-    pub(crate) fn drop_queued(&self, matches: impl Fn(&Item) -> bool) -> usize {
+    /// Drops all tasks that wait, and returns their number. What is being computed
+    /// goes on.
+    pub(crate) fn drop_queued(&self) -> usize {
+        mem::take(&mut self.shared.lock().tasks).len()
+    }
+
+    /// Drops the tasks that match, whether they wait or are being computed, and
+    /// returns their number. They have no outcome.
+    pub(crate) fn cancel(&self, matches: impl Fn(&Item) -> bool) -> usize {
         let mut queue = self.shared.lock();
-        let before = queue.tasks.len();
+        let n_before = queue.tasks.len();
         queue.tasks.retain(|task| !matches(&task.item));
-        before - queue.tasks.len()
+        let n_dropped = n_before - queue.tasks.len();
+        let running = queue.running.iter().filter(|running| matches(&running.item));
+        n_dropped + running.inspect(|running| running.cancelled.store(true, Relaxed)).count()
     }
 }
 
@@ -127,31 +150,40 @@ impl Shared {
 
     /// A slot's life.
     fn work(&self) {
-        while let Some(Task { item, evaluator, reply }) = self.next_task() {
-            let outcome = compute(&item, &evaluator);
-            // An error means that the stream of this item is gone, and with it
-            // the use of the outcome.
-            let _ = reply.blocking_send(outcome);
+        while let Some((running, evaluator, reply)) = self.next_task() {
+            let outcome = compute(&running, &evaluator);
+            self.lock().running.retain(|other| !Arc::ptr_eq(other, &running));
+            if let Some(outcome) = outcome {
+                // An error means that the stream of this item is gone, and with it
+                // the use of the outcome.
+                let _ = reply.blocking_send(outcome);
+            }
         }
     }
 
     /// Waits for a task; none once the pool is closed.
-    fn next_task(&self) -> Option<Task> {
+    fn next_task(&self) -> Option<(Arc<Running>, Evaluator, mpsc::Sender<Outcome>)> {
         let mut queue = self
             .changed
             .wait_while(self.lock(), |queue| queue.tasks.is_empty() && !queue.closed)
             .expect("nothing panics while it holds the queue");
-        queue.tasks.pop_front()
+        let Task { item, evaluator, reply } = queue.tasks.pop_front()?;
+        let running = Arc::new(Running { item, cancelled: AtomicBool::new(false) });
+        queue.running.push(Arc::clone(&running));
+        Some((running, evaluator, reply))
     }
 }
 
-/// Computes one item. A panic is the item's failure, not the worker's.
+/// Computes one item; no outcome if it is cancelled meanwhile. A panic is the
+/// item's failure, not the worker's.
 #[expect(clippy::disallowed_methods, reason = "reports how long an item took; decides nothing")]
-fn compute(item: &Item, evaluator: &Evaluator) -> Outcome {
+fn compute(Running { item, cancelled }: &Running, evaluator: &Evaluator) -> Option<Outcome> {
     let started = Instant::now();
-    let fitness = panic::catch_unwind(AssertUnwindSafe(|| evaluator(item)))
+    let keep_going = || !cancelled.load(Relaxed);
+    let fitness = panic::catch_unwind(AssertUnwindSafe(|| evaluator(item, &keep_going)))
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))));
-    Outcome { item_id: item.id, fitness, duration: started.elapsed() }
+    let fitness = fitness.transpose()?;
+    Some(Outcome { item_id: item.id, fitness, duration: started.elapsed() })
 }
 
 fn panic_message(payload: &(dyn Any + Send)) -> &str {
@@ -196,10 +228,10 @@ mod tests {
         let (started, starts) = std_mpsc::channel();
         let (permit, permits) = std_mpsc::channel();
         let permits = Mutex::new(permits);
-        let evaluator: Evaluator = Arc::new(move |item| {
+        let evaluator: Evaluator = Arc::new(move |item, keep_going| {
             started.send(item.id).map_err(|error| error.to_string())?;
             permits.lock().unwrap().recv().map_err(|error| error.to_string())?;
-            Ok(item.genotype.clone())
+            Ok(keep_going().then(|| item.genotype.clone()))
         });
         (evaluator, starts, permit)
     }
@@ -208,7 +240,7 @@ mod tests {
     fn every_item_gets_its_own_outcome() {
         let pool = Pool::start(4).unwrap();
         let (reply, outcomes) = mpsc::channel(8);
-        let evaluator: Evaluator = Arc::new(|item| Ok(item.genotype.clone()));
+        let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
         for id in 0..8 {
             submit(&pool, task(id, &evaluator, &reply));
         }
@@ -221,10 +253,10 @@ mod tests {
     fn a_panic_fails_its_item_and_spares_the_slot() {
         let pool = Pool::start(1).unwrap();
         let (reply, outcomes) = mpsc::channel(4);
-        let evaluator: Evaluator = Arc::new(|item| match item.id {
+        let evaluator: Evaluator = Arc::new(|item, _| match item.id {
             0 => panic!("no such robot"),
             1 => panic!("robot {}", item.id),
-            _ => Ok(vec![]),
+            _ => Ok(Some(vec![])),
         });
         submit(&pool, task(0, &evaluator, &reply));
         submit(&pool, task(1, &evaluator, &reply));
@@ -245,11 +277,28 @@ mod tests {
         assert_eq!(starts.recv(), Ok(0));
         submit(&pool, task(1, &evaluator, &reply));
         submit(&pool, task(2, &evaluator, &reply));
-        assert_eq!(pool.drop_queued(|item| item.experiment_id == 1), 1);
-        assert_eq!(pool.drop_queued(|_| true), 1);
+        assert_eq!(pool.drop_queued(), 2);
         permit.send(()).unwrap();
         drop(reply);
         assert_eq!(collect(outcomes), [(0, Ok(vec![0.0]))]);
+    }
+
+    #[test]
+    fn cancelling_stops_what_is_running_and_drops_what_waits() {
+        let pool = Pool::start(1).unwrap();
+        let (reply, outcomes) = mpsc::channel(4);
+        let (evaluator, starts, permit) = gated();
+        submit(&pool, task(0, &evaluator, &reply));
+        assert_eq!(starts.recv(), Ok(0));
+        for id in 1..=3 {
+            submit(&pool, task(id, &evaluator, &reply));
+        }
+        assert_eq!(pool.cancel(|item| item.experiment_id == 0), 2, "one runs, one waits");
+        for _ in 0..3 {
+            permit.send(()).unwrap();
+        }
+        drop(reply);
+        assert_eq!(collect(outcomes), [(1, Ok(vec![1.0])), (3, Ok(vec![3.0]))]);
     }
 
     #[test]
@@ -263,8 +312,8 @@ mod tests {
             submit(&pool, task(id, &evaluator, &reply));
         }
         assert_eq!(
-            pool.submit(task(9, &evaluator, &reply)).map_err(|task| task.item),
-            Err(item(9))
+            pool.submit(task(99, &evaluator, &reply)).map_err(|task| task.item),
+            Err(item(99))
         );
     }
 
@@ -285,7 +334,7 @@ mod tests {
     #[test]
     fn outcomes_that_nobody_waits_for_do_not_block_a_slot() {
         let pool = Pool::start(1).unwrap();
-        let evaluator: Evaluator = Arc::new(|item| Ok(item.genotype.clone()));
+        let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
         let (gone, receiver) = mpsc::channel(1);
         drop(receiver);
         submit(&pool, task(0, &evaluator, &gone));

@@ -1,10 +1,19 @@
 //! One conversation with the coordinator, from `Hello` to the end of its stream.
 
-use std::{collections::BTreeMap, error::Error, mem, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    error::Error,
+    mem,
+    sync::Arc,
+    time::Duration,
+};
 
 use swarm_proto::v1::{
     self, WorkRequest, WorkResponse, work_response::Message,
     worker_service_client::WorkerServiceClient,
+};
+use swarm_transport::{
+    Bearer, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, tls_trouble,
 };
 use tokio::{
     sync::mpsc,
@@ -12,7 +21,9 @@ use tokio::{
 };
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
-use tonic::{Code, Status, Streaming, transport::Endpoint};
+use tonic::{
+    Code, Status, Streaming, service::interceptor::InterceptedService, transport::Channel,
+};
 use tracing::{debug, info};
 
 use crate::{
@@ -20,8 +31,6 @@ use crate::{
     pool::{Evaluator, Outcome, Pool, Task},
 };
 
-/// Largest message accepted from the coordinator.
-const INBOUND_BYTES_MAX: usize = 64 << 20;
 /// Messages that wait for the network.
 const OUTBOUND_MESSAGES_MAX: usize = 16;
 /// Results in one message, so that no message outgrows what a coordinator accepts.
@@ -43,6 +52,8 @@ pub(crate) struct Session {
 pub(crate) enum OpenError {
     /// There never will be one; with the coordinator's reason.
     VersionMismatch(String),
+    /// Not with these credentials; with the coordinator's reason.
+    Denied(String),
     /// The coordinator said no, for now.
     Refused(String),
     /// Nobody answered.
@@ -64,32 +75,38 @@ pub(crate) enum Ended {
 
 impl Session {
     pub(crate) async fn open(
-        endpoint: &Endpoint,
+        link: &Link,
         config: &WorkerConfig,
+        process_id: u64,
     ) -> Result<Self, OpenError> {
-        let channel = endpoint.connect().await.map_err(|error| {
-            OpenError::Unreachable(with_causes(error.source().unwrap_or(&error)))
+        let channel = link.endpoint.connect().await.map_err(|error| {
+            let reason = tls_trouble(&error);
+            let or_else = || with_causes(error.source().unwrap_or(&error));
+            OpenError::Unreachable(reason.unwrap_or_else(or_else))
         })?;
-        let client = WorkerServiceClient::new(channel).max_decoding_message_size(INBOUND_BYTES_MAX);
-        timeout(WELCOME_TIMEOUT, Self::greet(client, config))
+        let client = WorkerServiceClient::with_interceptor(channel, link.bearer.clone())
+            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
+        timeout(WELCOME_TIMEOUT, Self::greet(client, config, process_id))
             .await
             .map_err(|_| OpenError::Refused("no answer to the greeting".into()))?
+            .map_err(|status| refusal(&status, link))
     }
 
     async fn greet(
-        mut client: WorkerServiceClient<tonic::transport::Channel>,
+        mut client: WorkerServiceClient<InterceptedService<Channel, Bearer>>,
         config: &WorkerConfig,
-    ) -> Result<Self, OpenError> {
+        process_id: u64,
+    ) -> Result<Self, Status> {
         let (outbound, requests) = mpsc::channel(OUTBOUND_MESSAGES_MAX);
-        outbound.try_send(convert::hello(config)).expect("a new channel has room");
-        let mut inbound =
-            client.work(ReceiverStream::new(requests)).await.map_err(refusal)?.into_inner();
-        match inbound.message().await.map_err(refusal)? {
+        outbound.try_send(convert::hello(config, process_id)).expect("a new channel has room");
+        let mut inbound = client.work(ReceiverStream::new(requests)).await?.into_inner();
+        match inbound.message().await? {
             Some(WorkResponse { message: Some(Message::Welcome(welcome)) }) => {
                 Ok(Self { welcome, inbound, outbound })
             }
-            Some(_) => Err(OpenError::Refused("it answered something else than a welcome".into())),
-            None => Err(OpenError::Refused("it closed the stream".into())),
+            Some(_) => Err(Status::internal("it answered something else than a welcome")),
+            None => Err(Status::unavailable("it closed the stream")),
         }
     }
 
@@ -104,7 +121,7 @@ impl Session {
         self,
         pool: &Pool,
         shutdown: &CancellationToken,
-        evaluator: fn(String) -> Evaluator,
+        evaluator: &(dyn Fn(String) -> Evaluator + Sync),
     ) -> Ended {
         let Self { welcome, mut inbound, outbound } = self;
         let (reply, mut outcomes) = mpsc::channel(pool.capacity());
@@ -180,7 +197,7 @@ const STOPPED_READING: &str = "the coordinator stopped reading";
 /// What a session knows: specifications, and results to be sent.
 struct Desk<'a> {
     pool: &'a Pool,
-    evaluator: fn(String) -> Evaluator,
+    evaluator: &'a (dyn Fn(String) -> Evaluator + Sync),
     /// By experiment.
     evaluators: BTreeMap<u64, Evaluator>,
     /// Where slots put outcomes; none once no more items are taken.
@@ -195,7 +212,7 @@ impl Desk<'_> {
 
     fn drain(&mut self) {
         self.reply = None;
-        let dropped = self.pool.drop_queued(|_| true);
+        let dropped = self.pool.drop_queued();
         info!(dropped, "draining");
     }
 
@@ -207,8 +224,13 @@ impl Desk<'_> {
             Message::Batch(batch) => self.on_batch(batch),
             Message::EndExperiment(v1::EndExperiment { experiment_id }) => {
                 self.evaluators.remove(&experiment_id);
-                let dropped = self.pool.drop_queued(|item| item.experiment_id == experiment_id);
+                let dropped = self.pool.cancel(|item| item.experiment_id == experiment_id);
                 debug!(experiment_id, dropped, "experiment ended");
+            }
+            Message::DropItems(v1::DropItems { item_ids }) => {
+                let item_ids = BTreeSet::from_iter(item_ids);
+                let dropped = self.pool.cancel(|item| item_ids.contains(&item.id));
+                debug!(dropped, "items dropped");
             }
             Message::Welcome(_) => debug!("ignored a second welcome"),
         }
@@ -237,14 +259,23 @@ impl Desk<'_> {
     }
 }
 
-fn refusal(status: Status) -> OpenError {
+fn refusal(status: &Status, link: &Link) -> OpenError {
     match status.code() {
         Code::FailedPrecondition => OpenError::VersionMismatch(status.message().into()),
-        _ => OpenError::Refused(describe(&status)),
+        Code::Unauthenticated | Code::PermissionDenied => {
+            OpenError::Denied(status.message().into())
+        }
+        _ => OpenError::Refused(match link.suspicion(status) {
+            Some(suspicion) => format!("{}; {suspicion}", describe(status)),
+            None => describe(status),
+        }),
     }
 }
 
 fn describe(status: &Status) -> String {
+    if let Some(trouble) = tls_trouble(status) {
+        return trouble;
+    }
     let message = status.message();
     let text = if message.is_empty() { status.code().description() } else { message };
     append_causes(text.into(), status.source())

@@ -1,4 +1,7 @@
-//! From a judged round to the next: conclude and store, beside the loop.
+//! From a judged round to the next, beside the loop: conclusions are drawn, and a
+//! generation that is complete is stored while the next one is judged.
+
+use std::sync::Arc;
 
 use sim_core::config::ExperimentConfig;
 use tokio::task;
@@ -8,73 +11,78 @@ use tracing::info;
 use crate::{
     clock,
     engine::JudgedGeneration,
+    failpoint,
     ids::ExperimentId,
-    shared_store::{SharedStore, Written},
+    shared_store::{Retry, SharedStore, Written},
     store::{Generation, GenerationCommit},
+    submission::checkpoint_json,
 };
 
 use super::round::{Complete, Next, Round};
 
-/// A judged round of an experiment, and what is needed to go on.
-pub struct Advance {
-    pub store: SharedStore,
-    pub shutdown: CancellationToken,
+/// Which run of which experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunId {
     pub id: ExperimentId,
     pub incarnation: u64,
-    pub config: ExperimentConfig,
-    pub round: Round,
-    pub judged: JudgedGeneration,
 }
 
-/// What became of it.
+/// A step that an experiment has made.
 pub struct Advanced {
-    pub id: ExperimentId,
-    pub incarnation: u64,
-    pub outcome: Outcome,
+    pub run: RunId,
+    pub step: Step,
 }
 
-/// Where the experiment stands now.
-pub enum Outcome {
-    /// There is another round to judge.
-    Continues(Box<Round>),
+/// Where it stands now.
+pub enum Step {
+    /// Conclusions are drawn.
+    Concluded(Next),
+    /// The latest complete generation is on disk.
+    Stored,
     /// It has ended, or the coordinator does; the store knows all there is to
     /// know.
     Ended,
-    /// It cannot go on; the store does not know yet.
+    /// No conclusion can be drawn.
     Failed(String),
+    /// The latest complete generation cannot be stored.
+    NotStored(String),
 }
 
-impl Advance {
-    /// Draws the conclusions and commits the generation if it is complete.
-    pub async fn run(self) -> Advanced {
-        let Self { store, shutdown, id, incarnation, config, round, judged } = self;
-        let concluding = task::spawn_blocking(move || (round.conclude(&config, &judged), config));
-        let outcome = match concluding.await {
-            Ok((Ok(Next::Judge(round)), _)) => Outcome::Continues(round),
-            Ok((Ok(Next::Commit(complete)), config)) => {
-                commit(&store, &shutdown, id, &config, *complete).await
-            }
-            Ok((Err(error), _)) => Outcome::Failed(error.to_string()),
-            Err(panic) => {
-                Outcome::Failed(format!("evolution panicked ({panic}); please report this"))
-            }
-        };
-        Advanced { id, incarnation, outcome }
-    }
+/// Draws the conclusions.
+pub async fn conclude(
+    run: RunId,
+    config: Arc<ExperimentConfig>,
+    round: Round,
+    judged: JudgedGeneration,
+) -> Advanced {
+    let concluding = task::spawn_blocking(move || round.conclude(&config, &judged));
+    let step = match concluding.await {
+        Ok(Ok(next)) => Step::Concluded(next),
+        Ok(Err(error)) => Step::Failed(error.to_string()),
+        Err(panic) => Step::Failed(format!("evolution panicked ({panic}); please report this")),
+    };
+    Advanced { run, step }
 }
 
-async fn commit(
-    store: &SharedStore,
-    shutdown: &CancellationToken,
-    id: ExperimentId,
-    config: &ExperimentConfig,
+/// Commits a generation.
+pub async fn commit(
+    run: RunId,
+    config: Arc<ExperimentConfig>,
+    store: SharedStore,
+    shutdown: CancellationToken,
     complete: Complete,
-) -> Outcome {
-    let Complete { generation, checkpoint, champion, digest, notices, over, next } = complete;
+) -> Advanced {
+    let Complete { generation, evolution, champion, digest, notices, over, next: _ } = complete;
+    let id = run.id;
     let (row, remarks, reason, link) =
         (generation.clone(), notices.clone(), over.clone(), digest.clone());
+    let what = format!("generation {} of experiment {id}", generation.generation);
+    let checkpoint = task::spawn_blocking(move || checkpoint_json(&evolution))
+        .await
+        .expect("numbers and lists serialise");
+    failpoint::reached("before commit");
     let written = store
-        .write(shutdown, move |store| {
+        .write(&shutdown, &what, Retry::WhileUnavailable, move |store| {
             store.commit_generation(
                 id,
                 clock::unix_ms(),
@@ -90,18 +98,17 @@ async fn commit(
         })
         .await;
     match written {
-        Written::Yes => {}
-        Written::NotWanted => return Outcome::Ended,
-        Written::Never(error) => return Outcome::Failed(error.to_string()),
+        Written::Yes => failpoint::reached("committed"),
+        Written::NotWanted => return Advanced { run, step: Step::Ended },
+        Written::Never(error) => return Advanced { run, step: Step::NotStored(error.to_string()) },
     }
-    log_generation(id, config, &generation);
+    log_generation(id, &config, &generation);
     for notice in notices {
         info!(experiment = %id, "{notice}");
     }
-    if let Some(reason) = over {
-        info!(experiment = %id, digest, reason, "experiment completed");
-    }
-    next.map_or(Outcome::Ended, |round| Outcome::Continues(Box::new(round)))
+    let Some(reason) = over else { return Advanced { run, step: Step::Stored } };
+    info!(experiment = %id, digest, reason, "experiment completed");
+    Advanced { run, step: Step::Ended }
 }
 
 /// The line by which people follow a run.

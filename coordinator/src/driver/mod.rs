@@ -5,6 +5,8 @@
 //! (evolution's arithmetic, the disk) runs beside it.
 
 mod advance;
+mod ledger;
+mod requests;
 mod round;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -20,18 +22,27 @@ use tracing::{debug, error, info, warn};
 
 use crate::{
     clock,
-    engine::{Command, Engine, Item, ItemResult},
-    ids::{ExperimentId, WorkerId},
+    engine::{
+        Activity, Command, Engine, EngineConfig, Introduction, Item, ItemResult, JudgedGeneration,
+        WorkerStatus,
+    },
+    failpoint,
+    ids::{ExperimentId, ItemId, WorkerId},
+    priority::Priority,
     shared_store::SharedStore,
     store::ExperimentState,
     submission::Runnable,
 };
 
-use advance::{Advance, Advanced, Outcome};
+use advance::{Advanced, RunId, Step};
+use ledger::{Change, Entry, Ledger};
 pub use round::Round;
+use round::{Complete, Next};
 
 /// Events that wait for the loop; whoever sends more waits.
 const EVENT_QUEUE_LEN: usize = 1024;
+/// How soon late work is noticed.
+const TICK_INTERVAL_MAX: Duration = Duration::from_millis(100);
 /// Genotypes of about this many bytes travel in one message.
 const BATCH_LEN: usize = 1 << 20;
 
@@ -40,10 +51,8 @@ const BATCH_LEN: usize = 1 << 20;
 pub enum Event {
     /// A worker has introduced itself and its versions agree.
     WorkerJoined {
-        /// What it calls itself.
-        name: String,
-        /// Items it computes at the same time.
-        n_slots: usize,
+        /// Who it is.
+        introduction: Introduction,
         /// The way to it.
         link: WorkerLink,
         /// Gets its id.
@@ -60,13 +69,32 @@ pub enum Event {
     },
     /// A stored experiment is to run.
     ExperimentReady(Box<Runnable>),
-    /// A client wants an experiment to end.
-    CancelRequested {
-        /// Which.
+    /// A client wants something of an unfinished experiment.
+    Requested {
+        /// Of which.
         experiment: ExperimentId,
-        /// Answered when it has ended.
+        /// What.
+        request: Request,
+        /// Answered when it is stored.
         reply: oneshot::Sender<()>,
     },
+    /// A client wants to see the workers.
+    WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// A client wonders what becomes of an experiment.
+    ActivityRequested(ExperimentId, oneshot::Sender<Activity>),
+}
+
+/// What a client may want of an unfinished experiment.
+#[derive(Debug, Clone)]
+pub enum Request {
+    /// That it ends.
+    Cancel,
+    /// That it waits to be resumed; why.
+    Pause(String),
+    /// That it goes on.
+    Resume,
+    /// Another share of the fleet.
+    SetPriority(Priority),
 }
 
 /// What a worker says after its introduction.
@@ -98,7 +126,9 @@ pub enum ToWorker {
     Spec(ExperimentId, Arc<str>),
     /// Items of a generation.
     Items(ExperimentId, u64, Vec<Item>),
-    /// An experiment is over.
+    /// Results that are not wanted any more.
+    DropItems(Vec<ItemId>),
+    /// An experiment is over, or paused.
     End(ExperimentId),
     /// It is dropped; why.
     Dropped(String),
@@ -124,8 +154,8 @@ pub struct Driver {
     n_started: u64,
     /// Judged rounds whose conclusions are being drawn and stored.
     advancing: JoinSet<Advanced>,
-    /// Ends that are being stored.
-    ending: JoinSet<()>,
+    /// Everything else that is being stored.
+    ledger: Ledger,
 }
 
 struct ConnectedWorker {
@@ -134,38 +164,57 @@ struct ConnectedWorker {
     is_draining: bool,
 }
 
-/// An experiment that has not ended.
+/// An experiment that has not ended. A generation is stored while the next one is
+/// judged; one that is complete before waits, so that they are stored in order.
 struct Running {
-    config: ExperimentConfig,
+    config: Arc<ExperimentConfig>,
     /// Tells this run of the experiment from one before more generations were
     /// asked for.
     incarnation: u64,
-    /// What is being judged; none while conclusions are drawn and stored.
+    /// What is being judged; none while conclusions are drawn, or wait.
     round: Option<Round>,
+    /// What is to be stored next.
+    complete: Option<Box<Complete>>,
+    is_storing: bool,
+    /// How it ends, as soon as what is being stored is stored.
+    end: Option<(ExperimentState, String)>,
     /// Who waits for it to end.
     cancellations: Vec<oneshot::Sender<()>>,
 }
 
+impl Running {
+    fn new(config: ExperimentConfig, incarnation: u64) -> Self {
+        Self {
+            config: Arc::new(config),
+            incarnation,
+            round: None,
+            complete: None,
+            is_storing: false,
+            end: None,
+            cancellations: Vec::new(),
+        }
+    }
+}
+
 impl Driver {
-    /// A loop without workers or experiments. A worker that is silent for
-    /// `lease` loses its items.
+    /// A loop without workers or experiments.
     pub fn new(
         store: SharedStore,
         events: mpsc::Receiver<Event>,
-        lease: Duration,
+        config: EngineConfig,
         shutdown: CancellationToken,
     ) -> Self {
         Self {
-            engine: Engine::new(clock::now(), lease),
+            engine: Engine::new(clock::now(), config),
+            ledger: Ledger::new(store.clone(), shutdown.clone()),
             store,
             events,
             shutdown,
-            tick_interval: lease / 8,
+            tick_interval: TICK_INTERVAL_MAX.min(config.lease / 8),
             workers: BTreeMap::new(),
             experiments: BTreeMap::new(),
             n_started: 0,
             advancing: JoinSet::new(),
-            ending: JoinSet::new(),
         }
     }
 
@@ -179,9 +228,11 @@ impl Driver {
                 Some(event) = self.events.recv() => self.on_event(event),
                 Some(advanced) = self.advancing.join_next() => match advanced {
                     Ok(advanced) => self.on_advanced(advanced),
-                    Err(error) => error!("storing a generation panicked: {error}; please report this"),
+                    // Its experiment would wait for ever. At the next start it goes on
+                    // from its last commit.
+                    Err(error) => panic!("storing a generation: {error}"),
                 },
-                Some(_) = self.ending.join_next() => {}
+                Some(()) = self.ledger.advance() => {}
                 _ = ticks.tick() => self.engine.on_tick(clock::now()),
             }
             while let Some(command) = self.engine.poll_command() {
@@ -191,14 +242,16 @@ impl Driver {
         // Dropping the links ends the workers' streams.
         self.workers.clear();
         while self.advancing.join_next().await.is_some() {}
-        while self.ending.join_next().await.is_some() {}
+        while self.ledger.advance().await.is_some() {}
     }
 
     fn on_event(&mut self, event: Event) {
+        failpoint::reached("event");
         let now = clock::now();
         match event {
-            Event::WorkerJoined { name, n_slots, link, reply } => {
-                let id = self.engine.on_worker_joined(now, &name, n_slots);
+            Event::WorkerJoined { introduction, link, reply } => {
+                let Introduction { name, version, n_slots, .. } = introduction.clone();
+                let id = self.engine.on_worker_joined(now, introduction);
                 // The worker is welcomed before it is sent work: commands are
                 // carried out after this.
                 self.workers
@@ -206,7 +259,7 @@ impl Driver {
                 self.send(id, ToWorker::Welcome(id));
                 let fleet = self.engine.fleet_size();
                 info!(
-                    worker = %id, name, slots = n_slots,
+                    worker = %id, name, version, slots = n_slots,
                     workers = fleet.n_workers, total_slots = fleet.n_slots,
                     "worker joined"
                 );
@@ -226,7 +279,12 @@ impl Driver {
             },
             Event::WorkerLeft { worker, reason } => self.on_worker_left(worker, &reason),
             Event::ExperimentReady(runnable) => self.start(*runnable),
-            Event::CancelRequested { experiment, reply } => self.cancel(experiment, reply),
+            Event::Requested { experiment, request, reply } => {
+                self.on_request(experiment, request, reply);
+            }
+            // If the client is gone it need not be told.
+            Event::WorkersRequested(reply) => drop(reply.send(self.engine.worker_status(now))),
+            Event::ActivityRequested(id, reply) => drop(reply.send(self.engine.activity(now, id))),
         }
     }
 
@@ -238,15 +296,13 @@ impl Driver {
             generation = runnable.round.address(), generations,
             "experiment starts"
         );
-        self.engine.on_experiment_started(id, runnable.spec);
+        self.engine.on_experiment_started(id, runnable.spec, runnable.priority);
+        if runnable.is_paused {
+            info!(experiment = %id, "experiment is paused");
+            self.engine.on_experiment_paused(clock::now(), id);
+        }
         self.n_started += 1;
-        let running = Running {
-            config: runnable.config,
-            incarnation: self.n_started,
-            round: None,
-            cancellations: Vec::new(),
-        };
-        self.experiments.insert(id, running);
+        self.experiments.insert(id, Running::new(runnable.config, self.n_started));
         self.judge(id, runnable.round);
     }
 
@@ -271,6 +327,7 @@ impl Driver {
                     self.send(worker, ToWorker::Items(experiment, generation, items.to_vec()));
                 }
             }
+            Command::SendDrop { worker, items } => self.send(worker, ToWorker::DropItems(items)),
             Command::SendEnd { worker, experiment } => {
                 self.send(worker, ToWorker::End(experiment));
             }
@@ -281,93 +338,82 @@ impl Driver {
             Command::FinishGeneration { experiment, judged } => {
                 let Some(running) = self.experiments.get_mut(&experiment) else { return };
                 let Some(round) = running.round.take() else { return };
-                debug!(%experiment, generation = judged.generation, "generation judged");
-                let advance = Advance {
-                    store: self.store.clone(),
-                    shutdown: self.shutdown.clone(),
-                    id: experiment,
-                    incarnation: running.incarnation,
-                    config: running.config.clone(),
-                    round,
-                    judged,
-                };
-                self.advancing.spawn(advance.run());
+                let JudgedGeneration { generation, n_audited, n_unaudited, .. } = judged;
+                debug!(%experiment, generation, n_audited, "generation judged");
+                if n_unaudited > 0 {
+                    warn!(
+                        %experiment, generation, n_audited, n_unaudited,
+                        "there was no second worker to audit results"
+                    );
+                }
+                let run = RunId { id: experiment, incarnation: running.incarnation };
+                let config = Arc::clone(&running.config);
+                self.advancing.spawn(advance::conclude(run, config, round, judged));
             }
             Command::FailExperiment { experiment, reason } => {
                 self.end(experiment, ExperimentState::Failed, reason);
             }
-        }
-    }
-
-    fn on_advanced(&mut self, advanced: Advanced) {
-        let id = advanced.id;
-        let Some(running) = self.experiments.get_mut(&id) else { return };
-        if running.incarnation != advanced.incarnation {
-            return;
-        }
-        match advanced.outcome {
-            Outcome::Continues(round) => {
-                if running.cancellations.is_empty() {
-                    self.judge(id, *round);
-                } else {
-                    self.end(id, ExperimentState::Cancelled, CANCELLED.to_owned());
+            Command::PauseExperiment { experiment, reason } => {
+                error!(%experiment, reason, "experiment paused");
+                let paused = Change::State(ExperimentState::Paused, reason.clone());
+                for change in [Change::Notice(reason), paused] {
+                    self.ledger.push(Entry { experiment, change, replies: Vec::new() });
                 }
             }
-            Outcome::Ended => {
-                self.experiments.remove(&id);
-                self.engine.on_experiment_ended(id);
-            }
-            Outcome::Failed(reason) => self.end(id, ExperimentState::Failed, reason),
         }
     }
 
-    fn cancel(&mut self, id: ExperimentId, reply: oneshot::Sender<()>) {
-        let Some(running) = self.experiments.get_mut(&id) else {
-            // It has ended, or waits for another version of the program; only
-            // the store is concerned.
-            self.store_end(id, ExperimentState::Cancelled, CANCELLED.to_owned(), vec![reply]);
+    fn on_advanced(&mut self, Advanced { run, step }: Advanced) {
+        let id = run.id;
+        let Some(running) = self.experiments.get_mut(&id) else { return };
+        if running.incarnation != run.incarnation {
             return;
-        };
-        running.cancellations.push(reply);
-        // A generation that is being stored is stored first.
-        if running.round.is_some() {
-            self.end(id, ExperimentState::Cancelled, CANCELLED.to_owned());
         }
-    }
-
-    /// Ends an experiment that is not being advanced.
-    fn end(&mut self, id: ExperimentId, state: ExperimentState, reason: String) {
-        self.engine.on_experiment_ended(id);
-        let replies = match self.experiments.remove(&id) {
-            Some(running) => running.cancellations,
-            None => Vec::new(),
-        };
-        match state {
-            ExperimentState::Failed => error!(experiment = %id, reason, "experiment failed"),
-            _ => info!(experiment = %id, reason, "experiment {}", state.name()),
-        }
-        self.store_end(id, state, reason, replies);
-    }
-
-    fn store_end(
-        &mut self,
-        id: ExperimentId,
-        state: ExperimentState,
-        reason: String,
-        replies: Vec<oneshot::Sender<()>>,
-    ) {
-        let (store, shutdown) = (self.store.clone(), self.shutdown.clone());
-        self.ending.spawn(async move {
-            // What keeps it from being written has been logged; at the next start
-            // the experiment goes on, and can be ended again.
-            let _ = store
-                .write(&shutdown, move |store| store.end(id, clock::unix_ms(), state, &reason))
-                .await;
-            for reply in replies {
-                // Whoever has stopped waiting need not be told.
-                let _ = reply.send(());
+        match step {
+            Step::Concluded(Next::Judge(round)) => self.judge(id, *round),
+            Step::Concluded(Next::Commit(complete)) => {
+                running.complete = Some(complete);
+                self.store_next(id);
             }
-        });
+            Step::Stored | Step::Ended => {
+                running.is_storing = false;
+                match (running.end.take(), step) {
+                    (Some((state, reason)), _) => self.end(id, state, reason),
+                    (None, Step::Stored) => self.store_next(id),
+                    (None, _) => {
+                        self.experiments.remove(&id);
+                        self.engine.on_experiment_ended(clock::now(), id);
+                    }
+                }
+            }
+            Step::Failed(reason) => self.end(id, ExperimentState::Failed, reason),
+            Step::NotStored(reason) => {
+                running.is_storing = false;
+                let failed = (ExperimentState::Failed, reason);
+                let (state, reason) = running.end.take().unwrap_or(failed);
+                self.end(id, state, reason);
+            }
+        }
+    }
+
+    /// Stores a complete generation, unless the one before is still being stored,
+    /// and has the next one judged meanwhile. If the coordinator dies before the
+    /// first is stored, both are judged again, to the same bits.
+    fn store_next(&mut self, id: ExperimentId) {
+        let Some(running) = self.experiments.get_mut(&id) else { return };
+        if running.is_storing {
+            return;
+        }
+        let Some(mut complete) = running.complete.take() else { return };
+        running.is_storing = true;
+        let next = complete.next.take();
+        let run = RunId { id, incarnation: running.incarnation };
+        let (config, store) = (Arc::clone(&running.config), self.store.clone());
+        let shutdown = self.shutdown.clone();
+        self.advancing.spawn(advance::commit(run, config, store, shutdown, *complete));
+        if let Some(round) = next {
+            self.judge(id, round);
+        }
     }
 
     fn send(&mut self, id: WorkerId, message: ToWorker) {
@@ -396,4 +442,5 @@ impl Driver {
     }
 }
 
-const CANCELLED: &str = "cancelled by a client";
+#[cfg(test)]
+mod tests;

@@ -1,20 +1,21 @@
 //! What the fleet is judging for an experiment, and what comes of it: a
 //! generation, and from time to time the champion and who challenges it.
 
+use std::sync::Arc;
+
 use sim_core::{config::ExperimentConfig, held_out};
 
 use crate::{
     engine::JudgedGeneration,
-    evolution::{Asked, Champion, Evolution, EvolutionError, Genotype, Origin, Reevaluation},
+    evolution::{Asked, Champion, Evolution, EvolutionError, Origin, Population, Reevaluation},
     store::Generation,
-    submission::checkpoint_json,
 };
 
 /// What the fleet judges at once.
 #[derive(Debug)]
 pub enum Round {
     /// The next generation.
-    Generation(Box<Evolution>, Asked),
+    Generation(Arc<Evolution>, Asked),
     /// Candidates on held-out trials, after a generation that has been learnt
     /// from and is not committed yet.
     Reevaluation(Box<Learnt>, Reevaluation),
@@ -43,7 +44,7 @@ pub struct Complete {
     /// For the history.
     pub generation: Generation,
     /// For whoever resumes.
-    pub checkpoint: String,
+    pub evolution: Arc<Evolution>,
     /// The champion so far.
     pub champion: Option<Champion>,
     /// The last link of the digest chain that covers everything so far.
@@ -58,9 +59,10 @@ pub struct Complete {
 
 impl Round {
     /// The next generation of an evolution.
-    pub fn generation(evolution: Evolution) -> Self {
+    pub fn generation(evolution: impl Into<Arc<Evolution>>) -> Self {
+        let evolution = evolution.into();
         let asked = evolution.ask();
-        Self::Generation(Box::new(evolution), asked)
+        Self::Generation(evolution, asked)
     }
 
     /// The generation, or the address of the held-out trials.
@@ -72,9 +74,9 @@ impl Round {
     }
 
     /// Who is judged.
-    pub fn genotypes(&self) -> Vec<Genotype> {
+    pub fn genotypes(&self) -> Population {
         match self {
-            Self::Generation(_, asked) => asked.genotypes.clone(),
+            Self::Generation(_, asked) => Arc::clone(&asked.genotypes),
             Self::Reevaluation(_, Reevaluation { candidates, .. }) => {
                 candidates.iter().map(|candidate| candidate.genotype.clone()).collect()
             }
@@ -97,7 +99,9 @@ impl Round {
     ) -> Result<Next, EvolutionError> {
         match self {
             Self::Generation(evolution, asked) => {
-                let learnt = learn(config, *evolution, asked, judged)?;
+                // By now, the generation before is usually stored, and nothing is copied.
+                let evolution = Arc::unwrap_or_clone(evolution);
+                let learnt = learn(config, evolution, asked, judged)?;
                 Ok(match learnt.evolution.reevaluation() {
                     Some(candidates) if learnt.over.is_some() || learnt.is_scheduled(config) => {
                         Next::Judge(Box::new(Self::Reevaluation(Box::new(learnt), candidates)))
@@ -132,13 +136,15 @@ impl Learnt {
             Some(crowned) => crowned.champion_digest(),
             None => evolution.digest(),
         };
+        let champion = crowned.as_ref().unwrap_or(&evolution).champion().cloned();
+        let evolution = Arc::new(evolution);
         Complete {
             generation,
-            checkpoint: checkpoint_json(&evolution),
-            champion: crowned.as_ref().unwrap_or(&evolution).champion().cloned(),
+            champion,
             digest: digest.to_string(),
             notices,
-            next: over.is_none().then(|| Round::generation(evolution)),
+            next: over.is_none().then(|| Round::generation(Arc::clone(&evolution))),
+            evolution,
             over,
         }
     }

@@ -1,10 +1,24 @@
-//! A generation that is being judged.
+//! A generation that is being judged: what is known, who computes the rest, what
+//! waits.
 
-use std::{collections::VecDeque, ops::Range, sync::Arc, time::Instant};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    ops::Range,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
-use crate::evolution::Genotype;
+use crate::{
+    evolution::Population,
+    ids::{ItemId, WorkerId},
+};
 
-use super::{FleetTime, JudgedGeneration};
+use super::{FleetTime, JudgedGeneration, blame::Blames};
+
+/// Copies of a trial that are computed at the same time, at most.
+const COPIES_MAX: usize = 3;
+/// Who judged a trial that nobody has judged.
+const NOBODY: WorkerId = WorkerId(0);
 
 /// A part of a generation: one individual on a range of trials.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,8 +27,28 @@ pub struct Task {
     pub individual: u32,
     /// Trials to run.
     pub trials: Range<u32>,
-    /// Attempts that failed or took their worker down.
-    pub n_failed_attempts: u32,
+}
+
+/// Somebody who computes a task.
+#[derive(Debug, Clone)]
+struct Holder {
+    item: ItemId,
+    worker: WorkerId,
+    trials: Range<u32>,
+    is_audit: bool,
+}
+
+/// Two workers' results for the same trial differ.
+#[derive(Debug, Clone)]
+pub struct Disagreement {
+    /// Whose result came first.
+    pub first: WorkerId,
+    /// Its name.
+    pub first_name: Arc<str>,
+    /// About which trial.
+    pub trial: u32,
+    /// What the first said, and the second.
+    pub values: (f64, f64),
 }
 
 /// A generation that is being judged.
@@ -22,14 +56,29 @@ pub struct Task {
 pub struct GenerationInProgress {
     /// Index of the generation, or address of held-out trials.
     pub number: u64,
-    /// One per individual.
-    pub genotypes: Vec<Arc<Genotype>>,
+    /// Who is judged.
+    pub genotypes: Population,
+    n_trials: u32,
     /// What no worker has been given, in the order in which it will be.
-    pub queue: VecDeque<Task>,
-    /// Per individual and trial; NaN until judged, but only `n_trials_left` says
-    /// whether it is.
+    queue: VecDeque<Task>,
+    n_trials_queued: usize,
+    /// By individual.
+    holders: BTreeMap<u32, Vec<Holder>>,
+    /// Running work that nobody duplicates, by when it should be done.
+    pub uncovered: BTreeMap<(Instant, ItemId), WorkerId>,
+    /// Work that takes workers down.
+    pub blames: Blames,
+    /// Per individual and trial; meaningless until judged.
     trial_fitness: Vec<Vec<f64>>,
+    /// Whose result it is; per individual and trial, in one row.
+    judges: Vec<WorkerId>,
+    /// Of everybody among `judges`.
+    names: BTreeMap<WorkerId, Arc<str>>,
     n_trials_left: usize,
+    /// Work that another worker has to confirm, by the name of the first.
+    audits: BTreeMap<Arc<str>, VecDeque<Task>>,
+    n_audits_in_flight: usize,
+    n_audited: usize,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
@@ -38,37 +87,260 @@ impl GenerationInProgress {
     /// A generation of which nothing is judged.
     pub fn new(
         number: u64,
-        genotypes: Vec<Genotype>,
+        genotypes: Population,
         n_trials: u32,
         now: Instant,
         fleet_time: FleetTime,
     ) -> Self {
-        let queue = (0..genotypes.len())
-            .map(|i| Task { individual: i as u32, trials: 0..n_trials, n_failed_attempts: 0 })
-            .collect();
+        let n_all = genotypes.len() * n_trials as usize;
+        let all = 0..genotypes.len() as u32;
         Self {
             number,
-            queue,
+            n_trials,
+            queue: all.map(|individual| Task { individual, trials: 0..n_trials }).collect(),
+            n_trials_queued: n_all,
+            holders: BTreeMap::new(),
+            uncovered: BTreeMap::new(),
+            blames: Blames::default(),
             trial_fitness: vec![vec![f64::NAN; n_trials as usize]; genotypes.len()],
-            n_trials_left: genotypes.len() * n_trials as usize,
-            genotypes: genotypes.into_iter().map(Arc::new).collect(),
+            judges: vec![NOBODY; n_all],
+            names: BTreeMap::new(),
+            n_trials_left: n_all,
+            audits: BTreeMap::new(),
+            n_audits_in_flight: 0,
+            n_audited: 0,
+            genotypes,
             started: now,
             fleet_time_at_start: fleet_time,
         }
     }
 
-    /// Records the fitness of a task. Each task is accepted once: it is either
-    /// queued, or assigned to one worker, or accepted.
-    pub fn accept(&mut self, task: &Task, fitness: Vec<f64>) {
-        let trials = task.trials.start as usize..task.trials.end as usize;
-        self.n_trials_left -= trials.len();
-        self.trial_fitness[task.individual as usize][trials].copy_from_slice(&fitness);
+    /// Queues all that is not judged; nobody computes anything any more.
+    pub fn requeue_all(&mut self) {
+        self.holders.clear();
+        self.n_audits_in_flight = 0;
+        self.uncovered.clear();
+        self.queue.clear();
+        self.n_trials_queued = 0;
+        for individual in 0..self.genotypes.len() as u32 {
+            let all = Task { individual, trials: 0..self.n_trials };
+            for task in self.unclaimed(&all) {
+                self.n_trials_queued += task.trials.len();
+                self.queue.push_back(task);
+            }
+        }
     }
 
-    /// Trials whose fitness is not known.
-    #[cfg(test)]
-    pub fn n_trials_left(&self) -> usize {
+    /// Forgets all results: whoever gave them cannot be trusted.
+    pub fn start_over(&mut self) {
+        self.judges.fill(NOBODY);
+        self.names.clear();
+        self.n_trials_left = self.judges.len();
+        self.audits.clear();
+        self.n_audited = 0;
+        self.requeue_all();
+    }
+
+    fn index(&self, individual: u32, trial: u32) -> usize {
+        individual as usize * self.n_trials as usize + trial as usize
+    }
+
+    fn is_known(&self, individual: u32, trial: u32) -> bool {
+        self.judges[self.index(individual, trial)] != NOBODY
+    }
+
+    /// The parts of a task that are neither judged, nor computed by anybody, nor
+    /// held back.
+    pub fn unclaimed(&self, task: &Task) -> Vec<Task> {
+        self.parts(task, |trial| {
+            !self.is_known(task.individual, trial)
+                && self.n_copies(task.individual, trial) == 0
+                && !self.blames.is_held_back(task.individual, trial)
+        })
+    }
+
+    /// The part of a task that may be computed once more.
+    pub fn duplicable(&self, task: &Task) -> Option<Task> {
+        let parts = self.parts(task, |trial| {
+            !self.is_known(task.individual, trial)
+                && self.n_copies(task.individual, trial) < COPIES_MAX
+        });
+        parts.into_iter().next()
+    }
+
+    fn n_copies(&self, individual: u32, trial: u32) -> usize {
+        let holders = self.holders.get(&individual).into_iter().flatten();
+        holders.filter(|holder| !holder.is_audit && holder.trials.contains(&trial)).count()
+    }
+
+    /// The contiguous parts of a task whose trials satisfy a condition.
+    fn parts(&self, task: &Task, is_in: impl Fn(u32) -> bool) -> Vec<Task> {
+        let individual = task.individual;
+        let mut parts: Vec<Task> = Vec::new();
+        for trial in task.trials.clone().filter(|&trial| is_in(trial)) {
+            match parts.last_mut() {
+                Some(part) if part.trials.end == trial => part.trials.end += 1,
+                _ => parts.push(Task { individual, trials: trial..trial + 1 }),
+            }
+        }
+        parts
+    }
+
+    /// Queues work before all other.
+    pub fn push_front(&mut self, task: Task) {
+        self.n_trials_queued += task.trials.len();
+        self.queue.push_front(task);
+    }
+
+    /// Takes the first `n_trials` trials at most of the first task in the queue.
+    pub fn pop_front(&mut self, n_trials: usize) -> Option<Task> {
+        let mut task = self.queue.pop_front()?;
+        self.n_trials_queued -= task.trials.len();
+        if n_trials < task.trials.len() {
+            let middle = task.trials.start + n_trials as u32;
+            self.push_front(Task { trials: middle..task.trials.end, ..task.clone() });
+            task.trials.end = middle;
+        }
+        Some(task)
+    }
+
+    /// Trials per individual.
+    pub fn n_trials(&self) -> u32 {
+        self.n_trials
+    }
+
+    /// Tasks that wait.
+    pub fn n_queued(&self) -> usize {
+        self.queue.len()
+    }
+
+    /// Trials that wait.
+    pub fn n_trials_queued(&self) -> usize {
+        self.n_trials_queued
+    }
+
+    /// Whether an audit waits.
+    pub fn has_audits(&self) -> bool {
+        !self.audits.is_empty()
+    }
+
+    /// Whether an audit waits for a worker of this name.
+    pub fn has_audit_for(&self, name: &str) -> bool {
+        self.audits.keys().any(|first| **first != *name)
+    }
+
+    /// Takes the first audit that a worker of this name may do.
+    pub fn pop_audit_for(&mut self, name: &str) -> Option<Task> {
+        let (first, tasks) = self.audits.iter_mut().find(|(first, _)| ***first != *name)?;
+        let task = tasks.pop_front();
+        if tasks.is_empty() {
+            let first = Arc::clone(first);
+            self.audits.remove(&first);
+        }
+        task
+    }
+
+    /// Whether anything waits.
+    pub fn has_waiting(&self) -> bool {
+        !self.queue.is_empty() || !self.audits.is_empty()
+    }
+
+    /// A worker has been given a task.
+    pub fn add_holder(&mut self, item: ItemId, worker: WorkerId, task: &Task, is_audit: bool) {
+        self.n_audits_in_flight += usize::from(is_audit);
+        let holder = Holder { item, worker, trials: task.trials.clone(), is_audit };
+        self.holders.entry(task.individual).or_default().push(holder);
+    }
+
+    /// A worker has a task no more. An audit that is not over waits again.
+    pub fn remove_holder(&mut self, item: ItemId, individual: u32) {
+        let Some(holders) = self.holders.get_mut(&individual) else { return };
+        let Some(index) = holders.iter().position(|holder| holder.item == item) else { return };
+        let holder = holders.remove(index);
+        if holders.is_empty() {
+            self.holders.remove(&individual);
+        }
+        self.n_audits_in_flight -= usize::from(holder.is_audit);
+    }
+
+    /// Everybody who computes parts of an individual, apart from audits.
+    pub fn holders(&self, individual: u32) -> impl Iterator<Item = (WorkerId, ItemId)> {
+        let holders = self.holders.get(&individual).into_iter().flatten();
+        holders.filter(|holder| !holder.is_audit).map(|holder| (holder.worker, holder.item))
+    }
+
+    /// Queues an audit; the first worker is the one whose result is known.
+    pub fn push_audit(&mut self, task: Task) {
+        let first = self.judges[self.index(task.individual, task.trials.start)];
+        if let Some(name) = self.names.get(&first) {
+            self.audits.entry(Arc::clone(name)).or_default().push_back(task);
+        }
+    }
+
+    /// Whether a worker's values agree with what is known.
+    pub fn compare(&self, task: &Task, fitness: &[f64]) -> Result<(), Disagreement> {
+        for (trial, &value) in task.trials.clone().zip(fitness) {
+            let known = self.trial_fitness[task.individual as usize][trial as usize];
+            let first = self.judges[self.index(task.individual, trial)];
+            if first != NOBODY && known.to_bits() != value.to_bits() {
+                return Err(Disagreement {
+                    first,
+                    first_name: Arc::clone(&self.names[&first]),
+                    trial,
+                    values: (known, value),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Records those values of a task that are not known; returns their number.
+    pub fn accept(&mut self, worker: WorkerId, name: &str, task: &Task, fitness: &[f64]) -> usize {
+        let mut n_new = 0;
+        for (trial, &value) in task.trials.clone().zip(fitness) {
+            let index = self.index(task.individual, trial);
+            if self.judges[index] == NOBODY {
+                self.judges[index] = worker;
+                self.trial_fitness[task.individual as usize][trial as usize] = value;
+                n_new += 1;
+            }
+        }
+        if n_new > 0 && !self.names.contains_key(&worker) {
+            self.names.insert(worker, name.into());
+        }
+        self.n_trials_left -= n_new;
+        n_new
+    }
+
+    /// An audit has agreed.
+    pub fn count_audited(&mut self) {
+        self.n_audited += 1;
+    }
+
+    /// Who computes parts of an individual whose results are all known, apart from
+    /// audits.
+    pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, ItemId)> {
+        let holders = self.holders.get(&individual).into_iter().flatten();
+        holders
+            .filter(|holder| !holder.is_audit)
+            .filter(|holder| holder.trials.clone().all(|trial| self.is_known(individual, trial)))
+            .map(|holder| (holder.worker, holder.item))
+            .collect()
+    }
+
+    /// Trials of all individuals.
+    pub fn n_episodes(&self) -> usize {
+        self.judges.len()
+    }
+
+    /// Those whose fitness is not known.
+    pub fn n_episodes_left(&self) -> usize {
         self.n_trials_left
+    }
+
+    /// Time since it began.
+    pub fn running_for(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.started)
     }
 
     /// What it is called in messages.
@@ -79,8 +351,16 @@ impl GenerationInProgress {
         }
     }
 
+    /// Whether all fitness is known and no audit is under way, or waits for a worker
+    /// that is there.
+    pub fn is_judged(&self, is_there: impl Fn(&Self) -> bool) -> bool {
+        self.n_trials_left == 0
+            && self.n_audits_in_flight == 0
+            && (self.audits.is_empty() || !is_there(self))
+    }
+
     /// Whether all fitness is known.
-    pub fn is_judged(&self) -> bool {
+    pub fn is_known_throughout(&self) -> bool {
         self.n_trials_left == 0
     }
 
@@ -97,6 +377,51 @@ impl GenerationInProgress {
             duration: now.saturating_duration_since(self.started),
             n_workers,
             idle_share: fleet_time.idle_share_since(&self.fleet_time_at_start),
+            n_audited: self.n_audited,
+            n_unaudited: self.audits.values().map(VecDeque::len).sum(),
+        }
+    }
+
+    /// Panics if the state contradicts itself; `in_flight`: what workers hold of
+    /// it, in any order.
+    pub fn sanity_check(&self, in_flight: &BTreeMap<ItemId, (WorkerId, Task, bool)>) {
+        let n_queued: usize = self.queue.iter().map(|task| task.trials.len()).sum();
+        assert_eq!(n_queued, self.n_trials_queued);
+        let n_known = self.judges.iter().filter(|&&judge| judge != NOBODY).count();
+        assert_eq!(n_known + self.n_trials_left, self.judges.len());
+        let mut n_holders = 0;
+        for (&individual, holders) in &self.holders {
+            assert!(!holders.is_empty());
+            for Holder { item, worker, trials, is_audit } in holders {
+                n_holders += 1;
+                let task = Task { individual, trials: trials.clone() };
+                assert_eq!(in_flight[item], (*worker, task, *is_audit));
+            }
+        }
+        assert_eq!(n_holders, in_flight.len(), "every holder is known");
+        let n_audits = in_flight.values().filter(|(.., is_audit)| *is_audit).count();
+        assert_eq!(n_audits, self.n_audits_in_flight);
+        for ((_, item), worker) in &self.uncovered {
+            assert_eq!(in_flight[item].0, *worker);
+        }
+        // Every trial is judged, queued or being computed, possibly by several, or
+        // held back; and it is queued only if it is nothing else.
+        let mut claims = vec![0_u32; self.judges.len()];
+        for task in &self.queue {
+            for trial in task.trials.clone() {
+                claims[self.index(task.individual, trial)] += 1;
+            }
+        }
+        for (index, n_queued) in claims.into_iter().enumerate() {
+            let individual = (index / self.n_trials as usize) as u32;
+            let trial = (index % self.n_trials as usize) as u32;
+            let n_copies = self.n_copies(individual, trial);
+            let is_known = self.is_known(individual, trial);
+            let is_held_back = self.blames.is_held_back(individual, trial);
+            let is_waited_for = !is_known && (n_copies > 0 || is_held_back);
+            let n_states = u32::from(is_known) + n_queued + u32::from(is_waited_for);
+            assert_eq!(n_states, 1, "individual {individual}, trial {trial}");
+            assert!(n_copies <= COPIES_MAX);
         }
     }
 }

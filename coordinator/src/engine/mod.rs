@@ -7,179 +7,162 @@
 //!
 //! The rules:
 //! - An *item* is one genotype and a range of trials, assigned to one worker.
-//!   A worker holds at most [`CREDITS_PER_SLOT`] items per slot, so that it has
-//!   the next one at hand while results travel.
+//!   A worker holds one per slot, and as many ahead as it computes in some tens
+//!   of milliseconds.
+//! - Experiments with work to hand out share the workers' time in proportion to
+//!   their priorities. Time that one does not want, such as at its barrier, goes
+//!   to the others and is not made up for.
+//! - Near the end of a generation, and when slots would be idle, items are split
+//!   by trial; when nothing is left to hand out, running items are duplicated if
+//!   idle workers should be done sooner. The first result wins, and the others
+//!   are told to drop the item.
 //! - Work returns to the front of the queue when its worker leaves or falls
 //!   silent, never because it takes long.
-//! - A result counts only while its item is assigned, and by its place in the
-//!   generation, not by its arrival. So who computes what, and how often, cannot
-//!   change a generation's fitness.
+//! - A result counts by its place in the generation, not by its arrival, and the
+//!   first one for each place is kept. So who computes what, and how often,
+//!   cannot change a generation's fitness.
+//! - Two results for the same place whose bits differ mean a faulty worker. The
+//!   generation's results are thrown away, both workers get nothing more, and the
+//!   experiment is paused with a reason that names them: nothing that was
+//!   committed is lost, nothing doubtful is committed, and somebody decides. To
+//!   find such workers, a share of the individuals can be audited: computed by a
+//!   second worker, too, if there is one.
 //! - Work that fails, or that takes its worker down, [`MAX_ATTEMPTS`] times
-//!   fails its experiment, and the fleet goes on with the others.
+//!   fails its experiment, and the fleet goes on with the others. A worker whose
+//!   process comes back was not taken down.
 
+mod activity;
+mod blame;
+mod dispatch;
+mod experiment;
+mod fleet_time;
 mod generation;
+mod messages;
+mod results;
 mod worker;
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     mem,
-    ops::Range,
+    num::NonZeroU64,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use crate::{
-    evolution::Genotype,
-    ids::{ExperimentId, ItemId, WorkerId},
+    evolution::Population,
+    ids::{ExperimentId, WorkerId},
+    priority::Priority,
 };
 
+pub use activity::{Activity, HeldItems, RoundActivity};
+use dispatch::Outgoing;
+use experiment::ExperimentWork;
+use fleet_time::FleetTime;
 use generation::{GenerationInProgress, Task};
-use worker::Worker;
+use worker::{FULL_LOAD, Worker};
 
-/// Items in flight per slot.
-pub const CREDITS_PER_SLOT: usize = 2;
+pub use messages::{
+    Command, FleetSize, Introduction, Item, ItemResult, JudgedGeneration, SharedGenotype,
+    WorkerStatus,
+};
+
 /// Times that work is tried before its experiment is given up.
 pub const MAX_ATTEMPTS: u32 = 3;
+
+/// How an engine decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EngineConfig {
+    /// A worker that is silent for so long loses its items.
+    pub lease: Duration,
+    /// Share of the individuals, 0 to 1, that two workers compute.
+    pub audit_fraction: f64,
+    /// Whether items are split by trial when that keeps slots busy.
+    pub split: bool,
+    /// Whether waiting items move to idle slots, and running ones are duplicated.
+    pub duplicate: bool,
+}
+
+impl EngineConfig {
+    /// Splits and duplicates, audits nothing.
+    pub fn new(lease: Duration) -> Self {
+        Self { lease, audit_fraction: 0.0, split: true, duplicate: true }
+    }
+}
 
 /// The state machine.
 #[derive(Debug)]
 pub struct Engine {
-    lease: Duration,
+    config: EngineConfig,
     last_tick: Instant,
     n_workers_seen: u64,
     n_items_assigned: u64,
     workers: BTreeMap<WorkerId, Worker>,
-    /// Workers with credit, least loaded first.
-    available: BTreeSet<(u64, WorkerId)>,
+    standings: Standings,
     experiments: BTreeMap<ExperimentId, ExperimentWork>,
-    /// Experiments with unassigned work; the front one is served next.
-    turns: VecDeque<ExperimentId>,
+    /// Experiments with something to hand out, by what they were served.
+    turns: BTreeSet<(u128, ExperimentId)>,
+    /// What the experiment that was served last had been served: who comes back
+    /// from waiting begins there, so that nobody saves up turns.
+    served_until: u128,
+    outgoing: Outgoing,
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
 }
 
-/// What the engine knows of an experiment.
-#[derive(Debug)]
-struct ExperimentWork {
-    /// Opaque to the engine; every worker gets it once.
-    spec: Arc<str>,
-    generation: Option<GenerationInProgress>,
+/// The workers, sorted by what they can take.
+#[derive(Debug, Default)]
+struct Standings {
+    /// Workers with credit, least loaded first, and among those the fastest.
+    available: BTreeSet<(u64, u32, WorkerId)>,
+    /// Workers with items that wait behind others, most loaded last.
+    backlogged: BTreeSet<(u64, WorkerId)>,
+    /// Slots that may have an item and have none.
+    n_idle_slots: usize,
+    /// Slots that may have an item.
+    n_usable_slots: usize,
 }
 
-/// What the shell has to do.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Command {
-    /// Send a worker the specification of an experiment.
-    SendSpec {
-        /// To whom.
-        worker: WorkerId,
-        /// Of what.
-        experiment: ExperimentId,
-        /// As given to [`Engine::on_experiment_started`].
-        spec: Arc<str>,
-    },
-    /// Send a worker items of one generation.
-    SendItems {
-        /// To whom.
-        worker: WorkerId,
-        /// Of what.
-        experiment: ExperimentId,
-        /// Whose trial seeds apply.
-        generation: u64,
-        /// At least one.
-        items: Vec<Item>,
-    },
-    /// Tell a worker that an experiment is over.
-    SendEnd {
-        /// To whom.
-        worker: WorkerId,
-        /// What is over.
-        experiment: ExperimentId,
-    },
-    /// Close a worker's stream; the engine has forgotten it already.
-    Disconnect {
-        /// Whose.
-        worker: WorkerId,
-        /// For the log and for the worker.
-        reason: String,
-        /// Items that it held and that others will get.
-        n_items_requeued: usize,
-    },
-    /// A generation is judged.
-    FinishGeneration {
-        /// Of what.
-        experiment: ExperimentId,
-        /// The outcome.
-        judged: JudgedGeneration,
-    },
-    /// An experiment cannot go on; the engine has forgotten it already.
-    FailExperiment {
-        /// Which.
-        experiment: ExperimentId,
-        /// For its owner.
-        reason: String,
-    },
-}
+impl Standings {
+    fn add(&mut self, id: WorkerId, worker: &Worker) {
+        let load = worker.load();
+        if worker.has_credit() {
+            self.available.insert((load, worker.pace_rank(), id));
+        }
+        if load > FULL_LOAD {
+            self.backlogged.insert((load, id));
+        }
+        self.n_idle_slots += worker.n_idle_slots();
+        self.n_usable_slots += if worker.is_usable() { worker.n_slots() } else { 0 };
+    }
 
-/// One genotype and the trials to run it on, assigned to a worker.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Item {
-    /// This assignment.
-    pub id: ItemId,
-    /// Trials to run.
-    pub trials: Range<u32>,
-    /// Its genes.
-    pub genotype: Arc<Genotype>,
-}
-
-/// A worker's answer to an item.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ItemResult {
-    /// The assignment.
-    pub id: ItemId,
-    /// Fitness per trial, or why there is none.
-    pub outcome: Result<Vec<f64>, String>,
-    /// Time the worker computed.
-    pub compute_time: Duration,
-}
-
-/// A generation with all its fitness.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JudgedGeneration {
-    /// Index of the generation.
-    pub generation: u64,
-    /// Fitness per individual and trial.
-    pub trial_fitness: Vec<Vec<f64>>,
-    /// From its start to its last result.
-    pub duration: Duration,
-    /// Workers connected at its end.
-    pub n_workers: usize,
-    /// Share of the slots' time, meanwhile, that was not spent computing.
-    pub idle_share: f64,
-}
-
-/// A worker as a reader of logs sees it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FleetSize {
-    /// Connected workers.
-    pub n_workers: usize,
-    /// Their slots.
-    pub n_slots: usize,
+    fn remove(&mut self, id: WorkerId, worker: &Worker) {
+        let load = worker.load();
+        if worker.has_credit() {
+            self.available.remove(&(load, worker.pace_rank(), id));
+        }
+        if load > FULL_LOAD {
+            self.backlogged.remove(&(load, id));
+        }
+        self.n_idle_slots -= worker.n_idle_slots();
+        self.n_usable_slots -= if worker.is_usable() { worker.n_slots() } else { 0 };
+    }
 }
 
 impl Engine {
-    /// An engine without workers or work. A worker that is silent for `lease`
-    /// loses its items.
-    pub fn new(now: Instant, lease: Duration) -> Self {
+    /// An engine without workers or work.
+    pub fn new(now: Instant, config: EngineConfig) -> Self {
         Self {
-            lease,
+            config,
             last_tick: now,
             n_workers_seen: 0,
             n_items_assigned: 0,
             workers: BTreeMap::new(),
-            available: BTreeSet::new(),
+            standings: Standings::default(),
             experiments: BTreeMap::new(),
-            turns: VecDeque::new(),
+            turns: BTreeSet::new(),
+            served_until: 0,
+            outgoing: Outgoing::default(),
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
         }
@@ -193,18 +176,26 @@ impl Engine {
 
     /// Connected workers and slots.
     pub fn fleet_size(&self) -> FleetSize {
-        FleetSize { n_workers: self.workers.len(), n_slots: self.fleet_time.n_slots }
+        FleetSize { n_workers: self.workers.len(), n_slots: self.fleet_time.n_slots() }
+    }
+
+    /// The connected workers, in the order in which they joined.
+    pub fn worker_status(&self, now: Instant) -> Vec<WorkerStatus> {
+        self.workers.iter().map(|(&id, worker)| worker.status(id, now)).collect()
     }
 
     /// A worker has introduced itself.
-    pub fn on_worker_joined(&mut self, now: Instant, name: &str, n_slots: usize) -> WorkerId {
+    pub fn on_worker_joined(&mut self, now: Instant, introduction: Introduction) -> WorkerId {
+        if let Some(process) = introduction.process {
+            self.forgive(process);
+        }
         self.n_workers_seen += 1;
         let id = WorkerId(self.n_workers_seen);
-        let worker = Worker::new(name, n_slots, now);
-        self.available.insert((worker.load(), id));
+        self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
+        let worker = Worker::new(introduction, now);
+        self.standings.add(id, &worker);
         self.workers.insert(id, worker);
-        self.fleet_time.set_slots(now, |n_slots_before| n_slots_before + n_slots);
-        self.assign();
+        self.assign(now);
         id
     }
 
@@ -212,7 +203,7 @@ impl Engine {
     /// items that are.
     pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
         let n_items_requeued = self.forget_worker(now, id, Some("was lost"));
-        self.assign();
+        self.assign(now);
         n_items_requeued
     }
 
@@ -226,9 +217,9 @@ impl Engine {
     /// A worker wants no more items. It will finish what it computes and leave.
     pub fn on_draining(&mut self, now: Instant, id: WorkerId) {
         self.on_heartbeat(now, id);
-        if let Some(worker) = self.workers.get_mut(&id) {
-            self.available.remove(&(worker.load(), id));
-            worker.is_draining = true;
+        if self.workers.contains_key(&id) {
+            self.update_worker(id, |worker| worker.is_draining = true);
+            self.finish_waived(now);
         }
     }
 
@@ -238,12 +229,12 @@ impl Engine {
         for result in results {
             self.on_result(now, id, result);
         }
-        self.assign();
+        self.assign(now);
     }
 
     /// An experiment exists; workers will need its specification.
-    pub fn on_experiment_started(&mut self, id: ExperimentId, spec: Arc<str>) {
-        self.experiments.insert(id, ExperimentWork { spec, generation: None });
+    pub fn on_experiment_started(&mut self, id: ExperimentId, spec: Arc<str>, priority: Priority) {
+        self.experiments.insert(id, ExperimentWork::new(spec, priority));
     }
 
     /// The genotypes of an experiment's next generation are known.
@@ -252,33 +243,60 @@ impl Engine {
         now: Instant,
         id: ExperimentId,
         generation: u64,
-        genotypes: Vec<Genotype>,
+        genotypes: Population,
         n_trials: u32,
     ) {
-        let Some(experiment) = self.experiments.get_mut(&id) else { return };
-        assert!(experiment.generation.is_none(), "one generation at a time");
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        assert!(work.generation.is_none(), "one generation at a time");
         self.fleet_time.advance(now);
         let clock = self.fleet_time;
-        experiment.generation =
+        work.generation =
             Some(GenerationInProgress::new(generation, genotypes, n_trials, now, clock));
-        self.turns.push_back(id);
-        self.assign();
+        self.make_ready(id);
+        self.assign(now);
+    }
+
+    /// An experiment waits until it is resumed. Its work is taken back; what has
+    /// been judged is kept.
+    pub fn on_experiment_paused(&mut self, now: Instant, id: ExperimentId) {
+        self.pause(id);
+        self.assign(now);
+    }
+
+    /// A paused experiment goes on.
+    pub fn on_experiment_resumed(&mut self, now: Instant, id: ExperimentId) {
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        work.is_paused = false;
+        self.make_ready(id);
+        self.finish_waived(now);
+        self.assign(now);
+    }
+
+    /// An experiment's share of the fleet is another from now on.
+    pub fn on_priority_set(&mut self, id: ExperimentId, priority: Priority) {
+        if let Some(work) = self.experiments.get_mut(&id) {
+            work.priority = priority;
+        }
     }
 
     /// An experiment is over, for whatever reason.
-    pub fn on_experiment_ended(&mut self, id: ExperimentId) {
+    pub fn on_experiment_ended(&mut self, now: Instant, id: ExperimentId) {
         self.forget_experiment(id);
-        self.assign();
+        self.assign(now);
     }
 
-    /// Time has passed. Call several times per lease.
+    /// Time has passed. Call several times per lease, and as often as late work
+    /// should be noticed.
     pub fn on_tick(&mut self, now: Instant) {
-        let lease = self.lease;
+        let lease = self.config.lease;
         // If the coordinator itself has paused (a suspended laptop, a debugger),
         // that is not its workers' silence.
         let pause = now.saturating_duration_since(mem::replace(&mut self.last_tick, now));
         if pause > lease / 2 {
             self.workers.values_mut().for_each(|worker| worker.last_heard += pause);
+            let works = self.experiments.values_mut();
+            let generations = works.filter_map(|work| work.generation.as_mut());
+            generations.for_each(|generation| generation.blames.postpone(pause));
         }
         let silent: Vec<WorkerId> = self
             .workers
@@ -288,132 +306,72 @@ impl Engine {
             .collect();
         for id in silent {
             // Silence is the network's fault, or a pause's, not an item's.
-            self.disconnect(now, id, None, format!("silent for {} s", lease.as_secs_f64()));
+            self.drop_worker(now, id, None, format!("silent for {} s", lease.as_secs_f64()));
         }
-        self.assign();
+        self.give_up_overdue(now);
+        self.assign(now);
     }
 
-    fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        // Unknown: the experiment has ended meanwhile, or the worker makes items
-        // up. Neither can do harm.
-        let Some(assignment) = worker.in_flight.get(&result.id) else { return };
-        let n_trials = assignment.task.trials.len();
-        if let Ok(fitness) = &result.outcome
-            && fitness.len() != n_trials
-        {
-            let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
-            let blame = format!("was dropped: {reason}");
-            self.disconnect(now, id, Some(&blame), reason);
-            return;
+    /// Lets an experiment take turns, if it has something to hand out.
+    fn make_ready(&mut self, id: ExperimentId) {
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        if work.is_ready() && !self.turns.contains(&(work.served, id)) {
+            work.served = work.served.max(self.served_until);
+            self.turns.insert((work.served, id));
         }
-        let (experiment_id, task) = self.take_assignment(id, result.id);
-        self.fleet_time.add_busy(result.compute_time);
-        match result.outcome {
-            Ok(fitness) => self.accept(now, experiment_id, &task, fitness),
-            Err(message) => {
-                let blame = format!("the worker reports: {message}");
-                self.retry(experiment_id, task, Some(&blame));
+    }
+
+    fn correct_charge(&mut self, id: ExperimentId, charged: Duration, real: Duration) {
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        let has_turn = self.turns.remove(&(work.served, id));
+        work.correct_charge(charged, real);
+        if has_turn {
+            self.turns.insert((work.served, id));
+        }
+    }
+
+    /// Whether the results of a task are compared with another worker's. Depends
+    /// on nothing but the seed-independent place of the individual, so that the
+    /// same individuals are audited whoever computes them.
+    fn is_audited(&self, id: ExperimentId, task: &Task) -> bool {
+        let Some(work) = self.experiments.get(&id) else { return false };
+        let Some(generation) = &work.generation else { return false };
+        let place = [id.0, generation.number, u64::from(task.individual)];
+        let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
+        (hash as f64) < self.config.audit_fraction * 2_f64.powi(64)
+    }
+
+    /// A process is alive, so that no work has taken it down.
+    fn forgive(&mut self, process: NonZeroU64) {
+        let ids: Vec<ExperimentId> = self.experiments.keys().copied().collect();
+        for id in ids {
+            let work = self.experiments.get_mut(&id).expect("just listed");
+            let Some(generation) = &mut work.generation else { continue };
+            for task in generation.blames.on_process_joined(process) {
+                self.requeue(id, &task);
             }
         }
     }
 
-    fn accept(&mut self, now: Instant, id: ExperimentId, task: &Task, fitness: Vec<f64>) {
-        let Some(experiment) = self.experiments.get_mut(&id) else { return };
-        let Some(generation) = &mut experiment.generation else { return };
-        generation.accept(task, fitness);
-        if generation.is_judged() {
-            self.fleet_time.advance(now);
-            let generation = experiment.generation.take().expect("just seen");
-            let judged = generation.into_judged(now, self.workers.len(), &self.fleet_time);
-            self.commands.push_back(Command::FinishGeneration { experiment: id, judged });
+    /// Fails experiments whose work has taken too many workers down for good.
+    fn give_up_overdue(&mut self, now: Instant) {
+        let overdue: Vec<(ExperimentId, Task, String)> = self
+            .experiments
+            .iter()
+            .filter_map(|(&id, work)| {
+                let generation = work.generation.as_ref()?;
+                let (task, blame) = generation.blames.overdue(now)?;
+                // Another copy's result may have come.
+                let is_needed = generation.duplicable(task).is_some();
+                is_needed.then(|| (id, task.clone(), blame.to_owned()))
+            })
+            .collect();
+        for (id, task, blame) in overdue {
+            self.fail(id, &task, &blame);
         }
     }
 
-    /// Queues work again. `blame`: why this attempt counts against it, if it does.
-    fn retry(&mut self, id: ExperimentId, mut task: Task, blame: Option<&str>) {
-        let Some(experiment) = self.experiments.get_mut(&id) else { return };
-        let Some(generation) = &mut experiment.generation else { return };
-        if let Some(blame) = blame {
-            task.n_failed_attempts += 1;
-            if task.n_failed_attempts >= MAX_ATTEMPTS {
-                let reason = format!(
-                    "individual {} of {}, trials {}..{}, failed {MAX_ATTEMPTS} times; \
-                     at last {blame}",
-                    task.individual,
-                    generation.name(),
-                    task.trials.start,
-                    task.trials.end,
-                );
-                self.forget_experiment(id);
-                self.commands.push_back(Command::FailExperiment { experiment: id, reason });
-                return;
-            }
-        }
-        if generation.queue.is_empty() {
-            self.turns.push_back(id);
-        }
-        generation.queue.push_front(task);
-    }
-
-    /// Gives queued work to the least loaded workers, the experiments taking
-    /// turns.
-    fn assign(&mut self) {
-        let mut batches: BTreeMap<(WorkerId, ExperimentId), (u64, Vec<Item>)> = BTreeMap::new();
-        while let Some(&experiment_id) = self.turns.front()
-            && let Some((_, worker_id)) = self.available.pop_first()
-        {
-            let experiment = &mut self.experiments.get_mut(&experiment_id);
-            let generation = experiment
-                .as_mut()
-                .and_then(|experiment| experiment.generation.as_mut())
-                .expect("an experiment that takes turns has queued work");
-            let task = generation.queue.pop_front().expect("as above");
-            self.n_items_assigned += 1;
-            let item = Item {
-                id: ItemId(self.n_items_assigned),
-                trials: task.trials.clone(),
-                genotype: Arc::clone(&generation.genotypes[task.individual as usize]),
-            };
-            let number = generation.number;
-            self.turns.pop_front();
-            if !generation.queue.is_empty() {
-                self.turns.push_back(experiment_id);
-            }
-
-            let worker = self.workers.get_mut(&worker_id).expect("available workers exist");
-            worker.assign(item.id, experiment_id, task);
-            if worker.has_credit() {
-                self.available.insert((worker.load(), worker_id));
-            }
-            let batch = batches.entry((worker_id, experiment_id));
-            batch.or_insert_with(|| (number, Vec::new())).1.push(item);
-        }
-        for ((worker, experiment), (generation, items)) in batches {
-            let is_new = self
-                .workers
-                .get_mut(&worker)
-                .is_some_and(|worker| worker.known_experiments.insert(experiment));
-            if is_new {
-                let spec = Arc::clone(&self.experiments[&experiment].spec);
-                self.commands.push_back(Command::SendSpec { worker, experiment, spec });
-            }
-            self.commands.push_back(Command::SendItems { worker, experiment, generation, items });
-        }
-    }
-
-    /// Ends an assignment and gives its worker the credit back.
-    fn take_assignment(&mut self, worker_id: WorkerId, item: ItemId) -> (ExperimentId, Task) {
-        let worker = self.workers.get_mut(&worker_id).expect("the caller has seen it");
-        self.available.remove(&(worker.load(), worker_id));
-        let assignment = worker.in_flight.remove(&item).expect("the caller has seen it");
-        if worker.has_credit() {
-            self.available.insert((worker.load(), worker_id));
-        }
-        (assignment.experiment, assignment.task)
-    }
-
-    fn disconnect(&mut self, now: Instant, id: WorkerId, blame: Option<&str>, reason: String) {
+    fn drop_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>, reason: String) {
         let n_items_requeued = self.forget_worker(now, id, blame);
         self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
     }
@@ -422,77 +380,119 @@ impl Engine {
     /// caused, if they may.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
-        self.available.remove(&(worker.load(), id));
-        self.fleet_time.set_slots(now, |n_slots| n_slots - worker.n_slots);
+        self.standings.remove(id, &worker);
+        self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
         // Only what it was computing can have taken it down: its oldest items,
         // one per slot. A worker that said goodbye was not taken down.
-        let n_suspects = if worker.is_draining { 0 } else { worker.n_slots };
+        let n_suspects = if worker.is_draining { 0 } else { worker.n_slots() };
         let n_items = worker.in_flight.len();
+        let blame = blame.map(|blame| format!("its worker \"{}\" {blame}", worker.name()));
+        let process = worker.introduction.process;
         // Later items first, so that the earliest ends up at the queue's front.
-        for (age_rank, (_, assignment)) in worker.in_flight.into_iter().enumerate().rev() {
-            let blame = blame.filter(|_| age_rank < n_suspects);
-            let blame = blame.map(|blame| format!("its worker \"{}\" {blame}", worker.name));
-            self.retry(assignment.experiment, assignment.task, blame.as_deref());
+        for (age_rank, (item, assignment)) in worker.in_flight.into_iter().enumerate().rev() {
+            self.forget_holder(item, &assignment);
+            self.correct_charge(assignment.experiment, assignment.charge, Duration::ZERO);
+            let blame = blame.as_deref().filter(|_| age_rank < n_suspects);
+            self.retry(now, assignment, blame.map(|blame| (process, blame)));
         }
+        self.finish_waived(now);
         n_items
     }
 
     fn forget_experiment(&mut self, id: ExperimentId) {
-        if self.experiments.remove(&id).is_none() {
-            return;
+        self.withdraw(id);
+        self.experiments.remove(&id);
+    }
+
+    fn pause(&mut self, id: ExperimentId) {
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        if !mem::replace(&mut work.is_paused, true) {
+            self.withdraw(id);
         }
-        self.turns.retain(|&turn| turn != id);
+    }
+
+    /// Takes an experiment away from all workers; its work waits again.
+    fn withdraw(&mut self, id: ExperimentId) {
+        let Some(work) = self.experiments.get_mut(&id) else { return };
+        self.turns.remove(&(work.served, id));
+        let mut audits = Vec::new();
         for (&worker_id, worker) in &mut self.workers {
+            worker.recalled.retain(|(_, assignment)| assignment.experiment != id);
             if worker.known_experiments.remove(&id) {
-                self.available.remove(&(worker.load(), worker_id));
-                worker.in_flight.retain(|_, assignment| assignment.experiment != id);
-                if worker.has_credit() {
-                    self.available.insert((worker.load(), worker_id));
-                }
+                self.standings.remove(worker_id, worker);
+                let ours = worker.in_flight.extract_if(.., |_, a| a.experiment == id);
+                audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.task));
+                self.standings.add(worker_id, worker);
                 self.commands.push_back(Command::SendEnd { worker: worker_id, experiment: id });
             }
         }
-    }
-}
-
-/// How long the fleet's slots have existed, and computed, altogether.
-#[derive(Debug, Clone, Copy)]
-struct FleetTime {
-    now: Instant,
-    n_slots: usize,
-    capacity_s: f64,
-    busy_s: f64,
-}
-
-impl FleetTime {
-    fn new(now: Instant) -> Self {
-        Self { now, n_slots: 0, capacity_s: 0.0, busy_s: 0.0 }
-    }
-
-    fn advance(&mut self, now: Instant) {
-        let elapsed = now.saturating_duration_since(self.now);
-        self.capacity_s += elapsed.as_secs_f64() * self.n_slots as f64;
-        self.now = self.now.max(now);
-    }
-
-    fn set_slots(&mut self, now: Instant, n_slots: impl FnOnce(usize) -> usize) {
-        self.advance(now);
-        self.n_slots = n_slots(self.n_slots);
-    }
-
-    fn add_busy(&mut self, time: Duration) {
-        self.busy_s += time.as_secs_f64();
-    }
-
-    /// Share of the slots' time since `start` that was not spent computing.
-    fn idle_share_since(&self, start: &Self) -> f64 {
-        let capacity_s = self.capacity_s - start.capacity_s;
-        if capacity_s > 0.0 {
-            (1.0 - (self.busy_s - start.busy_s) / capacity_s).clamp(0.0, 1.0)
-        } else {
-            0.0
+        if let Some(generation) = &mut work.generation {
+            generation.requeue_all();
+            audits.into_iter().for_each(|task| generation.push_audit(task));
         }
     }
+
+    fn generation_mut(&mut self, id: ExperimentId) -> &mut GenerationInProgress {
+        let work = self.experiments.get_mut(&id);
+        work.and_then(|work| work.generation.as_mut()).expect("what is assigned is being judged")
+    }
+
+    fn update_worker<T>(&mut self, id: WorkerId, change: impl FnOnce(&mut Worker) -> T) -> T {
+        let worker = self.workers.get_mut(&id).expect("the caller has seen it");
+        self.standings.remove(id, worker);
+        let result = change(worker);
+        self.standings.add(id, worker);
+        result
+    }
+
+    /// Panics if the state contradicts itself. For tests: it looks at everything.
+    pub fn sanity_check(&self) {
+        let mut standings = Standings::default();
+        let mut in_flight: BTreeMap<ExperimentId, BTreeMap<_, _>> = BTreeMap::new();
+        for (&id, worker) in &self.workers {
+            standings.add(id, worker);
+            for (&item, assignment) in &worker.in_flight {
+                assert!(worker.known_experiments.contains(&assignment.experiment));
+                let entry = (id, assignment.task.clone(), assignment.is_audit);
+                in_flight.entry(assignment.experiment).or_default().insert(item, entry);
+            }
+            assert!(worker.recalled.len() <= 2 * worker.n_slots());
+        }
+        assert_eq!(standings.available, self.standings.available);
+        assert_eq!(standings.backlogged, self.standings.backlogged);
+        assert_eq!(standings.n_idle_slots, self.standings.n_idle_slots);
+        assert_eq!(standings.n_usable_slots, self.standings.n_usable_slots);
+        for (&id, work) in &self.experiments {
+            let in_flight = in_flight.remove(&id).unwrap_or_default();
+            assert!(!work.is_paused || in_flight.is_empty(), "paused work is nobody's");
+            assert_eq!(self.turns.contains(&(work.served, id)), work.is_ready());
+            match &work.generation {
+                Some(generation) => generation.sanity_check(&in_flight),
+                None => assert!(in_flight.is_empty()),
+            }
+        }
+        assert!(in_flight.is_empty(), "nobody computes for an experiment that is over");
+        let n_ready = self.experiments.values().filter(|work| work.is_ready()).count();
+        assert_eq!(self.turns.len(), n_ready);
+        let has_queued = |work: &&ExperimentWork| {
+            work.is_ready() && work.generation.as_ref().is_some_and(|g| g.n_queued() > 0)
+        };
+        assert!(
+            !self.has_idle_slot() || self.experiments.values().find(has_queued).is_none(),
+            "no work waits while a slot is idle"
+        );
+        assert!(self.outgoing.is_empty(), "everything is sent");
+        let n_slots: usize = self.workers.values().map(Worker::n_slots).sum();
+        assert_eq!(n_slots, self.fleet_time.n_slots());
+    }
+}
+
+/// A step of SplitMix64 (Steele, Lea & Flood 2014).
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
 }
 
 #[cfg(test)]

@@ -4,6 +4,10 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 
+use swarm_proto::ITEMS_PER_SLOT_MAX;
+
+use crate::ids::ItemId;
+
 use super::*;
 
 const LEASE: Duration = Duration::from_secs(10);
@@ -17,7 +21,10 @@ struct Fleet {
     workers: BTreeMap<WorkerId, FakeWorker>,
     judged: Vec<(ExperimentId, JudgedGeneration)>,
     failed: Vec<(ExperimentId, String)>,
+    paused: Vec<(ExperimentId, String)>,
     n_items_sent: usize,
+    /// What workers say that an item took.
+    compute_time: Duration,
 }
 
 #[derive(Default)]
@@ -30,29 +37,44 @@ fn fitness(genotype: &[f64], trial: u32) -> f64 {
     genotype[0] * 1000.0 + f64::from(trial)
 }
 
-fn genotypes(n: usize) -> Vec<Genotype> {
+fn genotypes(n: usize) -> Population {
     (0..n).map(|i| vec![i as f64]).collect()
 }
 
+fn introduction(n_slots: usize) -> Introduction {
+    Introduction { name: "fake".to_owned(), version: String::new(), n_slots, process: None }
+}
+
 impl Fleet {
+    fn new() -> Self {
+        Self::with(EngineConfig::new(LEASE))
+    }
+
+    /// Its engine neither splits nor duplicates, so that items can be counted.
+    fn plain() -> Self {
+        Self::with(EngineConfig { split: false, duplicate: false, ..EngineConfig::new(LEASE) })
+    }
+
     #[expect(
         clippy::disallowed_methods,
         reason = "any instant will do as the origin of virtual time"
     )]
-    fn new() -> Self {
+    fn with(config: EngineConfig) -> Self {
         let now = Instant::now();
         Self {
-            engine: Engine::new(now, LEASE),
+            engine: Engine::new(now, config),
             now,
             workers: BTreeMap::new(),
             judged: Vec::new(),
             failed: Vec::new(),
+            paused: Vec::new(),
             n_items_sent: 0,
+            compute_time: Duration::from_millis(10),
         }
     }
 
     fn start(&mut self, id: ExperimentId, n_individuals: usize, n_trials: u32) {
-        self.engine.on_experiment_started(id, "spec".into());
+        self.engine.on_experiment_started(id, "spec".into(), Priority::default());
         self.ask(id, 0, n_individuals, n_trials);
     }
 
@@ -63,7 +85,7 @@ impl Fleet {
     }
 
     fn join(&mut self, n_slots: usize) -> WorkerId {
-        let id = self.engine.on_worker_joined(self.now, "fake", n_slots);
+        let id = self.engine.on_worker_joined(self.now, introduction(n_slots));
         self.workers.insert(id, FakeWorker::default());
         self.carry_out();
         id
@@ -86,8 +108,7 @@ impl Fleet {
     }
 
     fn answer(&mut self, worker: WorkerId, item: ItemId, outcome: Result<Vec<f64>, String>) {
-        let compute_time = Duration::from_millis(10);
-        let result = ItemResult { id: item, outcome, compute_time };
+        let result = ItemResult { id: item, outcome, compute_time: self.compute_time };
         self.engine.on_results(self.now, worker, vec![result]);
         self.carry_out();
     }
@@ -116,6 +137,13 @@ impl Fleet {
                 Command::FinishGeneration { experiment, judged } => {
                     self.judged.push((experiment, judged));
                 }
+                Command::SendDrop { worker, items } => {
+                    let worker = self.workers.get_mut(&worker).unwrap();
+                    worker.items.retain(|(_, item)| !items.contains(&item.id));
+                }
+                Command::PauseExperiment { experiment, reason } => {
+                    self.paused.push((experiment, reason));
+                }
                 Command::FailExperiment { experiment, reason } => {
                     self.failed.push((experiment, reason));
                 }
@@ -123,8 +151,8 @@ impl Fleet {
         }
         self.engine.sanity_check();
         for (id, worker) in &self.workers {
-            let n_slots = self.engine.workers[id].n_slots;
-            assert!(worker.items.len() <= CREDITS_PER_SLOT * n_slots, "credits are respected");
+            let n_slots = self.engine.workers[id].n_slots();
+            assert!(worker.items.len() <= ITEMS_PER_SLOT_MAX * n_slots, "credits are respected");
         }
     }
 
@@ -150,46 +178,9 @@ impl Fleet {
     }
 }
 
-impl Engine {
-    /// Panics if the state contradicts itself.
-    fn sanity_check(&self) {
-        for (&id, worker) in &self.workers {
-            assert_eq!(
-                self.available.contains(&(worker.load(), id)),
-                worker.has_credit(),
-                "exactly the workers with credit are available"
-            );
-            for assignment in worker.in_flight.values() {
-                assert!(self.experiments.contains_key(&assignment.experiment));
-                assert!(worker.known_experiments.contains(&assignment.experiment));
-            }
-        }
-        assert!(self.available.iter().all(|(_, id)| self.workers.contains_key(id)));
-        for (&id, experiment) in &self.experiments {
-            let Some(generation) = &experiment.generation else { continue };
-            let in_flight = self.workers.values().flat_map(|worker| worker.in_flight.values());
-            let in_flight = in_flight.filter(|a| a.experiment == id).map(|a| a.task.trials.len());
-            let queued = generation.queue.iter().map(|task| task.trials.len());
-            assert_eq!(
-                in_flight.sum::<usize>() + queued.sum::<usize>(),
-                generation.n_trials_left(),
-                "every trial is judged, queued or in flight, and only one of these"
-            );
-            let n_turns = self.turns.iter().filter(|&&turn| turn == id).count();
-            assert_eq!(n_turns, usize::from(!generation.queue.is_empty()));
-        }
-        assert!(
-            self.turns.is_empty() || self.available.is_empty(),
-            "no work waits while a worker has credit"
-        );
-        let n_slots: usize = self.workers.values().map(|worker| worker.n_slots).sum();
-        assert_eq!(n_slots, self.fleet_time.n_slots);
-    }
-}
-
 #[test]
 fn fitness_is_in_index_order_whoever_computed_it() {
-    let mut fleet = Fleet::new();
+    let mut fleet = Fleet::plain();
     fleet.join(1);
     fleet.join(3);
     fleet.start(EXPERIMENT, 50, 4);
@@ -209,21 +200,23 @@ fn work_waits_for_the_first_worker() {
 
 #[test]
 fn items_of_a_lost_worker_go_to_others() {
-    let mut fleet = Fleet::new();
+    let mut fleet = Fleet::plain();
     let lost = fleet.join(2);
     fleet.start(EXPERIMENT, 10, 2);
+    fleet.compute_time = Duration::from_secs(1);
+    fleet.now += fleet.compute_time;
     fleet.step(lost);
-    assert_eq!(fleet.workers[&lost].items.len(), 4);
+    assert_eq!(fleet.workers[&lost].items.len(), 3, "long items do not wait in line");
     fleet.kill(lost);
     fleet.join(1);
     fleet.run();
     fleet.assert_judged(10, 2);
-    assert_eq!(fleet.n_items_sent, 10 + 4);
+    assert_eq!(fleet.n_items_sent, 10 + 3);
 }
 
 #[test]
 fn a_silent_worker_is_dropped_after_its_lease_and_a_busy_one_is_not() {
-    let mut fleet = Fleet::new();
+    let mut fleet = Fleet::plain();
     let silent = fleet.join(1);
     let busy = fleet.join(1);
     fleet.start(EXPERIMENT, 6, 1);
@@ -272,7 +265,7 @@ fn silence_is_not_blamed_on_items() {
 
 #[test]
 fn a_draining_worker_gets_nothing_more_and_is_not_blamed() {
-    let mut fleet = Fleet::new();
+    let mut fleet = Fleet::plain();
     fleet.start(EXPERIMENT, 1, 1);
     for _ in 0..2 * MAX_ATTEMPTS {
         let id = fleet.join(1);
@@ -308,7 +301,7 @@ fn an_item_that_takes_its_workers_down_fails_its_experiment_and_no_other() {
 
 #[test]
 fn items_that_wait_in_a_lost_worker_are_not_blamed() {
-    let mut fleet = Fleet::new();
+    let mut fleet = Fleet::plain();
     fleet.start(EXPERIMENT, 2, 1);
     // One slot, two credits: individual 0 is computed, 1 waits. Answer 0 each
     // time under a fresh worker, and 1 is never the oldest.
@@ -356,7 +349,7 @@ fn results_of_unknown_items_and_of_ended_experiments_are_ignored() {
     fleet.start(EXPERIMENT, 2, 1);
     let item = fleet.workers[&id].items[0].1.id;
     fleet.answer(id, ItemId(999), Ok(vec![5.0]));
-    fleet.engine.on_experiment_ended(EXPERIMENT);
+    fleet.engine.on_experiment_ended(fleet.now, EXPERIMENT);
     fleet.carry_out();
     fleet.answer(id, item, Ok(vec![5.0]));
     assert!(fleet.judged.is_empty());
@@ -376,6 +369,53 @@ fn a_result_that_comes_twice_counts_once() {
     fleet.assert_judged(2, 1);
 }
 
+/// Three workers with an item each; the first has finished its own, and has been
+/// given the third's as well, which is late.
+fn fleet_with_a_late_item() -> (Fleet, [WorkerId; 3], Item) {
+    let mut fleet = Fleet::new();
+    let workers = [fleet.join(1), fleet.join(1), fleet.join(1)];
+    fleet.start(EXPERIMENT, 3, 1);
+    let late = fleet.workers[&workers[2]].items[0].1.clone();
+    fleet.compute_time = Duration::from_secs(1);
+    fleet.now += fleet.compute_time;
+    fleet.step(workers[0]);
+    fleet.now += LEASE / 3;
+    for id in workers {
+        fleet.engine.on_heartbeat(fleet.now, id);
+    }
+    fleet.engine.on_tick(fleet.now);
+    fleet.carry_out();
+    let copy = &fleet.workers[&workers[0]].items[0].1;
+    assert_eq!((&copy.genotype, &copy.trials), (&late.genotype, &late.trials));
+    (fleet, workers, late)
+}
+
+#[test]
+fn the_first_of_two_results_wins_and_the_other_worker_drops_the_item() {
+    let (mut fleet, [first, _, third], late) = fleet_with_a_late_item();
+    fleet.step(first);
+    assert!(fleet.workers[&third].items.iter().all(|(_, item)| item.id != late.id));
+    // Its answer was under way already.
+    fleet.answer(third, late.id, Ok(vec![fitness(&late.genotype, 0)]));
+    assert!(fleet.paused.is_empty());
+    fleet.run();
+    fleet.assert_judged(3, 1);
+}
+
+#[test]
+fn a_late_result_that_differs_pauses_the_experiment_and_its_generation_starts_over() {
+    let (mut fleet, [first, second, third], late) = fleet_with_a_late_item();
+    fleet.step(first);
+    fleet.answer(third, late.id, Ok(vec![-1.0]));
+    assert_eq!(fleet.paused.len(), 1);
+    assert!(fleet.workers[&second].items.is_empty(), "paused");
+    fleet.engine.on_experiment_resumed(fleet.now, EXPERIMENT);
+    fleet.carry_out();
+    assert!(fleet.workers[&first].items.is_empty() && fleet.workers[&third].items.is_empty());
+    fleet.run();
+    fleet.assert_judged(3, 1);
+}
+
 #[test]
 fn experiments_take_turns() {
     let mut fleet = Fleet::new();
@@ -387,6 +427,36 @@ fn experiments_take_turns() {
         assert!(fleet.step(id));
     }
     assert_eq!(fleet.judged[0].0, other, "the short one need not wait for the long one");
+}
+
+#[test]
+fn activity_says_who_holds_what_since_when() {
+    let mut fleet = Fleet::plain();
+    let other = ExperimentId(2);
+    fleet.start(EXPERIMENT, 5, 2);
+    let waiting = fleet.engine.activity(fleet.now, EXPERIMENT);
+    assert_eq!((waiting.n_workers, waiting.rivals), (0, vec![]));
+    let round = waiting.round.unwrap();
+    assert_eq!((round.n_items_queued, round.n_episodes, round.n_episodes_left), (5, 10, 10));
+
+    let worker = fleet.join(1);
+    fleet.now += Duration::from_secs(1);
+    let failure = fleet.workers.get_mut(&worker).unwrap().items.pop_front().unwrap().1;
+    fleet.answer(worker, failure.id, Err("too hot".to_owned()));
+    fleet.engine.on_draining(fleet.now, worker);
+    fleet.now += Duration::from_secs(3);
+    fleet.start(other, 3, 1);
+    let activity = fleet.engine.activity(fleet.now, EXPERIMENT);
+    assert_eq!((activity.n_workers, activity.n_workers_available), (1, 0));
+    assert_eq!(activity.rivals, [other]);
+    let round = activity.round.unwrap();
+    assert_eq!(round.n_individuals_failing, 1);
+    assert_eq!(round.running_for, Duration::from_secs(4));
+    let [held] = &round.held[..] else { panic!("{round:?}") };
+    assert_eq!(round.n_items_queued + held.n_items, 5);
+    assert_eq!((held.worker, held.silent_for), (worker, Duration::from_secs(3)));
+    assert_eq!(held.held_for, Duration::from_secs(4), "the oldest counts");
+    assert_eq!(fleet.engine.activity(fleet.now, ExperimentId(9)).round, None);
 }
 
 #[test]
@@ -405,7 +475,7 @@ fn idle_share_is_the_time_slots_did_not_compute() {
 fn ten_thousand_workers_share_a_generation() {
     let mut fleet = Fleet::new();
     let ids: Vec<WorkerId> =
-        (0..10_000).map(|_| fleet.engine.on_worker_joined(fleet.now, "fake", 1)).collect();
+        (0..10_000).map(|_| fleet.engine.on_worker_joined(fleet.now, introduction(1))).collect();
     fleet.workers = ids.iter().map(|&id| (id, FakeWorker::default())).collect();
     fleet.start(EXPERIMENT, 10_000, 1);
     assert!(fleet.workers.values().all(|worker| worker.items.len() == 1));

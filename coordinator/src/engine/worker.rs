@@ -1,65 +1,177 @@
 //! A connected worker, as the engine sees it.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
-    time::Instant,
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    time::{Duration, Instant},
 };
 
-use crate::ids::{ExperimentId, ItemId};
+use swarm_proto::ITEMS_PER_SLOT_MAX;
 
-use super::{CREDITS_PER_SLOT, generation::Task};
+use crate::ids::{ExperimentId, ItemId, WorkerId};
+
+use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, generation::Task};
+
+/// A worker is given so much work ahead, so that it computes while results and
+/// new items travel: longer than a round trip and the coordinator's own delays.
+const WORK_AHEAD: Duration = Duration::from_millis(50);
+/// [`Worker::load`] of a worker with as many items as slots.
+pub const FULL_LOAD: u64 = 1 << 20;
 
 /// A connected worker.
 #[derive(Debug)]
 pub struct Worker {
-    /// What it calls itself.
-    pub name: String,
-    /// Items it computes at the same time.
-    pub n_slots: usize,
+    /// Who it is.
+    pub introduction: Introduction,
     /// When it last gave a sign of life.
     pub last_heard: Instant,
     /// Whether it wants no more items.
     pub is_draining: bool,
+    /// Why it must not be given items.
+    pub distrusted: Option<String>,
     /// Experiments whose specification it has.
     pub known_experiments: BTreeSet<ExperimentId>,
     /// What it has been given and has not answered; oldest first, as ids grow.
     pub in_flight: BTreeMap<ItemId, Assignment>,
+    /// What was taken back from it lately, as the answer may be under way.
+    pub recalled: VecDeque<(ItemId, Assignment)>,
+    /// What it computed.
+    pub time: WorkerTime,
+    /// Time per item, s; smoothed.
+    item_s: Option<f64>,
+    /// How much longer than others it takes for the same work; smoothed.
+    pub pace: f64,
+    n_learnt: u32,
 }
 
 /// Work in a worker's hands.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Assignment {
     /// Whose work.
     pub experiment: ExperimentId,
+    /// Of which of its generations.
+    pub generation: u64,
     /// Which work.
     pub task: Task,
+    /// Whether it is computed only to be compared.
+    pub is_audit: bool,
+    /// When it was sent.
+    pub assigned: Instant,
+    /// When it should be done.
+    pub expected: Instant,
+    /// What the experiment was charged for it.
+    pub charge: Duration,
 }
 
 impl Worker {
     /// A worker without work.
-    pub fn new(name: &str, n_slots: usize, now: Instant) -> Self {
+    pub fn new(introduction: Introduction, now: Instant) -> Self {
         Self {
-            name: name.to_owned(),
-            n_slots,
+            time: WorkerTime::new(now, introduction.n_slots),
+            introduction,
             last_heard: now,
             is_draining: false,
+            distrusted: None,
             known_experiments: BTreeSet::new(),
             in_flight: BTreeMap::new(),
+            recalled: VecDeque::new(),
+            item_s: None,
+            pace: 1.0,
+            n_learnt: 0,
         }
+    }
+
+    /// What it calls itself.
+    pub fn name(&self) -> &str {
+        &self.introduction.name
+    }
+
+    /// Items it computes at the same time.
+    pub fn n_slots(&self) -> usize {
+        self.introduction.n_slots
+    }
+
+    /// Whether it may be given items at all.
+    pub fn is_usable(&self) -> bool {
+        !self.is_draining && self.distrusted.is_none()
+    }
+
+    /// Most items it may hold: one per slot, and as many more as it computes in
+    /// [`WORK_AHEAD`], so that few items wait behind long ones, and slots do not
+    /// wait for short ones. At first, two per slot.
+    pub fn n_credits(&self) -> usize {
+        let n_slots = self.n_slots();
+        let n_ahead = match self.item_s {
+            Some(item_s) => (n_slots as f64 * WORK_AHEAD.as_secs_f64() / item_s).ceil() as usize,
+            None => n_slots,
+        };
+        n_slots + n_ahead.clamp(1, (ITEMS_PER_SLOT_MAX - 1) * n_slots)
     }
 
     /// Whether it may be given another item.
     pub fn has_credit(&self) -> bool {
-        !self.is_draining && self.in_flight.len() < CREDITS_PER_SLOT * self.n_slots
+        self.is_usable() && self.in_flight.len() < self.n_credits()
     }
 
-    /// Items in flight per slot, in units of 2^-20.
+    /// Items in flight per slot, in units of 1 / [`FULL_LOAD`].
     pub fn load(&self) -> u64 {
-        ((self.in_flight.len() as u64) << 20) / self.n_slots as u64
+        (self.in_flight.len() as u64 * FULL_LOAD) / self.n_slots() as u64
     }
 
-    /// Gives it work.
-    pub fn assign(&mut self, item: ItemId, experiment: ExperimentId, task: Task) {
-        self.in_flight.insert(item, Assignment { experiment, task });
+    /// Its pace as a whole number, for sorting.
+    pub fn pace_rank(&self) -> u32 {
+        (self.pace * 64.0) as u32
+    }
+
+    /// Slots without an item, if they may have one.
+    pub fn n_idle_slots(&self) -> usize {
+        if self.is_usable() { self.n_slots().saturating_sub(self.in_flight.len()) } else { 0 }
+    }
+
+    /// Learns from an item that took `busy` and was expected to take `expected`
+    /// for a worker of pace 1.
+    pub fn learn(&mut self, busy: Duration, expected: Option<Duration>) {
+        let busy_s = busy.as_secs_f64();
+        let item_s = self.item_s.get_or_insert(busy_s);
+        *item_s = (*item_s + 0.1 * (busy_s - *item_s)).max(1e-6);
+        if let Some(expected) = expected {
+            let ratio = busy_s / expected.as_secs_f64().max(1e-9);
+            // The mean of the first few, then of the last few.
+            self.n_learnt += 1;
+            let gain = (1.0 / f64::from(self.n_learnt)).max(0.2);
+            self.pace = (self.pace + gain * (ratio - self.pace)).clamp(1e-2, 1e2);
+        }
+    }
+
+    /// Remembers what was taken back.
+    pub fn remember_recalled(&mut self, item: ItemId, assignment: Assignment) {
+        if self.recalled.len() >= 2 * self.n_slots() {
+            self.recalled.pop_front();
+        }
+        self.recalled.push_back((item, assignment));
+    }
+
+    /// What was taken back under this id, if it is remembered.
+    pub fn take_recalled(&mut self, item: ItemId) -> Option<Assignment> {
+        let index = self.recalled.iter().position(|(id, _)| *id == item)?;
+        self.recalled.remove(index).map(|(_, assignment)| assignment)
+    }
+
+    /// What people see of it.
+    pub fn status(&self, id: WorkerId, now: Instant) -> WorkerStatus {
+        let Introduction { name, version, n_slots, .. } = self.introduction.clone();
+        let (results_per_s, idle_share) = self.time.recent(now);
+        WorkerStatus {
+            id,
+            name,
+            version,
+            n_slots,
+            n_in_flight: self.in_flight.len(),
+            results_per_s,
+            idle_share,
+            connected_for: now.saturating_duration_since(self.time.joined()),
+            silent_for: now.saturating_duration_since(self.last_heard),
+            is_draining: self.is_draining,
+            distrusted: self.distrusted.clone(),
+        }
     }
 }

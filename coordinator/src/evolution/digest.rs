@@ -48,8 +48,10 @@ impl Digest {
         hash.update(generation.to_le_bytes());
         let mut bytes = Vec::new();
         for values in genotypes.iter().chain(trial_fitness) {
-            bytes.clear();
-            bytes.extend(values.iter().flat_map(|value| value.to_bits().to_le_bytes()));
+            bytes.resize(size_of_val(&values[..]), 0);
+            for (bytes, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
+                bytes.copy_from_slice(&value.to_bits().to_le_bytes());
+            }
             hash.update(&bytes);
         }
         Self(hash.finalize().into())

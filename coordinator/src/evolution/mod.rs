@@ -15,7 +15,7 @@ mod digest;
 mod ranking;
 mod statistics;
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use sim_core::{
@@ -31,6 +31,10 @@ use algorithms::{Algorithm, Sample, Strategy as _, Unsuitable};
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
+
+/// One genotype per individual. A large population takes tens of megabytes, so it
+/// is shared, not copied.
+pub type Population = Arc<[Genotype]>;
 
 /// An experiment's evolution, after some number of generations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,8 +59,8 @@ pub struct Evolution {
 pub struct Asked {
     /// Index of the generation, from 0.
     pub generation: u64,
-    /// Whole genotypes, one per individual.
-    pub genotypes: Vec<Genotype>,
+    /// Whole genotypes.
+    pub genotypes: Population,
     /// Per population.
     samples: Vec<Sample>,
 }
@@ -154,12 +158,14 @@ impl Evolution {
                 population.sample(self.population_size, &mut rng)
             })
             .collect();
-        let genotypes = (0..self.population_size)
-            .map(|i| {
-                let parts: Vec<&[f64]> = samples.iter().map(|s| &s.genotypes[i][..]).collect();
-                parts.concat()
-            })
-            .collect();
+        let whole = |i: usize| {
+            let parts: Vec<&[f64]> = samples.iter().map(|s| &s.genotypes[i][..]).collect();
+            parts.concat()
+        };
+        let genotypes = match &samples[..] {
+            [only] => Arc::clone(&only.genotypes),
+            _ => (0..self.population_size).map(whole).collect(),
+        };
         Asked { generation: self.n_generations, genotypes, samples }
     }
 

@@ -9,14 +9,12 @@ use tonic::Status;
 
 use crate::{
     driver::ToWorker,
-    engine::{Item, ItemResult},
+    engine::{Item, ItemResult, WorkerStatus},
     evolution::HeldOut,
     ids::ItemId,
+    limits::TEXT_LEN_MAX,
     store::{Event, EventKind, Experiment, ExperimentState, Generation},
 };
-
-/// What a worker says about itself or its failures is cut at this many bytes.
-const TEXT_LEN_MAX: usize = 512;
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +45,10 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
         ToWorker::End(experiment) => {
             Message::EndExperiment(v1::EndExperiment { experiment_id: experiment.0 })
         }
+        ToWorker::DropItems(items) => {
+            let item_ids = items.iter().map(|item| item.0).collect();
+            Message::DropItems(v1::DropItems { item_ids })
+        }
         ToWorker::Dropped(reason) => {
             return Err(Status::aborted(format!("the coordinator drops this worker: {reason}")));
         }
@@ -76,10 +78,34 @@ pub fn item_result(result: v1::ItemResult) -> ItemResult {
     }
 }
 
-/// Text from the network, fit for a log: bounded, on one line.
+/// A worker for clients; `now_ms`: now, since 1970 UTC.
+pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
+    let ago = |duration: Duration| now_ms.saturating_sub(duration.as_millis() as u64);
+    v1::Worker {
+        id: worker.id.0,
+        connected_at_ms: ago(worker.connected_for),
+        last_heard_at_ms: ago(worker.silent_for),
+        name: worker.name,
+        version: worker.version,
+        slots: worker.n_slots as u32,
+        items_in_flight: worker.n_in_flight as u32,
+        results_per_second: worker.results_per_s,
+        idle_share: worker.idle_share,
+        draining: worker.is_draining,
+        distrusted: worker.distrusted.unwrap_or_default(),
+    }
+}
+
+/// Text from the network, fit for a log and a terminal: bounded, on one line, and
+/// in the order in which it is read.
 pub fn printable(text: &str) -> String {
     let end = text.floor_char_boundary(TEXT_LEN_MAX);
-    text[..end].chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    let is_unfit = |c: char| {
+        // Line and paragraph separators; marks that change the direction of text.
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    text[..end].chars().map(|c| if is_unfit(c) { ' ' } else { c }).collect()
 }
 
 /// An experiment for clients.
@@ -101,6 +127,8 @@ pub fn experiment(experiment: Experiment) -> v1::Experiment {
         champion_fitness: experiment.champion_fitness,
         config_digest: experiment.config_digest,
         digest: experiment.digest,
+        priority: experiment.priority.weight(),
+        last_sequence: experiment.last_sequence,
     }
 }
 
@@ -155,6 +183,13 @@ pub fn event(event: Event) -> v1::Event {
     v1::Event { sequence: event.sequence, at_ms: event.at_ms, kind: Some(kind) }
 }
 
+/// A completed generation for clients.
+pub fn completed_generation(
+    (completed_at_ms, completed): (u64, Generation),
+) -> v1::CompletedGeneration {
+    v1::CompletedGeneration { summary: Some(generation(completed)), completed_at_ms }
+}
+
 fn generation(generation: Generation) -> v1::GenerationSummary {
     v1::GenerationSummary {
         generation: generation.generation,
@@ -173,6 +208,7 @@ fn generation(generation: Generation) -> v1::GenerationSummary {
 fn state(state: ExperimentState) -> v1::ExperimentState {
     match state {
         ExperimentState::Running => v1::ExperimentState::Running,
+        ExperimentState::Paused => v1::ExperimentState::Paused,
         ExperimentState::Completed => v1::ExperimentState::Completed,
         ExperimentState::Failed => v1::ExperimentState::Failed,
         ExperimentState::Cancelled => v1::ExperimentState::Cancelled,

@@ -1,16 +1,23 @@
-//! `ExperimentService`: submit, look, watch, cancel.
+//! `ExperimentService`: submit, look, watch, steer.
 
 use std::pin::Pin;
 
 use sim_core::config::{ConfigError, ExperimentConfig};
 use swarm_proto::v1::{
-    CancelExperimentRequest, CancelExperimentResponse, GetChampionRequest, GetChampionResponse,
-    GetExperimentRequest, GetExperimentResponse, ListExperimentsRequest, ListExperimentsResponse,
-    SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
-    WatchExperimentResponse, experiment_service_server::ExperimentService,
+    CancelExperimentRequest, CancelExperimentResponse, ExplainExperimentRequest,
+    ExplainExperimentResponse, GetChampionRequest, GetChampionResponse, GetExperimentRequest,
+    GetExperimentResponse, ListEventsRequest, ListEventsResponse, ListExperimentsRequest,
+    ListExperimentsResponse, ListGenerationsRequest, ListGenerationsResponse,
+    PauseExperimentRequest, PauseExperimentResponse, ResumeExperimentRequest,
+    ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse, SubmitExperimentRequest,
+    SubmitExperimentResponse, WatchExperimentRequest, WatchExperimentResponse,
+    experiment_service_server::ExperimentService,
 };
 use tokio::{
-    sync::{mpsc, oneshot},
+    sync::{
+        mpsc::{self, error::SendTimeoutError},
+        oneshot,
+    },
     task,
 };
 use tokio_stream::{Stream, wrappers::ReceiverStream};
@@ -20,26 +27,24 @@ use tracing::info;
 
 use crate::{
     clock,
-    driver::{Event, EventSender},
+    driver::{self, Event, EventSender},
     evolution::{Evolution, Origin},
+    failpoint,
     ids::ExperimentId,
+    limits::{
+        CHANGE_TIMEOUT, EVENT_PAGE_LEN, KEY_LEN_MAX, PROBLEMS_LEN_MAX, TEXT_LEN_MAX,
+        UNFINISHED_MAX, WATCH_PATIENCE, WATCH_QUEUE_LEN,
+    },
+    priority::Priority,
     shared_store::SharedStore,
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
     submission::{Checked, Runnable, Submission},
 };
 
-use super::{convert, shutting_down, store_status};
+use super::{convert, explain, history, shutting_down, store_status};
 
-/// Longest `request_id` and `default_name`, bytes.
-const KEY_LEN_MAX: usize = 128;
-/// Experiments that may be unfinished at the same time.
-const UNFINISHED_MAX: usize = 1000;
-/// Problems of a configuration travel in a header, whose size clients limit.
-const PROBLEMS_LEN_MAX: usize = 4096;
-/// Events read from the store at once.
-const EVENT_PAGE_LEN: u32 = 256;
-/// Events that may wait for a watcher to read them.
-const WATCH_QUEUE_LEN: usize = 16;
+/// Why an experiment is paused that a client paused.
+const PAUSED: &str = "paused by a client";
 
 /// The service.
 #[derive(Debug)]
@@ -71,12 +76,17 @@ impl ExperimentService for Experiments {
             }
         }
         let resume_unfinished = request.resume_unfinished;
+        let priority = match request.priority {
+            Some(weight) => read_priority(weight)?,
+            None => Priority::default(),
+        };
         let submission = Submission {
             request_id: Some(request.request_id).filter(|id| !id.is_empty()),
             config_json: request.config_json,
             default_name: request.default_name,
             seed: request.seed,
             generations: request.generations,
+            priority,
         };
         // Compiling is work for a CPU, not for the I/O threads.
         let Checked { new, evolution, warnings } = task::spawn_blocking(move || submission.check())
@@ -96,6 +106,7 @@ impl ExperimentService for Experiments {
                 .map_err(store_status)?;
             match placement {
                 Placement::Runs(runnable) => {
+                    failpoint::reached("experiment stored");
                     let id = runnable.id;
                     info!(experiment = %id, name = runnable.config.name, "experiment submitted");
                     let ready = Event::ExperimentReady(runnable);
@@ -141,7 +152,9 @@ impl ExperimentService for Experiments {
     ) -> Result<Response<Self::WatchExperimentStream>, Status> {
         let request = request.into_inner();
         let id = self.find(request.experiment_id).await?.id;
-        let (outbox, inbox) = mpsc::channel(WATCH_QUEUE_LEN);
+        let (outbox, inbox) = mpsc::channel(WATCH_QUEUE_LEN + 1);
+        // There is always room to say how it ends.
+        let farewell = outbox.clone().try_reserve_owned().expect("a new channel has room");
         let (store, shutdown) = (self.store.clone(), self.shutdown.clone());
         tokio::spawn(async move {
             let watching = watch(id, request.from_sequence.max(1), store, &outbox);
@@ -153,8 +166,7 @@ impl ExperimentService for Experiments {
                     Err(status) => status,
                 },
             };
-            // If the client is gone it need not be told.
-            let _ = outbox.send(Err(status)).await;
+            farewell.send(Err(status));
         });
         Ok(Response::new(Box::pin(ReceiverStream::new(inbox))))
     }
@@ -163,22 +175,52 @@ impl ExperimentService for Experiments {
         &self,
         request: Request<CancelExperimentRequest>,
     ) -> Result<Response<CancelExperimentResponse>, Status> {
-        let experiment = self.find(request.into_inner().experiment_id).await?;
-        let id = experiment.id;
-        if experiment.state == ExperimentState::Running {
-            let (reply, ended) = oneshot::channel();
-            let cancel = Event::CancelRequested { experiment: id, reply };
-            self.events.send(cancel).await.map_err(|_| shutting_down())?;
-            // Not answered: it has ended in another way meanwhile, as the store
-            // will tell, or the coordinator is about to.
-            let _ = ended.await;
-        }
-        let experiment = self.find(id.0).await?;
-        if experiment.state == ExperimentState::Running {
-            return Err(shutting_down());
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let mut experiment = self.find(id.0).await?;
+        if experiment.state.is_unfinished() {
+            experiment = self.request(id, driver::Request::Cancel).await?;
         }
         let experiment = Some(convert::experiment(experiment));
         Ok(Response::new(CancelExperimentResponse { experiment }))
+    }
+
+    async fn pause_experiment(
+        &self,
+        request: Request<PauseExperimentRequest>,
+    ) -> Result<Response<PauseExperimentResponse>, Status> {
+        let PauseExperimentRequest { experiment_id, reason } = request.into_inner();
+        if reason.len() > TEXT_LEN_MAX {
+            let message = format!("reason is longer than {TEXT_LEN_MAX} bytes");
+            return Err(Status::invalid_argument(message));
+        }
+        let reason = match convert::printable(&reason) {
+            empty if empty.is_empty() => PAUSED.to_owned(),
+            reason => format!("{PAUSED}: {reason}"),
+        };
+        let experiment = self.change(experiment_id, driver::Request::Pause(reason)).await?;
+        let experiment = Some(convert::experiment(experiment));
+        Ok(Response::new(PauseExperimentResponse { experiment }))
+    }
+
+    async fn resume_experiment(
+        &self,
+        request: Request<ResumeExperimentRequest>,
+    ) -> Result<Response<ResumeExperimentResponse>, Status> {
+        let id = request.into_inner().experiment_id;
+        let experiment = self.change(id, driver::Request::Resume).await?;
+        let experiment = Some(convert::experiment(experiment));
+        Ok(Response::new(ResumeExperimentResponse { experiment }))
+    }
+
+    async fn set_priority(
+        &self,
+        request: Request<SetPriorityRequest>,
+    ) -> Result<Response<SetPriorityResponse>, Status> {
+        let SetPriorityRequest { experiment_id, priority } = request.into_inner();
+        let priority = read_priority(priority)?;
+        let request = driver::Request::SetPriority(priority);
+        let experiment = Some(convert::experiment(self.change(experiment_id, request).await?));
+        Ok(Response::new(SetPriorityResponse { experiment }))
     }
 
     async fn get_champion(
@@ -224,6 +266,32 @@ impl ExperimentService for Experiments {
             network_json: network,
         }))
     }
+
+    async fn explain_experiment(
+        &self,
+        request: Request<ExplainExperimentRequest>,
+    ) -> Result<Response<ExplainExperimentResponse>, Status> {
+        let experiment = self.find(request.into_inner().experiment_id).await?;
+        explain::explain(&self.events, &self.store, experiment).await.map(Response::new)
+    }
+
+    async fn list_generations(
+        &self,
+        request: Request<ListGenerationsRequest>,
+    ) -> Result<Response<ListGenerationsResponse>, Status> {
+        let request = request.into_inner();
+        let id = self.find(request.experiment_id).await?.id;
+        history::list_generations(&self.store, id, request).await.map(Response::new)
+    }
+
+    async fn list_events(
+        &self,
+        request: Request<ListEventsRequest>,
+    ) -> Result<Response<ListEventsResponse>, Status> {
+        let request = request.into_inner();
+        let id = self.find(request.experiment_id).await?.id;
+        history::list_events(&self.store, id, request).await.map(Response::new)
+    }
 }
 
 impl Experiments {
@@ -233,6 +301,51 @@ impl Experiments {
             Status::not_found(format!("there is no experiment {id}; `swarmctl list` shows all"))
         })
     }
+}
+
+impl Experiments {
+    /// Has the driver change an experiment that has not ended, and reads it again.
+    async fn change(&self, id: u64, request: driver::Request) -> Result<store::Experiment, Status> {
+        let experiment = self.find(id).await?;
+        if !experiment.state.is_unfinished() {
+            return Err(store_status(StoreError::Ended(experiment.id)));
+        }
+        let experiment = self.request(experiment.id, request).await?;
+        if !experiment.state.is_unfinished() {
+            return Err(store_status(StoreError::Ended(experiment.id)));
+        }
+        Ok(experiment)
+    }
+
+    /// Has the driver change an experiment, and reads it again.
+    async fn request(
+        &self,
+        id: ExperimentId,
+        request: driver::Request,
+    ) -> Result<store::Experiment, Status> {
+        let (reply, stored) = oneshot::channel();
+        let event = Event::Requested { experiment: id, request, reply };
+        self.events.send(event).await.map_err(|_| shutting_down())?;
+        let stored = tokio::time::timeout(CHANGE_TIMEOUT, stored).await.map_err(|_| {
+            Status::resource_exhausted(format!(
+                "the database does not take it that experiment {id} is changed; \
+                 the coordinator tries again, and its log says why"
+            ))
+        })?;
+        let experiment = self.find(id.0).await?;
+        // Not stored: it has ended in another way meanwhile, or the coordinator is
+        // about to.
+        if stored.is_err() && experiment.state.is_unfinished() {
+            return Err(shutting_down());
+        }
+        Ok(experiment)
+    }
+}
+
+fn read_priority(weight: u32) -> Result<Priority, Status> {
+    Priority::new(weight).ok_or_else(|| {
+        Status::invalid_argument(format!("priority is {weight}, not within 1..={}", Priority::MAX))
+    })
 }
 
 /// Where a submission ends up.
@@ -259,13 +372,13 @@ fn place(
     if resume_unfinished && let Some(placement) = resume(store, &experiments, &new)? {
         return Ok(placement);
     }
-    let is_unfinished = |e: &&store::Experiment| e.state == ExperimentState::Running;
+    let is_unfinished = |e: &&store::Experiment| e.state.is_unfinished();
     if experiments.iter().filter(is_unfinished).count() >= UNFINISHED_MAX {
         return Ok(Placement::TooMany);
     }
     let (id, is_new) = store.create(&new, clock::unix_ms())?;
     Ok(if is_new {
-        Placement::Runs(Box::new(Runnable::new(id, new.config, evolution)))
+        Placement::Runs(Box::new(Runnable::new(id, new.config, evolution, new.priority)))
     } else {
         Placement::RunsAlready(id)
     })
@@ -282,9 +395,9 @@ fn resume(
     // The digest tells versions of the simulation apart.
     let config_digest = new.config_digest.to_string();
     let same_bits = experiments.iter().rev().filter(|e| e.config_digest == config_digest);
-    let is_running = |e: &&store::Experiment| e.state == ExperimentState::Running;
-    if let Some(same) = same_bits.clone().filter(is_running).find(|e| e.config_json == config_json)
-    {
+    let is_unfinished = |e: &&store::Experiment| e.state.is_unfinished();
+    let mut unfinished = same_bits.clone().filter(is_unfinished);
+    if let Some(same) = unfinished.find(|e| e.config_json == config_json) {
         return Ok(Some(Placement::RunsAlready(same.id)));
     }
     for experiment in same_bits {
@@ -324,17 +437,25 @@ async fn watch(
         let (page, is_over) = store
             .read(move |store| {
                 let experiment = store.experiment(id)?;
-                let is_over = experiment.is_none_or(|e| e.state != ExperimentState::Running);
+                let is_over = experiment.is_none_or(|e| !e.state.is_unfinished());
                 Ok((store.events(id, next_sequence, EVENT_PAGE_LEN)?, is_over))
             })
             .await
             .map_err(store_status)?;
         let is_full = page.len() == EVENT_PAGE_LEN as usize;
         for event in page {
-            next_sequence = event.sequence + 1;
+            let sequence = event.sequence;
             let response = WatchExperimentResponse { event: Some(convert::event(event)) };
-            if outbox.send(Ok(response)).await.is_err() {
-                return Ok(());
+            match outbox.send_timeout(Ok(response), WATCH_PATIENCE).await {
+                Ok(()) => next_sequence = sequence + 1,
+                Err(SendTimeoutError::Closed(_)) => return Ok(()),
+                Err(SendTimeoutError::Timeout(_)) => {
+                    info!(experiment = %id, sequence, "a watcher is too slow and dropped");
+                    return Err(Status::aborted(format!(
+                        "events were not read for {} s; resume from sequence {sequence}",
+                        WATCH_PATIENCE.as_secs()
+                    )));
+                }
             }
         }
         if !is_full && is_over {
@@ -370,3 +491,6 @@ fn network_json(config_json: &str, genotype: &[f64]) -> Result<String, String> {
     let network = experiment.network_json(genotype).map_err(|error| error.to_string())?;
     Ok(network.to_string())
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,6 +3,9 @@
 
 mod convert;
 mod experiment_service;
+mod explain;
+mod fleet_service;
+mod history;
 mod worker_service;
 
 use tonic::Status;
@@ -11,12 +14,14 @@ use crate::store::StoreError;
 
 pub use convert::WelcomeTimes;
 pub use experiment_service::Experiments;
+pub use fleet_service::Fleet;
 pub use worker_service::Workers;
 
 /// Says on the wire what went wrong with the store.
 fn store_status(error: StoreError) -> Status {
     match error {
-        StoreError::Unavailable(_) => Status::unavailable(error.to_string()),
+        // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
+        StoreError::Unavailable(_) => Status::resource_exhausted(error.to_string()),
         StoreError::Ended(_) => Status::failed_precondition(error.to_string()),
         StoreError::Corrupt(_) => Status::data_loss(error.to_string()),
         _ => Status::internal(error.to_string()),
@@ -27,3 +32,6 @@ fn store_status(error: StoreError) -> Status {
 fn shutting_down() -> Status {
     Status::unavailable("the coordinator is shutting down")
 }
+
+#[cfg(test)]
+mod tests;

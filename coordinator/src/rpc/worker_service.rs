@@ -1,9 +1,9 @@
 //! `WorkerService`: one stream per worker, translated to the driver's events.
 
-use std::{pin::Pin, time::Duration};
+use std::{num::NonZeroU64, pin::Pin};
 
 use swarm_proto::{
-    PROTOCOL_VERSION,
+    ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION,
     v1::{
         Hello, WorkRequest, WorkResponse, work_request::Message,
         worker_service_server::WorkerService,
@@ -17,23 +17,18 @@ use tracing::warn;
 
 use crate::{
     driver::{Event, EventSender, WorkerLink, WorkerMessage},
-    engine::CREDITS_PER_SLOT,
+    engine::Introduction,
     ids::WorkerId,
+    limits::{
+        HELLO_TIMEOUT, NAME_LEN_MAX, RESULTS_PER_MESSAGE_MAX, SLOTS_MAX, WORKER_OUTBOX_SLACK,
+    },
+    listener::Peer,
 };
 
 use super::{
     convert::{self, WelcomeTimes},
     shutting_down,
 };
-
-/// Time for a new stream to say `Hello`.
-const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-/// Largest number of slots of one worker.
-const SLOTS_MAX: u32 = 4096;
-/// Longest name of a worker, bytes.
-const NAME_LEN_MAX: usize = 128;
-/// Messages, beyond one per credit, that may wait for a worker to read them.
-const OUTBOX_SLACK: usize = 64;
 
 /// The service.
 #[derive(Debug)]
@@ -54,7 +49,8 @@ impl WorkerService for Workers {
         &self,
         request: Request<Streaming<WorkRequest>>,
     ) -> Result<Response<Self::WorkStream>, Status> {
-        let address = request.remote_addr().map_or_else(|| "?".to_owned(), |a| a.to_string());
+        let peer = request.extensions().get::<Peer>();
+        let address = peer.map_or_else(|| "?".to_owned(), |peer| peer.address().to_string());
         let mut inbound = request.into_inner();
         let first = tokio::time::timeout(HELLO_TIMEOUT, inbound.message())
             .await
@@ -69,11 +65,17 @@ impl WorkerService for Workers {
         })?;
 
         let n_slots = hello.slots as usize;
-        let (outbox, inbox) = mpsc::channel(CREDITS_PER_SLOT * n_slots + OUTBOX_SLACK);
+        let (outbox, inbox) = mpsc::channel(ITEMS_PER_SLOT_MAX * n_slots + WORKER_OUTBOX_SLACK);
         let link = WorkerLink { outbox, dropped: self.shutdown.child_token() };
         let dropped = link.dropped.clone();
         let (reply, id) = oneshot::channel();
-        let joined = Event::WorkerJoined { name: hello.name, n_slots, link, reply };
+        let introduction = Introduction {
+            name: convert::printable(&hello.name),
+            version: convert::printable(&hello.version),
+            n_slots,
+            process: NonZeroU64::new(hello.process_id),
+        };
+        let joined = Event::WorkerJoined { introduction, link, reply };
         self.events.send(joined).await.map_err(|_| shutting_down())?;
         let id = id.await.map_err(|_| shutting_down())?;
         tokio::spawn(listen(id, inbound, self.events.clone(), dropped));
@@ -102,11 +104,16 @@ async fn listen(
             // A message of a kind that this version does not know.
             Ok(Some(WorkRequest { message: None })) => continue,
             Ok(None) => break "it closed its stream".to_owned(),
-            Err(status) => break format!("its stream broke: {}", status.message()),
+            Err(status) => {
+                break format!("its stream broke: {}", convert::printable(status.message()));
+            }
         };
         let message = match message {
             Message::Heartbeat(_) => WorkerMessage::Heartbeat,
             Message::Draining(_) => WorkerMessage::Draining,
+            Message::Results(results) if results.results.len() > RESULTS_PER_MESSAGE_MAX => {
+                break format!("it sent {} results at once", results.results.len());
+            }
             Message::Results(results) => WorkerMessage::Results(
                 results.results.into_iter().map(convert::item_result).collect(),
             ),
@@ -144,6 +151,10 @@ fn check_hello(hello: &Hello) -> Result<(), Status> {
     }
     if hello.name.len() > NAME_LEN_MAX {
         return Err(Status::invalid_argument(format!("name is longer than {NAME_LEN_MAX} bytes")));
+    }
+    if hello.version.len() > NAME_LEN_MAX {
+        let message = format!("version is longer than {NAME_LEN_MAX} bytes");
+        return Err(Status::invalid_argument(message));
     }
     Ok(())
 }

@@ -5,27 +5,22 @@
 //! returns.
 
 mod champions;
+mod file;
+mod history;
 mod records;
 mod schema;
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::File,
     io,
     path::{Path, PathBuf},
-    time::Duration,
 };
 
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 
-use crate::{
-    evolution::{Champion, Statistics},
-    ids::ExperimentId,
-};
+use crate::{evolution::Champion, failpoint, ids::ExperimentId, priority::Priority};
 
 pub use records::{Event, EventKind, Experiment, ExperimentState, Generation, NewExperiment};
-
-const DATABASE_FILE: &str = "swarmevo.sqlite3";
-const LOCK_FILE: &str = "swarmevo.lock";
 
 /// The open database of one data directory.
 #[derive(Debug)]
@@ -128,21 +123,7 @@ pub struct GenerationCommit<'a> {
 impl Store {
     /// Opens, and if need be creates, the database in `directory`.
     pub fn open(directory: &Path) -> Result<Self> {
-        let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
-        fs::create_dir_all(directory).map_err(unusable)?;
-        let lock = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
-        lock.try_lock().map_err(|error| match error {
-            TryLockError::WouldBlock => StoreError::Locked { path: directory.to_owned() },
-            TryLockError::Error(source) => unusable(source),
-        })?;
-        let mut connection = Connection::open(directory.join(DATABASE_FILE))?;
-        connection.busy_timeout(Duration::from_secs(5))?;
-        // First, because it refuses a database that must stay as it is.
-        schema::check_version(&connection)?;
-        connection.pragma_update(None, "journal_mode", "WAL")?;
-        connection.pragma_update(None, "synchronous", "FULL")?;
-        connection.pragma_update(None, "foreign_keys", true)?;
-        schema::migrate(&mut connection)?;
+        let (connection, lock) = file::open(directory)?;
         Ok(Self { connection, _lock: lock })
     }
 
@@ -157,8 +138,8 @@ impl Store {
         let transaction = self.connection.transaction()?;
         transaction.execute(
             "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
-                                      genotype_len, state, submitted_at_ms)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7)",
+                                      genotype_len, state, submitted_at_ms, priority)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8)",
             params![
                 new.request_id,
                 new.config.name,
@@ -166,7 +147,8 @@ impl Store {
                 new.config_digest.to_string(),
                 sim_core::FINGERPRINT,
                 new.genotype_len,
-                now_ms
+                now_ms,
+                new.priority.weight()
             ],
         )?;
         let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
@@ -188,7 +170,8 @@ impl Store {
     }
 
     /// Commits a generation with everything that belongs to it;
-    /// [`StoreError::Ended`] if the experiment is not running any more.
+    /// [`StoreError::Ended`] if the experiment has ended. One that was paused after
+    /// its generation had been judged keeps the generation, and stays paused.
     pub fn commit_generation(
         &mut self,
         id: ExperimentId,
@@ -201,7 +184,7 @@ impl Store {
             [id.0],
             |row| row.get(0),
         )?;
-        if state != ExperimentState::Running.name() {
+        if !ExperimentState::from_name(&state).is_some_and(ExperimentState::is_unfinished) {
             return Err(StoreError::Ended(id));
         }
         let generation = commit.generation;
@@ -222,6 +205,7 @@ impl Store {
                 generation.idle_share
             ],
         )?;
+        failpoint::reached("history written");
         transaction.execute(
             "UPDATE checkpoints SET state = ?2 WHERE experiment_id = ?1",
             params![id.0, commit.checkpoint],
@@ -243,14 +227,16 @@ impl Store {
             params![id.0, now_ms, generation.generation],
         )?;
         if let Some(reason) = commit.completed {
-            end(&transaction, id, now_ms, ExperimentState::Completed, reason)?;
+            set_state(&transaction, id, now_ms, ExperimentState::Completed, reason)?;
         }
+        failpoint::reached("commit prepared");
         transaction.commit()?;
         Ok(())
     }
 
-    /// Ends a running experiment; one that has ended stays as it is.
-    pub fn end(
+    /// Changes the state of an unfinished experiment; one that has ended, or is in
+    /// that state already, stays as it is.
+    pub fn set_state(
         &mut self,
         id: ExperimentId,
         now_ms: u64,
@@ -258,7 +244,26 @@ impl Store {
         reason: &str,
     ) -> Result<()> {
         let transaction = self.connection.transaction()?;
-        end(&transaction, id, now_ms, state, reason)?;
+        set_state(&transaction, id, now_ms, state, reason)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Changes the priority of an unfinished experiment; one that has ended stays
+    /// as it is.
+    pub fn set_priority(&mut self, id: ExperimentId, priority: Priority) -> Result<()> {
+        self.connection.execute(
+            "UPDATE experiments SET priority = ?2
+             WHERE id = ?1 AND state IN ('running', 'paused')",
+            params![id.0, priority.weight()],
+        )?;
+        Ok(())
+    }
+
+    /// Adds a line to an experiment's events.
+    pub fn notice(&mut self, id: ExperimentId, now_ms: u64, text: &str) -> Result<()> {
+        let transaction = self.connection.transaction()?;
+        add_notice(&transaction, id, now_ms, text)?;
         transaction.commit()?;
         Ok(())
     }
@@ -310,46 +315,14 @@ impl Store {
     pub fn champion(&self, id: ExperimentId) -> Result<Option<Champion>> {
         champions::get(&self.connection, id)
     }
-
-    /// At most `limit` events from `from_sequence` on.
-    pub fn events(&self, id: ExperimentId, from_sequence: u64, limit: u32) -> Result<Vec<Event>> {
-        let mut statement = self.connection.prepare_cached(
-            "SELECT v.sequence, v.at_ms, v.kind, v.state, v.message,
-                    g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
-                    g.duration_ms, g.episodes, g.workers, g.idle_share
-             FROM events v
-             LEFT JOIN generations g
-                    ON g.experiment_id = v.experiment_id AND g.generation = v.generation
-             WHERE v.experiment_id = ?1 AND v.sequence >= ?2
-             ORDER BY v.sequence LIMIT ?3",
-        )?;
-        let from_sequence = i64::try_from(from_sequence).unwrap_or(i64::MAX);
-        let rows = statement.query_map(params![id.0, from_sequence, limit], |row| {
-            let (sequence, at_ms) = (row.get(0)?, row.get(1)?);
-            let message = row.get::<_, Option<String>>(4)?.unwrap_or_default();
-            let kind = match row.get::<_, String>(2)?.as_str() {
-                "generation" => read_generation(row, 5)?.map(EventKind::Generation),
-                "state" => {
-                    let state: Option<String> = row.get(3)?;
-                    state
-                        .and_then(|name| ExperimentState::from_name(&name))
-                        .map(|state| EventKind::State { state, reason: message })
-                }
-                _ => Some(EventKind::Notice(message)),
-            };
-            Ok(kind
-                .map(|kind| Event { sequence, at_ms, kind })
-                .ok_or_else(|| StoreError::Corrupt(format!("event {sequence} of {id}"))))
-        })?;
-        rows.map(|row| row?).collect()
-    }
 }
 
 const SELECT_EXPERIMENT: &str =
     "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
             e.submitted_at_ms, e.digest, c.held_out_mean, c.trial_fitness,
             g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
-            g.duration_ms, g.episodes, g.workers, g.idle_share
+            g.duration_ms, g.episodes, g.workers, g.idle_share, e.priority,
+            (SELECT max(sequence) FROM events WHERE experiment_id = e.id)
      FROM experiments e
      LEFT JOIN champions c ON c.experiment_id = e.id
      LEFT JOIN generations g ON g.experiment_id = e.id AND g.generation =
@@ -360,6 +333,9 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
     let state: String = row.get(5)?;
     let Some(state) = ExperimentState::from_name(&state) else {
         return Ok(Err(StoreError::Corrupt(format!("experiment {id} has state \"{state}\""))));
+    };
+    let Some(priority) = Priority::new(row.get(21)?) else {
+        return Ok(Err(StoreError::Corrupt(format!("experiment {id} has no valid priority"))));
     };
     let trial_fitness: Option<String> = row.get(10)?;
     let champion_fitness = match (row.get(9)?, trial_fitness) {
@@ -378,31 +354,13 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
         submitted_at_ms: row.get(7)?,
         digest: row.get(8)?,
         champion_fitness,
-        latest: read_generation(row, 11)?,
+        latest: history::read_generation(row, 11)?,
+        priority,
+        last_sequence: row.get::<_, Option<u64>>(22)?.unwrap_or_default(),
     }))
 }
 
-/// Reads the columns of `generations`, in the schema's order, from `first` on;
-/// none if an outer join found no row.
-fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Generation>> {
-    let Some(generation) = row.get(first)? else { return Ok(None) };
-    Ok(Some(Generation {
-        generation,
-        statistics: Statistics {
-            best: row.get(first + 1)?,
-            mean: row.get(first + 2)?,
-            min: row.get(first + 3)?,
-            standard_deviation: row.get(first + 4)?,
-        },
-        digest: row.get(first + 5)?,
-        duration_ms: row.get(first + 6)?,
-        episodes: row.get(first + 7)?,
-        workers: row.get(first + 8)?,
-        idle_share: row.get(first + 9)?,
-    }))
-}
-
-fn end(
+fn set_state(
     transaction: &Transaction<'_>,
     id: ExperimentId,
     now_ms: u64,
@@ -410,7 +368,8 @@ fn end(
     reason: &str,
 ) -> rusqlite::Result<()> {
     let n_changed = transaction.execute(
-        "UPDATE experiments SET state = ?2, reason = ?3 WHERE id = ?1 AND state = 'running'",
+        "UPDATE experiments SET state = ?2, reason = ?3
+         WHERE id = ?1 AND state IN ('running', 'paused') AND state <> ?2",
         params![id.0, state.name(), reason],
     )?;
     if n_changed > 0 {
@@ -448,6 +407,15 @@ fn add_notice(
         params![id.0, now_ms, text],
     )?;
     Ok(())
+}
+
+/// For tests that make the database fail.
+#[cfg(test)]
+impl Store {
+    /// The connection.
+    pub fn connection(&self) -> &Connection {
+        &self.connection
+    }
 }
 
 #[cfg(test)]

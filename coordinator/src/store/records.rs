@@ -5,6 +5,7 @@ use sim_core::config::ExperimentConfig;
 use crate::{
     evolution::{Digest, Statistics},
     ids::ExperimentId,
+    priority::Priority,
 };
 
 /// Where an experiment stands.
@@ -12,6 +13,8 @@ use crate::{
 pub enum ExperimentState {
     /// Computing, or waiting for workers.
     Running,
+    /// Given no workers until it is resumed.
+    Paused,
     /// All generations done, or the target fitness reached.
     Completed,
     /// Given up.
@@ -21,10 +24,16 @@ pub enum ExperimentState {
 }
 
 impl ExperimentState {
+    /// Whether it may still go on.
+    pub fn is_unfinished(self) -> bool {
+        matches!(self, Self::Running | Self::Paused)
+    }
+
     /// Its name in the database.
     pub fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
+            Self::Paused => "paused",
             Self::Completed => "completed",
             Self::Failed => "failed",
             Self::Cancelled => "cancelled",
@@ -33,7 +42,7 @@ impl ExperimentState {
 
     /// The state of that name.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Running, Self::Completed, Self::Failed, Self::Cancelled]
+        [Self::Running, Self::Paused, Self::Completed, Self::Failed, Self::Cancelled]
             .into_iter()
             .find(|state| state.name() == name)
     }
@@ -52,6 +61,8 @@ pub struct NewExperiment {
     pub genotype_len: usize,
     /// Evolution before its first generation, as JSON.
     pub checkpoint: String,
+    /// Its share of the fleet.
+    pub priority: Priority,
 }
 
 /// An experiment as it stands.
@@ -69,7 +80,7 @@ pub struct Experiment {
     pub genotype_len: u64,
     /// Where it stands.
     pub state: ExperimentState,
-    /// Why it ended, if not by completing its generations.
+    /// Why it ended, if not by completing its generations, or why it is paused.
     pub reason: String,
     /// Milliseconds since 1970 UTC.
     pub submitted_at_ms: u64,
@@ -81,6 +92,10 @@ pub struct Experiment {
     /// Fitness of the champion so far: on held-out trials, or, before the first
     /// re-evaluation, on those for which it was chosen.
     pub champion_fitness: Option<f64>,
+    /// Its share of the fleet.
+    pub priority: Priority,
+    /// Sequence number of its latest event.
+    pub last_sequence: u64,
 }
 
 /// A completed generation.

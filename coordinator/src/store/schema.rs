@@ -6,7 +6,8 @@ use super::StoreError;
 
 /// Statements that lead from version i to version i + 1. Never change an entry
 /// that has been released; add one.
-const MIGRATIONS: &[&str] = &["
+const MIGRATIONS: &[&str] = &[
+    "
     CREATE TABLE experiments (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         -- The client's key against double submission.
@@ -76,28 +77,109 @@ const MIGRATIONS: &[&str] = &["
         message TEXT,
         PRIMARY KEY (experiment_id, sequence)
     ) STRICT, WITHOUT ROWID;
-"];
+",
+    // SQLite cannot change a CHECK, so the table is made anew.
+    "
+    CREATE TABLE experiments_with_priority (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        -- The client's key against double submission.
+        request_id TEXT UNIQUE,
+        name TEXT NOT NULL,
+        -- The experiment file in canonical form, seed included.
+        config TEXT NOT NULL,
+        config_digest TEXT NOT NULL,
+        -- The simulation that computes it.
+        fingerprint TEXT NOT NULL,
+        genotype_len INTEGER NOT NULL,
+        state TEXT NOT NULL
+              CHECK (state IN ('running', 'paused', 'completed', 'failed', 'cancelled')),
+        reason TEXT NOT NULL DEFAULT '',
+        submitted_at_ms INTEGER NOT NULL,
+        -- The last link of the digest chain of re-evaluations, or of generations.
+        digest TEXT NOT NULL DEFAULT '',
+        -- Weight in the sharing of the fleet.
+        priority INTEGER NOT NULL DEFAULT 100 CHECK (priority BETWEEN 1 AND 1000)
+    ) STRICT;
+    INSERT INTO experiments_with_priority
+           (id, request_id, name, config, config_digest, fingerprint, genotype_len, state,
+            reason, submitted_at_ms, digest)
+    SELECT id, request_id, name, config, config_digest, fingerprint, genotype_len, state,
+           reason, submitted_at_ms, digest
+    FROM experiments;
+    DROP TABLE experiments;
+    ALTER TABLE experiments_with_priority RENAME TO experiments;
+",
+];
 
 /// The version that this code writes.
-const VERSION: i64 = MIGRATIONS.len() as i64;
+pub const VERSION: i64 = MIGRATIONS.len() as i64;
 
-/// The version of a database; refuses a newer one than this code knows.
-pub fn check_version(connection: &Connection) -> Result<usize, StoreError> {
-    let found: i64 = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
-    match usize::try_from(found) {
-        Ok(version) if version <= MIGRATIONS.len() => Ok(version),
-        _ => Err(StoreError::Newer { found, supported: VERSION }),
-    }
+/// The version of a database; 0 if it is empty, or not one of ours.
+pub fn version(connection: &Connection) -> rusqlite::Result<i64> {
+    connection.query_row("PRAGMA user_version", [], |row| row.get(0))
 }
 
 /// Brings a database to [`VERSION`].
 pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
-    let found = check_version(connection)?;
+    let found = usize::try_from(version(connection)?).unwrap_or(usize::MAX);
+    // A table that others refer to can be replaced only while nobody checks; the
+    // pragma means nothing within a transaction.
+    connection.pragma_update(None, "foreign_keys", false)?;
     for (version, statements) in MIGRATIONS.iter().enumerate().skip(found) {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         transaction.execute_batch(statements)?;
+        let n_dangling: i64 =
+            transaction
+                .query_row("SELECT count(*) FROM pragma_foreign_key_check", [], |row| row.get(0))?;
+        if n_dangling > 0 {
+            return Err(StoreError::Corrupt(format!(
+                "{n_dangling} rows refer to experiments that do not exist"
+            )));
+        }
         transaction.pragma_update(None, "user_version", version as i64 + 1)?;
         transaction.commit()?;
     }
+    connection.pragma_update(None, "foreign_keys", true)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn experiments_of_the_first_schema_are_kept_and_may_be_paused() {
+        let mut connection = Connection::open_in_memory().unwrap();
+        connection.execute_batch(MIGRATIONS[0]).unwrap();
+        connection
+            .execute_batch(
+                "INSERT INTO experiments (id, request_id, name, config, config_digest, fingerprint,
+                                          genotype_len, state, reason, submitted_at_ms, digest)
+                 VALUES (3, 'key', 'n', '{}', 'd', 'f', 5, 'failed', 'why', 7, 'link');
+                 INSERT INTO checkpoints VALUES (3, 'checkpoint');
+                 PRAGMA user_version = 1;",
+            )
+            .unwrap();
+        migrate(&mut connection).unwrap();
+        assert_eq!(version(&connection).unwrap(), VERSION);
+        let row =
+            "SELECT id || request_id || state || reason || digest || priority FROM experiments";
+        let text =
+            |sql: &str| connection.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap();
+        assert_eq!(text(row), "3keyfailedwhylink100");
+        assert_eq!(text("SELECT state FROM checkpoints WHERE experiment_id = 3"), "checkpoint");
+        connection.execute("UPDATE experiments SET state = 'paused'", []).unwrap();
+        connection
+            .execute("UPDATE checkpoints SET experiment_id = 9", [])
+            .expect_err("references are checked again");
+        connection
+            .execute(
+                "INSERT INTO experiments SELECT NULL, NULL, name, config, config_digest,
+                      fingerprint, genotype_len, state, reason, submitted_at_ms, digest, priority
+                      FROM experiments",
+                [],
+            )
+            .unwrap();
+        assert_eq!(connection.last_insert_rowid(), 4, "ids are not reused");
+    }
 }

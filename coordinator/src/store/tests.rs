@@ -173,11 +173,31 @@ fn events_tell_the_whole_story_in_order_and_from_any_number() {
 }
 
 #[test]
+fn history_is_read_in_parts_and_says_when_generations_were_completed() {
+    let (_directory, mut store) = open();
+    let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
+    assert_eq!(store.generations(ids[0], 0, 100).unwrap(), []);
+    for number in 0..4 {
+        commit(&mut store, ids[0], number, None).unwrap();
+    }
+    commit(&mut store, ids[1], 0, None).unwrap();
+    let completed = |numbers: std::ops::Range<u64>| -> Vec<_> {
+        numbers.map(|number| (1000 + number, generation(number))).collect()
+    };
+    assert_eq!(store.generations(ids[0], 0, 100).unwrap(), completed(0..4));
+    assert_eq!(store.generations(ids[0], 1, 2).unwrap(), completed(1..3));
+    assert_eq!(store.generations(ids[0], 4, 100).unwrap(), []);
+    assert_eq!(store.generations(ids[0], u64::MAX, 100).unwrap(), []);
+    let last_sequence = store.events(ids[0], 1, 100).unwrap().last().unwrap().sequence;
+    assert_eq!(store.experiment(ids[0]).unwrap().unwrap().last_sequence, last_sequence);
+}
+
+#[test]
 fn an_ended_experiment_takes_no_more_generations_and_ends_once() {
     let (_directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
-    store.end(id, 6, ExperimentState::Cancelled, "enough").unwrap();
-    store.end(id, 7, ExperimentState::Failed, "too late").unwrap();
+    store.set_state(id, 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.set_state(id, 7, ExperimentState::Failed, "too late").unwrap();
     assert!(
         matches!(commit(&mut store, id, 0, None), Err(StoreError::Ended(ended)) if ended == id)
     );
@@ -192,7 +212,7 @@ fn a_completed_experiment_can_be_given_more_generations_and_others_cannot() {
     let (_directory, mut store) = open();
     let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
     commit(&mut store, ids[0], 0, Some("")).unwrap();
-    store.end(ids[1], 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.set_state(ids[1], 6, ExperimentState::Cancelled, "enough").unwrap();
     let states = ids.map(|id| {
         store.reopen(id, "longer", 7).unwrap();
         store.experiment(id).unwrap().unwrap()
@@ -222,4 +242,74 @@ fn unknown_experiments_are_none() {
     for id in [0, 1, u64::MAX] {
         assert!(store.experiment(ExperimentId(id)).unwrap().is_none());
     }
+}
+
+#[test]
+fn a_wall_clock_that_jumps_changes_no_order() {
+    let (directory, mut store) = open();
+    let far_future = 1 << 50;
+    let (first, _) = store.create(&new_experiment(None), far_future).unwrap();
+    commit(&mut store, first, 0, None).unwrap(); // At 1 s after 1970.
+    let (second, _) = store.create(&new_experiment(None), 0).unwrap();
+    store.set_state(first, far_future + 1, ExperimentState::Cancelled, "enough").unwrap();
+    drop(store);
+
+    let store = Store::open(directory.path()).unwrap();
+    let ids: Vec<ExperimentId> = store.experiments().unwrap().iter().map(|e| e.id).collect();
+    assert_eq!(ids, [first, second], "by id, not by time of submission");
+    let events = store.events(first, 1, 100).unwrap();
+    let times: Vec<u64> = events.iter().map(|event| event.at_ms).collect();
+    assert_eq!(times, [far_future, 1000, 1000, far_future + 1]);
+    let sequences: Vec<u64> = events.iter().map(|event| event.sequence).collect();
+    assert_eq!(sequences, [1, 2, 3, 4]);
+}
+
+#[test]
+fn a_coordinator_killed_while_it_creates_the_database_creates_it_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let unfinished = directory.path().join("swarmevo.sqlite3.new");
+    fs::write(&unfinished, "half a datab").unwrap();
+    let mut store = Store::open(directory.path()).unwrap();
+    store.create(&new_experiment(None), 5).unwrap();
+    assert!(!unfinished.exists());
+}
+
+#[test]
+fn a_pause_is_kept_with_its_reason_and_takes_a_judged_generation() {
+    let (directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    store.set_state(id, 6, ExperimentState::Paused, "for lunch").unwrap();
+    store.set_state(id, 7, ExperimentState::Paused, "again").unwrap();
+    commit(&mut store, id, 0, None).unwrap();
+    drop(store);
+
+    let mut store = Store::open(directory.path()).unwrap();
+    let state = |store: &Store| {
+        let experiment = store.experiment(id).unwrap().unwrap();
+        (experiment.state, experiment.reason)
+    };
+    assert_eq!(state(&store), (ExperimentState::Paused, "for lunch".to_owned()));
+    store.set_state(id, 8, ExperimentState::Running, "").unwrap();
+    assert_eq!(state(&store), (ExperimentState::Running, String::new()));
+    let events = store.events(id, 1, 100).unwrap();
+    let states = events.iter().filter_map(|event| match &event.kind {
+        EventKind::State { state, .. } => Some(*state),
+        _ => None,
+    });
+    let expected = [ExperimentState::Running, ExperimentState::Paused, ExperimentState::Running];
+    assert_eq!(states.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn a_priority_can_be_changed_until_the_end() {
+    let (_directory, mut store) = open();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    let priority = |store: &Store| store.experiment(id).unwrap().unwrap().priority;
+    assert_eq!(priority(&store), Priority::default());
+    let high = Priority::new(1000).unwrap();
+    store.set_priority(id, high).unwrap();
+    assert_eq!(priority(&store), high);
+    store.set_state(id, 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.set_priority(id, Priority::default()).unwrap();
+    assert_eq!(priority(&store), high);
 }

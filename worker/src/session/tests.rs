@@ -151,14 +151,11 @@ fn serve(listener: TcpListener) -> mpsc::Receiver<Conversation> {
 
 /// Fitness that depends on everything that an item says.
 fn arithmetic(config_json: String) -> Evaluator {
-    Arc::new(move |item| {
+    Arc::new(move |item, _| {
         let factor: f64 = config_json.parse().map_err(|_| format!("`{config_json}`?"))?;
         let sum: f64 = item.genotype.iter().sum();
-        Ok(item
-            .trials
-            .clone()
-            .map(|t| factor * sum / (item.generation + u64::from(t)) as f64)
-            .collect())
+        let fitness = |trial| factor * sum / (item.generation + u64::from(trial)) as f64;
+        Ok(Some(item.trials.clone().map(fitness).collect()))
     })
 }
 
@@ -183,6 +180,8 @@ async fn a_worker_introduces_itself() {
     assert_eq!(hello.protocol_version, swarm_proto::PROTOCOL_VERSION);
     assert_eq!(hello.sim_core_fingerprint, sim_core::FINGERPRINT);
     assert_eq!((hello.name.as_str(), hello.slots), ("ada", 3));
+    assert_eq!(hello.version, env!("CARGO_PKG_VERSION"));
+    assert_ne!(hello.process_id, 0);
     stage.end().await;
 }
 
@@ -206,7 +205,10 @@ async fn results_are_what_was_computed_to_the_bit() {
 #[tokio::test]
 async fn an_item_that_cannot_be_computed_fails_alone() {
     fn panics_on_item_1(_: String) -> Evaluator {
-        Arc::new(|item| if item.id == 1 { panic!("division by swarm") } else { Ok(vec![1.0]) })
+        Arc::new(|item, _| match item.id {
+            1 => panic!("division by swarm"),
+            _ => Ok(Some(vec![1.0])),
+        })
     }
     let mut stage = Stage::new(1, panics_on_item_1).await;
     let mut coordinator = stage.conversation().await;
@@ -253,15 +255,47 @@ async fn an_ended_experiment_is_forgotten() {
 }
 
 #[tokio::test]
+async fn dropped_items_are_not_computed() {
+    static GATE: Gate = Gate::new();
+    fn gated(_: String) -> Evaluator {
+        Arc::new(|item, _| {
+            GATE.pass(item.id);
+            Ok(Some(vec![item.id as f64]))
+        })
+    }
+    let (mut starts, permit) = GATE.open();
+    let mut stage = Stage::new(1, gated).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_items(1, 1..=4).await;
+    assert_eq!(starts.recv().await, Some(1));
+    coordinator.send(Message::DropItems(v1::DropItems { item_ids: vec![2, 4, 99] })).await;
+    // Answered at once, so that what was sent before has been read.
+    coordinator.send_items(9, [5]).await;
+    assert_eq!(coordinator.results(1).await[0].item_id, 5);
+    permit.send(()).unwrap();
+    permit.send(()).unwrap();
+    let computed = coordinator.results(2).await;
+    assert_eq!(computed.iter().map(|result| result.item_id).collect::<Vec<_>>(), [1, 3]);
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
 async fn a_broken_stream_is_opened_again() {
     let mut stage = Stage::new(1, arithmetic).await;
+    let mut process_ids = BTreeSet::new();
     for _ in 0..3 {
         let mut coordinator = stage.conversation().await;
-        assert_eq!(coordinator.welcome(LONG).await.name, "ada");
+        let hello = coordinator.welcome(LONG).await;
+        assert_eq!(hello.name, "ada");
+        process_ids.insert(hello.process_id);
         coordinator.send_spec(1, "1").await;
         coordinator.send_items(1, [1]).await;
         coordinator.results(1).await;
     }
+    assert_eq!(process_ids.len(), 1, "it is recognised");
     stage.end().await;
 }
 
@@ -320,9 +354,9 @@ impl Gate {
 async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() {
     static GATE: Gate = Gate::new();
     fn gated(_: String) -> Evaluator {
-        Arc::new(|item| {
+        Arc::new(|item, _| {
             GATE.pass(item.id);
-            Ok(vec![item.id as f64])
+            Ok(Some(vec![item.id as f64]))
         })
     }
     let (mut starts, permit) = GATE.open();
@@ -347,9 +381,9 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
 async fn hearts_beat_while_all_slots_compute() {
     static GATE: Gate = Gate::new();
     fn gated(_: String) -> Evaluator {
-        Arc::new(|item| {
+        Arc::new(|item, _| {
             GATE.pass(item.id);
-            Ok(vec![])
+            Ok(Some(vec![]))
         })
     }
     let (mut starts, permit) = GATE.open();
@@ -371,9 +405,9 @@ async fn hearts_beat_while_all_slots_compute() {
 async fn more_items_than_the_credit_allows_are_failed() {
     static GATE: Gate = Gate::new();
     fn gated(_: String) -> Evaluator {
-        Arc::new(|item| {
+        Arc::new(|item, _| {
             GATE.pass(item.id);
-            Ok(vec![])
+            Ok(Some(vec![]))
         })
     }
     let (mut starts, permit) = GATE.open();
@@ -383,12 +417,13 @@ async fn more_items_than_the_credit_allows_are_failed() {
     coordinator.send_spec(1, "").await;
     coordinator.send_items(1, [1]).await;
     assert_eq!(starts.recv().await, Some(1));
-    coordinator.send_items(1, 2..=5).await;
+    let n_queued = swarm_proto::ITEMS_PER_SLOT_MAX as u64;
+    coordinator.send_items(1, 2..n_queued + 4).await;
     let results = coordinator.results(2).await;
     assert!(results.iter().all(|result| failure(result).contains("queued")));
     let failed: BTreeSet<u64> = results.iter().map(|result| result.item_id).collect();
-    assert_eq!(failed, BTreeSet::from([4, 5]));
-    for _ in 0..3 {
+    assert_eq!(failed, BTreeSet::from([n_queued + 2, n_queued + 3]));
+    for _ in 0..=n_queued {
         permit.send(()).unwrap();
     }
     drop(coordinator);

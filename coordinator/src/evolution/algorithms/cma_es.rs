@@ -69,7 +69,7 @@ impl Strategy for CmaEs {
             .iter()
             .map(|y| self.mean.iter().zip(y).map(|(mean, y)| mirror(mean + sigma * y)).collect())
             .collect();
-        Sample { genotypes, normals, steps }
+        Sample { steps, ..Sample::new(genotypes, normals) }
     }
 
     /// Eq. 41 to 47.
@@ -117,7 +117,7 @@ impl CmaEs {
         let inverse = deviations.map(|deviation| 1.0 / deviation);
         let whiten = |y: &Vec<f64>| eigen.apply(&inverse, &DVector::from_column_slice(y));
         let normals = steps.iter().map(|y| whiten(y).as_slice().to_vec()).collect();
-        Sample { genotypes: Vec::new(), normals, steps }
+        Sample { steps, ..Sample::new(Vec::new(), normals) }
     }
 }
 

@@ -10,13 +10,15 @@ mod sep_cma_es;
 mod snes;
 mod xnes;
 
+use std::iter;
+
 use serde::{Deserialize, Serialize};
 use sim_core::{
     config::{AlgorithmName, AlgorithmParams},
     random::Stream,
 };
 
-use super::Genotype;
+use super::{Genotype, Population};
 use cma_es::CmaEs;
 use ga::Ga;
 use openai_es::OpenAiEs;
@@ -33,7 +35,7 @@ pub const FULL_MATRIX_GENES_MAX: usize = 1000;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Genes of each individual, within \[0, 1\].
-    pub genotypes: Vec<Genotype>,
+    pub genotypes: Population,
     /// The standard normal draws behind each individual, for algorithms that
     /// learn from those; else empty.
     pub normals: Vec<Vec<f64>>,
@@ -45,7 +47,7 @@ pub struct Sample {
 impl Sample {
     /// Individuals and the normals behind them.
     pub fn new(genotypes: Vec<Genotype>, normals: Vec<Vec<f64>>) -> Self {
-        Self { genotypes, normals, steps: Vec::new() }
+        Self { genotypes: genotypes.into(), normals, steps: Vec::new() }
     }
 }
 
@@ -188,7 +190,12 @@ impl Strategy for Algorithm {
 
 /// `n` vectors of `d` independent standard normals, in this order.
 fn draw_normals(n: usize, d: usize, rng: &mut Stream) -> Vec<Vec<f64>> {
-    (0..n).map(|_| (0..d).map(|_| rng.normal()).collect()).collect()
+    let vector = || {
+        let mut vector = vec![0.0; d];
+        rng.fill_normal(&mut vector);
+        vector
+    };
+    iter::repeat_with(vector).take(n).collect()
 }
 
 /// `x` in \[0, 1\], by reflection at both ends.

@@ -130,7 +130,7 @@ fn every_generation_has_all_its_individuals_and_new_ones() {
     for variant in all() {
         for population_size in [4, 11] {
             let mut evolution = start(&variant, &[5], population_size);
-            let mut previous = Vec::new();
+            let mut previous = Population::default();
             for _ in 0..4 {
                 let asked = evolution.ask();
                 assert_eq!(asked.genotypes.len(), population_size);

@@ -6,7 +6,7 @@ use sim_core::{
 };
 
 use super::*;
-use crate::evolution::ranking::ranking;
+use crate::evolution::{Population, ranking::ranking};
 
 const PARAMS: GaParams = GaParams {
     selection_operator: SelectionOperator::Tournament,
@@ -26,7 +26,7 @@ fn rng(generation: u64) -> Stream {
 }
 
 /// A generation of `n` whose fitness is that of its index, and the next one.
-fn two_generations(params: &GaParams, n: usize) -> (Vec<Genotype>, Vec<Genotype>) {
+fn two_generations(params: &GaParams, n: usize) -> (Population, Population) {
     let mut ga = Ga::new(params, 4, n).unwrap();
     let first = ga.sample(n, &mut rng(0));
     let fitness: Vec<f64> = (0..n).map(|i| i as f64).collect();

@@ -1,0 +1,183 @@
+//! `swarmctl bench`: how fast this machine simulates, and how long an experiment
+//! will take, for whoever wants to size a fleet.
+
+use std::{
+    path::Path,
+    thread,
+    time::{Duration, Instant},
+};
+
+use serde::Serialize;
+use sim_core::{
+    Experiment, Isa,
+    config::ExperimentConfig,
+    random::{Purpose, Stream},
+};
+
+use crate::{
+    args::BenchArgs,
+    clock,
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides},
+    json,
+    progress::Progress,
+};
+
+/// The experiment to simulate if none is named.
+const DEFAULT: &str = include_str!("../../../configs/leader_selection_snes.json");
+
+/// Simulates for some seconds on every core, and prints how fast that was.
+pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
+    let isa = args.isa.get();
+    let (config, experiment) = experiment(args.config.as_deref())?;
+    let experiment = experiment.with_isa(isa);
+    let n_cores = match args.cores {
+        Some(n) => n.into(),
+        None => thread::available_parallelism().map_or(1, usize::from),
+    };
+    let duration = Duration::from_secs(args.seconds.into());
+    let n_trials = config.algorithm.num_evaluations;
+    let speed = thread::scope(|scope| {
+        let simulate = |core| {
+            let experiment = &experiment;
+            move || Speed::of_core(experiment, n_trials, core, duration)
+        };
+        let cores: Vec<_> = (0..n_cores as u64).map(|core| scope.spawn(simulate(core))).collect();
+        let speeds = cores.into_iter().map(|core| core.join().expect("simulation does not panic"));
+        speeds.fold(Speed::default(), Speed::and)
+    });
+    let report = Report::new(&config, isa, n_cores, &speed);
+    progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
+}
+
+fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Experiment), Error> {
+    if let Some(path) = path {
+        let compiled = ExperimentFile::read(path)
+            .and_then(|file| file.compile(&Overrides::default()))
+            .map_err(|error| Error::invalid(path, &error))?;
+        return Ok((compiled.config, compiled.experiment));
+    }
+    let (config, _warnings) =
+        ExperimentConfig::from_json(DEFAULT, "default").expect("a shipped file is right");
+    let experiment = Experiment::compile(&config).expect("a shipped file is right");
+    Ok((config, experiment))
+}
+
+/// What some cores have done.
+#[derive(Debug, Default, Clone, Copy)]
+struct Speed {
+    n_genotypes: u64,
+    /// Time of all cores together.
+    time: Duration,
+}
+
+impl Speed {
+    /// Evaluates one genotype after the other, for `duration` at least.
+    fn of_core(experiment: &Experiment, n_trials: u32, core: u64, duration: Duration) -> Self {
+        let mut genes = Stream::new(0, 0, 0, Purpose::Evolution, core);
+        let start: Instant = clock::now();
+        let mut n_genotypes = 0;
+        while start.elapsed() < duration {
+            let genotype: Vec<f64> =
+                (0..experiment.genotype_len()).map(|_| genes.uniform()).collect();
+            // Worlds that cannot be set up cost a worker no time worth measuring.
+            let _ = experiment.evaluate(&genotype, n_genotypes, 0..n_trials);
+            n_genotypes += 1;
+        }
+        Self { n_genotypes, time: start.elapsed() }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self { n_genotypes: self.n_genotypes + other.n_genotypes, time: self.time + other.time }
+    }
+}
+
+/// What was measured, and what follows for the experiment.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    experiment: &'a str,
+    isa: &'static str,
+    cores: usize,
+    robot_steps_per_second_per_core: f64,
+    us_per_robot_step: f64,
+    episodes_per_second_per_core: f64,
+    /// Of the whole experiment, without the re-evaluations of champions.
+    robot_steps: f64,
+    core_minutes: f64,
+    minutes: f64,
+}
+
+impl<'a> Report<'a> {
+    fn new(config: &'a ExperimentConfig, isa: Isa, cores: usize, speed: &Speed) -> Self {
+        let algorithm = &config.algorithm;
+        let n_robots: u32 = config.robots().map(|(_, robot)| robot.num_instances).sum();
+        let episodes = speed.n_genotypes as f64 * f64::from(algorithm.num_evaluations);
+        let episode = f64::from(n_robots) * f64::from(algorithm.evaluation_steps);
+        let episodes_per_second_per_core = episodes / speed.time.as_secs_f64();
+        let robot_steps_per_second_per_core = episodes_per_second_per_core * episode;
+        let robot_steps = episode
+            * f64::from(algorithm.num_evaluations)
+            * f64::from(algorithm.population_size)
+            * algorithm.generations as f64;
+        let core_minutes = robot_steps / robot_steps_per_second_per_core / 60.0;
+        Self {
+            experiment: &config.name,
+            isa: isa.name(),
+            cores,
+            robot_steps_per_second_per_core,
+            us_per_robot_step: 1e6 / robot_steps_per_second_per_core,
+            episodes_per_second_per_core,
+            robot_steps,
+            core_minutes,
+            minutes: core_minutes / cores as f64,
+        }
+    }
+
+    fn to_text(&self) -> String {
+        let minutes = |minutes: f64| clock::duration(Duration::from_secs_f64(60.0 * minutes));
+        format!(
+            "{}, {} on {} {}\n  \
+             speed of a core   {:.2} million robot-steps/s ({:.3} us each), {:.0} episodes/s\n  \
+             whole experiment  {:.2} billion robot-steps\n  \
+             on this machine   {}\n  \
+             on 16, 64 cores   {}, {}",
+            self.experiment,
+            self.isa,
+            self.cores,
+            if self.cores == 1 { "core" } else { "cores" },
+            self.robot_steps_per_second_per_core / 1e6,
+            self.us_per_robot_step,
+            self.episodes_per_second_per_core,
+            self.robot_steps / 1e9,
+            minutes(self.minutes),
+            minutes(self.core_minutes / 16.0),
+            minutes(self.core_minutes / 64.0),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_experiment_takes_its_robot_steps_at_the_speed_of_its_cores() {
+        let (config, _) = experiment(None).unwrap();
+        let speed = Speed { n_genotypes: 100, time: Duration::from_secs(2) };
+        let report = Report::new(&config, Isa::best(), 2, &speed);
+        // 100 genotypes x 5 trials x 300 steps x 10 robots in 2 s.
+        assert_eq!(report.episodes_per_second_per_core, 250.0);
+        assert_eq!(report.robot_steps_per_second_per_core, 750_000.0);
+        assert_eq!(report.robot_steps, 1.5e9);
+        assert!((report.core_minutes - 2000.0 / 60.0).abs() < 1e-9);
+        assert!((report.minutes - 1000.0 / 60.0).abs() < 1e-9);
+        assert!(report.to_text().contains("16 min 40 s"), "{}", report.to_text());
+    }
+
+    #[test]
+    fn a_core_simulates_until_its_time_is_over() {
+        let (_, experiment) = experiment(None).unwrap();
+        let speed = Speed::of_core(&experiment, 1, 0, Duration::from_millis(1));
+        assert!(speed.n_genotypes >= 1 && speed.time >= Duration::from_millis(1));
+    }
+}

@@ -1,0 +1,94 @@
+//! `swarmctl explain`: why nothing happens, and what to do about it.
+
+mod finding;
+
+use serde::Serialize;
+use swarm_proto::v1::{Event, ExplainExperimentResponse, HeldItems, Round, event::Kind};
+
+use crate::{
+    clock,
+    connection::{Connection, present},
+    error::Error,
+    json,
+    progress::Progress,
+    text,
+};
+
+use self::finding::Finding;
+
+/// Workers that are listed: all fits one screen.
+const WORKERS_MAX: usize = 8;
+
+#[derive(Debug, Serialize)]
+struct Explanation<'a> {
+    experiment: json::ExperimentDocument<'a>,
+    findings: &'a [Finding],
+}
+
+/// Prints what the experiment does or waits for.
+pub async fn explain(
+    connection: &Connection,
+    experiment_id: u64,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let answer = connection.explain(experiment_id).await?;
+    let experiment = present(answer.experiment.clone())?;
+    let findings = finding::findings(&experiment, &answer, connection.address());
+    progress.print(&if progress.is_json() {
+        json::document(&Explanation { experiment: (&experiment).into(), findings: &findings })
+    } else {
+        let mut sections = vec![text::standing(&experiment)];
+        sections.extend(findings.iter().map(Finding::to_string));
+        sections.extend(answer.round.as_ref().map(round));
+        sections.extend(notices(&answer));
+        sections.join("\n\n")
+    })
+}
+
+/// "generation 12", or what else is being judged.
+fn name(round: &Round) -> String {
+    if round.held_out {
+        format!("the re-evaluation of the champion after generation {}", round.generation)
+    } else {
+        format!("generation {}", round.generation)
+    }
+}
+
+fn round(round: &Round) -> String {
+    let mut lines = vec![format!(
+        "{}: {} of {} episodes done in {}; {} without a worker",
+        name(round),
+        round.episodes - round.episodes_left.min(round.episodes),
+        round.episodes,
+        clock::duration_ms(round.running_ms),
+        text::counted(round.items_queued.into(), "item"),
+    )];
+    let mut held: Vec<&HeldItems> = round.held.iter().collect();
+    held.sort_by_key(|held| (u64::MAX - held.held_ms, held.worker_id));
+    for held in held.iter().take(WORKERS_MAX) {
+        lines.push(format!(
+            "  {} on {} for {}, last seen {} ago",
+            text::counted(held.items.into(), "item"),
+            held.worker_name,
+            clock::duration_ms(held.held_ms),
+            clock::duration_ms(held.silent_ms),
+        ));
+    }
+    if let Some(rest @ [_, ..]) = held.get(WORKERS_MAX..) {
+        let n_items = rest.iter().map(|held| u64::from(held.items)).sum();
+        let workers = text::counted(rest.len() as u64, "more worker");
+        lines.push(format!("  {} on {workers}", text::counted(n_items, "item")));
+    }
+    lines.join("\n")
+}
+
+fn notices(answer: &ExplainExperimentResponse) -> Option<String> {
+    let line = |event: &Event| match &event.kind {
+        Some(Kind::Notice(notice)) => {
+            Some(format!("  {}  {}", clock::utc(event.at_ms), notice.message))
+        }
+        _ => None,
+    };
+    let lines: Vec<String> = answer.notices.iter().filter_map(line).collect();
+    (!lines.is_empty()).then(|| format!("recent notices:\n{}", lines.join("\n")))
+}

@@ -1,0 +1,266 @@
+//! What there is to say about an experiment's progress, and the next steps.
+
+use std::fmt;
+
+use serde::Serialize;
+use swarm_proto::v1::{Experiment, ExperimentState, ExplainExperimentResponse, Round};
+
+use crate::{clock, text};
+
+/// Items that a worker has for so long deserve a look at it.
+const LONG_MS: u64 = 60_000;
+
+/// Something that explains what happens or does not.
+#[derive(Debug, PartialEq, Serialize)]
+pub struct Finding {
+    kind: Kind,
+    what: String,
+    /// What to do about it; empty if nothing.
+    next_steps: Vec<String>,
+}
+
+/// What it is about, for programs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Ended,
+    Paused,
+    Incompatible,
+    StoreTrouble,
+    NoWorkers,
+    NoWorkersAvailable,
+    IndividualsFailing,
+    Queued,
+    Barrier,
+    Computing,
+    BetweenGenerations,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.what)?;
+        self.next_steps.iter().try_for_each(|step| write!(f, "\n  -> {step}"))
+    }
+}
+
+/// All that explains an experiment's progress, the most decisive first.
+pub fn findings(
+    experiment: &Experiment,
+    answer: &ExplainExperimentResponse,
+    address: &str,
+) -> Vec<Finding> {
+    let id = experiment.id;
+    match experiment.state() {
+        ExperimentState::Completed => {
+            let steps = [format!("its best: swarmctl champion {id}"), history(id)];
+            return vec![finding(Kind::Ended, "it has completed", steps)];
+        }
+        ExperimentState::Failed | ExperimentState::Cancelled => {
+            let steps = [format!("what happened: swarmctl logs {id}"), history(id)];
+            return vec![finding(Kind::Ended, "it has ended early, for the reason above", steps)];
+        }
+        ExperimentState::Paused => {
+            let steps = [format!("let it go on: swarmctl resume {id}")];
+            return vec![finding(Kind::Paused, "it is paused, for the reason above", steps)];
+        }
+        ExperimentState::Running | ExperimentState::Unspecified => {}
+    }
+    if !answer.incompatible.is_empty() {
+        let what = format!("another version has to compute it: {}", answer.incompatible);
+        let steps = [
+            "finish it with a coordinator of that version".to_owned(),
+            format!("or give it up and submit it again: swarmctl cancel {id}"),
+        ];
+        return vec![finding(Kind::Incompatible, what, steps)];
+    }
+    let mut findings = Vec::new();
+    if !answer.store_trouble.is_empty() {
+        let what = format!("the coordinator cannot store anything: {}", answer.store_trouble);
+        let steps = ["make room on its disk; it tries again by itself".to_owned()];
+        findings.push(finding(Kind::StoreTrouble, what, steps));
+    }
+    findings.extend(of_workers(answer, address));
+    match &answer.round {
+        Some(round) => findings.extend(of_round(id, round, answer)),
+        None => {
+            let what = "between generations: what was judged is being learnt from and stored";
+            findings.push(finding(Kind::BetweenGenerations, what, []));
+        }
+    }
+    findings
+}
+
+fn of_workers(answer: &ExplainExperimentResponse, address: &str) -> Option<Finding> {
+    let start = format!("start some: worker --coordinator {address}");
+    if answer.workers == 0 {
+        return Some(finding(Kind::NoWorkers, "no worker is connected", [start]));
+    }
+    if answer.workers_available == 0 {
+        let workers = text::counted(answer.workers.into(), "connected worker");
+        let what = format!("none of {workers} is given work: all are leaving or distrusted");
+        let steps = ["see which: swarmctl workers --output wide".to_owned(), start];
+        return Some(finding(Kind::NoWorkersAvailable, what, steps));
+    }
+    None
+}
+
+fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if round.individuals_failing > 0 {
+        let individuals = text::counted(round.individuals_failing.into(), "individual");
+        let what = format!(
+            "{individuals} failed, or took a worker down; the third time ends the experiment"
+        );
+        let steps = [
+            "see who is there: swarmctl workers".to_owned(),
+            "see why: the coordinator's and the workers' logs".to_owned(),
+        ];
+        findings.push(finding(Kind::IndividualsFailing, what, steps));
+    }
+    let n_held: u64 = round.held.iter().map(|held| u64::from(held.items)).sum();
+    let held_for = clock::duration_ms(held_ms(round));
+    let is_served = answer.workers_available > 0;
+    if is_served && round.items_queued > 0 && !answer.rivals.is_empty() {
+        let ids: Vec<String> = answer.rivals.iter().take(10).map(u64::to_string).collect();
+        let what = format!(
+            "queued beside {} with work to hand out: {}",
+            text::counted(answer.rivals.len() as u64, "other experiment"),
+            ids.join(", ")
+        );
+        let steps = [
+            format!("raise its share: swarmctl priority {id} N"),
+            "or hold another back: swarmctl pause ID".to_owned(),
+        ];
+        findings.push(finding(Kind::Queued, what, steps));
+    } else if round.items_queued == 0 && n_held > 0 {
+        let holders = match &round.held[..] {
+            [holder] => format!("worker {}", holder.worker_name),
+            holders => text::counted(holders.len() as u64, "worker"),
+        };
+        let what = format!(
+            "at the barrier: it waits for the last {} of {}, on {holders} for {held_for}",
+            text::counted(n_held, "item"),
+            super::name(round),
+        );
+        findings.push(finding(Kind::Barrier, what, look(round)));
+    } else if n_held > 0 {
+        let what = format!(
+            "being computed: {} on {}, the oldest for {held_for}",
+            text::counted(n_held, "item"),
+            text::counted(round.held.len() as u64, "worker"),
+        );
+        findings.push(finding(Kind::Computing, what, look(round)));
+    }
+    findings
+}
+
+/// How long the oldest item has been with a worker.
+fn held_ms(round: &Round) -> u64 {
+    round.held.iter().map(|held| held.held_ms).max().unwrap_or(0)
+}
+
+/// What to do about a round that takes long.
+fn look(round: &Round) -> Vec<String> {
+    if held_ms(round) < LONG_MS {
+        return Vec::new();
+    }
+    vec![
+        "long episodes may take so long; if not, look at the machines: swarmctl workers".into(),
+        "a worker that is stopped or killed loses nothing: others get its items".into(),
+    ]
+}
+
+fn history(id: u64) -> String {
+    format!("all generations: swarmctl history {id}")
+}
+
+fn finding(
+    kind: Kind,
+    what: impl Into<String>,
+    next_steps: impl IntoIterator<Item = String>,
+) -> Finding {
+    Finding { kind, what: what.into(), next_steps: next_steps.into_iter().collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use swarm_proto::v1::HeldItems;
+
+    use super::*;
+
+    fn kinds(experiment: Experiment, answer: &ExplainExperimentResponse) -> Vec<Kind> {
+        findings(&experiment, answer, "http://h:1").iter().map(|finding| finding.kind).collect()
+    }
+
+    fn running() -> Experiment {
+        Experiment { id: 3, state: ExperimentState::Running.into(), ..Experiment::default() }
+    }
+
+    fn held(items: u32) -> HeldItems {
+        HeldItems { worker_name: "w".into(), items, ..HeldItems::default() }
+    }
+
+    /// Two workers compute, and items wait for them.
+    fn healthy() -> ExplainExperimentResponse {
+        let round = Round { items_queued: 7, held: vec![held(2), held(2)], ..Round::default() };
+        ExplainExperimentResponse {
+            round: Some(round),
+            workers: 2,
+            workers_available: 2,
+            ..ExplainExperimentResponse::default()
+        }
+    }
+
+    #[test]
+    fn an_experiment_that_is_computed_needs_nothing() {
+        let findings = findings(&running(), &healthy(), "http://h:1");
+        assert_eq!(findings.len(), 1);
+        assert_eq!(findings[0].kind, Kind::Computing);
+        assert_eq!(findings[0].next_steps, [""; 0]);
+    }
+
+    #[test]
+    fn what_has_ended_or_is_paused_waits_for_nothing_else() {
+        for (state, kind) in [
+            (ExperimentState::Completed, Kind::Ended),
+            (ExperimentState::Failed, Kind::Ended),
+            (ExperimentState::Cancelled, Kind::Ended),
+            (ExperimentState::Paused, Kind::Paused),
+        ] {
+            let experiment = Experiment { state: state.into(), ..running() };
+            assert_eq!(kinds(experiment, &ExplainExperimentResponse::default()), [kind]);
+        }
+    }
+
+    #[test]
+    fn every_obstacle_is_found() {
+        let nobody = ExplainExperimentResponse { workers: 0, workers_available: 0, ..healthy() };
+        assert_eq!(kinds(running(), &nobody)[0], Kind::NoWorkers);
+        let leaving = ExplainExperimentResponse { workers_available: 0, ..healthy() };
+        assert_eq!(kinds(running(), &leaving)[0], Kind::NoWorkersAvailable);
+        let shared = ExplainExperimentResponse { rivals: vec![4], ..healthy() };
+        assert_eq!(kinds(running(), &shared), [Kind::Queued]);
+        let full = ExplainExperimentResponse { store_trouble: "disk".into(), ..healthy() };
+        assert_eq!(kinds(running(), &full), [Kind::StoreTrouble, Kind::Computing]);
+        let other = ExplainExperimentResponse { incompatible: "older".into(), ..healthy() };
+        assert_eq!(kinds(running(), &other), [Kind::Incompatible]);
+        let between = ExplainExperimentResponse { round: None, ..healthy() };
+        assert_eq!(kinds(running(), &between), [Kind::BetweenGenerations]);
+        let round = Round { individuals_failing: 1, ..healthy().round.unwrap() };
+        let failing = ExplainExperimentResponse { round: Some(round), ..healthy() };
+        assert_eq!(kinds(running(), &failing), [Kind::IndividualsFailing, Kind::Computing]);
+    }
+
+    #[test]
+    fn the_barrier_names_who_is_waited_for_and_since_when() {
+        let held = HeldItems { held_ms: 61_000, ..held(2) };
+        let round = Round { generation: 5, held: vec![held], ..Round::default() };
+        let answer = ExplainExperimentResponse { round: Some(round), ..healthy() };
+        let findings = findings(&running(), &answer, "http://h:1");
+        assert_eq!(findings[0].kind, Kind::Barrier);
+        let text = "at the barrier: it waits for the last 2 items of generation 5, on worker w \
+                    for 1 min 1 s";
+        assert_eq!(findings[0].what, text);
+        assert_eq!(findings[0].next_steps.len(), 2);
+    }
+}

@@ -1,0 +1,80 @@
+//! `swarmctl list`: all experiments.
+
+use console::Style;
+use swarm_proto::v1::Experiment;
+
+use crate::{
+    clock,
+    connection::Connection,
+    error::Error,
+    json::{ExperimentDocument, state_name},
+    progress::Progress,
+    table::{Column, Table},
+};
+
+/// What of an experiment is a column of CSV.
+const CSV_KEYS: [&str; 12] = [
+    "id",
+    "name",
+    "state",
+    "reason",
+    "generations_done",
+    "generations",
+    "champion_fitness",
+    "seed",
+    "algorithm",
+    "priority",
+    "population_size",
+    "submitted_at_ms",
+];
+
+/// Prints a table.
+pub async fn list(connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+    let experiments = connection.experiments().await?;
+    let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
+    progress.print_table(&table(&experiments), &CSV_KEYS, &documents, "no experiments yet")
+}
+
+fn table(experiments: &[Experiment]) -> Table {
+    let mut table = Table::new([
+        Column::number("id"),
+        Column::new("state").painted(state_style),
+        Column::number("generations"),
+        Column::number("champion"),
+        Column::number("seed"),
+        Column::new("algorithm"),
+        Column::number("priority").wide(),
+        Column::number("population").wide(),
+        Column::number("genes").wide(),
+        Column::new("submitted").wide(),
+        Column::text("name"),
+        Column::text("reason").wide(),
+    ]);
+    for experiment in experiments {
+        table.push([
+            experiment.id.to_string(),
+            state_name(experiment.state()).into(),
+            format!("{}/{}", experiment.generations_done, experiment.generations),
+            experiment.champion_fitness.map_or("-".into(), |fitness| format!("{fitness:.3}")),
+            experiment.seed.to_string(),
+            experiment.algorithm.clone(),
+            experiment.priority.to_string(),
+            experiment.population_size.to_string(),
+            experiment.genotype_len.to_string(),
+            clock::utc(experiment.submitted_at_ms),
+            experiment.name.clone(),
+            experiment.reason.clone(),
+        ]);
+    }
+    table
+}
+
+/// What needs attention stands out.
+fn state_style(state: &str) -> Style {
+    match state {
+        "running" => Style::new().green(),
+        "paused" => Style::new().yellow(),
+        "failed" => Style::new().red(),
+        _ => Style::new(),
+    }
+}

@@ -1,0 +1,108 @@
+//! A coordinator and workers inside this process, talking over loopback as any
+//! fleet does.
+
+use std::{net::Ipv4Addr, path::Path};
+
+use coordinator::{Access, Coordinator, CoordinatorConfig, Tokens};
+use sim_core::Isa;
+use swarm_transport::{Credentials, Token};
+use tokio::task::JoinSet;
+use tokio_util::sync::CancellationToken;
+use worker::{WorkerConfig, WorkerError};
+
+use crate::{connection::Connection, error::Error};
+
+/// A running fleet; [`Fleet::shutdown`] ends it in order.
+pub struct Fleet {
+    coordinator: Coordinator,
+    client_token: Token,
+    workers: JoinSet<Result<(), WorkerError>>,
+    shutdown: CancellationToken,
+}
+
+impl Fleet {
+    /// Starts a coordinator on a free port and workers of one slot each. Their tokens
+    /// keep the machine's other users out.
+    pub async fn start(data_dir: &Path, n_workers: usize, isa: Isa) -> Result<Self, Error> {
+        let listen = (Ipv4Addr::LOCALHOST, 0).into();
+        let (client_token, worker_token) = (random_token(), random_token());
+        let tokens =
+            Tokens::new(client_token.clone(), worker_token.clone()).expect("random tokens differ");
+        let config = CoordinatorConfig {
+            access: Access { tokens: Some(tokens), ..Access::default() },
+            ..CoordinatorConfig::new(listen, data_dir.into())
+        };
+        let coordinator = Coordinator::start(config).await?;
+        let mut fleet = Self {
+            coordinator,
+            client_token,
+            workers: JoinSet::new(),
+            shutdown: CancellationToken::new(),
+        };
+        for i in 1..=n_workers {
+            let config = WorkerConfig {
+                credentials: credentials(&worker_token),
+                isa,
+                ..WorkerConfig::new(fleet.address(), format!("local-{i}"), 1)
+            };
+            fleet.workers.spawn(worker::run(config, fleet.shutdown.clone()));
+        }
+        Ok(fleet)
+    }
+
+    /// A client's connection to the coordinator.
+    pub fn connection(&self) -> Result<Connection, Error> {
+        Connection::new(&self.address(), &credentials(&self.client_token))
+    }
+
+    fn address(&self) -> String {
+        format!("http://{}", self.coordinator.local_addr())
+    }
+
+    /// Waits for the coordinator or a worker to end, which none should.
+    pub async fn failure(&mut self) -> Error {
+        let ended = tokio::select! {
+            error = self.coordinator.failure() => return Error::Internal(error.to_string()),
+            ended = self.workers.join_next() => ended,
+        };
+        let reason = match ended {
+            Some(Ok(Err(error))) => error.to_string(),
+            Some(Err(error)) => error.to_string(),
+            Some(Ok(Ok(()))) | None => "nobody asked it to".into(),
+        };
+        Error::Internal(format!("a worker ended: {reason}"))
+    }
+
+    /// Lets the workers finish what they are computing, then closes the store.
+    pub async fn shutdown(self) {
+        let Self { coordinator, mut workers, shutdown, .. } = self;
+        shutdown.cancel();
+        while workers.join_next().await.is_some() {}
+        coordinator.shutdown().await;
+    }
+}
+
+fn credentials(token: &Token) -> Credentials {
+    Credentials { token: Some(token.clone()), ..Credentials::default() }
+}
+
+/// 256 bits from the system's source of randomness.
+fn random_token() -> Token {
+    let [high, low]: [u128; 2] = rand::random();
+    Token::parse(&format!("{high:032x}{low:032x}")).expect("hexadecimal digits are fit for a token")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn other_users_of_the_machine_are_kept_out() {
+        let directory = tempfile::tempdir().unwrap();
+        let fleet = Fleet::start(directory.path(), 1, Isa::best()).await.unwrap();
+        let stranger = Connection::new(&fleet.address(), &Credentials::default()).unwrap();
+        assert_eq!(stranger.experiments().await.unwrap_err().exit_code(), 7);
+        assert!(fleet.connection().unwrap().experiments().await.unwrap().is_empty());
+        fleet.shutdown().await;
+    }
+}

@@ -1,0 +1,137 @@
+//! `swarmctl simulate`: single episodes, as evolution sees them.
+
+mod genotype;
+mod trace;
+
+use std::{borrow::Cow, path::Path};
+
+use serde::Serialize;
+use sim_core::{EpisodeSummary, EvaluateError, Metrics};
+
+use crate::{
+    args::SimulateArgs,
+    error::Error,
+    json,
+    progress::Progress,
+    settings::Settings,
+    table::{Column, Screen, Table},
+};
+
+use self::{genotype::Genotype, trace::Trace};
+
+/// Simulates the trials one after the other. The coordinator is asked for a champion
+/// if one is wanted.
+pub async fn simulate(
+    settings: Settings,
+    args: &SimulateArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let compiled = args.compiled()?;
+    for warning in &compiled.warnings {
+        progress.remark(&format!("warning: {}: {warning}", args.config.display()));
+    }
+    let genotype = Genotype::choose(settings, args, &compiled).await?;
+    // A genotype that does not fit is refused before a file is touched.
+    let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
+    compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
+    let mut trace = match &args.trace {
+        Some(path) => Some(Trace::create(path, &compiled.config)?),
+        None => None,
+    };
+    let mut trials = Vec::new();
+    for trial in 0..compiled.config.algorithm.num_evaluations {
+        let observe: &mut dyn FnMut(_) = match &mut trace {
+            Some(trace) => &mut |record| trace.record(trial, &record),
+            None => &mut |_| {},
+        };
+        let simulated =
+            compiled.experiment.simulate(&genotype.genes, args.generation, trial, observe);
+        let summary = simulated.map_err(|error| Error::Input(error.to_string()))?;
+        trials.push(Trial { trial, summary });
+    }
+    let n_rows = trace.map(Trace::finish).transpose()?;
+    let simulation = Simulation {
+        name: &compiled.config.name,
+        genotype: genotype.to_string(),
+        seed: compiled.config.seed,
+        generation: args.generation,
+        steps: compiled.config.algorithm.evaluation_steps,
+        mean: mean(&trials),
+        trials,
+        trace: args.trace.as_deref().map(Path::to_string_lossy),
+        trace_rows: n_rows,
+    };
+    progress.print(&if progress.is_json() {
+        json::document(&simulation)
+    } else {
+        simulation.to_text(progress.screen())
+    })
+}
+
+/// What was simulated, and what came of it.
+#[derive(Debug, Serialize)]
+struct Simulation<'a> {
+    name: &'a str,
+    genotype: String,
+    seed: u64,
+    generation: u64,
+    steps: u32,
+    trials: Vec<Trial>,
+    mean: EpisodeSummary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trace: Option<Cow<'a, str>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trace_rows: Option<u64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Trial {
+    trial: u32,
+    #[serde(flatten)]
+    summary: EpisodeSummary,
+}
+
+impl Simulation<'_> {
+    fn to_text(&self, screen: Screen) -> String {
+        let Self { name, genotype, seed, generation, steps, .. } = self;
+        let mut lines = vec![format!(
+            "{name}: {genotype}, seed {seed}, generation {generation}, {steps} steps per trial"
+        )];
+        let names: Vec<&str> = self.mean.metrics.keys().copied().collect();
+        let row = |name: &str, summary: &EpisodeSummary| -> Vec<String> {
+            let metrics = names.iter().map(|name| summary.metrics.get(name).copied());
+            let numbers = std::iter::once(Some(summary.fitness)).chain(metrics);
+            let cells = numbers.map(|n| n.map_or("-".into(), |n| format!("{n:.6}")));
+            std::iter::once(name.to_owned()).chain(cells).collect()
+        };
+        let headings = ["trial", "fitness"].iter().chain(&names);
+        let mut table = Table::new(headings.map(|name| Column::number(name)).collect::<Vec<_>>());
+        for trial in &self.trials {
+            table.push(row(&trial.trial.to_string(), &trial.summary));
+        }
+        table.push(row("mean", &self.mean));
+        lines.push(table.to_text(screen));
+        if let (Some(trace), Some(n_rows)) = (&self.trace, self.trace_rows) {
+            lines.push(format!("{n_rows} rows in {trace}"));
+        }
+        lines.join("\n")
+    }
+}
+
+/// Means over the trials; of a measure, over those that have it.
+fn mean(trials: &[Trial]) -> EpisodeSummary {
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
+        sum / n
+    };
+    let measures = || trials.iter().flat_map(|trial| &trial.summary.metrics);
+    let names: Vec<&'static str> = measures().map(|(name, _)| *name).collect();
+    let metrics: Metrics = names
+        .into_iter()
+        .map(|name| (name, mean(&mut measures().filter(|m| *m.0 == name).map(|m| *m.1))))
+        .collect();
+    EpisodeSummary { fitness: mean(&mut trials.iter().map(|trial| trial.summary.fitness)), metrics }
+}
+
+#[cfg(test)]
+mod tests;

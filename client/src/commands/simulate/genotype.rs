@@ -1,0 +1,109 @@
+//! Where the genotype comes from: a file, a coordinator, or chance.
+
+use std::{fmt, fs, path::Path};
+
+use serde_json::Value;
+use sim_core::random::{Purpose, Stream};
+
+use crate::{
+    args::SimulateArgs, connection::Connection, error::Error, experiment_file::Compiled,
+    settings::Settings,
+};
+
+/// Genes and their origin, which is what it displays as.
+#[derive(Debug)]
+pub struct Genotype {
+    pub genes: Vec<f64>,
+    origin: String,
+}
+
+impl Genotype {
+    /// The genotype that was asked for; nobody has checked it yet.
+    pub async fn choose(
+        settings: Settings,
+        args: &SimulateArgs,
+        compiled: &Compiled,
+    ) -> Result<Self, Error> {
+        if let Some(path) = &args.genotype {
+            let genes = read(path).map_err(|problem| {
+                Error::Input(format!("no genotype in {}: {problem}", path.display()))
+            })?;
+            return Ok(Self { genes, origin: format!("genotype in {}", path.display()) });
+        }
+        if let Some(id) = args.experiment {
+            let champion = Connection::open(settings)?.champion(id).await?;
+            let origin = format!("champion of experiment {id}");
+            return Ok(Self { genes: champion.genotype, origin });
+        }
+        Ok(Self { genes: random(compiled), origin: "random genotype".into() })
+    }
+}
+
+impl fmt::Display for Genotype {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.origin)
+    }
+}
+
+/// Reads a list of genes, or the one in an object.
+fn read(path: &Path) -> Result<Vec<f64>, String> {
+    let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let value: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
+    let genes = match &value {
+        Value::Array(genes) => Some(genes),
+        object => object["genotype"].as_array(),
+    };
+    let genes = genes.ok_or("expected a list of numbers, or an object with a list `genotype`")?;
+    let gene = |(index, gene): (usize, &Value)| {
+        gene.as_f64().ok_or_else(|| format!("gene {index} is not a number"))
+    };
+    genes.iter().enumerate().map(gene).collect()
+}
+
+/// Uniform genes, from the streams that draw the first generation of a population.
+fn random(compiled: &Compiled) -> Vec<f64> {
+    let segments = compiled.experiment.population_segments().iter().zip(0..);
+    let genes = segments.flat_map(|(segment, population)| {
+        let mut stream = Stream::new(compiled.config.seed, 0, 0, Purpose::Evolution, population);
+        segment.clone().map(move |_| stream.uniform())
+    });
+    genes.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use coordinator::evolution::Evolution;
+
+    use super::*;
+    use crate::experiment_file::{ExperimentFile, Overrides, tests::shipped};
+
+    #[test]
+    fn a_random_genotype_is_the_first_that_a_ga_evaluates() {
+        let file = ExperimentFile::read(&shipped("leader_selection_ga")).unwrap();
+        let compiled = file.compile(&Overrides { seed: Some(7), ..Overrides::default() }).unwrap();
+        let segments = compiled.experiment.population_segments();
+        let evolution = Evolution::new(&compiled.config, segments).unwrap();
+        assert_eq!(random(&compiled), evolution.ask().genotypes[0][..]);
+    }
+
+    #[test]
+    fn genes_stand_alone_or_in_an_object() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("genes.json");
+        for text in ["[0, 0.1, 1.0]", r#"{"fitness": 3, "genotype": [0, 0.1, 1]}"#] {
+            fs::write(&path, text).unwrap();
+            assert_eq!(read(&path).unwrap(), [0.0, 0.1, 1.0]);
+        }
+    }
+
+    #[test]
+    fn what_is_no_list_of_numbers_is_refused_in_one_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("genes.json");
+        for text in ["", "[0.1", "3", "{}", r#"{"genotype": 3}"#, r#"[0.1, "0.2"]"#, "[null]"] {
+            fs::write(&path, text).unwrap();
+            assert_eq!(read(&path).unwrap_err().lines().count(), 1, "{text}");
+        }
+        assert!(read(&dir.path().join("missing")).unwrap_err().contains("No such file"));
+    }
+}

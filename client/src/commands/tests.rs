@@ -1,0 +1,238 @@
+//! What people see: every command's help and output, against a scripted
+//! coordinator, and each option's refusals.
+
+use clap::{CommandFactory as _, Parser as _};
+use swarm_proto::v1::{
+    Event, Experiment, ExperimentState, ExplainExperimentResponse, GenerationSummary,
+    GetChampionResponse, HeldItems, HeldOutFitness, Notice, Round, Worker, event::Kind,
+};
+
+use super::*;
+use crate::{
+    clock,
+    fake_coordinator::{FakeCoordinator, Script, state},
+    progress::tests::Captured,
+};
+
+/// 2026-02-03, some time after noon.
+const NOON_MS: u64 = 1_770_121_000_000;
+
+fn summary(generation: u64) -> GenerationSummary {
+    GenerationSummary {
+        generation,
+        best: 1.5 + generation as f64 / 8.0,
+        mean: 1.0 / 3.0,
+        min: 0.0,
+        standard_deviation: 0.25,
+        digest: format!("{generation:x}").repeat(64),
+        duration_ms: 1250,
+        episodes: 800,
+        workers: 2,
+        idle_share: 0.0625,
+    }
+}
+
+fn event(sequence: u64, kind: Kind) -> Event {
+    Event { sequence, at_ms: NOON_MS + 1250 * sequence, kind: Some(kind) }
+}
+
+/// A coordinator with one experiment, in its fourth generation.
+fn script() -> Script {
+    let notice = Notice { message: "champion: 1.500000 +- 0.250000".into() };
+    let past = vec![
+        Event { at_ms: NOON_MS, ..state(1, ExperimentState::Running) },
+        event(2, Kind::GenerationCompleted(summary(0))),
+        event(3, Kind::GenerationCompleted(summary(1))),
+        event(4, Kind::Notice(notice)),
+        event(5, Kind::GenerationCompleted(summary(2))),
+    ];
+    let now_ms = clock::unix_ms();
+    let worker = |id, name: &str| Worker {
+        id,
+        name: name.into(),
+        version: "0.1.0".into(),
+        slots: 4,
+        items_in_flight: 8,
+        results_per_second: 12.5,
+        idle_share: 0.02,
+        connected_at_ms: now_ms - 7_500_000,
+        last_heard_at_ms: now_ms - 1200,
+        ..Worker::default()
+    };
+    let distrusted = "returned other bits than worker 1".to_owned();
+    Script {
+        experiment: Experiment {
+            id: 3,
+            name: "leader".into(),
+            state: ExperimentState::Running.into(),
+            generations_done: 3,
+            generations: 40,
+            seed: 7,
+            algorithm: "SNES".into(),
+            population_size: 100,
+            genotype_len: 455,
+            submitted_at_ms: NOON_MS,
+            latest: Some(summary(2)),
+            champion_fitness: Some(1.5),
+            config_digest: "c0".repeat(32),
+            digest: "2".repeat(64),
+            priority: 100,
+            last_sequence: 5,
+            ..Experiment::default()
+        },
+        champion: Some(GetChampionResponse {
+            experiment_id: 3,
+            generation: 1,
+            individual: Some(42),
+            fitness: Some(1.625),
+            trial_fitness: vec![1.5, 1.75],
+            genotype: vec![0.25, 0.5],
+            network_json: r#"{"neurons":[]}"#.into(),
+            held_out: Some(HeldOutFitness { mean: 1.5, ci95: 0.25, trials: 50, generation: 2 }),
+        }),
+        explanation: ExplainExperimentResponse {
+            round: Some(Round {
+                generation: 3,
+                episodes: 800,
+                episodes_left: 24,
+                held: vec![HeldItems {
+                    worker_id: 2,
+                    worker_name: "lab-2".into(),
+                    items: 3,
+                    held_ms: 90_000,
+                    silent_ms: 1200,
+                }],
+                running_ms: 95_000,
+                ..Round::default()
+            }),
+            workers: 2,
+            workers_available: 1,
+            notices: vec![past[3].clone()],
+            ..ExplainExperimentResponse::default()
+        },
+        workers: vec![
+            worker(1, "lab-1"),
+            Worker { distrusted, items_in_flight: 0, ..worker(2, "lab-2") },
+        ],
+        past,
+        watches: [(vec![event(2, Kind::GenerationCompleted(summary(0)))], None)].into(),
+        ..Script::default()
+    }
+}
+
+/// What commands print, and how they end, one after the other.
+async fn transcript(script: Script, lines: &[&str]) -> String {
+    let (_fake, connection) = FakeCoordinator::serve(script).await;
+    let mut sections = Vec::new();
+    for line in lines {
+        let at = ["swarmctl", "--coordinator", connection.address()];
+        let captured = Captured::default();
+        let result = match Args::try_parse_from(at.into_iter().chain(line.split(' '))) {
+            Ok(args) => {
+                let progress = captured.progress(args.output);
+                execute(args, progress).await.map_err(|error| (error.exit_code(), error.report()))
+            }
+            Err(error) => Err((2, Some(error.to_string().trim_end().to_owned()))),
+        };
+        let mut section = vec![format!("$ swarmctl {line}")];
+        section.extend(captured.lines());
+        if let Err((code, report)) = result {
+            section.extend(report);
+            section.push(format!("[exit code {code}]"));
+        }
+        let section = section.join("\n").replace(connection.address(), "http://HOST:PORT");
+        sections.push(section);
+    }
+    sections.join("\n\n")
+}
+
+#[test]
+fn the_manual() {
+    let mut swarmctl = Args::command().term_width(80);
+    swarmctl.build();
+    let names: Vec<String> =
+        swarmctl.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    let mut pages = vec![swarmctl.render_long_help().to_string()];
+    for name in names.iter().filter(|name| *name != "help") {
+        let command = swarmctl.find_subcommand_mut(name).unwrap();
+        // What all commands have in common is on the first page.
+        let command = command.clone().mut_args(|arg| {
+            let is_common = arg.is_global_set();
+            arg.hide(is_common)
+        });
+        pages.push(command.clone().render_long_help().to_string());
+    }
+    let rule = format!("\n\n{}\n\n", "=".repeat(80));
+    let pages: Vec<&str> = pages.iter().map(|page| page.trim_end()).collect();
+    insta::assert_snapshot!(pages.join(&rule));
+}
+
+#[tokio::test]
+async fn answers_for_people() {
+    let commands = [
+        "list",
+        "list --output wide",
+        "history 3",
+        "history 3 --output wide",
+        "logs 3",
+        "logs --from 4 3",
+        "workers",
+        "workers --output wide",
+        "explain 3",
+        "pause 3 --reason maintenance",
+        "explain 3",
+        "resume 3",
+        "priority 3 200",
+        "cancel 3",
+        "wait 3 --for ended",
+        "wait 3",
+        "explain 3",
+    ];
+    insta::assert_snapshot!(transcript(script(), &commands).await);
+}
+
+#[tokio::test]
+async fn answers_for_programs() {
+    let commands = [
+        "list --output json",
+        "list --output csv",
+        "history 3 --output json",
+        "history 3 --output csv",
+        "logs --output json",
+        "explain 3 --output json",
+        "champion 3",
+        "cancel 3 --output json",
+        "wait 3 --output json",
+    ];
+    insta::assert_snapshot!(transcript(script(), &commands).await);
+}
+
+#[tokio::test]
+async fn refusals() {
+    let commands = [
+        "lst",
+        "history 9",
+        "explain three",
+        "champion 3 --output csv",
+        "priority 3 0",
+        "wait 3 --timeout 0s",
+        "wait 3 --timeout 5",
+        "logs --from 3",
+        "submit missing.json",
+    ];
+    insta::assert_snapshot!(transcript(script(), &commands).await);
+}
+
+#[tokio::test]
+async fn nothing_is_said_in_words() {
+    let script = Script { workers: vec![], past: vec![], ..script() };
+    insta::assert_snapshot!(transcript(script, &["history 3", "workers", "logs"]).await);
+}
+
+#[tokio::test]
+async fn completions_are_for_every_shell() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = transcript(Script::default(), &[&format!("completions {shell}")]).await;
+        assert!(script.contains("history") && script.contains("follow"), "{shell}");
+    }
+}

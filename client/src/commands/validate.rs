@@ -1,0 +1,188 @@
+//! `swarmctl validate`: what is wrong with experiment files, without a
+//! coordinator.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sim_core::config::{AlgorithmName, ConfigError, Problem};
+
+use crate::{
+    error::Error,
+    experiment_file::{Compiled, ExperimentFile, Overrides},
+    json,
+    progress::Progress,
+};
+
+/// Checks all files, good and bad; fails if there is a bad one.
+pub fn validate(files: &[PathBuf], progress: &mut Progress) -> Result<(), Error> {
+    let mut reports = Vec::new();
+    for file in files {
+        let report = Report::of(file);
+        for problem in &report.problems {
+            progress.remark(&format!("{}: {problem}", report.file));
+        }
+        for warning in &report.warnings {
+            progress.remark(&format!("warning: {}: {warning}", report.file));
+        }
+        if let (false, Some(summary)) = (progress.is_json(), &report.summary) {
+            progress.print(&format!("{}: ok: {summary}", report.file))?;
+        }
+        reports.push(report);
+    }
+    if progress.is_json() {
+        progress.print(&json::document(&reports))?;
+    }
+    match reports.iter().filter(|report| !report.ok).count() {
+        0 => Ok(()),
+        n_bad => {
+            Err(Error::Input(format!("experiment files with problems: {n_bad} of {}", files.len())))
+        }
+    }
+}
+
+/// What there is to say about a file.
+#[derive(Debug, Serialize)]
+struct Report {
+    file: String,
+    ok: bool,
+    #[serde(serialize_with = "problems")]
+    problems: Vec<Problem>,
+    #[serde(serialize_with = "problems")]
+    warnings: Vec<Problem>,
+    #[serde(flatten)]
+    summary: Option<Summary>,
+}
+
+/// A good file in brief.
+#[derive(Debug, Serialize)]
+struct Summary {
+    name: String,
+    seed: u64,
+    algorithm: AlgorithmName,
+    population_size: u32,
+    generations: u64,
+    trials: u32,
+    steps: u32,
+    robots: u32,
+    genotype_len: usize,
+}
+
+impl Report {
+    fn of(path: &Path) -> Self {
+        let file = path.to_string_lossy().into_owned();
+        match ExperimentFile::read(path).and_then(|file| file.check(&Overrides::default())) {
+            Ok(compiled) => {
+                let summary = Some(Summary::of(&compiled));
+                Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary }
+            }
+            Err(ConfigError { problems }) => {
+                Self { file, ok: false, problems, warnings: vec![], summary: None }
+            }
+        }
+    }
+}
+
+impl Summary {
+    fn of(compiled: &Compiled) -> Self {
+        let Compiled { config, experiment, .. } = compiled;
+        Self {
+            name: config.name.clone(),
+            seed: config.seed,
+            algorithm: config.algorithm.name,
+            population_size: config.algorithm.population_size,
+            generations: config.algorithm.generations,
+            trials: config.algorithm.num_evaluations,
+            steps: config.algorithm.evaluation_steps,
+            robots: config.robots().map(|(_, robots)| robots.num_instances).sum(),
+            genotype_len: experiment.genotype_len(),
+        }
+    }
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let algorithm = serde_json::to_value(self.algorithm).unwrap_or_default();
+        write!(
+            f,
+            "{}, {}, {} robots, {} genes, {} generations",
+            self.name,
+            algorithm.as_str().unwrap_or_default(),
+            self.robots,
+            self.genotype_len,
+            self.generations,
+        )
+    }
+}
+
+/// Problems as JSON; the core's type is for people.
+fn problems<S: serde::Serializer>(problems: &[Problem], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Located<'a> {
+        path: &'a str,
+        line: Option<usize>,
+        message: &'a str,
+    }
+    serializer.collect_seq(problems.iter().map(|Problem { path, line, message }| Located {
+        path,
+        line: *line,
+        message,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::{
+        args::OutputFormat, experiment_file::tests::quickstart, progress::tests::Captured,
+    };
+
+    fn files() -> (tempfile::TempDir, [PathBuf; 3]) {
+        let dir = tempfile::tempdir().unwrap();
+        let bad = dir.path().join("bad.json");
+        let text = fs::read_to_string(quickstart()).unwrap();
+        let text = text.replace("\"dt\"", "\"ct\"").replace("\"steps\"", "\"stops\"");
+        fs::write(&bad, text.replace("\"generations\": 60", "\"generations\": -1")).unwrap();
+        let missing = dir.path().join("missing.json");
+        (dir, [quickstart(), bad, missing])
+    }
+
+    #[test]
+    fn a_good_file_is_one_line() {
+        let captured = Captured::default();
+        validate(&[quickstart()], &mut captured.progress(OutputFormat::Table)).unwrap();
+        let [line] = &captured.lines()[..] else { panic!() };
+        let expected = "quickstart.json: ok: quickstart, SNES, 5 robots, 424 genes, 60 generations";
+        assert!(line.ends_with(expected), "{line}");
+    }
+
+    #[test]
+    fn one_bad_file_does_not_hide_another() {
+        let (_dir, files) = files();
+        let captured = Captured::default();
+        let error = validate(&files, &mut captured.progress(OutputFormat::Json)).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert_eq!(error.to_string(), "experiment files with problems: 2 of 3");
+        let reports: Value = serde_json::from_str(&captured.lines().join("\n")).unwrap();
+        assert_eq!(reports[0]["ok"], true);
+        assert_eq!(reports[0]["problems"], json!([]));
+        assert_eq!(reports[0]["algorithm"], "SNES");
+        assert_eq!(reports[1]["ok"], false);
+        assert_eq!(reports[1].get("algorithm"), None);
+        let paths: Vec<_> = reports[1]["problems"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|problem| {
+                assert!(problem["line"].as_u64().unwrap() > 1);
+                problem["path"].as_str().unwrap()
+            })
+            .collect();
+        assert_eq!(paths, ["topology.ct", "algorithm.generations"]);
+        let message = reports[2]["problems"][0]["message"].as_str().unwrap();
+        assert!(message.starts_with("cannot be read: "), "{message}");
+    }
+}

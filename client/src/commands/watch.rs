@@ -1,0 +1,190 @@
+//! Follows an experiment to its end, across interruptions of the coordinator.
+
+use std::time::Duration;
+
+use swarm_proto::v1::{Event, Experiment, ExperimentState, GetChampionResponse, event::Kind};
+use tokio::time::{Instant, sleep};
+use tonic::Streaming;
+
+use crate::{
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
+    error::{Error, is_transient, reason},
+    json::{self, has_ended},
+    progress::Progress,
+    text,
+};
+
+/// A stream that lasted so long was contact, even if nothing happened.
+const LASTING: Duration = Duration::from_secs(5);
+
+/// An experiment that has ended.
+#[derive(Debug)]
+pub struct Followed {
+    pub experiment: Experiment,
+    /// None if it ended before its first generation did.
+    pub champion: Option<GetChampionResponse>,
+    /// Best fitness of the first generation.
+    pub first_best: Option<f64>,
+}
+
+impl Followed {
+    /// Completing is success, ending otherwise is not.
+    pub fn verdict(&self) -> Result<(), Error> {
+        verdict(&self.experiment)
+    }
+}
+
+/// `swarmctl watch`
+pub async fn watch(
+    connection: &Connection,
+    experiment_id: u64,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let followed = follow(connection, experiment_id, progress).await?;
+    let Followed { experiment, champion, first_best } = &followed;
+    progress.print(&if progress.is_json() {
+        json::line(&json::End::new(experiment, champion.as_ref()))
+    } else {
+        text::end(experiment, *first_best, champion.as_ref())
+    })?;
+    followed.verdict()
+}
+
+/// Shows an experiment's events, from the first to the last.
+pub async fn follow(
+    connection: &Connection,
+    experiment_id: u64,
+    progress: &mut Progress,
+) -> Result<Followed, Error> {
+    progress.begin(&connection.experiment(experiment_id).await?);
+    let connection = connection.with_patience(PATIENCE);
+    let first_best = Follower { connection: &connection, experiment_id, progress }.run().await?;
+    progress.clear();
+    let experiment = connection.experiment(experiment_id).await?;
+    let champion = match connection.champion(experiment_id).await {
+        Ok(champion) => Some(champion),
+        Err(Error::NotFound(_)) => None,
+        Err(error) => return Err(error),
+    };
+    Ok(Followed { experiment, champion, first_best })
+}
+
+/// Completing is success, ending otherwise is not.
+pub fn verdict(experiment: &Experiment) -> Result<(), Error> {
+    let (id, reason) = (experiment.id, experiment.reason.clone());
+    match experiment.state() {
+        ExperimentState::Completed => Ok(()),
+        ExperimentState::Cancelled => Err(Error::Cancelled { id, reason }),
+        _ => Err(Error::Failed { id, reason }),
+    }
+}
+
+struct Follower<'a> {
+    connection: &'a Connection,
+    experiment_id: u64,
+    progress: &'a mut Progress,
+}
+
+/// How a stream of events ended.
+enum StreamEnd {
+    /// With the experiment.
+    Final,
+    /// For this reason, which may pass.
+    Broken(String),
+}
+
+impl Follower<'_> {
+    /// Returns the best fitness of the first generation, once all is over.
+    async fn run(mut self) -> Result<Option<f64>, Error> {
+        let mut seen = Seen { next_sequence: 1, first_best: None, is_over: false };
+        let mut backoff = backoff();
+        let mut unreachable_since = None;
+        loop {
+            let reason = match self.connection.events(self.experiment_id, seen.next_sequence).await
+            {
+                Ok(events) => {
+                    let (opened, sequence) = (Instant::now(), seen.next_sequence);
+                    match self.read(events, &mut seen).await? {
+                        StreamEnd::Final => return Ok(seen.first_best),
+                        StreamEnd::Broken(reason) => {
+                            // A stream that opens and breaks at once is no contact.
+                            if seen.next_sequence > sequence || opened.elapsed() > LASTING {
+                                backoff.reset();
+                                unreachable_since = None;
+                            }
+                            reason
+                        }
+                    }
+                }
+                Err(status) if is_transient(&status) => reason(&status),
+                Err(status) => return Err(self.connection.error(&status)),
+            };
+            let now = Instant::now();
+            let since = *unreachable_since.get_or_insert_with(|| {
+                self.progress.remark(&format!(
+                    "lost the coordinator ({reason}); trying for {} s to reach it again",
+                    PATIENCE.as_secs()
+                ));
+                now
+            });
+            if now - since >= self.connection.patience() {
+                return Err(self.connection.unreachable(reason));
+            }
+            sleep(backoff.next_delay(rand::random())).await;
+        }
+    }
+
+    async fn read(
+        &mut self,
+        mut events: Streaming<swarm_proto::v1::WatchExperimentResponse>,
+        seen: &mut Seen,
+    ) -> Result<StreamEnd, Error> {
+        loop {
+            match events.message().await {
+                Ok(Some(response)) => {
+                    self.show(present(response.event)?, seen)?;
+                }
+                Ok(None) if seen.is_over => return Ok(StreamEnd::Final),
+                Ok(None) => return Ok(StreamEnd::Broken("it ended the stream".into())),
+                Err(status) if is_transient(&status) => {
+                    return Ok(StreamEnd::Broken(reason(&status)));
+                }
+                Err(status) => return Err(self.connection.error(&status)),
+            }
+        }
+    }
+
+    /// Shows an event once.
+    fn show(&mut self, event: Event, seen: &mut Seen) -> Result<(), Error> {
+        if event.sequence < seen.next_sequence {
+            return Ok(());
+        }
+        seen.next_sequence = event.sequence + 1;
+        match event.kind {
+            Some(Kind::GenerationCompleted(summary)) => {
+                if summary.generation == 0 {
+                    seen.first_best = Some(summary.best);
+                }
+                self.progress.generation(&summary)?;
+            }
+            Some(Kind::StateChanged(change)) => {
+                seen.is_over = has_ended(change.state());
+            }
+            Some(Kind::Notice(notice)) => self.progress.remark(&notice.message),
+            // A kind of event from the future.
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// What earlier streams have brought.
+struct Seen {
+    next_sequence: u64,
+    first_best: Option<f64>,
+    /// Whether the experiment has ended, as far as is known.
+    is_over: bool,
+}
+
+#[cfg(test)]
+mod tests;

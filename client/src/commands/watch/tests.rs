@@ -1,0 +1,85 @@
+//! Following, against a scripted coordinator.
+
+use serde_json::Value;
+use tonic::Status;
+
+use super::*;
+use crate::{
+    args::OutputFormat,
+    fake_coordinator::{FakeCoordinator, Script, generation, state, unreachable_connection},
+    progress::tests::Captured,
+};
+
+fn experiment(state: ExperimentState) -> Experiment {
+    Experiment { id: 3, generations: 3, state: state.into(), ..Experiment::default() }
+}
+
+#[tokio::test]
+async fn events_are_shown_once_and_in_order_however_often_the_stream_breaks() {
+    let completed = ExperimentState::Completed;
+    let (fake, connection) = FakeCoordinator::serve(Script {
+        experiment: experiment(completed),
+        champion: Some(GetChampionResponse {
+            experiment_id: 3,
+            fitness: Some(2.5),
+            ..Default::default()
+        }),
+        watches: [
+            (vec![state(1, ExperimentState::Running), generation(2, 0)], None),
+            (vec![], Some(Status::unavailable("shutting down"))),
+            // One more than asked for.
+            (vec![generation(2, 0), generation(3, 1)], None),
+            (vec![generation(4, 2), state(5, completed)], None),
+        ]
+        .into(),
+        ..Script::default()
+    })
+    .await;
+    let captured = Captured::default();
+    watch(&connection, 3, &mut captured.progress(OutputFormat::Json)).await.unwrap();
+    let lines: Vec<Value> =
+        captured.lines().iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let generations: Vec<_> = lines.iter().filter_map(|line| line["generation"].as_u64()).collect();
+    assert_eq!(generations, [0, 1, 2]);
+    assert_eq!(lines.len(), 4);
+    assert_eq!(lines[3]["state"], "completed");
+    assert_eq!(lines[3]["champion"]["fitness"], 2.5);
+    assert_eq!(fake.script(|script| script.watched_from.clone()), [1, 3, 3, 4]);
+}
+
+#[tokio::test]
+async fn an_experiment_that_fails_is_reported_and_is_a_failure() {
+    let failed = ExperimentState::Failed;
+    let (_fake, connection) = FakeCoordinator::serve(Script {
+        experiment: Experiment { reason: "item 7".into(), ..experiment(failed) },
+        watches: [(vec![state(1, failed)], None)].into(),
+        ..Script::default()
+    })
+    .await;
+    let captured = Captured::default();
+    let result = watch(&connection, 3, &mut captured.progress(OutputFormat::Table)).await;
+    let error = result.unwrap_err();
+    assert_eq!(error.exit_code(), 5);
+    assert_eq!(error.to_string(), "experiment 3 failed: item 7");
+    assert_eq!(captured.lines(), ["experiment 3 () failed after 0 of 3 generations: item 7"]);
+}
+
+#[tokio::test]
+async fn an_unknown_experiment_is_not_found() {
+    let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
+    let mut progress = Captured::default().progress(OutputFormat::Table);
+    let error = watch(&connection, 9, &mut progress).await.unwrap_err();
+    assert_eq!((error.exit_code(), error.to_string().as_str()), (3, "there is no experiment 9"));
+}
+
+#[tokio::test]
+async fn a_coordinator_that_stays_away_is_unreachable() {
+    let connection = unreachable_connection().await;
+    let mut progress = Captured::default().progress(OutputFormat::Table);
+    let error = watch(&connection, 3, &mut progress).await.unwrap_err();
+    assert_eq!(error.exit_code(), 4);
+    let follower = Follower { connection: &connection, experiment_id: 3, progress: &mut progress };
+    let error = follower.run().await.unwrap_err();
+    assert_eq!(error.exit_code(), 4);
+    assert!(error.to_string().to_lowercase().contains("connection refused"), "{error}");
+}

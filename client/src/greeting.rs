@@ -1,0 +1,92 @@
+//! What answers at an address where no coordinator does.
+
+use std::{io, time::Duration};
+
+use tokio::{net::TcpStream, time::timeout};
+
+/// Time for an answer.
+const LIMIT: Duration = Duration::from_secs(1);
+/// Longest part of an answer that is shown.
+const SHOWN_BYTES_MAX: usize = 60;
+/// Anything that speaks HTTP/1 answers this; a coordinator closes the connection.
+const REQUEST: &[u8] = b"GET / HTTP/1.0\r\n\r\n";
+
+/// The beginning of what something else than a coordinator says at `HOST:PORT`;
+/// none if nobody is there, or says nothing that people could read.
+pub async fn greeting(address: &str) -> Option<String> {
+    let answer = timeout(LIMIT, answer(address)).await.ok()?.ok()?;
+    let line = answer.lines().next().filter(|line| !line.trim().is_empty())?;
+    // HTTP/2 and TLS begin with control characters.
+    line.chars().all(|c| !c.is_control()).then(|| line.to_owned())
+}
+
+async fn answer(address: &str) -> io::Result<String> {
+    let stream = TcpStream::connect(address).await?;
+    stream.writable().await?;
+    stream.try_write(REQUEST)?;
+    let mut bytes = [0; SHOWN_BYTES_MAX];
+    loop {
+        stream.readable().await?;
+        match stream.try_read(&mut bytes) {
+            Ok(n_bytes) => return Ok(String::from_utf8_lossy(&bytes[..n_bytes]).into_owned()),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{io::Write as _, net::TcpListener, thread};
+
+    use swarm_transport::Credentials;
+
+    use super::*;
+    use crate::{
+        connection::Connection,
+        fake_coordinator::{FakeCoordinator, Script},
+    };
+
+    /// A service that says this to everyone.
+    fn service(words: &'static [u8]) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        thread::spawn(move || {
+            for stream in listener.incoming() {
+                // Whoever has gone away does not want to know.
+                let _ = stream.and_then(|mut stream| stream.write_all(words));
+            }
+        });
+        address
+    }
+
+    #[tokio::test]
+    async fn other_services_are_recognised_by_their_words() {
+        let http = service(b"HTTP/1.0 404 Not Found\r\nServer: x\r\n\r\n");
+        assert_eq!(greeting(&http).await.unwrap(), "HTTP/1.0 404 Not Found");
+        assert_eq!(greeting(&service(b"220 mail ESMTP\r\n")).await.unwrap(), "220 mail ESMTP");
+        assert_eq!(greeting(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, None);
+        assert_eq!(greeting(&service(b"")).await, None);
+        assert_eq!(greeting("127.0.0.1:1").await, None);
+    }
+
+    #[tokio::test]
+    async fn a_coordinator_is_not_another_service() {
+        let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
+        let address = connection.address().strip_prefix("http://").unwrap();
+        assert_eq!(greeting(address).await, None);
+    }
+
+    #[tokio::test]
+    async fn asking_another_service_says_so() {
+        let address = service(b"220 mail ESMTP\r\n");
+        let connection =
+            Connection::new(&format!("http://{address}"), &Credentials::default()).unwrap();
+        let error = connection.with_patience(Duration::ZERO).experiments().await.unwrap_err();
+        let expected = format!(
+            "what answers at http://{address} is not a coordinator: it says \"220 mail ESMTP\"; is \
+             this the right port?"
+        );
+        assert_eq!((error.exit_code(), error.to_string()), (9, expected));
+    }
+}

@@ -1,0 +1,231 @@
+//! How to reach the coordinator: flags, else the environment, else the settings
+//! file, else its usual place.
+
+use std::{
+    env, fs, io,
+    path::{Path, PathBuf},
+};
+
+use clap::Args as ClapArgs;
+use serde::Deserialize;
+use swarm_transport::{CredentialArgs, Credentials};
+
+use crate::error::Error;
+
+/// Where a coordinator listens unless it is told otherwise.
+const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
+/// Holds the client token itself.
+const TOKEN_VARIABLE: &str = "SWARM_CLIENT_TOKEN";
+/// Names the settings file.
+pub const FILE_VARIABLE: &str = "SWARM_CONFIG";
+/// Where the settings file is otherwise, below the directory of the user's
+/// configuration.
+const FILE: &str = "swarmevo/config.json";
+
+/// What has been said about the way to the coordinator.
+#[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
+#[command(next_help_heading = "Way to the coordinator")]
+pub struct Settings {
+    /// Address of the coordinator; `run` brings its own [default:
+    /// http://127.0.0.1:7700]
+    #[arg(
+        long,
+        global = true,
+        value_name = "URL",
+        env = "SWARM_COORDINATOR",
+        hide_env_values = true
+    )]
+    pub coordinator: Option<String>,
+    /// File of the client token, if the coordinator wants one; or put the token
+    /// itself into SWARM_CLIENT_TOKEN.
+    #[arg(
+        long,
+        global = true,
+        value_name = "FILE",
+        env = "SWARM_CLIENT_TOKEN_FILE",
+        hide_env_values = true
+    )]
+    pub token_file: Option<PathBuf>,
+    #[command(flatten)]
+    pub credentials: CredentialArgs,
+}
+
+/// The settings file: the same settings, under the names of their flags.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+struct SettingsFile {
+    coordinator: Option<String>,
+    token_file: Option<PathBuf>,
+    tls_ca: Option<PathBuf>,
+    tls_cert: Option<PathBuf>,
+    tls_key: Option<PathBuf>,
+    tls_domain: Option<String>,
+    plaintext: bool,
+}
+
+impl Settings {
+    /// Fills in from the settings file what has not been said.
+    pub fn or_file(self) -> Result<Self, Error> {
+        let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
+            Some(path) => (PathBuf::from(path), true),
+            None => match user_file() {
+                Some(path) => (path, false),
+                None => return Ok(self),
+            },
+        };
+        let mut others = match fs::read_to_string(&path) {
+            Ok(text) => parse(&path, &text)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !must_exist => {
+                return Ok(self);
+            }
+            Err(error) => {
+                return Err(Error::Input(format!(
+                    "cannot read the settings in {}: {error}",
+                    path.display()
+                )));
+            }
+        };
+        if env::var_os(TOKEN_VARIABLE).is_some() {
+            others.token_file = None;
+        }
+        Ok(self.or(others))
+    }
+
+    /// The coordinator's address.
+    pub fn address(&self) -> &str {
+        self.coordinator.as_deref().unwrap_or(DEFAULT_COORDINATOR)
+    }
+
+    /// Reads the files of token and certificates.
+    pub fn credentials(&self) -> Result<Credentials, Error> {
+        self.credentials
+            .load(self.token_file.as_deref(), TOKEN_VARIABLE)
+            .map_err(|error| Error::Input(error.to_string()))
+    }
+
+    /// These settings, and `others` where these say nothing. Those of another
+    /// coordinator say nothing about this one: its token is not for this one to see.
+    fn or(self, others: Self) -> Self {
+        if self.coordinator.is_some() && self.address() != others.address() {
+            return self;
+        }
+        let (these, those) = (self.credentials, others.credentials);
+        Self {
+            coordinator: self.coordinator.or(others.coordinator),
+            token_file: self.token_file.or(others.token_file),
+            credentials: CredentialArgs {
+                tls_ca: these.tls_ca.or(those.tls_ca),
+                tls_cert: these.tls_cert.or(those.tls_cert),
+                tls_key: these.tls_key.or(those.tls_key),
+                tls_domain: these.tls_domain.or(those.tls_domain),
+                plaintext: these.plaintext || those.plaintext,
+            },
+        }
+    }
+}
+
+impl SettingsFile {
+    /// The settings in a file of this directory, beside which it names others.
+    fn within(self, directory: &Path) -> Settings {
+        let beside = |path: Option<PathBuf>| path.map(|path| directory.join(path));
+        Settings {
+            coordinator: self.coordinator,
+            token_file: beside(self.token_file),
+            credentials: CredentialArgs {
+                tls_ca: beside(self.tls_ca),
+                tls_cert: beside(self.tls_cert),
+                tls_key: beside(self.tls_key),
+                tls_domain: self.tls_domain,
+                plaintext: self.plaintext,
+            },
+        }
+    }
+}
+
+/// The settings file of this user.
+fn user_file() -> Option<PathBuf> {
+    let directory = |name| env::var_os(name).filter(|path| !path.is_empty()).map(PathBuf::from);
+    let config = directory("XDG_CONFIG_HOME").filter(|path| path.is_absolute());
+    let config = config.or_else(|| Some(directory("HOME")?.join(".config")))?;
+    Some(config.join(FILE))
+}
+
+fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
+    let file: SettingsFile = serde_json::from_str(text).map_err(|error| {
+        let place = format!(" at line {} column {}", error.line(), error.column());
+        let message = error.to_string();
+        let message = message.strip_suffix(&place).unwrap_or(&message);
+        Error::Input(format!("{}: line {}: {message}", path.display(), error.line()))
+    })?;
+    Ok(file.within(path.parent().unwrap_or(Path::new(""))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(address: Option<&str>) -> Settings {
+        Settings { coordinator: address.map(str::to_owned), ..Settings::default() }
+    }
+
+    #[test]
+    fn what_is_said_first_counts() {
+        let (flag, file) = (settings(Some("http://flag:1")), settings(Some("http://file:1")));
+        assert_eq!(flag.clone().or(file.clone()), flag);
+        assert_eq!(settings(None).or(file.clone()), file);
+        assert_eq!(settings(None).address(), "http://127.0.0.1:7700");
+    }
+
+    #[test]
+    fn every_flag_has_its_key_and_files_are_beside_the_settings() {
+        let text = r#"{
+            "coordinator": "https://h:1", "token-file": "client.token", "tls-ca": "/etc/ca.pem",
+            "tls-cert": "c.pem", "tls-key": "c.key", "tls-domain": "name", "plaintext": true
+        }"#;
+        let expected = Settings {
+            coordinator: Some("https://h:1".into()),
+            token_file: Some("/home/ada/client.token".into()),
+            credentials: CredentialArgs {
+                tls_ca: Some("/etc/ca.pem".into()),
+                tls_cert: Some("/home/ada/c.pem".into()),
+                tls_key: Some("/home/ada/c.key".into()),
+                tls_domain: Some("name".into()),
+                plaintext: true,
+            },
+        };
+        let found = parse(Path::new("/home/ada/config.json"), text).unwrap();
+        assert_eq!(found, expected);
+        assert_eq!(settings(None).or(found.clone()), expected);
+        let said = Settings { token_file: Some("other".into()), ..settings(Some("https://h:1")) };
+        assert_eq!(said.clone().or(found), Settings { token_file: said.token_file, ..expected });
+    }
+
+    #[test]
+    fn a_token_is_for_its_coordinator_only() {
+        let file = Settings { token_file: Some("secret".into()), ..settings(Some("http://a:1")) };
+        assert_eq!(settings(Some("http://b:1")).or(file).token_file, None);
+        let file = Settings { token_file: Some("secret".into()), ..settings(None) };
+        assert_eq!(settings(Some("http://b:1")).or(file).token_file, None);
+    }
+
+    #[test]
+    fn a_mistake_in_the_file_is_named_with_its_line() {
+        let path = Path::new("config.json");
+        assert_eq!(parse(path, "{}").unwrap(), settings(None));
+        for (text, expected) in [
+            (
+                "{\n  \"coordinater\": \"http://h:1\"\n}",
+                "config.json: line 2: unknown field `coordinater`, expected one of `coordinator`, \
+                 `token-file`, `tls-ca`, `tls-cert`, `tls-key`, `tls-domain`, `plaintext`",
+            ),
+            (
+                "{\n\n  \"coordinator\": 7700}",
+                "config.json: line 3: invalid type: integer `7700`, expected a string",
+            ),
+            ("{", "config.json: line 1: EOF while parsing an object"),
+        ] {
+            let error = parse(path, text).unwrap_err();
+            assert_eq!((error.exit_code(), error.to_string().as_str()), (2, expected));
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Tables: as wide as the terminal allows, or CSV.
+
+use console::{Style, Term, measure_text_width, truncate_str};
+use serde::Serialize;
+use serde_json::Value;
+
+/// Between columns.
+const GAP: &str = "  ";
+/// Stands for what has been cut off.
+const ELLIPSIS: &str = "…";
+/// Columns of text are not made narrower than this.
+const COLUMN_WIDTH_MIN: usize = 8;
+
+/// What standard output is shown on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Screen {
+    /// Characters per line; none if it is not a terminal.
+    pub width: Option<usize>,
+    /// Whether colours are wanted.
+    pub has_colours: bool,
+}
+
+impl Screen {
+    /// The screen of standard output.
+    pub fn of_stdout() -> Self {
+        let term = Term::stdout();
+        // As `NO_COLOR` is defined: an empty value does not count.
+        let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        Self {
+            width: term.size_checked().filter(|_| term.is_term()).map(|(_, width)| width.into()),
+            has_colours: !no_colour && console::colors_enabled(),
+        }
+    }
+}
+
+/// A column's heading and ways.
+#[derive(Debug, Clone)]
+pub struct Column {
+    heading: String,
+    is_number: bool,
+    is_wide: bool,
+    is_cuttable: bool,
+    paint: fn(&str) -> Style,
+}
+
+impl Column {
+    /// A column of words that must be read whole.
+    pub fn new(heading: &str) -> Self {
+        let heading = heading.to_owned();
+        Self {
+            heading,
+            is_number: false,
+            is_wide: false,
+            is_cuttable: false,
+            paint: |_| Style::new(),
+        }
+    }
+
+    /// A column of numbers, aligned on the right.
+    pub fn number(heading: &str) -> Self {
+        Self { is_number: true, ..Self::new(heading) }
+    }
+
+    /// A column of text that may be cut where there is no room for it.
+    pub fn text(heading: &str) -> Self {
+        Self { is_cuttable: true, ..Self::new(heading) }
+    }
+
+    /// Shown with `--output wide` only.
+    pub fn wide(self) -> Self {
+        Self { is_wide: true, ..self }
+    }
+
+    /// Coloured by what a cell says.
+    pub fn painted(self, paint: fn(&str) -> Style) -> Self {
+        Self { paint, ..self }
+    }
+}
+
+/// Rows of as many cells as there are columns.
+#[derive(Debug, Clone)]
+pub struct Table {
+    columns: Vec<Column>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(columns: impl Into<Vec<Column>>) -> Self {
+        Self { columns: columns.into(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, cells: impl Into<Vec<String>>) {
+        let cells = cells.into();
+        debug_assert_eq!(cells.len(), self.columns.len());
+        // Names come from people and their machines: they must not move the cursor.
+        let is_plain = |c: char| if c.is_control() { ' ' } else { c };
+        self.rows.push(cells.iter().map(|cell| cell.chars().map(is_plain).collect()).collect());
+    }
+
+    /// The columns that everybody wants, no line longer than the screen.
+    pub fn to_text(&self, screen: Screen) -> String {
+        self.render(|column| !column.is_wide, screen)
+    }
+
+    /// All columns, whole.
+    pub fn to_wide_text(&self, screen: Screen) -> String {
+        self.render(|_| true, Screen { width: None, ..screen })
+    }
+
+    fn render(&self, is_shown: impl Fn(&Column) -> bool, screen: Screen) -> String {
+        let shown: Vec<usize> =
+            (0..self.columns.len()).filter(|&i| is_shown(&self.columns[i])).collect();
+        let widths = self.widths(&shown, screen.width);
+        let headings = self.columns.iter().map(|column| column.heading.clone()).collect();
+        let mut lines = Vec::with_capacity(1 + self.rows.len());
+        for (i_line, row) in std::iter::once(&headings).chain(&self.rows).enumerate() {
+            let cells: Vec<String> = shown
+                .iter()
+                .zip(&widths)
+                .map(|(&i, &width)| {
+                    let column = &self.columns[i];
+                    let style =
+                        if i_line == 0 { Style::new().bold() } else { (column.paint)(&row[i]) };
+                    let text = truncate_str(&row[i], width, ELLIPSIS);
+                    let room = " ".repeat(width - measure_text_width(&text));
+                    let text = style.force_styling(screen.has_colours).apply_to(text);
+                    if column.is_number { format!("{room}{text}") } else { format!("{text}{room}") }
+                })
+                .collect();
+            let line = cells.join(GAP);
+            let line = line.trim_end();
+            lines.push(match screen.width {
+                Some(width) => truncate_str(line, width, ELLIPSIS).into_owned(),
+                None => line.to_owned(),
+            });
+        }
+        lines.join("\n")
+    }
+
+    /// The shown columns' widths; if they are too wide for the screen together,
+    /// the widest of those that may be cut give way.
+    fn widths(&self, shown: &[usize], screen_width: Option<usize>) -> Vec<usize> {
+        let mut widths: Vec<usize> = shown
+            .iter()
+            .map(|&i| {
+                let cells = self.rows.iter().map(|row| &row[i]);
+                let cells = cells.chain([&self.columns[i].heading]);
+                cells.map(|cell| measure_text_width(cell)).max().unwrap_or(0)
+            })
+            .collect();
+        let gaps = GAP.len() * shown.len().saturating_sub(1);
+        let Some(room) = screen_width.map(|width| width.saturating_sub(gaps)) else {
+            return widths;
+        };
+        while widths.iter().sum::<usize>() > room {
+            let cuttable = (0..shown.len()).filter(|&i| self.columns[shown[i]].is_cuttable);
+            let Some(widest) = cuttable.max_by_key(|&i| widths[i]) else { break };
+            if widths[widest] <= COLUMN_WIDTH_MIN {
+                break;
+            }
+            widths[widest] -= 1;
+        }
+        widths
+    }
+}
+
+/// Records as CSV (RFC 4180, but for the line ends), one column per key. Numbers
+/// read back to the same bits; what is missing or not finite is empty.
+pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
+    let mut lines = vec![keys.join(",")];
+    for record in records {
+        let record = serde_json::to_value(record).expect("plain data serialises");
+        let fields: Vec<String> = keys
+            .iter()
+            .map(|key| match &record[key] {
+                Value::Null => String::new(),
+                Value::String(text) => quoted(text),
+                value => quoted(&value.to_string()),
+            })
+            .collect();
+        lines.push(fields.join(","));
+    }
+    lines.join("\n")
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn table() -> Table {
+        let columns = [
+            Column::number("id"),
+            Column::new("state").painted(|_| Style::new().green()),
+            Column::text("name"),
+            Column::text("reason").wide(),
+        ];
+        let mut table = Table::new(columns);
+        table.push(["3", "running", "leader", ""].map(String::from));
+        table.push(["12", "failed", "größe 漢字 of a long name", "why"].map(String::from));
+        table
+    }
+
+    fn on(width: Option<usize>) -> String {
+        table().to_text(Screen { width, has_colours: false })
+    }
+
+    #[test]
+    fn without_a_terminal_nothing_is_cut_or_coloured() {
+        assert_eq!(
+            on(None),
+            "id  state    name\n \
+             3  running  leader\n\
+             12  failed   größe 漢字 of a long name"
+        );
+        let wide = table().to_wide_text(Screen { width: Some(10), has_colours: false });
+        assert!(wide.ends_with("12  failed   größe 漢字 of a long name  why"), "{wide}");
+    }
+
+    #[test]
+    fn no_line_is_longer_than_the_screen() {
+        for width in 1..40 {
+            let text = on(Some(width));
+            assert!(text.lines().all(|line| measure_text_width(line) <= width), "{width}:\n{text}");
+        }
+        assert!(on(Some(30)).ends_with("12  failed   größe 漢字 of a …"), "{}", on(Some(30)));
+        assert!(on(Some(12)).contains("12  failed"), "numbers and states are cut last");
+    }
+
+    #[test]
+    fn colours_do_not_move_columns() {
+        let coloured = table().to_text(Screen { width: Some(30), has_colours: true });
+        assert!(coloured.contains("\u{1b}[32mrunning\u{1b}[0m"), "{coloured:?}");
+        assert_eq!(console::strip_ansi_codes(&coloured), on(Some(30)));
+    }
+
+    #[test]
+    fn names_do_not_move_the_cursor() {
+        let mut table = Table::new([Column::text("name")]);
+        table.push(["a\u{1b}[2J\nb".to_owned()]);
+        assert_eq!(table.to_text(Screen::default()), "name\na [2J b");
+    }
+
+    #[test]
+    fn csv_keeps_bits_and_quotes_what_needs_it() {
+        let records = [json!({"n": 0.1 + 0.2, "s": "a, \"b\""}), json!({"n": null, "s": "c"})];
+        let expected = "s,n\n\"a, \"\"b\"\"\",0.30000000000000004\nc,";
+        assert_eq!(csv(&["s", "n"], &records), expected);
+    }
+}

@@ -1,0 +1,154 @@
+//! Workers that compute nothing: they answer items as soon as these arrive, and
+//! note when that was.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
+
+use anyhow::bail;
+use swarm_proto::{
+    PROTOCOL_VERSION,
+    v1::{
+        self, ItemResult, ItemResults, TrialFitness, WorkRequest, WorkResponse,
+        item_result::Outcome, work_request, work_response,
+        worker_service_client::WorkerServiceClient,
+    },
+};
+use tokio::{
+    sync::{mpsc, watch},
+    task::JoinSet,
+};
+use tokio_stream::wrappers::ReceiverStream;
+
+use super::CoordinatorProcess;
+
+const RETRY_INTERVAL: Duration = Duration::from_millis(1);
+/// Answers that wait for the network.
+const OUTBOX_LEN: usize = 64;
+/// What a worker accepts at once.
+const MESSAGE_LEN_MAX: usize = 64 << 20;
+
+/// Some workers; they leave when this is dropped.
+pub struct InstantWorkers {
+    _tasks: JoinSet<()>,
+    diary: Arc<Diary>,
+}
+
+/// A generation as the workers saw it.
+#[derive(Debug, Clone, Copy)]
+pub struct Round {
+    /// When the first item came.
+    pub started: Instant,
+    /// When the last answer was given.
+    ended: Instant,
+}
+
+struct Diary {
+    rounds: Mutex<BTreeMap<u64, Round>>,
+    latest: watch::Sender<Option<u64>>,
+}
+
+impl InstantWorkers {
+    /// Starts workers that connect as soon as they can.
+    pub fn start(coordinator: &CoordinatorProcess, n_workers: usize, n_slots: u32) -> Self {
+        let diary = Arc::new(Diary { rounds: Mutex::default(), latest: watch::Sender::new(None) });
+        let mut tasks = JoinSet::new();
+        for worker in 0..n_workers {
+            let (url, diary) = (coordinator.url(), Arc::clone(&diary));
+            tasks.spawn(async move {
+                while let Err(_retry) =
+                    work(&url, format!("instant-{worker}"), n_slots, &diary).await
+                {
+                    tokio::time::sleep(RETRY_INTERVAL).await;
+                }
+            });
+        }
+        Self { _tasks: tasks, diary }
+    }
+
+    /// Generations `first` to `last`, as soon as they are over.
+    pub async fn rounds(&self, first: u64, last: u64) -> Vec<Round> {
+        let mut latest = self.diary.latest.subscribe();
+        latest.wait_for(|latest| *latest > Some(last)).await.expect("the diary is ours");
+        let rounds = self.diary.rounds.lock().expect("nobody panics while writing");
+        (first..=last).map(|generation| rounds[&generation]).collect()
+    }
+
+    /// The first generation that they see, as soon as it has begun.
+    pub async fn first_round(&self) -> Round {
+        let mut latest = self.diary.latest.subscribe();
+        latest.wait_for(Option::is_some).await.expect("the diary is ours");
+        let rounds = self.diary.rounds.lock().expect("nobody panics while writing");
+        *rounds.values().next().expect("one has begun")
+    }
+}
+
+impl Round {
+    /// From the first item to the last answer.
+    pub fn judging(&self) -> Duration {
+        self.ended - self.started
+    }
+}
+
+impl Diary {
+    fn note(&self, generation: u64, received: Instant) {
+        let mut rounds = self.rounds.lock().expect("nobody panics while writing");
+        let new = Round { started: received, ended: received };
+        let round = rounds.entry(generation).or_insert(new);
+        round.ended = now();
+        self.latest.send_if_modified(|latest| {
+            let is_new = *latest < Some(generation);
+            if is_new {
+                *latest = Some(generation);
+            }
+            is_new
+        });
+    }
+}
+
+/// One stream, until it ends.
+async fn work(url: &str, name: String, n_slots: u32, diary: &Diary) -> anyhow::Result<()> {
+    let (outbox, requests) = mpsc::channel(OUTBOX_LEN);
+    let hello = work_request::Message::Hello(v1::Hello {
+        protocol_version: PROTOCOL_VERSION,
+        sim_core_fingerprint: sim_core::FINGERPRINT.to_owned(),
+        name,
+        slots: n_slots,
+        ..v1::Hello::default()
+    });
+    outbox.send(WorkRequest { message: Some(hello) }).await?;
+    let mut client = WorkerServiceClient::connect(url.to_owned())
+        .await?
+        .max_decoding_message_size(MESSAGE_LEN_MAX);
+    let mut inbound = client.work(ReceiverStream::new(requests)).await?.into_inner();
+    while let Some(WorkResponse { message }) = inbound.message().await? {
+        let received = now();
+        let Some(work_response::Message::Batch(batch)) = message else { continue };
+        let results = batch.items.iter().map(answer).collect();
+        let results = work_request::Message::Results(ItemResults { results });
+        outbox.send(WorkRequest { message: Some(results) }).await?;
+        diary.note(batch.generation, received);
+    }
+    bail!("the stream ended")
+}
+
+/// Any fitness will do, as long as it depends on the genotype alone.
+fn answer(item: &v1::Item) -> ItemResult {
+    let values = vec![item.genotype[0]; item.trial_count as usize];
+    let outcome = Some(Outcome::Fitness(TrialFitness { values }));
+    ItemResult { item_id: item.item_id, outcome, compute_us: 0 }
+}
+
+#[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// The value in the middle.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}

@@ -1,0 +1,143 @@
+//! How well a fleet is used, from one worker to ten thousand: the real engine
+//! drives simulated workers in virtual time. Prints the tables of
+//! `docs/scaling.md`.
+
+#[path = "../tests/simulated_fleet/mod.rs"]
+#[allow(dead_code, reason = "shared with the tests, which use more of it")]
+mod simulated_fleet;
+
+use std::time::{Duration, Instant};
+
+use coordinator::{
+    engine::{Command, Engine, EngineConfig, Introduction, ItemResult},
+    ids::ExperimentId,
+    priority::Priority,
+};
+use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
+
+const EXPERIMENT: ExperimentId = ExperimentId(1);
+const LEASE: Duration = Duration::from_secs(10);
+const N_TRIALS: u32 = 5;
+/// The first one teaches the engine how long things take.
+const N_GENERATIONS: u64 = 4;
+const TRIAL: Duration = Duration::from_millis(100);
+const CALL_OVERHEAD: f64 = 0.4;
+
+fn main() {
+    let plain = EngineConfig { split: false, duplicate: false, ..EngineConfig::new(LEASE) };
+    let split = EngineConfig { split: true, ..plain };
+    let both = EngineConfig { duplicate: true, ..split };
+    println!("parallel efficiency; whole: items of all trials; split: by trial; both: split,");
+    println!("and moved and duplicated");
+    for population_size in [100, 10_000] {
+        for stalled in [0.0, 0.01] {
+            println!("\nP = {population_size}, {} % of the workers stall", 100.0 * stalled);
+            println!("workers   whole   split    both   limit");
+            for n_workers in [1, 10, 100, 1_000, 10_000] {
+                let measured = [plain, split, both]
+                    .map(|config| efficiency(config, population_size, n_workers, stalled));
+                print!("{n_workers:>7}");
+                for share in measured.into_iter().chain([limit(population_size, n_workers)]) {
+                    print!(" {:>6.1}%", 100.0 * share);
+                }
+                println!();
+            }
+        }
+    }
+    println!("\nengine alone, 10,000 workers of one slot, a generation of 100,000:");
+    println!("{:.0} items/s", throughput());
+}
+
+fn speed(worker: usize) -> f64 {
+    0.5 + uniform(worker as u64)
+}
+
+/// Time of all work on a worker of speed 1, if no item is split.
+fn work(population_size: usize) -> Duration {
+    TRIAL.mul_f64(population_size as f64 * (f64::from(N_TRIALS) + CALL_OVERHEAD))
+}
+
+fn total_speed(n_workers: usize) -> f64 {
+    (0..n_workers).map(speed).sum()
+}
+
+/// No generation takes less than the work divided by the workers' speeds, nor
+/// less than one trial on the fastest worker.
+fn limit(population_size: usize, n_workers: usize) -> f64 {
+    let ideal = work(population_size).div_f64(total_speed(n_workers));
+    let fastest = (0..n_workers).map(speed).fold(0.0, f64::max);
+    let one_trial = TRIAL.mul_f64((1.0 + CALL_OVERHEAD) / fastest);
+    ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
+}
+
+/// The time that generations would take if no slot were ever idle, by the time
+/// that they take.
+fn efficiency(config: EngineConfig, population_size: usize, n_workers: usize, stalled: f64) -> f64 {
+    let model = FleetModel {
+        latency: Duration::from_millis(1),
+        trial: TRIAL,
+        dispersion: 0.3,
+        stops: false,
+        checks: false,
+    };
+    let mut fleet = SimulatedFleet::new(model, config);
+    for worker in 0..n_workers {
+        fleet.join(1, speed(worker));
+    }
+    fleet.submit(EXPERIMENT, 100);
+    let mut measured_from = Duration::ZERO;
+    for generation in 0..N_GENERATIONS {
+        if generation == 1 {
+            measured_from = fleet.now();
+        }
+        fleet.ask(EXPERIMENT, generation, population_size, N_TRIALS);
+        let ids = fleet.worker_ids();
+        let n_stalled = (stalled * n_workers as f64) as usize;
+        for i in 0..n_stalled {
+            let place = generation << 32 | i as u64;
+            let id = ids[(uniform(place) * ids.len() as f64) as usize];
+            fleet.stall(id, Duration::from_secs(30));
+        }
+        let n_judged = generation as usize + 1;
+        let is_done = |fleet: &SimulatedFleet| fleet.judged.len() == n_judged;
+        assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
+    }
+    let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;
+    work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / taken
+}
+
+/// Items per second of one core, if workers and network cost nothing.
+#[expect(clippy::disallowed_methods, reason = "measures the engine's own time")]
+fn throughput() -> f64 {
+    let started = Instant::now();
+    let mut engine = Engine::new(started, EngineConfig::new(LEASE));
+    for worker in 0..10_000 {
+        let name = format!("worker-{worker}");
+        let version = String::new();
+        engine.on_worker_joined(started, Introduction { name, version, n_slots: 1, process: None });
+    }
+    engine.on_experiment_started(EXPERIMENT, "spec".into(), Priority::default());
+    let genotypes = population(100_000);
+    let started = Instant::now();
+    let mut now = started;
+    engine.on_generation_asked(now, EXPERIMENT, 0, genotypes, 1);
+    let mut n_items = 0;
+    loop {
+        match engine.poll_command() {
+            Some(Command::SendItems { worker, items, .. }) => {
+                n_items += items.len();
+                now += Duration::from_micros(10);
+                let compute_time = Duration::from_millis(100);
+                for item in items {
+                    let outcome = Ok(vec![fitness(&item.genotype, 0)]);
+                    let result = ItemResult { id: item.id, outcome, compute_time };
+                    engine.on_results(now, worker, vec![result]);
+                }
+            }
+            Some(Command::FinishGeneration { .. }) => break,
+            Some(_) => {}
+            None => unreachable!("the generation is not finished"),
+        }
+    }
+    n_items as f64 / started.elapsed().as_secs_f64()
+}

@@ -1,0 +1,163 @@
+//! How much of the slots' time goes into results.
+
+use std::time::{Duration, Instant};
+
+/// How long the fleet's slots have existed, and computed, altogether.
+#[derive(Debug, Clone, Copy)]
+pub struct FleetTime {
+    now: Instant,
+    n_slots: usize,
+    capacity_s: f64,
+    busy_s: f64,
+}
+
+impl FleetTime {
+    /// A fleet without slots.
+    pub fn new(now: Instant) -> Self {
+        Self { now, n_slots: 0, capacity_s: 0.0, busy_s: 0.0 }
+    }
+
+    /// Slots that exist.
+    pub fn n_slots(&self) -> usize {
+        self.n_slots
+    }
+
+    /// Counts the time up to now.
+    pub fn advance(&mut self, now: Instant) {
+        let elapsed = now.saturating_duration_since(self.now);
+        self.capacity_s += elapsed.as_secs_f64() * self.n_slots as f64;
+        self.now = self.now.max(now);
+    }
+
+    /// Slots come or go.
+    pub fn set_slots(&mut self, now: Instant, n_slots: usize) {
+        self.advance(now);
+        self.n_slots = n_slots;
+    }
+
+    /// A slot has computed for so long.
+    pub fn add_busy(&mut self, time: Duration) {
+        self.busy_s += time.as_secs_f64();
+    }
+
+    /// Share of the slots' time since `start` that was not spent computing.
+    pub fn idle_share_since(&self, start: &Self) -> f64 {
+        let capacity_s = self.capacity_s - start.capacity_s;
+        if capacity_s > 0.0 {
+            (1.0 - (self.busy_s - start.busy_s) / capacity_s).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// One worker's computing, over all its time and recently.
+#[derive(Debug)]
+pub struct WorkerTime {
+    n_slots: usize,
+    joined: Instant,
+    busy: Duration,
+    /// The last two windows: a full one and one that fills up.
+    previous: Window,
+    current: Window,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    start: Instant,
+    n_results: u64,
+    busy: Duration,
+}
+
+const WINDOW_LEN: Duration = Duration::from_secs(30);
+
+impl WorkerTime {
+    /// A worker that has just joined.
+    pub fn new(now: Instant, n_slots: usize) -> Self {
+        let window = Window { start: now, n_results: 0, busy: Duration::ZERO };
+        Self { n_slots, joined: now, busy: Duration::ZERO, previous: window, current: window }
+    }
+
+    /// Counts a result; returns the part of `compute_time` that can be true: a
+    /// worker's slots cannot have computed for longer than they exist, nor an
+    /// item for longer than since it was `assigned`.
+    pub fn add_result(
+        &mut self,
+        now: Instant,
+        assigned: Instant,
+        compute_time: Duration,
+    ) -> Duration {
+        let exists = now.saturating_duration_since(self.joined) * self.n_slots as u32;
+        let busy = compute_time
+            .min(now.saturating_duration_since(assigned))
+            .min(exists.saturating_sub(self.busy));
+        self.busy += busy;
+        self.turn_windows(now);
+        self.current.n_results += 1;
+        self.current.busy += busy;
+        busy
+    }
+
+    fn turn_windows(&mut self, now: Instant) {
+        if now.saturating_duration_since(self.current.start) >= WINDOW_LEN {
+            self.previous = self.current;
+            self.current = Window { start: now, n_results: 0, busy: Duration::ZERO };
+        }
+    }
+
+    /// Results per second, and idle share, of about the last minute.
+    pub fn recent(&self, now: Instant) -> (f64, f64) {
+        let elapsed_s = now.saturating_duration_since(self.previous.start).as_secs_f64();
+        let is_first = self.previous.start == self.current.start;
+        let (n_results, busy) = if is_first {
+            (self.current.n_results, self.current.busy)
+        } else {
+            let (a, b) = (&self.previous, &self.current);
+            (a.n_results + b.n_results, a.busy + b.busy)
+        };
+        if elapsed_s <= 0.0 {
+            return (0.0, 1.0);
+        }
+        let busy_share = busy.as_secs_f64() / (elapsed_s * self.n_slots as f64);
+        (n_results as f64 / elapsed_s, (1.0 - busy_share).clamp(0.0, 1.0))
+    }
+
+    /// When the worker joined.
+    pub fn joined(&self) -> Instant {
+        self.joined
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "any instant will do as the origin")]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    #[test]
+    fn nobody_computes_for_longer_than_there_is_time() {
+        let start = Instant::now();
+        let mut time = WorkerTime::new(start, 2);
+        let now = start + SECOND;
+        // One item: as long as since it was assigned. Two slots: two seconds.
+        assert_eq!(time.add_result(now, start, Duration::MAX), SECOND);
+        assert_eq!(time.add_result(now, start, SECOND / 2), SECOND / 2);
+        assert_eq!(time.add_result(now, start, SECOND), SECOND / 2);
+        assert_eq!(time.add_result(now, start, SECOND), Duration::ZERO);
+        assert_eq!(time.recent(now), (4.0, 0.0));
+    }
+
+    #[test]
+    fn old_results_are_forgotten() {
+        let start = Instant::now();
+        let mut time = WorkerTime::new(start, 1);
+        for second in 1..=200 {
+            let now = start + SECOND * second;
+            let assigned = now - SECOND / 4;
+            time.add_result(now, assigned, SECOND / if second <= 100 { 4 } else { 8 });
+        }
+        let (per_s, idle) = time.recent(start + SECOND * 200);
+        assert!((per_s - 1.0).abs() < 0.05 && (idle - 0.875).abs() < 0.01, "{per_s} {idle}");
+    }
+}

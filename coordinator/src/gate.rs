@@ -1,0 +1,262 @@
+//! Stands before all services: lets in who knows the right token, and not too many.
+
+use std::{
+    convert::Infallible,
+    future::{Future, ready},
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError},
+    task::{Context, Poll},
+};
+
+use http::{Request, Response, header::AUTHORIZATION};
+use http_body_util::BodyExt as _;
+use swarm_proto::v1::worker_service_server;
+use swarm_transport::BEARER;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tonic::{Status, body::Body, transport::server::TlsConnectInfo};
+use tonic_health::pb::health_server;
+use tower::{Layer, Service};
+use tracing::warn;
+
+use crate::{
+    access::{Role, Tokens},
+    clock,
+    limits::{CLIENT_CALLS_MAX, WORKERS_MAX},
+    listener::Peer,
+    throttle::Throttle,
+};
+
+/// Decides who may pass.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    tokens: Option<Arc<Tokens>>,
+    client_calls: Arc<Semaphore>,
+    worker_calls: Arc<Semaphore>,
+    log: Arc<Mutex<Throttle>>,
+}
+
+/// Services behind a gate.
+#[derive(Debug, Clone)]
+pub struct Guarded<S> {
+    gate: Gate,
+    services: S,
+}
+
+impl Gate {
+    /// Asks for tokens, if there are any.
+    pub fn new(tokens: Option<Tokens>) -> Self {
+        Self {
+            tokens: tokens.map(Arc::new),
+            client_calls: Arc::new(Semaphore::new(CLIENT_CALLS_MAX)),
+            worker_calls: Arc::new(Semaphore::new(WORKERS_MAX)),
+            log: Arc::default(),
+        }
+    }
+
+    fn admit(
+        &self,
+        role: Role,
+        authorization: Option<&[u8]>,
+    ) -> Result<OwnedSemaphorePermit, Status> {
+        self.authorize(role, authorization)?;
+        let calls = match role {
+            Role::Client => &self.client_calls,
+            Role::Worker => &self.worker_calls,
+        };
+        Arc::clone(calls).try_acquire_owned().map_err(|_| {
+            Status::resource_exhausted(format!(
+                "the coordinator serves as many {role}s as it can; try again later"
+            ))
+        })
+    }
+
+    fn authorize(&self, role: Role, authorization: Option<&[u8]>) -> Result<(), Status> {
+        let Some(tokens) = &self.tokens else { return Ok(()) };
+        let Some(authorization) = authorization else {
+            return Err(Status::unauthenticated(format!(
+                "the coordinator wants the {role} token and got none; pass --token-file"
+            )));
+        };
+        match bearer_token(authorization).and_then(|token| tokens.role_of(token)) {
+            Some(presented) if presented == role => Ok(()),
+            Some(presented) => Err(Status::permission_denied(format!(
+                "the {presented} token does not permit this; it takes the {role} token"
+            ))),
+            None => Err(Status::unauthenticated(format!(
+                "this is not the coordinator's {role} token; pass the right one with --token-file"
+            ))),
+        }
+    }
+
+    fn log_refusal(&self, peer: Option<&Peer>, path: &str, status: &Status) {
+        let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(withheld) = log.on_line(clock::now()) else { return };
+        drop(log);
+        let address = peer.map_or_else(|| "?".to_owned(), |peer| peer.address().to_string());
+        warn!(address, path, withheld, reason = status.message(), "call refused");
+    }
+}
+
+/// Whose token a call takes. None: probes must not need a secret. A service that
+/// nobody thought of here takes the client's.
+fn role_for(path: &str) -> Option<Role> {
+    match path.trim_start_matches('/').split('/').next() {
+        Some(health_server::SERVICE_NAME) => None,
+        Some(worker_service_server::SERVICE_NAME) => Some(Role::Worker),
+        _ => Some(Role::Client),
+    }
+}
+
+/// The token of a header, whose scheme may be written in any case.
+fn bearer_token(authorization: &[u8]) -> Option<&[u8]> {
+    let (scheme, token) = authorization.split_at_checked(BEARER.len())?;
+    scheme.eq_ignore_ascii_case(BEARER.as_bytes()).then_some(token)
+}
+
+impl<S> Layer<S> for Gate {
+    type Service = Guarded<S>;
+
+    fn layer(&self, services: S) -> Guarded<S> {
+        Guarded { gate: self.clone(), services }
+    }
+}
+
+impl<S> Service<Request<Body>> for Guarded<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible>,
+    S::Future: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+        let Some(role) = role_for(request.uri().path()) else {
+            return Box::pin(self.services.call(request));
+        };
+        let extensions = request.extensions();
+        let encrypted = || extensions.get::<TlsConnectInfo<Peer>>().map(TlsConnectInfo::get_ref);
+        let peer = extensions.get::<Peer>().or_else(encrypted).cloned();
+        let authorization = request.headers().get(AUTHORIZATION).map(|value| value.as_bytes());
+        let permit = match self.gate.admit(role, authorization) {
+            Ok(permit) => permit,
+            Err(status) => {
+                self.gate.log_refusal(peer.as_ref(), request.uri().path(), &status);
+                return Box::pin(ready(Ok(status.into_http())));
+            }
+        };
+        // What was checked is not needed any more, and must not be seen any more.
+        request.headers_mut().remove(AUTHORIZATION);
+        if let Some(peer) = peer {
+            peer.admit();
+            request.extensions_mut().insert(peer);
+        }
+        let response = self.services.call(request);
+        Box::pin(async move {
+            // A call lasts until its answer has been read, or given up.
+            let until_read = move |body: Body| {
+                Body::new(body.map_err(move |status| {
+                    let _held = &permit;
+                    status
+                }))
+            };
+            Ok(response.await?.map(until_read))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::Full;
+    use swarm_transport::Token;
+    use tonic::Code;
+
+    use super::*;
+
+    fn gate() -> Gate {
+        let token = |letter: &str| Token::parse(&letter.repeat(32)).unwrap();
+        Gate::new(Some(Tokens::new(token("c"), token("w")).unwrap()))
+    }
+
+    fn code(gate: &Gate, role: Role, authorization: Option<&str>) -> Code {
+        let admitted = gate.admit(role, authorization.map(str::as_bytes));
+        admitted.map_or_else(|status| status.code(), |_| Code::Ok)
+    }
+
+    #[test]
+    fn roles_are_told_apart() {
+        let (gate, client, worker) = (gate(), "c".repeat(32), "w".repeat(32));
+        for (role, own, other) in
+            [(Role::Client, &client, &worker), (Role::Worker, &worker, &client)]
+        {
+            let code = |authorization: Option<&str>| code(&gate, role, authorization);
+            assert_eq!(code(Some(&format!("Bearer {own}"))), Code::Ok);
+            assert_eq!(code(Some(&format!("bearer {own}"))), Code::Ok);
+            assert_eq!(code(Some(&format!("Bearer {other}"))), Code::PermissionDenied);
+            for wrong in ["", "Bearer", "Bearer ", "Basic abc", own, &format!("Bearer {own}x")] {
+                assert_eq!(code(Some(wrong)), Code::Unauthenticated, "{wrong}");
+            }
+            assert_eq!(code(None), Code::Unauthenticated);
+        }
+    }
+
+    #[test]
+    fn only_health_takes_no_token() {
+        assert_eq!(role_for("/grpc.health.v1.Health/Check"), None);
+        assert_eq!(role_for("/swarm.v1.WorkerService/Work"), Some(Role::Worker));
+        for path in [
+            "/swarm.v1.ExperimentService/SubmitExperiment",
+            "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+            "/swarm.v1.ServiceOfTheFuture/Anything",
+            "/grpc.health.v1.HealthAndMore/Check",
+            "/",
+            "",
+        ] {
+            assert_eq!(role_for(path), Some(Role::Client), "{path}");
+        }
+    }
+
+    #[test]
+    fn without_tokens_everybody_may_pass() {
+        let gate = Gate::new(None);
+        assert_eq!(code(&gate, Role::Client, None), Code::Ok);
+        assert_eq!(code(&gate, Role::Worker, Some("whatever")), Code::Ok);
+    }
+
+    #[test]
+    fn one_call_too_many_is_refused_until_another_ends() {
+        let gate = Gate::new(None);
+        let mut calls: Vec<_> =
+            (0..CLIENT_CALLS_MAX).map(|_| gate.admit(Role::Client, None).unwrap()).collect();
+        assert_eq!(code(&gate, Role::Client, None), Code::ResourceExhausted);
+        assert_eq!(code(&gate, Role::Worker, None), Code::Ok, "they are counted apart");
+        calls.pop();
+        assert_eq!(code(&gate, Role::Client, None), Code::Ok);
+    }
+
+    #[tokio::test]
+    async fn a_call_counts_until_its_answer_is_dropped() {
+        #[derive(Clone)]
+        struct Answer;
+        impl Service<Request<Body>> for Answer {
+            type Response = Response<Body>;
+            type Error = Infallible;
+            type Future = std::future::Ready<Result<Response<Body>, Infallible>>;
+            fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+                Poll::Ready(Ok(()))
+            }
+            fn call(&mut self, _: Request<Body>) -> Self::Future {
+                ready(Ok(Response::new(Body::new(Full::from("answer")))))
+            }
+        }
+        let gate = Gate::new(None);
+        let response = gate.layer(Answer).call(Request::new(Body::empty())).await.unwrap();
+        assert_eq!(gate.client_calls.available_permits(), CLIENT_CALLS_MAX - 1);
+        drop(response);
+        assert_eq!(gate.client_calls.available_permits(), CLIENT_CALLS_MAX);
+    }
+}

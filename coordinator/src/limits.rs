@@ -1,0 +1,74 @@
+//! Every bound on what the network can make the coordinator hold or wait for.
+//!
+//! What is over a bound waits in the peer, or is refused with a status that says
+//! so; nothing grows. Bounds on what an experiment file may ask for are
+//! `sim_core`'s; `docs/security.md` lists both.
+
+use std::time::Duration;
+
+use swarm_proto::ITEMS_PER_SLOT_MAX;
+
+/// Connections at the same time: every worker and every call of a client on one
+/// of its own. More wait in the system's queue.
+pub const CONNECTIONS_MAX: usize = WORKERS_MAX + CLIENT_CALLS_MAX;
+/// Workers at the same time. Each holds a stream, some buffers and a file
+/// descriptor.
+pub const WORKERS_MAX: usize = 4096;
+/// Calls of clients, watches included, at the same time.
+pub const CLIENT_CALLS_MAX: usize = 1024;
+/// Calls on one connection at the same time: a worker has one, a client few.
+pub const CALLS_PER_CONNECTION_MAX: u32 = 128;
+/// Bytes of a call's headers: a token has up to 1,024 characters.
+pub const HEADERS_LEN_MAX: u32 = 16 << 10;
+
+/// Time for a connection to make a call that is let in. So those who know no
+/// token cannot keep the others out by holding all connections.
+pub const ADMISSION_TIMEOUT: Duration = Duration::from_secs(30);
+/// Time for a TLS handshake.
+pub const TLS_HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
+/// A peer is asked for a sign of life so often, and gone after as long without
+/// one: a machine that vanishes closes nothing.
+pub const KEEPALIVE: Duration = Duration::from_secs(20);
+/// Pause after the system cannot accept a connection, for lack of descriptors,
+/// say.
+pub const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
+/// Least time between two log lines about what anybody may cause.
+pub const STRANGER_LOG_INTERVAL: Duration = Duration::from_secs(1);
+/// Time for open streams to end at shutdown.
+pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
+
+/// Time for a new worker's stream to say `Hello`.
+pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+/// Slots of one worker.
+pub const SLOTS_MAX: u32 = 4096;
+/// Bytes of a worker's name, and of its version.
+pub const NAME_LEN_MAX: usize = 128;
+/// Results in one message: as many as the largest worker can hold items. On the
+/// wire an empty result takes two bytes, in memory fifty.
+pub const RESULTS_PER_MESSAGE_MAX: usize = ITEMS_PER_SLOT_MAX * SLOTS_MAX as usize;
+/// Bytes of what a worker says about itself or its failures, where the rest is cut,
+/// and of a client's reason for a pause.
+pub const TEXT_LEN_MAX: usize = 512;
+/// Messages, beyond one per credit, that may wait for a worker to read them; one
+/// that lets more wait is dropped.
+pub const WORKER_OUTBOX_SLACK: usize = 64;
+
+/// Bytes of `request_id` and `default_name`.
+pub const KEY_LEN_MAX: usize = 128;
+/// Bytes of the problems of a configuration: they travel in a header, whose size
+/// clients limit.
+pub const PROBLEMS_LEN_MAX: usize = 4096;
+/// Experiments that may be unfinished at the same time.
+pub const UNFINISHED_MAX: usize = 1000;
+/// Time for what a client changes to be stored before the client is told that it
+/// is not yet.
+pub const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Events read from the store at once.
+pub const EVENT_PAGE_LEN: u32 = 256;
+/// Generations or events in one answer.
+pub const PAGE_LEN_MAX: u32 = 1000;
+/// Events that may wait for a watcher to read them.
+pub const WATCH_QUEUE_LEN: usize = 16;
+/// Time for a watcher to make room for the next event; one that takes longer is
+/// told where to resume.
+pub const WATCH_PATIENCE: Duration = Duration::from_secs(30);

@@ -1,0 +1,92 @@
+//! Watchers that do not read.
+
+use std::time::Duration;
+
+use rusqlite::params;
+use swarm_proto::v1::{
+    SubmitExperimentRequest, WatchExperimentRequest,
+    experiment_service_server::ExperimentService as _,
+};
+use tokio_stream::StreamExt as _;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Request, Status};
+
+use super::*;
+use crate::{
+    driver::{self, Driver},
+    engine::EngineConfig,
+    limits::{WATCH_PATIENCE, WATCH_QUEUE_LEN},
+    shared_store::SharedStore,
+    store::Store,
+};
+
+const N_NOTICES: u64 = 1000;
+
+/// The service, and an experiment with many events.
+async fn service(directory: &tempfile::TempDir) -> Experiments {
+    let store = SharedStore::new(Store::open(directory.path()).unwrap());
+    let (events, queue) = driver::channel();
+    let shutdown = CancellationToken::new();
+    let config = EngineConfig::new(Duration::from_secs(10));
+    tokio::spawn(Driver::new(store.clone(), queue, config, shutdown.clone()).run());
+    let service = Experiments { events, store, shutdown };
+    let config_json = include_str!("../../../configs/quickstart.json").to_owned();
+    let request = SubmitExperimentRequest { config_json, ..Default::default() };
+    service.submit_experiment(Request::new(request)).await.unwrap();
+    let database = rusqlite::Connection::open(directory.path().join("swarmevo.sqlite3")).unwrap();
+    let last: u64 =
+        database.query_row("SELECT MAX(sequence) FROM events", [], |row| row.get(0)).unwrap();
+    let transaction = database.unchecked_transaction().unwrap();
+    for sequence in last + 1..=N_NOTICES {
+        let insert = "INSERT INTO events (experiment_id, sequence, at_ms, kind, message) \
+                      VALUES (1, ?1, 0, 'notice', 'news')";
+        transaction.execute(insert, params![sequence]).unwrap();
+    }
+    transaction.commit().unwrap();
+    service
+}
+
+/// Reads sequence numbers up to the last event, or to the status that ends the
+/// stream.
+async fn read(
+    service: &Experiments,
+    from_sequence: u64,
+    pause: Duration,
+) -> (Vec<u64>, Option<Status>) {
+    let request = WatchExperimentRequest { experiment_id: 1, from_sequence };
+    let mut stream = service.watch_experiment(Request::new(request)).await.unwrap().into_inner();
+    tokio::time::sleep(pause).await;
+    let mut sequences = Vec::new();
+    while sequences.last() != Some(&N_NOTICES) {
+        match stream.next().await.expect("the experiment goes on") {
+            Ok(response) => sequences.push(response.event.unwrap().sequence),
+            Err(status) => return (sequences, Some(status)),
+        }
+    }
+    (sequences, None)
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_watcher_that_does_not_read_is_told_where_to_resume_and_misses_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let service = service(&directory).await;
+    let (mut seen, status) = read(&service, 0, WATCH_PATIENCE * 2).await;
+    let status = status.expect("it was dropped");
+    assert_eq!(status.code(), Code::Aborted);
+    let next = seen.last().unwrap() + 1;
+    assert!(status.message().ends_with(&format!("resume from sequence {next}")), "{status}");
+    assert_eq!(seen.len(), WATCH_QUEUE_LEN, "no more waits for it");
+
+    let (rest, status) = read(&service, next, Duration::ZERO).await;
+    assert!(status.is_none());
+    seen.extend(rest);
+    assert_eq!(seen, (1..=N_NOTICES).collect::<Vec<_>>());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_watcher_that_pauses_is_not_dropped() {
+    let directory = tempfile::tempdir().unwrap();
+    let (seen, status) = read(&service(&directory).await, 0, WATCH_PATIENCE / 2).await;
+    assert!(status.is_none());
+    assert_eq!(seen, (1..=N_NOTICES).collect::<Vec<_>>());
+}

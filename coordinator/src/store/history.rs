@@ -1,0 +1,94 @@
+//! What has happened to an experiment: its events and its generations.
+
+use rusqlite::{Row, params};
+
+use crate::{evolution::Statistics, ids::ExperimentId};
+
+use super::{Event, EventKind, ExperimentState, Generation, Result, Store, StoreError};
+
+impl Store {
+    /// At most `limit` events from `from_sequence` on.
+    pub fn events(&self, id: ExperimentId, from_sequence: u64, limit: u32) -> Result<Vec<Event>> {
+        let mut statement = self.connection.prepare_cached(
+            "SELECT v.sequence, v.at_ms, v.kind, v.state, v.message,
+                    g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
+                    g.duration_ms, g.episodes, g.workers, g.idle_share
+             FROM events v
+             LEFT JOIN generations g
+                    ON g.experiment_id = v.experiment_id AND g.generation = v.generation
+             WHERE v.experiment_id = ?1 AND v.sequence >= ?2
+             ORDER BY v.sequence LIMIT ?3",
+        )?;
+        let from_sequence = i64::try_from(from_sequence).unwrap_or(i64::MAX);
+        let rows = statement.query_map(params![id.0, from_sequence, limit], |row| {
+            let (sequence, at_ms) = (row.get(0)?, row.get(1)?);
+            let message = row.get::<_, Option<String>>(4)?.unwrap_or_default();
+            let kind = match row.get::<_, String>(2)?.as_str() {
+                "generation" => read_generation(row, 5)?.map(EventKind::Generation),
+                "state" => {
+                    let state: Option<String> = row.get(3)?;
+                    state
+                        .and_then(|name| ExperimentState::from_name(&name))
+                        .map(|state| EventKind::State { state, reason: message })
+                }
+                _ => Some(EventKind::Notice(message)),
+            };
+            Ok(kind
+                .map(|kind| Event { sequence, at_ms, kind })
+                .ok_or_else(|| StoreError::Corrupt(format!("event {sequence} of {id}"))))
+        })?;
+        rows.map(|row| row?).collect()
+    }
+
+    /// At most `limit` completed generations from `from_generation` on, and when
+    /// they were completed, in milliseconds since 1970 UTC.
+    pub fn generations(
+        &self,
+        id: ExperimentId,
+        from_generation: u64,
+        limit: u32,
+    ) -> Result<Vec<(u64, Generation)>> {
+        // Events begin with the submission, and every generation has one: those of
+        // earlier generations need not be looked at.
+        let mut statement = self.connection.prepare_cached(
+            "SELECT v.at_ms, g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
+                    g.duration_ms, g.episodes, g.workers, g.idle_share
+             FROM events v
+             JOIN generations g
+               ON g.experiment_id = v.experiment_id AND g.generation = v.generation
+             WHERE v.experiment_id = ?1 AND v.sequence > ?2 AND v.generation >= ?2
+                   AND v.kind = 'generation'
+             ORDER BY v.sequence LIMIT ?3",
+        )?;
+        let from_generation = i64::try_from(from_generation).unwrap_or(i64::MAX);
+        let rows = statement.query_map(params![id.0, from_generation, limit], |row| {
+            let missing = || StoreError::Corrupt(format!("a generation of {id}"));
+            Ok((row.get(0)?, read_generation(row, 1)?.ok_or_else(missing)))
+        })?;
+        rows.map(|row| {
+            let (completed_at_ms, generation) = row?;
+            Ok((completed_at_ms, generation?))
+        })
+        .collect()
+    }
+}
+
+/// Reads the columns of `generations`, in the schema's order, from `first` on;
+/// none if an outer join found no row.
+pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Generation>> {
+    let Some(generation) = row.get(first)? else { return Ok(None) };
+    Ok(Some(Generation {
+        generation,
+        statistics: Statistics {
+            best: row.get(first + 1)?,
+            mean: row.get(first + 2)?,
+            min: row.get(first + 3)?,
+            standard_deviation: row.get(first + 4)?,
+        },
+        digest: row.get(first + 5)?,
+        duration_ms: row.get(first + 6)?,
+        episodes: row.get(first + 7)?,
+        workers: row.get(first + 8)?,
+        idle_share: row.get(first + 9)?,
+    }))
+}

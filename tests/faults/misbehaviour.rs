@@ -1,0 +1,238 @@
+//! Workers that do not keep to the protocol, or die of what they are given.
+
+use std::{
+    collections::BTreeMap,
+    io::{Read as _, Write as _},
+    net::TcpStream,
+    sync::{Arc, OnceLock},
+};
+
+use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello, undisturbed};
+use sim_core::config::ExperimentConfig;
+use swarm_proto::v1::{
+    Draining, ExperimentSpec, Heartbeat, Hello, Item, ItemResult, ItemResults,
+    SubmitExperimentRequest, TrialFitness, WorkRequest, WorkResponse, item_result::Outcome,
+    work_request::Message, work_response, worker_service_client::WorkerServiceClient,
+};
+use tonic::{Code, Request, codegen::http::uri::PathAndQuery, transport::Endpoint};
+use tonic_prost::ProstCodec;
+
+use super::{OTHER, TINY, n_lost};
+
+/// Enough for a worker to misbehave in another generation each time: what is
+/// done to one item three times fails the experiment.
+const GENERATIONS: u64 = 16;
+
+/// A worker in the middle of an experiment, with items in its hands.
+struct Intruder {
+    worker: HandWorker,
+    experiment: sim_core::Experiment,
+    generation: u64,
+    items: Vec<Item>,
+}
+
+impl Intruder {
+    async fn join(url: &str, name: &str) -> Self {
+        let hello = Hello { name: name.to_owned(), ..hello() };
+        let mut worker = HandWorker::connect(url, hello).await.unwrap();
+        let experiment = loop {
+            if let work_response::Message::Spec(spec) = worker.receive().await.unwrap() {
+                break compile(&spec);
+            }
+        };
+        let batch = worker.receive_batch().await.unwrap();
+        Self { worker, experiment, generation: batch.generation, items: batch.items }
+    }
+
+    /// What the first of its items is worth.
+    fn honest_fitness(&self) -> Vec<f64> {
+        evaluate(&self.experiment, self.generation, &self.items[0])
+    }
+
+    /// Leaves without harm; all it has said before has been read by then.
+    async fn leave(self, coordinator: &CoordinatorProcess, name: &str) {
+        self.worker.say(Message::Draining(Draining {})).await;
+        self.worker.hang_up().await;
+        coordinator
+            .process
+            .wait_for("farewell", |line| line["message"] == "worker left" && line["name"] == name);
+    }
+}
+
+fn compile(spec: &ExperimentSpec) -> sim_core::Experiment {
+    let (config, _) = ExperimentConfig::from_json(&spec.config_json, "").unwrap();
+    sim_core::Experiment::compile(&config).unwrap()
+}
+
+fn evaluate(experiment: &sim_core::Experiment, generation: u64, item: &Item) -> Vec<f64> {
+    let trials = item.first_trial..item.first_trial + item.trial_count;
+    experiment.evaluate(&item.genotype, generation, trials).unwrap()
+}
+
+fn fitness(item_id: u64, values: Vec<f64>) -> ItemResult {
+    let outcome = Some(Outcome::Fitness(TrialFitness { values }));
+    ItemResult { item_id, outcome, compute_us: u64::MAX }
+}
+
+/// Waits until a worker is lost; returns why.
+fn reason_of_loss(coordinator: &CoordinatorProcess, name: &str) -> String {
+    let lost = coordinator
+        .process
+        .wait_for("loss", |line| line["message"] == "worker lost" && line["name"] == name);
+    lost["reason"].as_str().unwrap().to_owned()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
+    let coordinator = CoordinatorProcess::start();
+    let url = coordinator.url();
+    let experiment = Experiment::tiny(GENERATIONS);
+    let id = coordinator.submit(&experiment.path());
+    let _honest = WorkerProcess::start(&coordinator, "honest");
+
+    // Wrong sizes, whatever the values.
+    for (generation, values) in
+        [vec![], vec![f64::NAN], vec![1e300; 4], vec![f64::INFINITY; 100_000]]
+            .into_iter()
+            .enumerate()
+    {
+        let name = format!("sizes-{generation}");
+        let mut intruder = Intruder::join(&url, &name).await;
+        let expected = format!("{} values for 2 trials", values.len());
+        intruder.worker.answer_fitness(intruder.items[0].item_id, values).await;
+        assert_eq!(intruder.worker.receive_end().await.code(), Code::Aborted);
+        assert!(reason_of_loss(&coordinator, &name).contains(&expected));
+        coordinator.wait_for_generation(generation as u64 + 1);
+    }
+
+    // Results for every item there is, except its own.
+    let intruder = Intruder::join(&url, "greedy").await;
+    let own: Vec<u64> = intruder.items.iter().map(|item| item.item_id).collect();
+    let others = (0..own[0] + 100).chain([u64::MAX]).filter(|id| !own.contains(id));
+    let results = others.map(|id| fitness(id, vec![f64::NAN; 2])).collect();
+    intruder.worker.say(Message::Results(ItemResults { results })).await;
+    intruder.leave(&coordinator, "greedy").await;
+
+    // The same result twice, the second time with another value, and once more.
+    let intruder = Intruder::join(&url, "repetitive").await;
+    let (item, right) = (intruder.items[0].item_id, intruder.honest_fitness());
+    let wrong: Vec<f64> = right.iter().map(|fitness| fitness + 1.0).collect();
+    let results = vec![fitness(item, right), fitness(item, wrong.clone())];
+    intruder.worker.say(Message::Results(ItemResults { results })).await;
+    intruder.worker.answer_fitness(item, wrong).await;
+    intruder.leave(&coordinator, "repetitive").await;
+
+    // Out of turn.
+    let intruder = Intruder::join(&url, "polite").await;
+    intruder.worker.say(Message::Hello(hello())).await;
+    assert_eq!(reason_of_loss(&coordinator, "polite"), "it said Hello twice");
+
+    let (code, finished) = coordinator.watch(id).end();
+    assert_eq!(code, Some(0), "{}", finished.last);
+    assert_eq!(finished.digests(), undisturbed(&experiment));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
+    let coordinator = CoordinatorProcess::start();
+    let url = coordinator.url();
+    let id = TINY.submit(&coordinator);
+
+    // No gRPC at all. HTTP/2 says goodbye and closes.
+    let mut raw = TcpStream::connect(coordinator.address()).unwrap();
+    raw.write_all(&[0x5a; 4096]).unwrap();
+    let mut farewell = Vec::new();
+    let _ = raw.read_to_end(&mut farewell);
+
+    // Not this service's messages: what should be an introduction is text.
+    let channel = Endpoint::from_shared(url.clone()).unwrap().connect().await.unwrap();
+    let mut client = tonic::client::Grpc::new(channel);
+    client.ready().await.unwrap();
+    let garbage = SubmitExperimentRequest { request_id: "hello?".to_owned(), ..Default::default() };
+    let codec = ProstCodec::<SubmitExperimentRequest, WorkResponse>::default();
+    let path = PathAndQuery::from_static("/swarm.v1.WorkerService/Work");
+    let request = Request::new(tokio_stream::iter([garbage]));
+    let status = client.streaming(request, path, codec).await.unwrap_err();
+    assert_eq!(status.code(), Code::Internal, "{status}");
+
+    // A first message that is no introduction.
+    let mut client = WorkerServiceClient::connect(url.clone()).await.unwrap();
+    let message = Some(Message::Heartbeat(Heartbeat {}));
+    let status = client.work(tokio_stream::iter([WorkRequest { message }])).await.unwrap_err();
+    assert_eq!(status.code(), Code::InvalidArgument);
+
+    // A message that is too long. What its worker held goes to others.
+    let mut intruder = Intruder::join(&url, "talkative").await;
+    let values = vec![0.0; 3 << 20];
+    intruder.worker.answer_fitness(intruder.items[0].item_id, values).await;
+    intruder.worker.receive_end().await;
+    assert!(reason_of_loss(&coordinator, "talkative").contains("its stream broke"));
+
+    let _honest = WorkerProcess::start(&coordinator, "honest");
+    TINY.assert_undisturbed(coordinator.watch(id));
+}
+
+/// The first experiment, its second generation.
+const POISONED: (u64, u64) = (1, 1);
+
+/// A worker that computes honestly, and dies whenever it gets to the genotype that
+/// was the first of [`POISONED`].
+async fn die_of(poison: Arc<OnceLock<Vec<f64>>>, url: String, name: String) {
+    loop {
+        let hello = Hello { name: name.clone(), ..hello() };
+        let Ok(mut worker) = HandWorker::connect(&url, hello).await else { return };
+        serve_until_poisoned(&mut worker, &poison).await;
+        // What it has said is heard: only the item of which it dies is to blame.
+        worker.hang_up().await;
+    }
+}
+
+async fn serve_until_poisoned(worker: &mut HandWorker, poison: &OnceLock<Vec<f64>>) {
+    let mut experiments = BTreeMap::new();
+    while let Ok(message) = worker.receive().await {
+        let batch = match message {
+            work_response::Message::Spec(spec) => {
+                experiments.insert(spec.experiment_id, compile(&spec));
+                continue;
+            }
+            work_response::Message::Batch(batch) => batch,
+            _ => continue,
+        };
+        for item in &batch.items {
+            if (batch.experiment_id, batch.generation) == POISONED
+                && *poison.get_or_init(|| item.genotype.clone()) == item.genotype
+            {
+                return;
+            }
+            let experiment = &experiments[&batch.experiment_id];
+            let values = evaluate(experiment, batch.generation, item);
+            worker.answer_fitness(item.item_id, values).await;
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_genotype_that_takes_every_worker_down_fails_its_experiment_by_name_and_no_other() {
+    let coordinator = CoordinatorProcess::start();
+    let doomed = TINY.submit(&coordinator);
+    assert_eq!(doomed, POISONED.0);
+    let sound = OTHER.submit(&coordinator);
+    let poison = Arc::new(OnceLock::new());
+    for i in 0..3 {
+        let name = format!("mortal-{i}");
+        tokio::spawn(die_of(Arc::clone(&poison), coordinator.url(), name));
+    }
+    OTHER.assert_undisturbed(coordinator.watch(sound));
+
+    let (code, finished) = coordinator.watch(doomed).end();
+    assert_eq!(code, Some(5));
+    assert_eq!(finished.last["state"], "failed");
+    let reason = finished.last["reason"].as_str().unwrap();
+    for expected in ["of generation 1", "failed 3 times", "mortal-", "was lost"] {
+        assert!(reason.contains(expected), "{reason}");
+    }
+    assert_eq!(finished.generations.len(), 1, "what was complete stays");
+    // Beside the three on one trial, some may have had another of the genotype's
+    // trials, or the same as a duplicate.
+    assert!((3..=6).contains(&n_lost(&coordinator)), "few more than it takes");
+}

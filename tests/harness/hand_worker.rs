@@ -1,0 +1,94 @@
+//! A worker whose every word is chosen by the test.
+
+use swarm_proto::{
+    PROTOCOL_VERSION,
+    v1::{
+        Hello, ItemBatch, ItemResult, ItemResults, TrialFitness, WorkRequest, WorkResponse,
+        item_result::Outcome, work_request, work_response,
+        worker_service_client::WorkerServiceClient,
+    },
+};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Status, Streaming};
+
+/// The introduction of a worker that will be let in.
+pub fn hello() -> Hello {
+    Hello {
+        protocol_version: PROTOCOL_VERSION,
+        sim_core_fingerprint: sim_core::FINGERPRINT.to_owned(),
+        name: "by hand".to_owned(),
+        slots: 1,
+        ..Hello::default()
+    }
+}
+
+/// The stream of a worker. It says nothing by itself, not even heartbeats.
+#[derive(Debug)]
+pub struct HandWorker {
+    outbox: mpsc::Sender<WorkRequest>,
+    inbox: Streaming<WorkResponse>,
+}
+
+impl HandWorker {
+    /// Connects and says Hello.
+    pub async fn connect(url: &str, hello: Hello) -> Result<Self, Status> {
+        let client = WorkerServiceClient::connect(url.to_owned()).await;
+        let mut client = client.map_err(|error| Status::unavailable(error.to_string()))?;
+        let (outbox, requests) = mpsc::channel(16);
+        let message = Some(work_request::Message::Hello(hello));
+        outbox.try_send(WorkRequest { message }).expect("a new channel has room");
+        let inbox = client.work(ReceiverStream::new(requests)).await?.into_inner();
+        Ok(Self { outbox, inbox })
+    }
+
+    /// The next message.
+    pub async fn receive(&mut self) -> Result<work_response::Message, Status> {
+        let response = self.inbox.message().await?;
+        let response = response.ok_or_else(|| Status::unavailable("the stream has ended"))?;
+        Ok(response.message.expect("known kind"))
+    }
+
+    /// The next items.
+    pub async fn receive_batch(&mut self) -> Result<ItemBatch, Status> {
+        loop {
+            if let work_response::Message::Batch(batch) = self.receive().await? {
+                return Ok(batch);
+            }
+        }
+    }
+
+    /// The status with which the coordinator ends the stream.
+    pub async fn receive_end(&mut self) -> Status {
+        loop {
+            if let Err(status) = self.receive().await {
+                return status;
+            }
+        }
+    }
+
+    /// Says anything.
+    pub async fn say(&self, message: work_request::Message) {
+        // If the stream is gone, `receive` will tell.
+        let _ = self.outbox.send(WorkRequest { message: Some(message) }).await;
+    }
+
+    /// Closes its side of the stream, behind all it has said, and waits for the
+    /// coordinator to close the other.
+    pub async fn hang_up(self) {
+        let Self { outbox, mut inbox } = self;
+        drop(outbox);
+        while let Ok(Some(_)) = inbox.message().await {}
+    }
+
+    /// Answers an item.
+    pub async fn answer(&self, item_id: u64, outcome: Outcome) {
+        let result = ItemResult { item_id, outcome: Some(outcome), compute_us: 1 };
+        self.say(work_request::Message::Results(ItemResults { results: vec![result] })).await;
+    }
+
+    /// Answers an item with fitness.
+    pub async fn answer_fitness(&self, item_id: u64, values: Vec<f64>) {
+        self.answer(item_id, Outcome::Fitness(TrialFitness { values })).await;
+    }
+}

@@ -1,0 +1,282 @@
+//! Everything that can be killed, frozen, cut off or blocked is, at random and
+//! for a while, and every experiment comes to the digest of an undisturbed run.
+//!
+//! `SWARM_SOAK_SECONDS` says for how long, `SWARM_SOAK_SEED` repeats the choices
+//! of a run (though not its timing).
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{
+    collections::BTreeMap,
+    env,
+    hash::{BuildHasher as _, Hasher as _, RandomState},
+    io::{self, Write as _},
+    str::FromStr,
+    thread,
+    time::{Duration, Instant},
+};
+
+use harness::{
+    CoordinatorProcess, Direction, Experiment, Proxy, Watch, WorkerProcess, undisturbed,
+};
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng as _, SeedableRng as _},
+};
+
+const DEFAULT_SECONDS: u64 = 20;
+const GENERATIONS: u64 = 20;
+const N_WORKERS: usize = 4;
+/// Short, so that the pauses are longer and shorter than it.
+const LEASE: &str = "1";
+const PAUSE_MS_MAX: u64 = 400;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Fault {
+    WorkerKilled,
+    WorkerStopped,
+    WorkerFrozen,
+    NetworkCut,
+    NetworkSilent,
+    NetworkDeaf,
+    NetworkDead,
+    CoordinatorKilled,
+    CoordinatorStopped,
+    CoordinatorFrozen,
+    DatabaseBlocked,
+}
+
+const FAULTS: [Fault; 11] = [
+    Fault::WorkerKilled,
+    Fault::WorkerStopped,
+    Fault::WorkerFrozen,
+    Fault::NetworkCut,
+    Fault::NetworkSilent,
+    Fault::NetworkDeaf,
+    Fault::NetworkDead,
+    Fault::CoordinatorKilled,
+    Fault::CoordinatorStopped,
+    Fault::CoordinatorFrozen,
+    Fault::DatabaseBlocked,
+];
+
+/// A worker behind a network of its own.
+struct Place {
+    network: Proxy,
+    worker: WorkerProcess,
+    is_troubled: bool,
+}
+
+impl Place {
+    fn heal(&mut self) {
+        self.worker.process.signal("CONT");
+        self.network.heal();
+        self.is_troubled = false;
+    }
+}
+
+struct Soak {
+    random: ChaCha8Rng,
+    coordinator: CoordinatorProcess,
+    places: Vec<Place>,
+    n_workers_started: usize,
+    experiment: Experiment,
+    expected: Vec<String>,
+    watch: Watch,
+    n_completed: usize,
+    faults: BTreeMap<Fault, usize>,
+}
+
+impl Soak {
+    fn start(seed: u64) -> Self {
+        let experiment = Experiment::tiny(GENERATIONS);
+        let expected = undisturbed(&experiment);
+        let coordinator = CoordinatorProcess::start_with(&["--lease", LEASE]);
+        let places = (0..N_WORKERS)
+            .map(|i| {
+                let network = Proxy::start(coordinator.address());
+                let worker = WorkerProcess::start_with(&network.url(), &format!("worker-{i}"), &[]);
+                Place { network, worker, is_troubled: false }
+            })
+            .collect();
+        let watch = coordinator.watch(coordinator.submit(&experiment.path()));
+        Self {
+            random: ChaCha8Rng::seed_from_u64(seed),
+            coordinator,
+            places,
+            n_workers_started: N_WORKERS,
+            experiment,
+            expected,
+            watch,
+            n_completed: 0,
+            faults: BTreeMap::new(),
+        }
+    }
+
+    fn below(&mut self, n: u64) -> u64 {
+        self.random.next_u64() % n
+    }
+
+    /// How long something lasts: part of the fault, not a way to wait for
+    /// something.
+    fn pause(&mut self) {
+        let pause_ms = self.below(PAUSE_MS_MAX);
+        thread::sleep(Duration::from_millis(pause_ms));
+    }
+
+    /// Every fault once, in random order.
+    fn deck(&mut self) -> Vec<Fault> {
+        let mut deck = FAULTS.to_vec();
+        for i in (1..deck.len()).rev() {
+            let j = self.below(i as u64 + 1) as usize;
+            deck.swap(i, j);
+        }
+        deck
+    }
+
+    /// Some place that is well. One is left alone, so that work goes on.
+    fn place(&mut self) -> &mut Place {
+        if self.places.iter().filter(|place| !place.is_troubled).count() < 2 {
+            self.places.iter_mut().for_each(Place::heal);
+        }
+        loop {
+            let i = self.below(N_WORKERS as u64) as usize;
+            if !self.places[i].is_troubled {
+                return &mut self.places[i];
+            }
+        }
+    }
+
+    fn strike(&mut self, fault: Fault) {
+        *self.faults.entry(fault).or_default() += 1;
+        let n_lines = self.coordinator.process.lines().len();
+        match fault {
+            Fault::WorkerKilled | Fault::WorkerStopped => {
+                self.n_workers_started += 1;
+                let name = format!("worker-{}", self.n_workers_started);
+                let place = self.place();
+                if fault == Fault::WorkerKilled {
+                    place.worker.process.kill();
+                } else {
+                    place.worker.process.signal("TERM");
+                    assert_eq!(place.worker.process.wait().code(), Some(0));
+                }
+                place.worker = WorkerProcess::start_with(&place.network.url(), &name, &[]);
+            }
+            Fault::WorkerFrozen => {
+                let place = self.place();
+                place.worker.process.signal("STOP");
+                place.is_troubled = true;
+            }
+            Fault::NetworkCut => {
+                let place = self.place();
+                place.network.cut();
+                place.is_troubled = true;
+            }
+            Fault::NetworkSilent | Fault::NetworkDeaf | Fault::NetworkDead => {
+                let place = self.place();
+                if fault != Fault::NetworkDeaf {
+                    place.network.hold(Direction::ToCoordinator);
+                }
+                if fault != Fault::NetworkSilent {
+                    place.network.hold(Direction::ToWorker);
+                }
+                place.is_troubled = true;
+            }
+            Fault::CoordinatorKilled | Fault::CoordinatorStopped => {
+                if fault == Fault::CoordinatorKilled {
+                    self.coordinator.process.kill();
+                } else {
+                    self.coordinator.process.signal("TERM");
+                    assert_eq!(self.coordinator.process.wait().code(), Some(0));
+                }
+                self.pause();
+                self.coordinator.restart();
+            }
+            Fault::CoordinatorFrozen => {
+                self.coordinator.process.signal("STOP");
+                self.pause();
+                self.coordinator.process.signal("CONT");
+            }
+            Fault::DatabaseBlocked => {
+                let database = self.coordinator.database();
+                database.execute_batch("BEGIN IMMEDIATE").unwrap();
+                self.pause();
+                database.execute_batch("ROLLBACK").unwrap();
+            }
+        }
+        self.keep_busy();
+        if matches!(fault, Fault::WorkerKilled | Fault::NetworkCut) {
+            // What is lost with three workers in a row is given up, by design: let
+            // it be judged before the next worker is taken from it. Workers that hear
+            // nothing would hold it up.
+            self.pause();
+            self.places.iter_mut().for_each(Place::heal);
+            self.coordinator.process.find(n_lines, "progress", |line| {
+                line["message"] == "generation" || line["message"] == "experiment completed"
+            });
+        } else {
+            self.pause();
+        }
+        for i in 0..N_WORKERS {
+            if self.places[i].is_troubled && self.below(2) == 0 {
+                self.places[i].heal();
+            }
+        }
+    }
+
+    /// Checks the experiment if it has ended, and starts it anew.
+    fn keep_busy(&mut self) {
+        let n_running: u64 = self
+            .coordinator
+            .database()
+            .query_row("SELECT count(*) FROM experiments WHERE state = 'running'", [], |row| {
+                row.get(0)
+            })
+            .unwrap();
+        if n_running == 0 {
+            let id = self.coordinator.submit(&self.experiment.path());
+            let watch = std::mem::replace(&mut self.watch, self.coordinator.watch(id));
+            assert_eq!(watch.finish().digests(), self.expected);
+            self.n_completed += 1;
+        }
+    }
+}
+
+fn setting<T: FromStr>(name: &str) -> Option<T> {
+    let text = env::var(name).ok()?;
+    Some(text.parse().unwrap_or_else(|_| panic!("{name} is {text}, not a number")))
+}
+
+/// Says something past the capture of a test's output.
+fn say(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+#[test]
+#[allow(clippy::disallowed_methods, reason = "it lasts for a given time")]
+fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
+    let seed =
+        setting("SWARM_SOAK_SEED").unwrap_or_else(|| RandomState::new().build_hasher().finish());
+    let seconds = setting("SWARM_SOAK_SECONDS").unwrap_or(DEFAULT_SECONDS);
+    say(&format!("soak: {seconds} s with SWARM_SOAK_SEED={seed}"));
+    let mut soak = Soak::start(seed);
+    let started = Instant::now();
+    let mut is_over = false;
+    while !is_over {
+        for fault in soak.deck() {
+            soak.strike(fault);
+            // Every kind of fault is to happen at least once.
+            is_over = started.elapsed() > Duration::from_secs(seconds)
+                && soak.faults.len() == FAULTS.len();
+            if is_over {
+                break;
+            }
+        }
+    }
+    soak.places.iter_mut().for_each(Place::heal);
+    // The workers and the coordinator live until it is finished.
+    let Soak { watch, expected, places, coordinator, .. } = soak;
+    assert_eq!(watch.finish().digests(), expected);
+    drop((places, coordinator));
+    say(&format!("soak: {} experiments came through {:?}", soak.n_completed + 1, soak.faults));
+}

@@ -1,0 +1,26 @@
+//! How the programs reach and trust each other: tokens, TLS, and the limits that
+//! both ends of a connection have to agree on.
+//!
+//! A worker or client turns an address and its [`Credentials`] into a [`Link`],
+//! which refuses whatever would give a secret away. `docs/security.md` has the
+//! model.
+
+mod credentials;
+mod link;
+mod pem;
+mod token;
+mod trouble;
+
+pub use credentials::{CredentialArgs, CredentialError, Credentials};
+pub use link::{Bearer, Link, LinkError, is_loopback};
+pub use pem::{Identity, PemError, certificates};
+pub use token::{BEARER, Token, TokenError};
+pub use trouble::tls_trouble;
+
+/// Largest message to a coordinator, bytes. An experiment file has at most 1 MiB;
+/// 512 results, more than a worker sends at once, of 1,000 trials each have about
+/// 4 MB.
+pub const TO_COORDINATOR_LEN_MAX: usize = 8 << 20;
+/// Largest message from a coordinator, bytes: a network written out as JSON is
+/// long, and so is a list of all experiments.
+pub const FROM_COORDINATOR_LEN_MAX: usize = 64 << 20;
