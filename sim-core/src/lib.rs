@@ -9,7 +9,10 @@
 //! genotype side by side, `trial` has the phases of a step, and `swarm` the state
 //! of its robots. A phase is a module each: `senses` and `sensors`,
 //! `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`.
-//! `random` and `torus` lie below everything.
+//! Below everything lie `random` and `torus`, `neighbours` (who is in reach of whom)
+//! and the arithmetic on vectors of robots: `isa` picks the instruction set, `lanes`
+//! are the vectors, `exp2` is what activations are made of. `bench` opens the kernel
+//! to the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]

@@ -19,9 +19,9 @@ use tonic_prost::ProstCodec;
 
 use super::{OTHER, TINY, n_lost};
 
-/// Enough for a worker to misbehave in another generation each time: what is
-/// done to one item three times fails the experiment.
-const GENERATIONS: u64 = 16;
+/// Enough for each size of answer to be in a generation of its own: what is done to
+/// one item three times fails the experiment.
+const GENERATIONS: u64 = 6;
 
 /// A worker in the middle of an experiment, with items in its hands.
 struct Intruder {
@@ -47,6 +47,22 @@ impl Intruder {
     /// What the first of its items is worth.
     fn honest_fitness(&self) -> Vec<f64> {
         evaluate(&self.experiment, self.generation, &self.items[0])
+    }
+
+    /// Computes honestly until its generation is complete, and leaves.
+    async fn complete_generation(mut self, coordinator: &CoordinatorProcess, name: &str) {
+        let mut items = std::mem::take(&mut self.items);
+        loop {
+            for item in &items {
+                let values = evaluate(&self.experiment, self.generation, item);
+                self.worker.answer_fitness(item.item_id, values).await;
+            }
+            let batch = self.worker.receive_batch().await.unwrap();
+            if batch.generation != self.generation {
+                return self.leave(coordinator, name).await;
+            }
+            items = batch.items;
+        }
     }
 
     /// Leaves without harm; all it has said before has been read by then.
@@ -88,21 +104,27 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     let url = coordinator.url();
     let experiment = Experiment::tiny(GENERATIONS);
     let id = coordinator.submit(&experiment.path());
-    let _honest = WorkerProcess::start(&coordinator, "honest");
 
-    // Wrong sizes, whatever the values.
-    for (generation, values) in
-        [vec![], vec![f64::NAN], vec![1e300; 4], vec![f64::INFINITY; 100_000]]
-            .into_iter()
-            .enumerate()
-    {
-        let name = format!("sizes-{generation}");
+    // Wrong sizes, whatever the values. It has the fleet for itself: with others at
+    // work its items might be theirs, too, and be called off before it answers.
+    let wrong: [fn(usize) -> Vec<f64>; 4] = [
+        |_| vec![],
+        |n_trials| vec![f64::NAN; n_trials + 1],
+        |n_trials| vec![1e300; n_trials + 2],
+        |_| vec![f64::INFINITY; 100_000],
+    ];
+    for (case, wrong) in wrong.into_iter().enumerate() {
+        let name = format!("sizes-{case}");
         let mut intruder = Intruder::join(&url, &name).await;
-        let expected = format!("{} values for 2 trials", values.len());
-        intruder.worker.answer_fitness(intruder.items[0].item_id, values).await;
+        let (item_id, n_trials) = (intruder.items[0].item_id, intruder.items[0].trial_count);
+        let values = wrong(n_trials as usize);
+        let expected = format!("{} values for {n_trials} trials", values.len());
+        intruder.worker.answer_fitness(item_id, values).await;
         assert_eq!(intruder.worker.receive_end().await.code(), Code::Aborted);
-        assert!(reason_of_loss(&coordinator, &name).contains(&expected));
-        coordinator.wait_for_generation(generation as u64 + 1);
+        let reason = reason_of_loss(&coordinator, &name);
+        assert!(reason.contains(&expected), "{reason}, not {expected}");
+        let name = format!("honest-{case}");
+        Intruder::join(&url, &name).await.complete_generation(&coordinator, &name).await;
     }
 
     // Results for every item there is, except its own.
@@ -127,6 +149,7 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     intruder.worker.say(Message::Hello(hello())).await;
     assert_eq!(reason_of_loss(&coordinator, "polite"), "it said Hello twice");
 
+    let _honest = WorkerProcess::start(&coordinator, "honest");
     let (code, finished) = coordinator.watch(id).end();
     assert_eq!(code, Some(0), "{}", finished.last);
     assert_eq!(finished.digests(), undisturbed(&experiment));

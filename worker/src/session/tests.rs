@@ -105,6 +105,10 @@ impl Conversation {
     }
 }
 
+/// What makes a specification computable.
+trait MakesEvaluators: Fn(String) -> Evaluator + Send + Sync + 'static {}
+impl<F: Fn(String) -> Evaluator + Send + Sync + 'static> MakesEvaluators for F {}
+
 /// A coordinator, and a worker that connects to it.
 struct Stage {
     conversations: mpsc::Receiver<Conversation>,
@@ -113,14 +117,14 @@ struct Stage {
 }
 
 impl Stage {
-    async fn new(slots: usize, evaluator: fn(String) -> Evaluator) -> Self {
+    async fn new(slots: usize, evaluator: impl MakesEvaluators) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         Self { conversations: serve(listener), ..Self::worker(address, slots, evaluator) }
     }
 
     /// A worker whose coordinator is somebody else's affair.
-    fn worker(address: SocketAddr, slots: usize, evaluator: fn(String) -> Evaluator) -> Self {
+    fn worker(address: SocketAddr, slots: usize, evaluator: impl MakesEvaluators) -> Self {
         let mut config = WorkerConfig::new(format!("http://{address}"), "ada", slots);
         config.retry_delay_min = Duration::from_millis(1);
         config.retry_delay_max = Duration::from_millis(20);
@@ -157,6 +161,23 @@ fn arithmetic(config_json: String) -> Evaluator {
         let fitness = |trial| factor * sum / (item.generation + u64::from(trial)) as f64;
         Ok(Some(item.trials.clone().map(fitness).collect()))
     })
+}
+
+/// Evaluators that say when they start an item, and wait for a permit each to answer
+/// with its number, unless they have been stopped.
+fn gated() -> (impl MakesEvaluators, mpsc::UnboundedReceiver<u64>, std_mpsc::Sender<()>) {
+    let (started, starts) = mpsc::unbounded_channel();
+    let (permit, permits) = std_mpsc::channel();
+    let permits = Arc::new(Mutex::new(permits));
+    let gated = move |_| -> Evaluator {
+        let (started, permits) = (started.clone(), Arc::clone(&permits));
+        Arc::new(move |item, keep_going| {
+            started.send(item.id).map_err(|error| error.to_string())?;
+            permits.lock().unwrap().recv().map_err(|error| error.to_string())?;
+            Ok(keep_going().then(|| vec![item.id as f64]))
+        })
+    };
+    (gated, starts, permit)
 }
 
 fn fitness(result: &v1::ItemResult) -> &[f64] {
@@ -256,14 +277,7 @@ async fn an_ended_experiment_is_forgotten() {
 
 #[tokio::test]
 async fn dropped_items_are_not_computed() {
-    static GATE: Gate = Gate::new();
-    fn gated(_: String) -> Evaluator {
-        Arc::new(|item, _| {
-            GATE.pass(item.id);
-            Ok(Some(vec![item.id as f64]))
-        })
-    }
-    let (mut starts, permit) = GATE.open();
+    let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
@@ -280,6 +294,32 @@ async fn dropped_items_are_not_computed() {
     assert_eq!(computed.iter().map(|result| result.item_id).collect::<Vec<_>>(), [1, 3]);
     drop(coordinator);
     stage.end().await;
+}
+
+#[tokio::test]
+async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
+    let drop_item = Message::DropItems(v1::DropItems { item_ids: vec![1] });
+    let end = Message::EndExperiment(v1::EndExperiment { experiment_id: 1 });
+    for message in [drop_item, end] {
+        let (gated, mut starts, permit) = gated();
+        let mut stage = Stage::new(1, gated).await;
+        let mut coordinator = stage.conversation().await;
+        coordinator.welcome(LONG).await;
+        coordinator.send_spec(1, "").await;
+        coordinator.send_spec(2, "").await;
+        coordinator.send_items(1, [1]).await;
+        assert_eq!(starts.recv().await, Some(1));
+        coordinator.send(message).await;
+        coordinator.send_items(2, [2]).await;
+        // Answered at once, so that what was sent before has been read.
+        coordinator.send_items(9, [3]).await;
+        assert_eq!(coordinator.results(1).await[0].item_id, 3);
+        permit.send(()).unwrap();
+        permit.send(()).unwrap();
+        assert_eq!(coordinator.results(1).await[0].item_id, 2, "of 1 nothing is heard");
+        drop(coordinator);
+        stage.end().await;
+    }
 }
 
 #[tokio::test]
@@ -324,42 +364,9 @@ async fn a_version_mismatch_is_fatal_and_any_other_refusal_is_not() {
     );
 }
 
-/// What the gated evaluators of the tests below tell and are told. A
-/// function pointer captures nothing, so each test has a static of its own.
-struct Gate {
-    started: Mutex<Option<mpsc::UnboundedSender<u64>>>,
-    permits: Mutex<Option<std_mpsc::Receiver<()>>>,
-}
-
-impl Gate {
-    const fn new() -> Self {
-        Self { started: Mutex::new(None), permits: Mutex::new(None) }
-    }
-
-    fn open(&self) -> (mpsc::UnboundedReceiver<u64>, std_mpsc::Sender<()>) {
-        let (started, starts) = mpsc::unbounded_channel();
-        let (permit, permits) = std_mpsc::channel();
-        *self.started.lock().unwrap() = Some(started);
-        *self.permits.lock().unwrap() = Some(permits);
-        (starts, permit)
-    }
-
-    fn pass(&self, item_id: u64) {
-        self.started.lock().unwrap().as_ref().unwrap().send(item_id).unwrap();
-        self.permits.lock().unwrap().as_ref().unwrap().recv().unwrap();
-    }
-}
-
 #[tokio::test]
 async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() {
-    static GATE: Gate = Gate::new();
-    fn gated(_: String) -> Evaluator {
-        Arc::new(|item, _| {
-            GATE.pass(item.id);
-            Ok(Some(vec![item.id as f64]))
-        })
-    }
-    let (mut starts, permit) = GATE.open();
+    let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
@@ -379,14 +386,7 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
 
 #[tokio::test]
 async fn hearts_beat_while_all_slots_compute() {
-    static GATE: Gate = Gate::new();
-    fn gated(_: String) -> Evaluator {
-        Arc::new(|item, _| {
-            GATE.pass(item.id);
-            Ok(Some(vec![]))
-        })
-    }
-    let (mut starts, permit) = GATE.open();
+    let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(Duration::from_millis(5)).await;
@@ -403,14 +403,7 @@ async fn hearts_beat_while_all_slots_compute() {
 
 #[tokio::test]
 async fn more_items_than_the_credit_allows_are_failed() {
-    static GATE: Gate = Gate::new();
-    fn gated(_: String) -> Evaluator {
-        Arc::new(|item, _| {
-            GATE.pass(item.id);
-            Ok(Some(vec![]))
-        })
-    }
-    let (mut starts, permit) = GATE.open();
+    let (gated, mut starts, permit) = gated();
     let mut stage = Stage::new(1, gated).await;
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
