@@ -51,6 +51,9 @@ fn main() {
     if wants("sizes") {
         sizes(best);
     }
+    if wants("items") {
+        items(best);
+    }
 }
 
 /// The network alone.
@@ -108,6 +111,33 @@ fn sizes(isa: Isa) {
             config.algorithm.evaluation_steps = 100;
             compare(&format!("{} ({n} robots)", config.name), &config, isa);
         }
+    }
+}
+
+/// What a trial costs in an item of fewer trials than five, whose lanes fill fewer
+/// vectors less well.
+fn items(isa: Isa) {
+    println!("\nitems ({isa}): time per trial, relative to that in an item of {N_TRIALS}");
+    println!("{:20} {:>10} {:>10} {:>10} {:>10}", "trials of the item", 1, 2, 3, 4);
+    for config in [experiment_a(), experiment_b(), experiment_c(), experiment_d()] {
+        let experiment = compile(&config, isa);
+        let genotype = genotype(&config, 1);
+        let per_trial = |n_trials: u32| {
+            let evaluate = || experiment.evaluate(&genotype, 0, 0..n_trials).expect("it is valid");
+            seconds_per(evaluate) / f64::from(n_trials)
+        };
+        let [one, two, three, four, all] = medians([
+            &mut || per_trial(1),
+            &mut || per_trial(2),
+            &mut || per_trial(3),
+            &mut || per_trial(4),
+            &mut || per_trial(N_TRIALS),
+        ]);
+        print!("{:20}", format!("{} ({} robots)", config.name, n_robots(&config)));
+        println!(
+            "{}",
+            [one, two, three, four].map(|time| format!(" {:9.2}x", time / all)).concat()
+        );
     }
 }
 
