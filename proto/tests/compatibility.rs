@@ -1,0 +1,196 @@
+//! What clients were promised stays: the protocol only grows.
+//!
+//! `swarm.v1.binpb` is the descriptor of what was promised. After additions, let
+//! them be promised, too, with
+//!
+//! ```sh
+//! SWARM_PROMISE=1 cargo test -p swarm-proto --test compatibility
+//! ```
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{collections::BTreeSet, env, fs};
+
+use prost::Message as _;
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, FileDescriptorSet, ServiceDescriptorProto,
+    field_descriptor_proto::{Label, Type},
+};
+use swarm_proto::FILE_DESCRIPTOR_SET;
+
+const PROMISED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/swarm.v1.binpb");
+
+fn present() -> FileDescriptorSet {
+    let mut set = FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).unwrap();
+    for file in &mut set.file {
+        // Comments are no promise.
+        file.source_code_info = None;
+    }
+    set
+}
+
+fn promised() -> FileDescriptorSet {
+    FileDescriptorSet::decode(&*fs::read(PROMISED).unwrap()).unwrap()
+}
+
+/// Everything that a client may rely on, one line each. A change of anything is
+/// the loss of a line.
+fn facts(set: &FileDescriptorSet) -> BTreeSet<String> {
+    let mut facts = BTreeSet::new();
+    for file in &set.file {
+        let package = file.package();
+        file.message_type.iter().for_each(|it| add_message(&mut facts, package, it));
+        file.enum_type.iter().for_each(|it| add_enum(&mut facts, package, it));
+        file.service.iter().for_each(|it| add_service(&mut facts, package, it));
+    }
+    facts
+}
+
+fn add_message(facts: &mut BTreeSet<String>, scope: &str, message: &DescriptorProto) {
+    let scope = format!("{scope}.{}", message.name());
+    facts.insert(format!("message {scope}"));
+    for field in &message.field {
+        let presence = match field.oneof_index {
+            _ if field.proto3_optional() => "optional".to_owned(),
+            Some(index) => format!("in oneof {}", message.oneof_decl[index as usize].name()),
+            None => "plain".to_owned(),
+        };
+        facts.insert(format!(
+            "field {scope}.{} = {}: {:?} {:?} {} {presence}, {} in JSON",
+            field.name(),
+            field.number(),
+            field.label(),
+            field.r#type(),
+            field.type_name(),
+            field.json_name(),
+        ));
+    }
+    message.nested_type.iter().for_each(|it| add_message(facts, &scope, it));
+    message.enum_type.iter().for_each(|it| add_enum(facts, &scope, it));
+}
+
+fn add_enum(facts: &mut BTreeSet<String>, scope: &str, enumeration: &EnumDescriptorProto) {
+    let scope = format!("{scope}.{}", enumeration.name());
+    facts.insert(format!("enum {scope}"));
+    for value in &enumeration.value {
+        facts.insert(format!("value {scope}.{} = {}", value.name(), value.number()));
+    }
+}
+
+fn add_service(facts: &mut BTreeSet<String>, scope: &str, service: &ServiceDescriptorProto) {
+    let scope = format!("{scope}.{}", service.name());
+    facts.insert(format!("service {scope}"));
+    for method in &service.method {
+        let side = |is_stream, message| if is_stream { ("stream", message) } else { ("", message) };
+        let takes = side(method.client_streaming(), method.input_type());
+        let returns = side(method.server_streaming(), method.output_type());
+        facts.insert(format!("method {scope}/{} {takes:?} {returns:?}", method.name()));
+    }
+}
+
+/// What the first promises and the second does not keep.
+fn broken(promised: &FileDescriptorSet, present: &FileDescriptorSet) -> Vec<String> {
+    facts(promised).difference(&facts(present)).cloned().collect()
+}
+
+#[test]
+fn the_protocol_keeps_its_promises() {
+    if env::var_os("SWARM_PROMISE").is_some() {
+        let is_new = !fs::exists(PROMISED).unwrap();
+        assert!(is_new || broken(&promised(), &present()).is_empty(), "a promise can only grow");
+        fs::write(PROMISED, present().encode_to_vec()).unwrap();
+    }
+    let broken = broken(&promised(), &present());
+    assert!(
+        broken.is_empty(),
+        "clients rely on what is gone or has changed; add something new beside it: {broken:#?}"
+    );
+}
+
+/// What breaks if `change` is done to a protocol with a bit of everything.
+fn broken_by(change: impl FnOnce(&mut FileDescriptorSet)) -> Vec<String> {
+    let mut changed = present();
+    change(&mut changed);
+    broken(&present(), &changed)
+}
+
+fn message<'a>(set: &'a mut FileDescriptorSet, name: &str) -> &'a mut DescriptorProto {
+    let mut messages = set.file.iter_mut().flat_map(|file| &mut file.message_type);
+    messages.find(|message| message.name() == name).unwrap()
+}
+
+fn service<'a>(set: &'a mut FileDescriptorSet, name: &str) -> &'a mut ServiceDescriptorProto {
+    let mut services = set.file.iter_mut().flat_map(|file| &mut file.service);
+    services.find(|service| service.name() == name).unwrap()
+}
+
+fn states(set: &mut FileDescriptorSet) -> &mut EnumDescriptorProto {
+    set.file.iter_mut().find_map(|file| file.enum_type.first_mut()).unwrap()
+}
+
+#[test]
+fn every_kind_of_breaking_change_is_found_by_name() {
+    type Change = fn(&mut FileDescriptorSet);
+    let changes: [(&str, Change); 16] = [
+        ("message swarm.v1.Notice", |set| message(set, "Notice").name = Some("Remark".into())),
+        ("field swarm.v1.Notice.message", |set| message(set, "Notice").field.clear()),
+        ("field swarm.v1.Notice.message", |set| {
+            message(set, "Notice").field[0].name = Some("text".into());
+        }),
+        ("field swarm.v1.Notice.message", |set| {
+            message(set, "Notice").field[0].json_name = Some("text".into());
+        }),
+        ("field swarm.v1.Notice.message", |set| message(set, "Notice").field[0].number = Some(2)),
+        ("field swarm.v1.Notice.message", |set| {
+            message(set, "Notice").field[0].set_type(Type::Bytes);
+        }),
+        ("field swarm.v1.Notice.message", |set| {
+            message(set, "Notice").field[0].set_label(Label::Repeated);
+        }),
+        ("field swarm.v1.Notice.message", |set| {
+            message(set, "Notice").field[0].proto3_optional = Some(true);
+        }),
+        ("field swarm.v1.ListWorkersResponse.workers", |set| {
+            message(set, "ListWorkersResponse").field[0].type_name = Some(".swarm.v1.Event".into());
+        }),
+        ("field swarm.v1.Event.notice", |set| {
+            let field = message(set, "Event").field.iter_mut().find(|it| it.name() == "notice");
+            field.unwrap().oneof_index = None;
+        }),
+        ("enum swarm.v1.ExperimentState", |set| states(set).name = Some("State".into())),
+        ("value swarm.v1.ExperimentState.EXPERIMENT_STATE_PAUSED", |set| {
+            states(set).value.pop();
+        }),
+        ("value swarm.v1.ExperimentState.EXPERIMENT_STATE_RUNNING", |set| {
+            states(set).value[1].number = Some(77);
+        }),
+        ("service swarm.v1.FleetService", |set| {
+            service(set, "FleetService").name = Some("Fleet".into());
+        }),
+        ("method swarm.v1.FleetService/ListWorkers", |set| {
+            service(set, "FleetService").method[0].server_streaming = Some(true);
+        }),
+        ("method swarm.v1.FleetService/ListWorkers", |set| {
+            service(set, "FleetService").method[0].input_type = Some(".swarm.v1.Event".into());
+        }),
+    ];
+    for (expected, change) in changes {
+        let broken = broken_by(change);
+        assert!(broken.iter().any(|fact| fact.starts_with(expected)), "{expected}: {broken:#?}");
+    }
+}
+
+#[test]
+fn additions_break_nothing() {
+    let broken = broken_by(|set| {
+        let mut field = message(set, "Notice").field[0].clone();
+        (field.name, field.number) = (Some("level".into()), Some(2));
+        message(set, "Notice").field.push(field);
+        let mut value = states(set).value[1].clone();
+        (value.name, value.number) = (Some("EXPERIMENT_STATE_QUEUED".into()), Some(78));
+        states(set).value.push(value);
+        let mut method = service(set, "FleetService").method[0].clone();
+        method.name = Some("DrainWorker".into());
+        service(set, "FleetService").method.push(method);
+    });
+    assert_eq!(broken, Vec::<String>::new());
+}
