@@ -4,7 +4,9 @@
 
 use std::{fs, process::Command};
 
-use harness::{CoordinatorProcess, Experiment, Outcome, WorkerProcess, binary, swarmctl};
+use harness::{
+    CoordinatorProcess, Experiment, Outcome, PythonClient, WorkerProcess, binary, swarmctl,
+};
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
 use swarm_proto::{
     PROTOCOL_VERSION,
@@ -307,6 +309,25 @@ fn a_fleet_works_over_tls_with_certificates_on_both_sides() {
         4,
         &["client certificate", "--tls-cert"],
     );
+}
+
+#[test]
+fn a_python_script_speaks_tls() {
+    let Some(python) = PythonClient::find() else { return };
+    let files = Files::new().with_certificates();
+    let coordinator = files.coordinator("--tls-cert @coordinator.pem --tls-key @coordinator.key");
+    let url = https(&coordinator);
+    let _worker = files.worker(&url, "--tls-ca @ca.pem --token-file @worker.token");
+    let experiment = Experiment::tiny(1);
+    let run = |options: &str| {
+        let mut args = files.options(&format!("--token-file @client.token --patience 0 {options}"));
+        args.extend([experiment.path().to_str().unwrap(), "--coordinator", &url].map(String::from));
+        python.run(&args.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    run("--tls-ca @ca.pem").expect_success();
+    let outcome = run("--tls-ca @other-ca.pem");
+    assert_eq!(outcome.code, Some(4), "{outcome:#?}");
+    assert!(outcome.stderr.contains("CERTIFICATE_VERIFY_FAILED"), "{}", outcome.stderr);
 }
 
 #[test]

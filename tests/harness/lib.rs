@@ -10,6 +10,7 @@ mod hand_worker;
 mod mount;
 mod process;
 mod proxy;
+mod python;
 
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
@@ -18,3 +19,4 @@ pub use hand_worker::{HandWorker, hello};
 pub use mount::SmallDisk;
 pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};
 pub use proxy::{Direction, Proxy, Traffic};
+pub use python::{PythonClient, RunningPythonClient};
