@@ -1,7 +1,7 @@
 //! What people see: results, errors that say what to do, exit codes.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::fs;
+use std::{fs, io::Write as _, net::TcpListener, thread};
 
 use harness::{
     CoordinatorProcess, Experiment, WorkerProcess, run_coordinator, swarmctl, workspace_file,
@@ -127,7 +127,38 @@ fn unknown_experiments_are_not_found() {
 fn a_coordinator_that_is_not_there_is_named() {
     let outcome = swarmctl(["--coordinator", "http://127.0.0.1:1", "list"]);
     assert_eq!(outcome.code, Some(4), "{outcome:#?}");
-    assert!(outcome.stderr.contains("127.0.0.1:1"), "{}", outcome.stderr);
+    assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
+    for expected in ["127.0.0.1:1", "start one with `coordinator`", "--coordinator"] {
+        assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_wrong_port_is_recognised_by_what_answers_there() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        for mut connection in listener.incoming().map_while(Result::ok) {
+            let _ = connection.write_all(b"HTTP/1.1 400 Bad Request\r\n\r\n");
+        }
+    });
+    let outcome = swarmctl(["--coordinator", &format!("http://{address}"), "list"]);
+    assert_eq!(outcome.code, Some(9), "{outcome:#?}");
+    assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
+    for expected in [&*address.to_string(), "HTTP/1.1 400", "is this the right port?"] {
+        assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_worker_waits_for_a_coordinator_that_is_not_up_yet_and_says_so() {
+    let mut coordinator = CoordinatorProcess::start();
+    coordinator.process.kill();
+    let worker = WorkerProcess::start(&coordinator, "early");
+    let waiting = worker.process.wait_for("reason", |line| line["reason"].is_string());
+    assert!(waiting.to_string().contains(coordinator.address()), "{waiting}");
+    coordinator.restart();
+    coordinator.process.wait_for("worker", |line| line["message"] == "worker joined");
 }
 
 #[test]

@@ -1,17 +1,35 @@
 //! The wire protocol, spoken by hand.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use harness::{CoordinatorProcess, Experiment, HandWorker, hello};
+use std::collections::BTreeSet;
+
+use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
         ExperimentState, Hello, ItemFailure, ListWorkersRequest, SubmitExperimentRequest,
-        SubmitExperimentResponse, WatchExperimentRequest, event::Kind,
+        SubmitExperimentResponse, WatchExperimentRequest, WorkRequest, WorkResponse,
+        event::Kind,
         experiment_service_client::ExperimentServiceClient,
-        fleet_service_client::FleetServiceClient, item_result::Outcome, work_response,
+        fleet_service_client::FleetServiceClient,
+        item_result::Outcome,
+        work_response,
+        worker_service_server::{WorkerService, WorkerServiceServer},
     },
 };
-use tonic::{Code, Status, transport::Channel};
+use tokio::net::TcpListener;
+use tokio_stream::{Empty, wrappers::TcpListenerStream};
+use tonic::{
+    Code, Request, Response, Status, Streaming,
+    transport::{Channel, Endpoint, Server},
+};
+use tonic_health::pb::{
+    HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
+};
+use tonic_reflection::pb::v1::{
+    ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
+    server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
+};
 
 async fn submit(
     url: &str,
@@ -46,6 +64,83 @@ async fn a_worker_of_another_version_is_refused_with_both_versions() {
         coordinator.process.wait_for("refusal", |line| {
             line["message"] == "worker refused" && line["reason"] == *reason
         });
+    }
+}
+
+/// A coordinator of some other version.
+struct OtherVersion;
+
+#[tonic::async_trait]
+impl WorkerService for OtherVersion {
+    type WorkStream = Empty<Result<WorkResponse, Status>>;
+
+    async fn work(
+        &self,
+        _: Request<Streaming<WorkRequest>>,
+    ) -> Result<Response<Self::WorkStream>, Status> {
+        Err(Status::failed_precondition("this is swarmevo 9; run the same release on both sides"))
+    }
+}
+
+#[tokio::test]
+async fn a_worker_that_meets_another_version_ends_and_says_what_to_do() {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let serving = Server::builder()
+        .add_service(WorkerServiceServer::new(OtherVersion))
+        .serve_with_incoming(TcpListenerStream::new(listener));
+    let server = tokio::spawn(serving);
+    let mut worker = WorkerProcess::start_with(&url, "w", &[]);
+    let (code, last) = tokio::task::spawn_blocking(move || {
+        (worker.process.wait().code(), worker.process.lines().pop().unwrap())
+    })
+    .await
+    .unwrap();
+    server.abort();
+    assert_eq!(code, Some(6), "{last}");
+    let message = last["message"].as_str().unwrap();
+    assert!(message.contains("swarmevo 9; run the same release"), "{message}");
+    assert!(message.contains(sim_core::FINGERPRINT) && message.contains(&url), "{message}");
+}
+
+#[tokio::test]
+async fn reflection_shows_every_service_and_health_says_serving() {
+    let services = [
+        "swarm.v1.ExperimentService",
+        "swarm.v1.FleetService",
+        "swarm.v1.WorkerService",
+        "grpc.health.v1.Health",
+    ];
+    let coordinator = CoordinatorProcess::start();
+    let channel = Endpoint::from_shared(coordinator.url()).unwrap().connect().await.unwrap();
+    let ask = |question| ServerReflectionRequest {
+        message_request: Some(question),
+        ..ServerReflectionRequest::default()
+    };
+    let mut questions = vec![ask(MessageRequest::ListServices(String::new()))];
+    questions.extend(services.map(|name| ask(MessageRequest::FileContainingSymbol(name.into()))));
+    let mut answers = ServerReflectionClient::new(channel.clone())
+        .server_reflection_info(tokio_stream::iter(questions))
+        .await
+        .unwrap()
+        .into_inner();
+    let mut next = async || answers.message().await.unwrap().unwrap().message_response.unwrap();
+    let MessageResponse::ListServicesResponse(list) = next().await else { panic!("no list") };
+    let listed: BTreeSet<String> = list.service.into_iter().map(|service| service.name).collect();
+    for service in services {
+        assert!(listed.contains(service), "{service} in {listed:?}");
+        let MessageResponse::FileDescriptorResponse(files) = next().await else {
+            panic!("no description of {service}")
+        };
+        assert!(!files.file_descriptor_proto.is_empty(), "{service}");
+    }
+
+    let mut health = HealthClient::new(channel);
+    // The last one is the server as a whole.
+    for service in services.iter().take(3).chain(&[""]) {
+        let request = HealthCheckRequest { service: (*service).to_owned() };
+        let status = health.check(request).await.unwrap().into_inner().status();
+        assert_eq!(status, ServingStatus::Serving, "`{service}`");
     }
 }
 
