@@ -26,9 +26,12 @@ use tonic::{
 use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
-use tonic_reflection::pb::v1::{
-    ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
-    server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
+use tonic_reflection::pb::{
+    v1::{
+        ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
+        server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
+    },
+    v1alpha,
 };
 
 async fn submit(
@@ -134,6 +137,21 @@ async fn reflection_shows_every_service_and_health_says_serving() {
         };
         assert!(!files.file_descriptor_proto.is_empty(), "{service}");
     }
+    // Older tools ask in the older way.
+    let question = v1alpha::ServerReflectionRequest {
+        message_request: Some(v1alpha::server_reflection_request::MessageRequest::ListServices(
+            String::new(),
+        )),
+        ..Default::default()
+    };
+    let mut answers =
+        v1alpha::server_reflection_client::ServerReflectionClient::new(channel.clone())
+            .server_reflection_info(tokio_stream::once(question))
+            .await
+            .unwrap()
+            .into_inner();
+    let answer = answers.message().await.unwrap().unwrap();
+    assert!(format!("{answer:?}").contains(services[0]), "{answer:?}");
 
     let mut health = HealthClient::new(channel);
     // The last one is the server as a whole.

@@ -158,11 +158,15 @@ impl Coordinator {
         health_reporter.set_serving::<ExperimentServiceServer<Experiments>>().await;
         health_reporter.set_serving::<FleetServiceServer<Fleet>>().await;
         health_reporter.set_serving::<WorkerServiceServer<Workers>>().await;
-        let reflection = tonic_reflection::server::Builder::configure()
-            .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
-            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
-            .build_v1()
-            .expect("the descriptors come from the build");
+        let reflection = || {
+            tonic_reflection::server::Builder::configure()
+                .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
+                .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        };
+        const VALID: &str = "the descriptors come from the build";
+        let reflection_v1 = reflection().build_v1().expect(VALID);
+        // The same under its former name, which tools still ask for: Evans, older grpcurl.
+        let reflection_v1alpha = reflection().build_v1alpha().expect(VALID);
         let has_tokens = tokens.is_some();
         let workers = WorkerServiceServer::new(workers)
             .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
@@ -176,7 +180,8 @@ impl Coordinator {
         let serving = server
             .layer(Gate::new(tokens))
             .add_service(health)
-            .add_service(reflection)
+            .add_service(reflection_v1)
+            .add_service(reflection_v1alpha)
             .add_service(workers)
             .add_service(fleet)
             .add_service(experiments)
