@@ -58,8 +58,11 @@ class Coordinator:
         token = args.token_file.read_text().strip() if args.token_file else os.environ.get("SWARM_CLIENT_TOKEN")
         if token and url.scheme != "https" and url.hostname not in ("127.0.0.1", "::1", "localhost"):
             raise ValueError("the token would travel unencrypted; use https:// and --tls-ca")
-        # Only pings tell a patient coordinator from a dead one.
-        options = [("grpc.keepalive_time_ms", 20_000), ("grpc.max_reconnect_backoff_ms", 2000)]
+        options = [
+            ("grpc.keepalive_time_ms", 20_000),  # Only pings tell a patient coordinator from a dead one.
+            ("grpc.max_reconnect_backoff_ms", 2000),
+            ("grpc.max_receive_message_length", 64 << 20),
+        ]
         if url.scheme == "https":
             authorities = args.tls_ca.read_bytes() if args.tls_ca else None
             channel = grpc.secure_channel(url.netloc, grpc.ssl_channel_credentials(authorities), options)
