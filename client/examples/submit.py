@@ -30,21 +30,21 @@ from swarm.v1.experiment_pb2_grpc import ExperimentServiceStub
 Response = TypeVar("Response")
 
 # What may pass without anybody's doing. Every request can be repeated safely.
-TRANSIENT = (StatusCode.UNAVAILABLE, StatusCode.DEADLINE_EXCEEDED, StatusCode.RESOURCE_EXHAUSTED, StatusCode.ABORTED)
+TRANSIENT = (
+    StatusCode.UNAVAILABLE, StatusCode.DEADLINE_EXCEEDED,
+    StatusCode.RESOURCE_EXHAUSTED, StatusCode.ABORTED,
+)
+# Of any other, 1.
 EXIT_CODES = {
     StatusCode.INVALID_ARGUMENT: 2,
-    StatusCode.NOT_FOUND: 3,
-    StatusCode.FAILED_PRECONDITION: 3,
-    StatusCode.UNAVAILABLE: 4,
-    StatusCode.DEADLINE_EXCEEDED: 4,
-    StatusCode.UNAUTHENTICATED: 7,
-    StatusCode.PERMISSION_DENIED: 7,
+    StatusCode.NOT_FOUND: 3, StatusCode.FAILED_PRECONDITION: 3,
+    StatusCode.UNAVAILABLE: 4, StatusCode.DEADLINE_EXCEEDED: 4,
+    StatusCode.UNAUTHENTICATED: 7, StatusCode.PERMISSION_DENIED: 7,
     StatusCode.UNIMPLEMENTED: 9,
 }
-EXIT_CODES_OF_ENDS = {
+ENDS = {
     pb.EXPERIMENT_STATE_COMPLETED: 0,
-    pb.EXPERIMENT_STATE_FAILED: 5,
-    pb.EXPERIMENT_STATE_CANCELLED: 6,
+    pb.EXPERIMENT_STATE_FAILED: 5, pb.EXPERIMENT_STATE_CANCELLED: 6,
 }
 DEADLINE_S = 30  # of one request
 PAUSE_S = 1  # between attempts
@@ -55,17 +55,21 @@ class Coordinator:
 
     def __init__(self, args: argparse.Namespace) -> None:
         url = urlsplit(args.coordinator)
-        token = args.token_file.read_text().strip() if args.token_file else os.environ.get("SWARM_CLIENT_TOKEN")
-        if token and url.scheme != "https" and url.hostname not in ("127.0.0.1", "::1", "localhost"):
+        token = os.environ.get("SWARM_CLIENT_TOKEN")
+        if args.token_file:
+            token = args.token_file.read_text().strip()
+        is_here = url.hostname in ("127.0.0.1", "::1", "localhost")
+        if token and url.scheme != "https" and not is_here:
             raise ValueError("the token would travel unencrypted; use https:// and --tls-ca")
         options = [
-            ("grpc.keepalive_time_ms", 20_000),  # Only pings tell a patient coordinator from a dead one.
+            # Only pings tell a patient coordinator from a dead one.
+            ("grpc.keepalive_time_ms", 20_000),
             ("grpc.max_reconnect_backoff_ms", 2000),
             ("grpc.max_receive_message_length", 64 << 20),
         ]
         if url.scheme == "https":
-            authorities = args.tls_ca.read_bytes() if args.tls_ca else None
-            channel = grpc.secure_channel(url.netloc, grpc.ssl_channel_credentials(authorities), options)
+            tls = grpc.ssl_channel_credentials(args.tls_ca.read_bytes() if args.tls_ca else None)
+            channel = grpc.secure_channel(url.netloc, tls, options)
         else:
             channel = grpc.insecure_channel(url.netloc, options)
         self.stub = ExperimentServiceStub(channel)
@@ -86,25 +90,29 @@ class Coordinator:
 
     def follow(self, experiment: pb.Experiment) -> None:
         """Prints every generation once, also across breaks of the stream."""
-        next_sequence, is_over = 1, False
+        get = pb.GetExperimentRequest(experiment_id=experiment.id)
+        watch = pb.WatchExperimentRequest(experiment_id=experiment.id, from_sequence=1)
+        is_over = False
         while not is_over:
-            request = pb.WatchExperimentRequest(experiment_id=experiment.id, from_sequence=next_sequence)
             try:
-                for response in self.stub.WatchExperiment(request, metadata=self.metadata):
+                for response in self.stub.WatchExperiment(watch, metadata=self.metadata):
                     event = response.event
-                    next_sequence = event.sequence + 1
+                    watch.from_sequence = event.sequence + 1
                     kind = event.WhichOneof("kind")
                     if kind == "generation_completed":
-                        print_generation(event.generation_completed, experiment.generations)
+                        done = event.generation_completed
+                        print(f"{done.generation + 1}/{experiment.generations}  "
+                              f"best {done.best:.3f}  mean {done.mean:.3f}  "
+                              f"digest {done.digest[:12]}", flush=True)
                     elif kind == "state_changed":
-                        is_over = event.state_changed.state in EXIT_CODES_OF_ENDS
+                        is_over = event.state_changed.state in ENDS
             except grpc.RpcError as error:
                 if error.code() not in TRANSIENT:
                     raise
-                remark(f"{error.details()}; following on from event {next_sequence}")
+                remark(f"{error.details()}; following on from event {watch.from_sequence}")
             if not is_over:
                 time.sleep(PAUSE_S)
-                self.call(self.stub.GetExperiment, pb.GetExperimentRequest(experiment_id=experiment.id))
+                self.call(self.stub.GetExperiment, get)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -124,17 +132,14 @@ def run(args: argparse.Namespace) -> int:
     get = pb.GetExperimentRequest(experiment_id=experiment.id)
     experiment = coordinator.call(stub.GetExperiment, get).experiment
     if experiment.generations_done > 0:
-        champion = coordinator.call(stub.GetChampion, pb.GetChampionRequest(experiment_id=experiment.id))
-        print(f"champion of generation {champion.generation}: fitness {experiment.champion_fitness:.6f}")
+        by_id = pb.GetChampionRequest(experiment_id=experiment.id)
+        champion = coordinator.call(stub.GetChampion, by_id)
+        fitness = experiment.champion_fitness  # as honest as it is known
+        print(f"champion of generation {champion.generation}: fitness {fitness:.6f}")
     print(f"digest {experiment.digest}")
     if experiment.reason:
         remark(experiment.reason)
-    return EXIT_CODES_OF_ENDS[experiment.state]
-
-
-def print_generation(summary: pb.GenerationSummary, generations: int) -> None:
-    fitness = f"best {summary.best:.3f}  mean {summary.mean:.3f}"
-    print(f"{summary.generation + 1}/{generations}  {fitness}  digest {summary.digest[:12]}", flush=True)
+    return ENDS.get(experiment.state, 1)
 
 
 def remark(text: str) -> None:
@@ -142,16 +147,17 @@ def remark(text: str) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="Submits an experiment file and follows it to its end.")
-    parser.add_argument("file", type=Path, help="the experiment file")
-    url = os.environ.get("SWARM_COORDINATOR", "http://127.0.0.1:7700")
-    parser.add_argument("--coordinator", default=url, metavar="URL", help="http:// or https:// [%(default)s]")
-    parser.add_argument("--seed", type=int, help="instead of the file's")
-    parser.add_argument("--generations", type=int, help="instead of the file's")
-    parser.add_argument("--token-file", type=Path, help="or the token itself in SWARM_CLIENT_TOKEN")
-    parser.add_argument("--tls-ca", type=Path, help="PEM file of the authority to trust [public ones]")
-    parser.add_argument("--request-id", default=str(uuid.uuid4()), help="the same id: the same experiment")
-    parser.add_argument("--patience", type=float, default=60, help="seconds to wait for the coordinator [60]")
+    parser = argparse.ArgumentParser(description="Submits an experiment file and follows it.")
+    option = parser.add_argument
+    option("file", type=Path, help="the experiment file")
+    option("--coordinator", default=os.environ.get("SWARM_COORDINATOR", "http://127.0.0.1:7700"),
+           metavar="URL", help="http:// or https:// [%(default)s]")
+    option("--seed", type=int, help="instead of the file's")
+    option("--generations", type=int, help="instead of the file's")
+    option("--token-file", type=Path, help="or the token itself in SWARM_CLIENT_TOKEN")
+    option("--tls-ca", type=Path, help="PEM file of the authority to trust [public ones]")
+    option("--request-id", default=str(uuid.uuid4()), help="the same id: the same experiment")
+    option("--patience", type=float, default=60, help="seconds to wait for the coordinator [60]")
     args = parser.parse_args()
     try:
         return run(args)
@@ -160,9 +166,9 @@ def main() -> int:
         return 2
     except grpc.RpcError as error:
         # INVALID_ARGUMENT has a line for every mistake in the file.
-        is_about_file = error.code() == StatusCode.INVALID_ARGUMENT
-        for line in error.details().splitlines():
-            remark(f"{args.file if is_about_file else args.coordinator}: {line}")
+        about = args.file if error.code() == StatusCode.INVALID_ARGUMENT else args.coordinator
+        for line in (error.details() or "").splitlines():
+            remark(f"{about}: {line}")
         return EXIT_CODES.get(error.code(), 1)
     except KeyboardInterrupt:
         remark("interrupted; the experiment goes on")
