@@ -7,9 +7,11 @@
 //! - `driver`: the loop that connects the three with the network
 //! - `rpc`: gRPC services, translation only
 //! - `listener`, `gate`: who gets as far as the services
+//! - [`metrics`]: what can be scraped
 //! - [`limits`]: every bound on what the network can ask for
 
 mod access;
+mod calls;
 mod clock;
 mod driver;
 pub mod engine;
@@ -19,6 +21,7 @@ mod gate;
 pub mod ids;
 pub mod limits;
 mod listener;
+pub mod metrics;
 pub mod priority;
 mod rpc;
 mod server;

@@ -2,20 +2,14 @@
 
 mod access_args;
 
-use std::{
-    io::{self, IsTerminal as _},
-    net::SocketAddr,
-    path::PathBuf,
-    process::ExitCode,
-    time::Duration,
-};
+use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use access_args::{AccessArgs, AccessInputError};
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use coordinator::{Coordinator, CoordinatorConfig, StartError};
+use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
-use tracing_subscriber::EnvFilter;
 
 /// Owns the evolution of robot swarms: takes experiment files, hands genotypes
 /// to workers, keeps every generation.
@@ -42,12 +36,10 @@ struct Args {
     /// if the bits differ, one of the two is faulty, and the experiment is paused.
     #[arg(long, default_value_t = 0.0, value_parser = fraction)]
     audit_fraction: f64,
-    /// Form of the log lines.
-    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
-    log_format: LogFormat,
-    /// What to log: error, warn, info, debug, trace, or a tracing filter.
-    #[arg(long, env = "SWARM_LOG", default_value = "info")]
-    log_level: String,
+    #[command(flatten)]
+    metrics: MetricsArgs,
+    #[command(flatten)]
+    log: LogArgs,
 }
 
 const EXIT_CODES: &str = "\
@@ -59,12 +51,6 @@ Exit codes:
 
 docs/security.md says how to make tokens and certificates.";
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum LogFormat {
-    Text,
-    Json,
-}
-
 fn fraction(text: &str) -> Result<f64, String> {
     let fraction: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if (0.0..=1.0).contains(&fraction) { Ok(fraction) } else { Err("not within 0..=1".to_owned()) }
@@ -73,20 +59,9 @@ fn fraction(text: &str) -> Result<f64, String> {
 #[tokio::main]
 async fn main() -> ExitCode {
     let args = Args::parse();
-    let filter = match EnvFilter::try_new(&args.log_level) {
-        Ok(filter) => filter,
-        Err(error) => {
-            eprintln!("error: --log-level {}: {error}", args.log_level);
-            return ExitCode::from(2);
-        }
-    };
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(io::stderr)
-        .with_ansi(io::stderr().is_terminal());
-    match args.log_format {
-        LogFormat::Text => log.with_target(false).init(),
-        LogFormat::Json => log.json().flatten_event(true).with_current_span(false).init(),
+    if let Err(error) = args.log.init() {
+        eprintln!("error: {error}");
+        return ExitCode::from(2);
     }
     match serve(&args).await {
         Ok(()) => ExitCode::SUCCESS,
@@ -108,6 +83,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         lease,
         access: args.access.load()?,
         audit_fraction: args.audit_fraction,
+        metrics_listen: args.metrics.metrics_listen,
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })
     .await?;

@@ -1,6 +1,6 @@
 //! A running coordinator: store, driver and gRPC server together.
 
-use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
+use std::{convert::Infallible, io, net::SocketAddr, path::PathBuf, time::Duration};
 
 use swarm_proto::{
     FILE_DESCRIPTOR_SET,
@@ -9,6 +9,7 @@ use swarm_proto::{
         fleet_service_server::FleetServiceServer, worker_service_server::WorkerServiceServer,
     },
 };
+use swarm_telemetry::{Endpoint, ListenError};
 use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX, tls_trouble};
 use tokio::{net::TcpListener, task::JoinSet};
 use tokio_util::sync::CancellationToken;
@@ -24,6 +25,7 @@ use crate::{
         CALLS_PER_CONNECTION_MAX, CONNECTIONS_MAX, HEADERS_LEN_MAX, KEEPALIVE, SHUTDOWN_GRACE,
     },
     listener,
+    metrics::{Instruments, Source},
     rpc::{Experiments, Fleet, WelcomeTimes, Workers},
     shared_store::SharedStore,
     store::{Experiment, Store, StoreError},
@@ -46,11 +48,13 @@ pub struct CoordinatorConfig {
     pub audit_fraction: f64,
     /// Who may connect.
     pub access: Access,
+    /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
+    pub metrics_listen: Option<SocketAddr>,
 }
 
 impl CoordinatorConfig {
-    /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits. Access is
-    /// open, and so for loopback only.
+    /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits, no metrics.
+    /// Access is open, and so for loopback only.
     pub fn new(listen: SocketAddr, data_dir: PathBuf) -> Self {
         Self {
             listen,
@@ -59,6 +63,7 @@ impl CoordinatorConfig {
             lease: Duration::from_secs(10),
             audit_fraction: 0.0,
             access: Access::default(),
+            metrics_listen: None,
         }
     }
 }
@@ -80,6 +85,9 @@ pub enum StartError {
         /// What the system says.
         source: io::Error,
     },
+    /// Metrics cannot be served.
+    #[error(transparent)]
+    Metrics(#[from] ListenError),
     /// The store cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -111,6 +119,8 @@ pub struct Coordinator {
     /// One task; none once its end is known. So is `server`.
     driver: JoinSet<()>,
     server: JoinSet<Result<(), tonic::transport::Error>>,
+    /// Ends when it is dropped.
+    _metrics: JoinSet<Infallible>,
 }
 
 impl Coordinator {
@@ -133,6 +143,10 @@ impl Coordinator {
         let listen_error = |source| StartError::Listen { address, source };
         let listener = TcpListener::bind(address).await.map_err(listen_error)?;
         let local_addr = listener.local_addr().map_err(listen_error)?;
+        let endpoint = match config.metrics_listen {
+            Some(address) => Some(Endpoint::listen(address).await?),
+            None => None,
+        };
         let data_dir = config.data_dir.clone();
         let store = tokio::task::spawn_blocking(move || Store::open(&data_dir))
             .await
@@ -146,9 +160,18 @@ impl Coordinator {
             ..EngineConfig::new(config.lease)
         };
         let mut driver = JoinSet::new();
-        driver.spawn(Driver::new(store.clone(), event_queue, engine, shutdown.clone()).run());
+        let instruments = Instruments::default();
+        let calls = instruments.calls.clone();
+        let running = Driver::new(store.clone(), event_queue, engine, shutdown.clone())
+            .measured_by(instruments.clone());
+        driver.spawn(running.run());
         resume_unfinished(&store, &events).await?;
 
+        let mut metrics = JoinSet::new();
+        if let Some(endpoint) = endpoint {
+            let source = Source { events: events.clone(), store: store.clone(), instruments };
+            metrics.spawn(endpoint.serve(move || source.clone().scrape()));
+        }
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let workers = Workers { events: events.clone(), times, shutdown: shutdown.clone() };
@@ -178,6 +201,7 @@ impl Coordinator {
             .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
         let serving = server
+            .layer(calls)
             .layer(Gate::new(tokens))
             .add_service(health)
             .add_service(reflection_v1)
@@ -199,7 +223,7 @@ impl Coordinator {
         if !is_encrypted && !local_addr.ip().to_canonical().is_loopback() {
             warn!("there is no TLS: every member of the network can read all traffic, tokens too");
         }
-        Ok(Self { local_addr, shutdown, driver, server })
+        Ok(Self { local_addr, shutdown, driver, server, _metrics: metrics })
     }
 
     /// The address it listens on.

@@ -10,7 +10,7 @@ use crate::{
     evolution::{Digest, Evolution},
     ids::ExperimentId,
     priority::Priority,
-    store::{self, ExperimentState, NewExperiment, StoreError},
+    store::{self, ExperimentState, Generation, NewExperiment, StoreError},
 };
 
 /// What a client submits.
@@ -51,6 +51,8 @@ pub struct Runnable {
     pub config: ExperimentConfig,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
+    /// The latest generation that is stored.
+    pub latest: Option<Generation>,
     /// What is to be judged first.
     pub round: Round,
     /// Its share of the fleet.
@@ -98,7 +100,7 @@ impl Runnable {
     ) -> Self {
         let spec = config.to_canonical_json().into();
         let round = Round::generation(evolution);
-        Self { id, spec, config, round, priority, is_paused: false }
+        Self { id, spec, config, latest: None, round, priority, is_paused: false }
     }
 
     /// An experiment as the store has it.
@@ -112,7 +114,8 @@ impl Runnable {
         let evolution =
             serde_json::from_str(checkpoint).map_err(|error| corrupt("checkpoint", &error))?;
         let is_paused = experiment.state == ExperimentState::Paused;
-        Ok(Self { is_paused, ..Self::new(id, config, evolution, experiment.priority) })
+        let latest = experiment.latest.clone();
+        Ok(Self { is_paused, latest, ..Self::new(id, config, evolution, experiment.priority) })
     }
 }
 

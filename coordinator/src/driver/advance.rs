@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use sim_core::config::ExperimentConfig;
+use swarm_telemetry::Histogram;
 use tokio::task;
 use tokio_util::sync::CancellationToken;
 use tracing::info;
@@ -38,7 +39,7 @@ pub enum Step {
     /// Conclusions are drawn.
     Concluded(Next),
     /// The latest complete generation is on disk.
-    Stored,
+    Stored(Generation),
     /// It has ended, or the coordinator does; the store knows all there is to
     /// know.
     Ended,
@@ -64,16 +65,18 @@ pub async fn conclude(
     Advanced { run, step }
 }
 
-/// Commits a generation.
+/// Commits a generation; `duration`: how long that takes, s.
 pub async fn commit(
     run: RunId,
     config: Arc<ExperimentConfig>,
     store: SharedStore,
     shutdown: CancellationToken,
+    duration: Histogram,
     complete: Complete,
 ) -> Advanced {
     let Complete { generation, evolution, champion, digest, notices, over, next: _ } = complete;
     let id = run.id;
+    let started = clock::now();
     let (row, remarks, reason, link) =
         (generation.clone(), notices.clone(), over.clone(), digest.clone());
     let what = format!("generation {} of experiment {id}", generation.generation);
@@ -98,7 +101,10 @@ pub async fn commit(
         })
         .await;
     match written {
-        Written::Yes => failpoint::reached("committed"),
+        Written::Yes => {
+            failpoint::reached("committed");
+            duration.observe((clock::now() - started).as_secs_f64());
+        }
         Written::NotWanted => return Advanced { run, step: Step::Ended },
         Written::Never(error) => return Advanced { run, step: Step::NotStored(error.to_string()) },
     }
@@ -106,7 +112,7 @@ pub async fn commit(
     for notice in notices {
         info!(experiment = %id, "{notice}");
     }
-    let Some(reason) = over else { return Advanced { run, step: Step::Stored } };
+    let Some(reason) = over else { return Advanced { run, step: Step::Stored(generation) } };
     info!(experiment = %id, digest, reason, "experiment completed");
     Advanced { run, step: Step::Ended }
 }

@@ -5,6 +5,7 @@
 //! (evolution's arithmetic, the disk) runs beside it.
 
 mod advance;
+mod figures;
 mod ledger;
 mod requests;
 mod round;
@@ -28,13 +29,15 @@ use crate::{
     },
     failpoint,
     ids::{ExperimentId, ItemId, WorkerId},
+    metrics::Instruments,
     priority::Priority,
     shared_store::SharedStore,
-    store::ExperimentState,
+    store::{ExperimentState, Generation},
     submission::Runnable,
 };
 
 use advance::{Advanced, RunId, Step};
+pub use figures::{ExperimentFigures, Figures};
 use ledger::{Change, Entry, Ledger};
 pub use round::Round;
 use round::{Complete, Next};
@@ -82,6 +85,8 @@ pub enum Event {
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
     /// A client wonders what becomes of an experiment.
     ActivityRequested(ExperimentId, oneshot::Sender<Activity>),
+    /// Somebody scrapes metrics.
+    FiguresRequested(oneshot::Sender<Figures>),
 }
 
 /// What a client may want of an unfinished experiment.
@@ -148,6 +153,7 @@ pub struct Driver {
     store: SharedStore,
     events: mpsc::Receiver<Event>,
     shutdown: CancellationToken,
+    instruments: Instruments,
     tick_interval: Duration,
     workers: BTreeMap<WorkerId, ConnectedWorker>,
     experiments: BTreeMap<ExperimentId, Running>,
@@ -173,6 +179,8 @@ struct Running {
     incarnation: u64,
     /// What is being judged; none while conclusions are drawn, or wait.
     round: Option<Round>,
+    /// The latest generation that is on disk.
+    latest: Option<Generation>,
     /// What is to be stored next.
     complete: Option<Box<Complete>>,
     is_storing: bool,
@@ -188,6 +196,7 @@ impl Running {
             config: Arc::new(config),
             incarnation,
             round: None,
+            latest: None,
             complete: None,
             is_storing: false,
             end: None,
@@ -210,12 +219,19 @@ impl Driver {
             store,
             events,
             shutdown,
+            instruments: Instruments::default(),
             tick_interval: TICK_INTERVAL_MAX.min(config.lease / 8),
             workers: BTreeMap::new(),
             experiments: BTreeMap::new(),
             n_started: 0,
             advancing: JoinSet::new(),
         }
+    }
+
+    /// The same loop, which measures what it does with these.
+    #[must_use]
+    pub fn measured_by(self, instruments: Instruments) -> Self {
+        Self { instruments, ..self }
     }
 
     /// Runs until shutdown, and then finishes what is being stored.
@@ -285,6 +301,7 @@ impl Driver {
             // If the client is gone it need not be told.
             Event::WorkersRequested(reply) => drop(reply.send(self.engine.worker_status(now))),
             Event::ActivityRequested(id, reply) => drop(reply.send(self.engine.activity(now, id))),
+            Event::FiguresRequested(reply) => drop(reply.send(self.figures())),
         }
     }
 
@@ -302,7 +319,11 @@ impl Driver {
             self.engine.on_experiment_paused(clock::now(), id);
         }
         self.n_started += 1;
-        self.experiments.insert(id, Running::new(runnable.config, self.n_started));
+        let running = Running {
+            latest: runnable.latest,
+            ..Running::new(runnable.config, self.n_started)
+        };
+        self.experiments.insert(id, running);
         self.judge(id, runnable.round);
     }
 
@@ -375,15 +396,21 @@ impl Driver {
                 running.complete = Some(complete);
                 self.store_next(id);
             }
-            Step::Stored | Step::Ended => {
+            Step::Stored(generation) => {
                 running.is_storing = false;
-                match (running.end.take(), step) {
-                    (Some((state, reason)), _) => self.end(id, state, reason),
-                    (None, Step::Stored) => self.store_next(id),
-                    (None, _) => {
-                        self.experiments.remove(&id);
-                        self.engine.on_experiment_ended(clock::now(), id);
-                    }
+                running.latest = Some(generation);
+                match running.end.take() {
+                    Some((state, reason)) => self.end(id, state, reason),
+                    None => self.store_next(id),
+                }
+            }
+            Step::Ended => {
+                running.is_storing = false;
+                if let Some((state, reason)) = running.end.take() {
+                    self.end(id, state, reason);
+                } else {
+                    self.experiments.remove(&id);
+                    self.engine.on_experiment_ended(clock::now(), id);
                 }
             }
             Step::Failed(reason) => self.end(id, ExperimentState::Failed, reason),
@@ -410,7 +437,8 @@ impl Driver {
         let run = RunId { id, incarnation: running.incarnation };
         let (config, store) = (Arc::clone(&running.config), self.store.clone());
         let shutdown = self.shutdown.clone();
-        self.advancing.spawn(advance::commit(run, config, store, shutdown, *complete));
+        let duration = self.instruments.commit_duration.clone();
+        self.advancing.spawn(advance::commit(run, config, store, shutdown, duration, *complete));
         if let Some(round) = next {
             self.judge(id, round);
         }

@@ -260,6 +260,7 @@ impl Engine {
     /// Takes an assignment back: its worker is told to drop it.
     pub(super) fn recall(&mut self, worker: WorkerId, item: ItemId) -> Assignment {
         let assignment = self.take_assignment(worker, item);
+        self.tally.n_items_recalled += 1;
         self.correct_charge(assignment.experiment, assignment.charge, Duration::ZERO);
         self.outgoing.recalled.entry(worker).or_default().push(item);
         let worker = self.workers.get_mut(&worker).expect("it had the assignment");

@@ -29,6 +29,8 @@ pub struct ExperimentWork {
     /// Workers' time that it was given, divided by its priority, in ns: who has
     /// least is served next.
     pub served: u128,
+    /// Trials whose fitness became known.
+    pub n_episodes: u64,
     /// Time per trial for a worker of pace 1, s; smoothed.
     trial_s: Option<f64>,
     n_learnt: u64,
@@ -43,6 +45,7 @@ impl ExperimentWork {
             generation: None,
             priority,
             served: 0,
+            n_episodes: 0,
             trial_s: None,
             n_learnt: 0,
         }

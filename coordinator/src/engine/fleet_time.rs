@@ -22,6 +22,16 @@ impl FleetTime {
         self.n_slots
     }
 
+    /// Time that slots have existed, s.
+    pub fn capacity_s(&self) -> f64 {
+        self.capacity_s
+    }
+
+    /// Part of it that went into results, s.
+    pub fn busy_s(&self) -> f64 {
+        self.busy_s
+    }
+
     /// Counts the time up to now.
     pub fn advance(&mut self, now: Instant) {
         let elapsed = now.saturating_duration_since(self.now);

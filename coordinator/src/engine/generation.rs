@@ -214,6 +214,16 @@ impl GenerationInProgress {
         self.queue.len()
     }
 
+    /// Items that wait: tasks, and audits.
+    pub fn n_waiting(&self) -> usize {
+        self.queue.len() + self.audits.values().map(VecDeque::len).sum::<usize>()
+    }
+
+    /// Items that workers have.
+    pub fn n_in_flight(&self) -> usize {
+        self.holders.values().map(Vec::len).sum()
+    }
+
     /// Trials that wait.
     pub fn n_trials_queued(&self) -> usize {
         self.n_trials_queued

@@ -35,6 +35,7 @@ mod activity;
 mod blame;
 mod dispatch;
 mod experiment;
+mod figures;
 mod fleet_time;
 mod generation;
 mod messages;
@@ -58,6 +59,7 @@ use crate::{
 pub use activity::{Activity, HeldItems, RoundActivity};
 use dispatch::Outgoing;
 use experiment::ExperimentWork;
+pub use figures::{FleetFigures, Tally, WorkFigures};
 use fleet_time::FleetTime;
 use generation::{GenerationInProgress, Task};
 use worker::{FULL_LOAD, Worker};
@@ -108,6 +110,7 @@ pub struct Engine {
     outgoing: Outgoing,
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
+    tally: Tally,
 }
 
 /// The workers, sorted by what they can take.
@@ -165,6 +168,7 @@ impl Engine {
             outgoing: Outgoing::default(),
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
+            tally: Tally::default(),
         }
     }
 
@@ -190,6 +194,7 @@ impl Engine {
             self.forgive(process);
         }
         self.n_workers_seen += 1;
+        self.tally.n_workers_joined += 1;
         let id = WorkerId(self.n_workers_seen);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
         let worker = Worker::new(introduction, now);
@@ -380,6 +385,10 @@ impl Engine {
     /// caused, if they may.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
+        match worker.is_draining {
+            true => self.tally.n_workers_left += 1,
+            false => self.tally.n_workers_lost += 1,
+        }
         self.standings.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
         // Only what it was computing can have taken it down: its oldest items,

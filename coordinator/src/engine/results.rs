@@ -38,10 +38,12 @@ impl Engine {
         let busy = self.account(now, id, &assignment, result.compute_time);
         match result.outcome {
             Ok(fitness) => {
+                self.tally.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
                 self.accept(now, id, &assignment, &fitness);
             }
             Err(message) => {
+                self.tally.n_items_failed += 1;
                 let blame = format!("the worker reports: {message}");
                 self.retry(now, assignment, Some((None, &blame)));
             }
@@ -85,6 +87,8 @@ impl Engine {
             let work = self.experiments.get_mut(&experiment).expect("it is assigned");
             let generation = work.generation.as_mut().expect("it is assigned");
             let n_new = generation.accept(id, worker.name(), task, fitness);
+            work.n_episodes += n_new as u64;
+            self.tally.n_episodes += n_new as u64;
             if n_new > 0 && is_audited {
                 generation.push_audit(task.clone());
             }
@@ -206,6 +210,7 @@ impl Engine {
         let Assignment { experiment: id, task, is_audit, .. } = assignment;
         let Some(work) = self.experiments.get_mut(&id) else { return };
         let Some(generation) = &mut work.generation else { return };
+        self.tally.n_items_requeued += 1;
         if is_audit {
             // It may have been the second worker that made an audit possible.
             generation.push_audit(task);

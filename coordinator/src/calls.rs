@@ -1,0 +1,223 @@
+//! Counts the calls of all services, by method and by how they ended.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    convert::Infallible,
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError},
+    task::{Context, Poll},
+};
+
+use http::{HeaderMap, Request, Response};
+use http_body_util::BodyExt as _;
+use prost::Message as _;
+use prost_types::FileDescriptorSet;
+use tonic::{Code, Status, body::Body};
+use tower::{Layer, Service};
+
+/// Method of a call that no service has: callers choose their paths.
+const UNKNOWN: &str = "unknown";
+
+/// The calls that have ended.
+#[derive(Debug, Clone)]
+pub struct Calls {
+    /// Paths of all methods, without the first slash.
+    methods: Arc<BTreeSet<String>>,
+    ended: Arc<Mutex<BTreeMap<(String, &'static str), u64>>>,
+}
+
+/// Services whose calls are counted.
+#[derive(Debug, Clone)]
+pub struct Counted<S> {
+    calls: Calls,
+    services: S,
+}
+
+/// A call that has not ended.
+struct Call {
+    calls: Calls,
+    method: String,
+    /// As answered; a call that is given up before has none.
+    code: Option<Code>,
+}
+
+impl Default for Calls {
+    fn default() -> Self {
+        let files = [
+            swarm_proto::FILE_DESCRIPTOR_SET,
+            tonic_health::pb::FILE_DESCRIPTOR_SET,
+            tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
+        ];
+        Self { methods: Arc::new(files.into_iter().flat_map(methods).collect()), ended: Arc::default() }
+    }
+}
+
+impl Calls {
+    /// Ended calls by method (`package.Service/Method`) and status code (`OK`).
+    pub fn ended(&self) -> BTreeMap<(String, &'static str), u64> {
+        self.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn begin(&self, path: &str) -> Call {
+        let method = path.strip_prefix('/').filter(|path| self.methods.contains(*path));
+        Call { calls: self.clone(), method: method.unwrap_or(UNKNOWN).to_owned(), code: None }
+    }
+}
+
+impl Call {
+    /// Reads the status, which is in the trailers, or in the headers of an answer
+    /// without content.
+    fn look_for_status(&mut self, headers: &HeaderMap) {
+        if let Some(code) = headers.get(Status::GRPC_STATUS) {
+            self.code = Some(Code::from_bytes(code.as_bytes()));
+        }
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        let key = (std::mem::take(&mut self.method), name(self.code.unwrap_or(Code::Cancelled)));
+        let mut ended = self.calls.ended.lock().unwrap_or_else(PoisonError::into_inner);
+        *ended.entry(key).or_default() += 1;
+    }
+}
+
+impl<S> Layer<S> for Calls {
+    type Service = Counted<S>;
+
+    fn layer(&self, services: S) -> Counted<S> {
+        Counted { calls: self.clone(), services }
+    }
+}
+
+impl<S> Service<Request<Body>> for Counted<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible>,
+    S::Future: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
+        let mut call = self.calls.begin(request.uri().path());
+        let response = self.services.call(request);
+        Box::pin(async move {
+            let response = response.await?;
+            call.look_for_status(response.headers());
+            // It ends when its answer has been read, or given up.
+            let until_read = move |body: Body| {
+                Body::new(body.inspect_frame(move |frame| {
+                    if let Some(trailers) = frame.trailers_ref() {
+                        call.look_for_status(trailers);
+                    }
+                }))
+            };
+            Ok(response.map(until_read))
+        })
+    }
+}
+
+/// The methods of all services of encoded descriptors.
+fn methods(descriptors: &[u8]) -> Vec<String> {
+    let files = FileDescriptorSet::decode(descriptors).expect("the descriptors come from the build");
+    let mut methods = Vec::new();
+    for file in &files.file {
+        for service in &file.service {
+            for method in &service.method {
+                methods.push(format!("{}.{}/{}", file.package(), service.name(), method.name()));
+            }
+        }
+    }
+    methods
+}
+
+/// A status code as the gRPC specification writes it.
+fn name(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "OK",
+        Code::Cancelled => "CANCELLED",
+        Code::Unknown => "UNKNOWN",
+        Code::InvalidArgument => "INVALID_ARGUMENT",
+        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
+        Code::NotFound => "NOT_FOUND",
+        Code::AlreadyExists => "ALREADY_EXISTS",
+        Code::PermissionDenied => "PERMISSION_DENIED",
+        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
+        Code::FailedPrecondition => "FAILED_PRECONDITION",
+        Code::Aborted => "ABORTED",
+        Code::OutOfRange => "OUT_OF_RANGE",
+        Code::Unimplemented => "UNIMPLEMENTED",
+        Code::Internal => "INTERNAL",
+        Code::Unavailable => "UNAVAILABLE",
+        Code::DataLoss => "DATA_LOSS",
+        Code::Unauthenticated => "UNAUTHENTICATED",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::future::{Ready, ready};
+
+    use http_body_util::Full;
+
+    use super::*;
+
+    /// Answers with a status in the headers, or without any.
+    #[derive(Clone)]
+    struct Answer(Option<Code>);
+
+    impl Service<Request<Body>> for Answer {
+        type Response = Response<Body>;
+        type Error = Infallible;
+        type Future = Ready<Result<Response<Body>, Infallible>>;
+        fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+            Poll::Ready(Ok(()))
+        }
+        fn call(&mut self, _: Request<Body>) -> Self::Future {
+            ready(Ok(match self.0 {
+                Some(code) => Status::new(code, "").into_http(),
+                None => Response::new(Body::new(Full::from("content"))),
+            }))
+        }
+    }
+
+    async fn call(calls: &Calls, path: &str, code: Option<Code>) -> Response<Body> {
+        let request = Request::builder().uri(path).body(Body::empty()).unwrap();
+        calls.layer(Answer(code)).call(request).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn calls_are_counted_by_method_and_code() {
+        let calls = Calls::default();
+        let list = "/swarm.v1.ExperimentService/ListExperiments";
+        drop(call(&calls, list, Some(Code::Ok)).await);
+        drop(call(&calls, list, Some(Code::Unauthenticated)).await);
+        drop(call(&calls, list, Some(Code::Unauthenticated)).await);
+        drop(call(&calls, "/grpc.health.v1.Health/Check", Some(Code::NotFound)).await);
+        for path in ["/", "/swarm.v1.ExperimentService/Other", "/a/b"] {
+            drop(call(&calls, path, Some(Code::Unimplemented)).await);
+        }
+        let expected = [
+            (("grpc.health.v1.Health/Check".to_owned(), "NOT_FOUND"), 1),
+            ((list[1..].to_owned(), "OK"), 1),
+            ((list[1..].to_owned(), "UNAUTHENTICATED"), 2),
+            (("unknown".to_owned(), "UNIMPLEMENTED"), 3),
+        ];
+        assert_eq!(calls.ended(), BTreeMap::from(expected));
+    }
+
+    #[tokio::test]
+    async fn a_call_that_is_given_up_counts_as_cancelled_and_not_before() {
+        let calls = Calls::default();
+        let answer = call(&calls, "/swarm.v1.WorkerService/Work", None).await;
+        assert!(calls.ended().is_empty());
+        drop(answer);
+        let key = ("swarm.v1.WorkerService/Work".to_owned(), "CANCELLED");
+        assert_eq!(calls.ended(), BTreeMap::from([(key, 1)]));
+    }
+}

@@ -1,0 +1,164 @@
+//! The coordinator's metrics: what there is, and its values when somebody scrapes
+//! them. `docs/metrics.md` has the same list.
+
+use swarm_telemetry::{Histogram, Metric, Scrape, metrics};
+use tokio::sync::oneshot;
+
+use crate::{
+    calls::Calls,
+    driver::{Event, EventSender, ExperimentFigures, Figures},
+    shared_store::SharedStore,
+};
+
+metrics! {
+    BUILD = Gauge "swarm_coordinator_build_info" ["version", "fingerprint"]
+        "1; the labels say which release runs, and with which simulation.";
+    WORKERS = Gauge "swarm_workers" ["state"]
+        "Connected workers: available for work, draining (they leave when they have finished what they compute), or distrusted (their results are in doubt).";
+    SLOTS = Gauge "swarm_slots" []
+        "Items that all connected workers together compute at the same time.";
+    SLOT_TIME = Counter "swarm_slot_seconds_total" []
+        "Time that slots have existed, summed over slots.";
+    BUSY_TIME = Counter "swarm_slot_busy_seconds_total" []
+        "Part of swarm_slot_seconds_total that went into results.";
+    WORKERS_JOINED = Counter "swarm_workers_joined_total" []
+        "Workers that have connected; one that comes back counts again.";
+    WORKERS_LEFT = Counter "swarm_workers_left_total" []
+        "Workers that have left after they had said so.";
+    WORKERS_LOST = Counter "swarm_workers_lost_total" []
+        "Workers whose connection broke, that fell silent, or that were dropped.";
+    ITEMS_ASSIGNED = Counter "swarm_items_assigned_total" []
+        "Items given to workers, duplicates included.";
+    ITEMS_COMPUTED = Counter "swarm_items_computed_total" []
+        "Items for which a worker returned fitness.";
+    ITEMS_FAILED = Counter "swarm_items_failed_total" []
+        "Items that a worker could not compute.";
+    ITEMS_REQUEUED = Counter "swarm_items_requeued_total" []
+        "Items without a result, given to another worker because theirs failed, was lost or is in doubt.";
+    ITEMS_RECALLED = Counter "swarm_items_recalled_total" []
+        "Items taken back from a worker because another has the result, or computes it sooner.";
+    EPISODES = Counter "swarm_episodes_total" []
+        "Episodes whose fitness has become known; none counts twice.";
+    COMMIT_DURATION = Histogram "swarm_commit_duration_seconds" []
+        "Time to write a completed generation out and to store it, until it is on disk.";
+    STORE_AVAILABLE = Gauge "swarm_store_available" []
+        "1, or 0 if the latest write did not reach the disk.";
+    CALLS = Counter "swarm_grpc_calls_total" ["method", "code"]
+        "Ended gRPC calls; a worker's stream is one call, and CANCELLED if the worker is gone.";
+    STATE = Gauge "swarm_experiment_state" ["experiment", "name", "state"]
+        "1 for the state, running or paused, of an unfinished experiment.";
+    GENERATIONS_WANTED = Gauge "swarm_experiment_generations_wanted" ["experiment", "name"]
+        "Generations that the experiment is to have.";
+    GENERATIONS_COMPLETED = Gauge "swarm_experiment_generations_completed" ["experiment", "name"]
+        "Generations that are on disk.";
+    BEST_FITNESS = Gauge "swarm_experiment_best_fitness" ["experiment", "name"]
+        "Best fitness of the latest completed generation.";
+    MEAN_FITNESS = Gauge "swarm_experiment_mean_fitness" ["experiment", "name"]
+        "Mean fitness of the latest completed generation.";
+    GENERATION_DURATION = Gauge "swarm_experiment_generation_duration_seconds" ["experiment", "name"]
+        "Time from the first to the last item of the latest completed generation.";
+    IDLE = Gauge "swarm_experiment_barrier_idle_ratio" ["experiment", "name"]
+        "Share of the slots' time, 0 to 1, that did not go into results during the latest completed generation.";
+    EXPERIMENT_EPISODES = Counter "swarm_experiment_episodes_total" ["experiment", "name"]
+        "Episodes of the experiment whose fitness has become known.";
+    ITEMS_QUEUED = Gauge "swarm_experiment_items_queued" ["experiment", "name"]
+        "Items that wait for a worker; 0 while the experiment is paused.";
+    ITEMS_IN_FLIGHT = Gauge "swarm_experiment_items_in_flight" ["experiment", "name"]
+        "Items that workers have and have not answered, duplicates included.";
+}
+
+/// Bounds of the buckets for commits: a fast disk takes less than 1 ms, a busy one
+/// tenths of a second; one that is full takes until it is not.
+const COMMIT_BOUNDS_S: [f64; 13] =
+    [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0];
+
+/// What is measured as it happens; everything else is asked for.
+#[derive(Debug, Clone)]
+pub struct Instruments {
+    /// Time per commit, s.
+    pub commit_duration: Histogram,
+    /// Calls of all services.
+    pub calls: Calls,
+}
+
+impl Default for Instruments {
+    fn default() -> Self {
+        Self {
+            commit_duration: COMMIT_DURATION.histogram(&COMMIT_BOUNDS_S),
+            calls: Calls::default(),
+        }
+    }
+}
+
+/// Where the values come from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// To the driver.
+    pub events: EventSender,
+    /// Whether it can be written.
+    pub store: SharedStore,
+    /// What is measured.
+    pub instruments: Instruments,
+}
+
+impl Source {
+    /// All values in Prometheus' text format; none while the coordinator stops.
+    pub async fn scrape(self) -> Option<String> {
+        let (reply, figures) = oneshot::channel();
+        self.events.send(Event::FiguresRequested(reply)).await.ok()?;
+        let Figures { fleet, experiments } = figures.await.ok()?;
+        let mut scrape = Scrape::default();
+        let version = env!("CARGO_PKG_VERSION");
+        scrape.put(&BUILD, &[version, sim_core::FINGERPRINT], 1.0);
+        let tally = fleet.tally;
+        for (state, n_workers) in [
+            ("available", fleet.n_workers_available),
+            ("draining", fleet.n_workers_draining),
+            ("distrusted", fleet.n_workers_distrusted),
+        ] {
+            scrape.put(&WORKERS, &[state], n_workers as f64);
+        }
+        for (metric, value) in [
+            (&SLOTS, fleet.n_slots as f64),
+            (&SLOT_TIME, fleet.slot_time_s),
+            (&BUSY_TIME, fleet.busy_time_s),
+            (&WORKERS_JOINED, tally.n_workers_joined as f64),
+            (&WORKERS_LEFT, tally.n_workers_left as f64),
+            (&WORKERS_LOST, tally.n_workers_lost as f64),
+            (&ITEMS_ASSIGNED, tally.n_items_assigned as f64),
+            (&ITEMS_COMPUTED, tally.n_items_computed as f64),
+            (&ITEMS_FAILED, tally.n_items_failed as f64),
+            (&ITEMS_REQUEUED, tally.n_items_requeued as f64),
+            (&ITEMS_RECALLED, tally.n_items_recalled as f64),
+            (&EPISODES, tally.n_episodes as f64),
+            (&STORE_AVAILABLE, if self.store.trouble().is_none() { 1.0 } else { 0.0 }),
+        ] {
+            scrape.put(metric, &[], value);
+        }
+        scrape.put_histogram(&COMMIT_DURATION, &self.instruments.commit_duration);
+        for ((method, code), n_calls) in self.instruments.calls.ended() {
+            scrape.put(&CALLS, &[&method, code], n_calls as f64);
+        }
+        experiments.iter().for_each(|experiment| put_experiment(&mut scrape, experiment));
+        Some(scrape.into_text())
+    }
+}
+
+fn put_experiment(scrape: &mut Scrape, experiment: &ExperimentFigures) {
+    let ExperimentFigures { id, name, generations_wanted, latest, work } = experiment;
+    let labels = [&id.to_string(), name.as_str()];
+    let state = if work.is_paused { "paused" } else { "running" };
+    scrape.put(&STATE, &[labels[0], labels[1], state], 1.0);
+    let mut put = |metric: &Metric, value: f64| scrape.put(metric, &labels, value);
+    put(&GENERATIONS_WANTED, *generations_wanted as f64);
+    put(&GENERATIONS_COMPLETED, latest.as_ref().map_or(0, |latest| latest.generation + 1) as f64);
+    put(&EXPERIMENT_EPISODES, work.n_episodes as f64);
+    put(&ITEMS_QUEUED, work.n_items_queued as f64);
+    put(&ITEMS_IN_FLIGHT, work.n_items_in_flight as f64);
+    if let Some(latest) = latest {
+        put(&BEST_FITNESS, latest.statistics.best);
+        put(&MEAN_FITNESS, latest.statistics.mean);
+        put(&GENERATION_DURATION, latest.duration_ms as f64 / 1000.0);
+        put(&IDLE, latest.idle_share);
+    }
+}
