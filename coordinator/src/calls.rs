@@ -48,7 +48,10 @@ impl Default for Calls {
             tonic_health::pb::FILE_DESCRIPTOR_SET,
             tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
         ];
-        Self { methods: Arc::new(files.into_iter().flat_map(methods).collect()), ended: Arc::default() }
+        Self {
+            methods: Arc::new(files.into_iter().flat_map(methods).collect()),
+            ended: Arc::default(),
+        }
     }
 }
 
@@ -124,7 +127,8 @@ where
 
 /// The methods of all services of encoded descriptors.
 fn methods(descriptors: &[u8]) -> Vec<String> {
-    let files = FileDescriptorSet::decode(descriptors).expect("the descriptors come from the build");
+    let files =
+        FileDescriptorSet::decode(descriptors).expect("the descriptors come from the build");
     let mut methods = Vec::new();
     for file in &files.file {
         for service in &file.service {

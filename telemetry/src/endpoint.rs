@@ -64,7 +64,10 @@ impl Endpoint {
 
     /// Answers with what `scrape` says, for as long as it is polled; while that says
     /// nothing, with 503.
-    pub async fn serve<S>(self, scrape: impl Fn() -> S + Clone + Send + Sync + 'static) -> Infallible
+    pub async fn serve<S>(
+        self,
+        scrape: impl Fn() -> S + Clone + Send + Sync + 'static,
+    ) -> Infallible
     where
         S: Future<Output = Option<String>> + Send + 'static,
     {

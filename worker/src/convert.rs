@@ -3,7 +3,10 @@
 
 use std::sync::{Arc, OnceLock};
 
-use sim_core::{Experiment, Isa, config::ExperimentConfig};
+use sim_core::{
+    Experiment, Isa,
+    config::{ConfigError, ExperimentConfig},
+};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},
@@ -11,27 +14,47 @@ use swarm_proto::{
 
 use crate::{
     WorkerConfig,
+    activity::Activity,
     pool::{Evaluator, Item, Outcome},
 };
 
 /// Makes a specification computable. It is compiled by the slot that computes
 /// its first item, once; what is wrong with it is the failure of each item.
-pub(crate) fn evaluator(config_json: String, isa: Isa) -> Evaluator {
+/// `activity`: where robots' steps are counted.
+pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) -> Evaluator {
     let compiled = OnceLock::new();
     Arc::new(move |item: &Item, keep_going: &dyn Fn() -> bool| {
-        let experiment: &Experiment =
+        let Computable { experiment, robot_steps }: &Computable =
             compiled.get_or_init(|| compile(&config_json, isa)).as_ref().map_err(String::clone)?;
-        experiment
+        let fitness = experiment
             .evaluate_while(&item.genotype, item.generation, item.trials.clone(), keep_going)
-            .map_err(|error| error.to_string())
+            .map_err(|error| error.to_string())?;
+        let n_episodes = fitness.as_ref().map_or(0, Vec::len) as u64;
+        activity.add_robot_steps(n_episodes * robot_steps);
+        Ok(fitness)
     })
 }
 
-fn compile(config_json: &str, isa: Isa) -> Result<Experiment, String> {
-    ExperimentConfig::from_json(config_json, "")
-        .and_then(|(config, _warnings)| Experiment::compile(&config))
-        .map(|experiment| experiment.with_isa(isa))
+/// A compiled specification.
+struct Computable {
+    experiment: Experiment,
+    /// Environment steps of an episode, summed over robots.
+    robot_steps: u64,
+}
+
+fn compile(config_json: &str, isa: Isa) -> Result<Computable, String> {
+    computable(config_json, isa)
         .map_err(|error| format!("the experiment's specification is not valid: {error}"))
+}
+
+fn computable(config_json: &str, isa: Isa) -> Result<Computable, ConfigError> {
+    let (config, _warnings) = ExperimentConfig::from_json(config_json, "")?;
+    let experiment = Experiment::compile(&config)?.with_isa(isa);
+    let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
+    Ok(Computable {
+        experiment,
+        robot_steps: n_robots * u64::from(config.algorithm.evaluation_steps),
+    })
 }
 
 /// Reads an item, or fails it: the coordinator is not trusted to be right.

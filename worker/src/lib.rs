@@ -3,19 +3,24 @@
 //!
 //! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
 
+mod activity;
 mod backoff;
 mod convert;
+pub mod metrics;
 mod pool;
 mod session;
 
-use std::{io, time::Duration};
+use std::{io, sync::Arc, time::Duration};
 
 use sim_core::Isa;
 use swarm_transport::{Credentials, Link, LinkError};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-pub use crate::backoff::Backoff;
+pub use crate::{
+    activity::{Activity, ActivityFigures},
+    backoff::Backoff,
+};
 use crate::{
     pool::{Evaluator, Pool},
     session::{Ended, OpenError, Session},
@@ -46,6 +51,8 @@ pub struct WorkerConfig {
     pub credentials: Credentials,
     /// Vector instructions to compute with. They decide how fast it is, and no bit.
     pub isa: Isa,
+    /// Where what it does can be seen.
+    pub activity: Arc<Activity>,
 }
 
 impl WorkerConfig {
@@ -59,6 +66,7 @@ impl WorkerConfig {
             retry_delay_max: Duration::from_secs(10),
             credentials: Credentials::default(),
             isa: Isa::best(),
+            activity: Arc::default(),
         }
     }
 }
@@ -118,8 +126,9 @@ impl WorkerError {
 /// A coordinator that is not up, or goes away, is tried again without end, after
 /// random delays that grow.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
-    let isa = config.isa;
-    run_with(config, shutdown, move |config_json| convert::evaluator(config_json, isa)).await
+    let (isa, activity) = (config.isa, Arc::clone(&config.activity));
+    let evaluator = move |config_json| convert::evaluator(config_json, isa, Arc::clone(&activity));
+    run_with(config, shutdown, evaluator).await
 }
 
 /// [`run`] with another way to make a specification computable.
@@ -129,7 +138,8 @@ async fn run_with(
     evaluator: impl Fn(String) -> Evaluator + Sync,
 ) -> Result<(), WorkerError> {
     let link = link(&config)?;
-    let pool = Pool::start(config.slots)?;
+    let activity = &config.activity;
+    let pool = Pool::start(config.slots, Arc::clone(activity))?;
     // 0 means that it is not known.
     let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
@@ -141,6 +151,7 @@ async fn run_with(
         };
         let (what, reason) = match opened {
             Ok(session) => {
+                activity.on_connected();
                 info!(
                     coordinator = config.coordinator,
                     name = config.name,
@@ -149,6 +160,7 @@ async fn run_with(
                     "connected"
                 );
                 let ended = session.serve(&pool, &shutdown, &evaluator).await;
+                activity.on_disconnected();
                 // What is left was assigned on this stream: it is not ours any more.
                 pool.cancel(|_| true);
                 match ended {
@@ -167,8 +179,14 @@ async fn run_with(
             Err(OpenError::Denied(refusal)) => {
                 return Err(WorkerError::Denied { address: config.coordinator, refusal });
             }
-            Err(OpenError::Refused(reason)) => ("refused", reason),
-            Err(OpenError::Unreachable(reason)) => ("cannot connect", reason),
+            Err(OpenError::Refused(reason)) => {
+                activity.on_connection_failed();
+                ("refused", reason)
+            }
+            Err(OpenError::Unreachable(reason)) => {
+                activity.on_connection_failed();
+                ("cannot connect", reason)
+            }
         };
         let delay = backoff.next_delay(rand::random());
         warn!(

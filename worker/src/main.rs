@@ -1,18 +1,15 @@
 //! The `worker` program: computes for a coordinator until it is told to stop.
 
-mod telemetry;
-
-use std::{env, fs, path::PathBuf, process::ExitCode, thread};
+use std::{env, fs, future::ready, path::PathBuf, process::ExitCode, sync::Arc, thread};
 
 use clap::Parser;
 use sim_core::Isa;
+use swarm_telemetry::{Endpoint, LogArgs, MetricsArgs};
 use swarm_transport::CredentialArgs;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
-use worker::{WorkerConfig, WorkerError};
-
-use crate::telemetry::LogFormat;
+use worker::{WorkerConfig, WorkerError, metrics};
 
 const EXIT_INTERNAL: u8 = 1;
 const EXIT_INPUT: u8 = 2;
@@ -47,20 +44,17 @@ struct Args {
     /// is, and no bit [default: the best of this processor]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
     isa: Option<Isa>,
-    /// How log lines look.
-    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
-    log_format: LogFormat,
-    /// What to log: error, warn, info, debug or trace, also per module
-    /// (info,worker=debug).
-    #[arg(long, env = "SWARM_LOG", default_value = "info")]
-    log_level: String,
+    #[command(flatten)]
+    metrics: MetricsArgs,
+    #[command(flatten)]
+    log: LogArgs,
 }
 
 const EXIT_CODES: &str = "\
 Exit codes:
   0    stopped by a signal
   1    internal error
-  2    bad arguments; token or certificate unusable
+  2    bad arguments; token or certificate unusable; address for metrics in use
   6    coordinator and worker are of different versions
   7    the coordinator does not accept the token
   130  ended at once by a second signal";
@@ -68,8 +62,8 @@ Exit codes:
 #[tokio::main]
 async fn main() -> ExitCode {
     let args = Args::parse();
-    if let Err(error) = telemetry::init(args.log_format, &args.log_level) {
-        eprintln!("error: {error:#}");
+    if let Err(error) = args.log.init() {
+        eprintln!("error: {error}");
         return EXIT_INPUT.into();
     }
     let shutdown = CancellationToken::new();
@@ -90,6 +84,19 @@ async fn main() -> ExitCode {
     let isa = args.isa.unwrap_or_else(Isa::best);
     let config =
         WorkerConfig { credentials, isa, ..WorkerConfig::new(args.coordinator, name, slots) };
+    if let Some(address) = args.metrics.metrics_listen {
+        let endpoint = match Endpoint::listen(address).await {
+            Ok(endpoint) => endpoint,
+            Err(error) => {
+                error!("{error}");
+                return EXIT_INPUT.into();
+            }
+        };
+        let identity = metrics::Identity { name: config.name.clone(), slots, isa };
+        let activity = Arc::clone(&config.activity);
+        let scrape = move || ready(Some(metrics::scrape(&identity, &activity.figures())));
+        tokio::spawn(endpoint.serve(scrape));
+    }
     match worker::run(config, shutdown).await {
         Ok(()) => {
             info!("stopped");

@@ -18,6 +18,8 @@ use std::{
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 
+use crate::activity::{Activity, Made};
+
 /// One genotype and the trials to run it on.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Item {
@@ -62,6 +64,7 @@ pub(crate) struct Pool {
 struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
+    activity: Arc<Activity>,
 }
 
 #[derive(Default)]
@@ -88,9 +91,10 @@ impl fmt::Debug for Queue {
 
 impl Pool {
     /// Starts `slots` threads; the queue holds as many tasks as the coordinator may
-    /// send ahead.
-    pub(crate) fn start(slots: usize) -> io::Result<Self> {
-        let shared = Arc::new(Shared { queue: Mutex::default(), changed: Condvar::new() });
+    /// send ahead. `activity`: where they are counted.
+    pub(crate) fn start(slots: usize, activity: Arc<Activity>) -> io::Result<Self> {
+        let (queue, changed) = (Mutex::default(), Condvar::new());
+        let shared = Arc::new(Shared { queue, changed, activity });
         // Built first, so that the threads that did start end if one does not.
         let pool = Self { shared, capacity: ITEMS_PER_SLOT_MAX * slots };
         for slot in 0..slots {
@@ -112,6 +116,7 @@ impl Pool {
             return Err(task);
         }
         queue.tasks.push_back(task);
+        self.shared.report(&queue);
         self.shared.changed.notify_one();
         Ok(())
     }
@@ -119,7 +124,10 @@ impl Pool {
     /// Drops all tasks that wait, and returns their number. What is being computed
     /// goes on.
     pub(crate) fn drop_queued(&self) -> usize {
-        mem::take(&mut self.shared.lock().tasks).len()
+        let mut queue = self.shared.lock();
+        let dropped = mem::take(&mut queue.tasks);
+        self.shared.report(&queue);
+        dropped.len()
     }
 
     /// Drops the tasks that match, whether they wait or are being computed, and
@@ -128,6 +136,7 @@ impl Pool {
         let mut queue = self.shared.lock();
         let n_before = queue.tasks.len();
         queue.tasks.retain(|task| !matches(&task.item));
+        self.shared.report(&queue);
         let n_dropped = n_before - queue.tasks.len();
         let running = queue.running.iter().filter(|running| matches(&running.item));
         n_dropped + running.inspect(|running| running.cancelled.store(true, Relaxed)).count()
@@ -139,6 +148,7 @@ impl Drop for Pool {
         let mut queue = self.shared.lock();
         queue.closed = true;
         queue.tasks.clear();
+        self.shared.report(&queue);
         self.shared.changed.notify_all();
     }
 }
@@ -148,11 +158,19 @@ impl Shared {
         self.queue.lock().expect("nothing panics while it holds the queue")
     }
 
+    /// The queue has changed.
+    fn report(&self, queue: &Queue) {
+        self.activity.on_queue(queue.tasks.len(), queue.running.len());
+    }
+
     /// A slot's life.
     fn work(&self) {
         while let Some((running, evaluator, reply)) = self.next_task() {
-            let outcome = compute(&running, &evaluator);
-            self.lock().running.retain(|other| !Arc::ptr_eq(other, &running));
+            let outcome = compute(&running, &evaluator, &self.activity);
+            let mut queue = self.lock();
+            queue.running.retain(|other| !Arc::ptr_eq(other, &running));
+            self.report(&queue);
+            drop(queue);
             if let Some(outcome) = outcome {
                 // An error means that the stream of this item is gone, and with it
                 // the use of the outcome.
@@ -170,6 +188,7 @@ impl Shared {
         let Task { item, evaluator, reply } = queue.tasks.pop_front()?;
         let running = Arc::new(Running { item, cancelled: AtomicBool::new(false) });
         queue.running.push(Arc::clone(&running));
+        self.report(&queue);
         Some((running, evaluator, reply))
     }
 }
@@ -177,13 +196,23 @@ impl Shared {
 /// Computes one item; no outcome if it is cancelled meanwhile. A panic is the
 /// item's failure, not the worker's.
 #[expect(clippy::disallowed_methods, reason = "reports how long an item took; decides nothing")]
-fn compute(Running { item, cancelled }: &Running, evaluator: &Evaluator) -> Option<Outcome> {
+fn compute(
+    Running { item, cancelled }: &Running,
+    evaluator: &Evaluator,
+    activity: &Activity,
+) -> Option<Outcome> {
     let started = Instant::now();
     let keep_going = || !cancelled.load(Relaxed);
     let fitness = panic::catch_unwind(AssertUnwindSafe(|| evaluator(item, &keep_going)))
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))));
-    let fitness = fitness.transpose()?;
-    Some(Outcome { item_id: item.id, fitness, duration: started.elapsed() })
+    let duration = started.elapsed();
+    let made = match &fitness {
+        Ok(Some(trials)) => Made::Fitness { n_episodes: trials.len() as u64 },
+        Ok(None) => Made::Nothing,
+        Err(_) => Made::Failure,
+    };
+    activity.on_item(made, duration);
+    Some(Outcome { item_id: item.id, fitness: fitness.transpose()?, duration })
 }
 
 fn panic_message(payload: &(dyn Any + Send)) -> &str {
@@ -238,7 +267,7 @@ mod tests {
 
     #[test]
     fn every_item_gets_its_own_outcome() {
-        let pool = Pool::start(4).unwrap();
+        let pool = Pool::start(4, Arc::default()).unwrap();
         let (reply, outcomes) = mpsc::channel(8);
         let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
         for id in 0..8 {
@@ -251,7 +280,7 @@ mod tests {
 
     #[test]
     fn a_panic_fails_its_item_and_spares_the_slot() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, outcomes) = mpsc::channel(4);
         let evaluator: Evaluator = Arc::new(|item, _| match item.id {
             0 => panic!("no such robot"),
@@ -270,7 +299,7 @@ mod tests {
 
     #[test]
     fn dropping_what_is_queued_lets_what_is_running_finish() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, outcomes) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
         submit(&pool, task(0, &evaluator, &reply));
@@ -285,7 +314,7 @@ mod tests {
 
     #[test]
     fn cancelling_stops_what_is_running_and_drops_what_waits() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, outcomes) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
         submit(&pool, task(0, &evaluator, &reply));
@@ -302,8 +331,36 @@ mod tests {
     }
 
     #[test]
+    fn what_becomes_of_items_is_counted() {
+        let activity = Arc::new(Activity::default());
+        let pool = Pool::start(1, Arc::clone(&activity)).unwrap();
+        let (reply, outcomes) = mpsc::channel(4);
+        let (evaluator, starts, permit) = gated();
+        submit(&pool, task(0, &evaluator, &reply));
+        assert_eq!(starts.recv(), Ok(0));
+        submit(&pool, task(1, &evaluator, &reply));
+        submit(&pool, task(2, &evaluator, &reply));
+        let figures = activity.figures();
+        assert_eq!((figures.n_slots_busy, figures.n_items_queued), (1, 2));
+        pool.cancel(|item| item.experiment_id == 0);
+        let failing: Evaluator = Arc::new(|_, _| Err("no such robot".into()));
+        submit(&pool, task(3, &failing, &reply));
+        permit.send(()).unwrap();
+        permit.send(()).unwrap();
+        drop(reply);
+        assert_eq!(collect(outcomes).len(), 2);
+        let figures = activity.figures();
+        assert_eq!(figures.n_items_computed, 1);
+        assert_eq!(figures.n_items_failed, 1);
+        assert_eq!(figures.n_items_dropped, 1, "of two, one had not begun");
+        assert_eq!(figures.n_episodes, 1);
+        assert_eq!((figures.n_slots_busy, figures.n_items_queued), (0, 0));
+        assert!(figures.busy > Duration::ZERO);
+    }
+
+    #[test]
     fn a_full_queue_gives_the_task_back() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, _outcomes) = mpsc::channel(4);
         let (evaluator, starts, _permit) = gated();
         submit(&pool, task(0, &evaluator, &reply));
@@ -319,7 +376,7 @@ mod tests {
 
     #[test]
     fn a_dropped_pool_finishes_what_is_running_and_nothing_else() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let (reply, outcomes) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
         submit(&pool, task(0, &evaluator, &reply));
@@ -333,7 +390,7 @@ mod tests {
 
     #[test]
     fn outcomes_that_nobody_waits_for_do_not_block_a_slot() {
-        let pool = Pool::start(1).unwrap();
+        let pool = Pool::start(1, Arc::default()).unwrap();
         let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
         let (gone, receiver) = mpsc::channel(1);
         drop(receiver);

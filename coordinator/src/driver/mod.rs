@@ -319,10 +319,8 @@ impl Driver {
             self.engine.on_experiment_paused(clock::now(), id);
         }
         self.n_started += 1;
-        let running = Running {
-            latest: runnable.latest,
-            ..Running::new(runnable.config, self.n_started)
-        };
+        let running =
+            Running { latest: runnable.latest, ..Running::new(runnable.config, self.n_started) };
         self.experiments.insert(id, running);
         self.judge(id, runnable.round);
     }

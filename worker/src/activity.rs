@@ -1,0 +1,117 @@
+//! What a worker does, for whoever wants to see it from outside; it decides nothing.
+
+use std::{
+    sync::atomic::{
+        AtomicBool, AtomicU64, AtomicUsize,
+        Ordering::{Relaxed, SeqCst},
+    },
+    time::Duration,
+};
+
+/// What a worker has done since it began, and what it is doing. Counted where it
+/// happens, read at any time.
+#[derive(Debug, Default)]
+pub struct Activity {
+    is_connected: AtomicBool,
+    n_connections: AtomicU64,
+    n_connections_failed: AtomicU64,
+    n_items_computed: AtomicU64,
+    n_items_failed: AtomicU64,
+    n_items_dropped: AtomicU64,
+    n_episodes: AtomicU64,
+    n_robot_steps: AtomicU64,
+    busy_ns: AtomicU64,
+    n_items_queued: AtomicUsize,
+    n_slots_busy: AtomicUsize,
+}
+
+/// What a slot made of an item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Made {
+    /// So many episodes.
+    Fitness { n_episodes: u64 },
+    /// It cannot be computed.
+    Failure,
+    /// Nobody wanted it any more.
+    Nothing,
+}
+
+/// [`Activity`] at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ActivityFigures {
+    /// Whether the coordinator has welcomed it and the stream goes on.
+    pub is_connected: bool,
+    /// Streams that the coordinator welcomed.
+    pub n_connections: u64,
+    /// Attempts that came to nothing.
+    pub n_connections_failed: u64,
+    /// Items that gave fitness.
+    pub n_items_computed: u64,
+    /// Items that gave none.
+    pub n_items_failed: u64,
+    /// Items that the coordinator took back while they were computed.
+    pub n_items_dropped: u64,
+    /// Episodes of all items that gave fitness.
+    pub n_episodes: u64,
+    /// Environment steps of those, summed over robots.
+    pub n_robot_steps: u64,
+    /// Time that slots have computed, summed over slots.
+    pub busy: Duration,
+    /// Items that wait for a slot.
+    pub n_items_queued: usize,
+    /// Slots that compute.
+    pub n_slots_busy: usize,
+}
+
+impl Activity {
+    /// As it is now.
+    pub fn figures(&self) -> ActivityFigures {
+        ActivityFigures {
+            is_connected: self.is_connected.load(SeqCst),
+            n_connections: self.n_connections.load(Relaxed),
+            n_connections_failed: self.n_connections_failed.load(Relaxed),
+            n_items_computed: self.n_items_computed.load(Relaxed),
+            n_items_failed: self.n_items_failed.load(Relaxed),
+            n_items_dropped: self.n_items_dropped.load(Relaxed),
+            n_episodes: self.n_episodes.load(Relaxed),
+            n_robot_steps: self.n_robot_steps.load(Relaxed),
+            busy: Duration::from_nanos(self.busy_ns.load(Relaxed)),
+            n_items_queued: self.n_items_queued.load(Relaxed),
+            n_slots_busy: self.n_slots_busy.load(Relaxed),
+        }
+    }
+
+    pub(crate) fn on_connected(&self) {
+        self.n_connections.fetch_add(1, Relaxed);
+        self.is_connected.store(true, SeqCst);
+    }
+
+    pub(crate) fn on_disconnected(&self) {
+        self.is_connected.store(false, SeqCst);
+    }
+
+    pub(crate) fn on_connection_failed(&self) {
+        self.n_connections_failed.fetch_add(1, Relaxed);
+    }
+
+    pub(crate) fn on_queue(&self, n_queued: usize, n_running: usize) {
+        self.n_items_queued.store(n_queued, Relaxed);
+        self.n_slots_busy.store(n_running, Relaxed);
+    }
+
+    pub(crate) fn on_item(&self, made: Made, busy: Duration) {
+        self.busy_ns.fetch_add(busy.as_nanos() as u64, Relaxed);
+        match made {
+            Made::Fitness { n_episodes } => {
+                self.n_episodes.fetch_add(n_episodes, Relaxed);
+                self.n_items_computed.fetch_add(1, Relaxed)
+            }
+            Made::Failure => self.n_items_failed.fetch_add(1, Relaxed),
+            Made::Nothing => self.n_items_dropped.fetch_add(1, Relaxed),
+        };
+    }
+
+    pub(crate) fn add_robot_steps(&self, n: u64) {
+        self.n_robot_steps.fetch_add(n, Relaxed);
+    }
+}
