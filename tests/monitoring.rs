@@ -1,0 +1,126 @@
+//! The page on metrics and the dashboard know the metrics that there are, and a real
+//! Prometheus has something to show in every panel.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{collections::BTreeSet, fs, thread, time::Duration};
+
+use harness::{
+    CoordinatorProcess, Experiment, Prometheus, WorkerProcess, metrics_address,
+    promtool_check_config, workspace_file,
+};
+use serde_json::Value;
+use swarm_telemetry::{Kind, Metric};
+
+const MISSING: &str = "SKIPPED: Prometheus is not installed (Debian package `prometheus`)";
+
+fn all_metrics() -> Vec<&'static Metric> {
+    coordinator::metrics::METRICS.iter().chain(worker::metrics::METRICS).collect()
+}
+
+fn dashboard() -> Value {
+    let text = fs::read_to_string(workspace_file("docker/grafana/dashboard.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Title and expressions of every panel.
+fn panels() -> Vec<(String, Vec<String>)> {
+    let mut panels = Vec::new();
+    for panel in dashboard()["panels"].as_array().unwrap() {
+        let Some(targets) = panel["targets"].as_array() else { continue };
+        let expressions = targets.iter().map(|t| t["expr"].as_str().unwrap().to_owned()).collect();
+        panels.push((panel["title"].as_str().unwrap().to_owned(), expressions));
+    }
+    assert!(panels.len() > 20);
+    panels
+}
+
+/// The names of our metrics in an expression.
+fn names_in(expression: &str) -> impl Iterator<Item = &str> {
+    let words = expression.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    words.filter(|word| word.starts_with("swarm_"))
+}
+
+#[test]
+fn the_page_on_metrics_has_a_row_for_each_and_no_other() {
+    let page = fs::read_to_string(workspace_file("docs/metrics.md")).unwrap();
+    let documented: Vec<&str> = page.lines().filter(|line| line.starts_with("| `swarm_")).collect();
+    let row = |metric: &&Metric| {
+        let labels: Vec<String> = metric.labels.iter().map(|label| format!("`{label}`")).collect();
+        let (name, kind, labels) = (metric.name, metric.kind.name(), labels.join(", "));
+        format!("| `{name}` | {kind} | {labels} | {} |", metric.help).replace("|  |", "| |")
+    };
+    let expected: Vec<String> = all_metrics().iter().map(row).collect();
+    assert_eq!(documented, expected, "it should say\n{}", expected.join("\n"));
+}
+
+#[test]
+fn names_are_unique_and_say_what_the_metric_is() {
+    let metrics = all_metrics();
+    let names: BTreeSet<&str> = metrics.iter().map(|metric| metric.name).collect();
+    assert_eq!(names.len(), metrics.len());
+    for Metric { name, kind, help, .. } in metrics {
+        assert_eq!(*kind == Kind::Counter, name.ends_with("_total"), "{name}");
+        assert!(help.ends_with('.') && !help.contains('|'), "{name}: {help}");
+    }
+}
+
+#[test]
+fn the_dashboard_asks_for_metrics_that_there_are() {
+    let mut names = BTreeSet::new();
+    for metric in all_metrics() {
+        match metric.kind {
+            Kind::Histogram => names
+                .extend(["bucket", "sum", "count"].map(|part| format!("{}_{part}", metric.name))),
+            Kind::Gauge | Kind::Counter => drop(names.insert(metric.name.to_owned())),
+        }
+    }
+    let variables = dashboard()["templating"].to_string();
+    let panels = panels();
+    let expressions = panels.iter().flat_map(|(_, expressions)| expressions).chain([&variables]);
+    let asked: BTreeSet<&str> = expressions.flat_map(|expression| names_in(expression)).collect();
+    assert!(asked.len() > 20, "{asked:?}");
+    let missing: Vec<&&str> = asked.iter().filter(|name| !names.contains(**name)).collect();
+    assert!(missing.is_empty(), "no such metrics: {missing:?}");
+}
+
+#[test]
+fn promtool_accepts_the_configuration() {
+    match promtool_check_config(&workspace_file("docker/prometheus.yml")) {
+        Some(verdict) => assert_eq!(verdict, Ok(())),
+        None => eprintln!("{MISSING}"),
+    }
+}
+
+/// With a fleet at work, an experiment without end, and a call that failed.
+#[test]
+fn every_panel_shows_something_to_a_real_prometheus() {
+    let listen = ["--metrics-listen", "127.0.0.1:0"];
+    let coordinator = CoordinatorProcess::start_with(&listen);
+    let worker = WorkerProcess::start_with(&coordinator.url(), "ada", &listen);
+    let addresses = [&coordinator.process, &worker.process].map(metrics_address);
+    let targets = [("coordinator", addresses[0].as_str()), ("worker", addresses[1].as_str())];
+    let Some(prometheus) = Prometheus::start(&targets) else {
+        eprintln!("{MISSING}");
+        return;
+    };
+    coordinator.submit(&Experiment::tiny(1_000_000).path());
+    let mut expressions: Vec<String> = panels()
+        .into_iter()
+        .flat_map(|(_, expressions)| expressions)
+        .map(|expression| expression.replace("$__rate_interval", "1m").replace("$experiment", ".*"))
+        .collect();
+    // Two scrapes, a second apart, are enough; who is busy takes longer.
+    for _ in 0..240 {
+        assert_eq!(coordinator.swarmctl(&["watch", "77"]).code, Some(3));
+        expressions.retain(|expression| {
+            let series = prometheus.query(expression);
+            let shows = |series: &Value| series["value"][1].as_str() != Some("NaN");
+            !series.iter().any(shows)
+        });
+        if expressions.is_empty() {
+            return;
+        }
+        thread::sleep(Duration::from_millis(500));
+    }
+    panic!("nothing to show for {expressions:#?}");
+}
