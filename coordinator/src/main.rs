@@ -66,7 +66,7 @@ async fn main() -> ExitCode {
     match serve(&args).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            error!("{error:#}");
+            error!("{error}");
             let is_input = error.is::<StartError>() || error.is::<AccessInputError>();
             ExitCode::from(if is_input { 2 } else { 1 })
         }

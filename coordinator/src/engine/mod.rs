@@ -493,6 +493,9 @@ impl Engine {
         assert!(self.outgoing.is_empty(), "everything is sent");
         let n_slots: usize = self.workers.values().map(Worker::n_slots).sum();
         assert_eq!(n_slots, self.fleet_time.n_slots());
+        let Tally { n_workers_joined, n_workers_left, n_workers_lost, .. } = self.tally;
+        let n_gone = n_workers_left + n_workers_lost;
+        assert_eq!(n_workers_joined - n_gone, self.workers.len() as u64);
     }
 }
 
