@@ -86,7 +86,7 @@ fn figures_agree_with_what_a_run_did() {
     let submit = [("method", "swarm.v1.ExperimentService/SubmitExperiment"), ("code", "OK")];
     assert_eq!(samples.value("swarm_grpc_calls_total", &submit), 1.0);
     coordinator.swarmctl(&["watch", "77"]);
-    let unknown = [("method", "swarm.v1.ExperimentService/WatchExperiment"), ("code", "NOT_FOUND")];
+    let unknown = [("method", "swarm.v1.ExperimentService/GetExperiment"), ("code", "NOT_FOUND")];
     scrape_until(&address, "counted", |samples| {
         samples.find("swarm_grpc_calls_total", &unknown) == Some(1.0)
     });
