@@ -175,6 +175,14 @@ fn a_worker_without_a_coordinator_says_so() {
 }
 
 #[test]
+fn an_address_that_others_reach_is_warned_of() {
+    let coordinator = CoordinatorProcess::start_with(&["--metrics-listen", "0.0.0.0:0"]);
+    let warning = "everybody who reaches this address can read the metrics";
+    let line = coordinator.process.wait_for("warning", |line| line["message"] == warning);
+    assert_eq!(line["level"], "WARN");
+}
+
+#[test]
 fn an_address_in_use_is_one_clear_line_and_there_is_none_by_default() {
     let (coordinator, taken) = coordinator();
     let directory = tempfile::tempdir().unwrap();
