@@ -12,7 +12,14 @@ use crate::LoggingProcess;
 pub struct Samples {
     /// As it was.
     pub text: String,
-    samples: Vec<(String, Vec<(String, String)>, f64)>,
+    samples: Vec<Sample>,
+}
+
+#[derive(Debug)]
+struct Sample {
+    name: String,
+    labels: Vec<(String, String)>,
+    value: f64,
 }
 
 /// Where a process that was started with `--metrics-listen 127.0.0.1:0` serves
@@ -33,11 +40,14 @@ impl Samples {
 
     /// The value of the only series of a metric that has these labels, if there is one.
     pub fn find(&self, name: &str, labels: &[(&str, &str)]) -> Option<f64> {
-        let has = |all: &[(String, String)]| {
-            labels.iter().all(|(name, value)| all.iter().any(|(n, v)| n == name && v == value))
+        let is_it = |sample: &&Sample| {
+            let has = |&(name, value): &(&str, &str)| {
+                sample.labels.iter().any(|(n, v)| n == name && v == value)
+            };
+            sample.name == name && labels.iter().all(has)
         };
-        let mut found = self.samples.iter().filter(|(n, all, _)| n == name && has(all));
-        let value = found.next().map(|(.., value)| *value);
+        let mut found = self.samples.iter().filter(is_it);
+        let value = found.next().map(|sample| sample.value);
         assert!(found.next().is_none(), "{name} {labels:?} is several series: {}", self.text);
         value
     }
@@ -49,7 +59,7 @@ impl Samples {
 }
 
 /// `name{label="value",...} 1.5`; no value here has a quotation mark or a comma.
-fn parse(line: &str) -> (String, Vec<(String, String)>, f64) {
+fn parse(line: &str) -> Sample {
     let (series, value) = line.rsplit_once(' ').expect("a value");
     let (name, labels) = match series.strip_suffix('}') {
         Some(series) => series.split_once('{').expect("labels in braces"),
@@ -60,7 +70,7 @@ fn parse(line: &str) -> (String, Vec<(String, String)>, f64) {
         (name.to_owned(), value.trim_matches('"').to_owned())
     };
     let labels = labels.split(',').filter(|pair| !pair.is_empty()).map(pair).collect();
-    (name.to_owned(), labels, value.parse().expect("a number"))
+    Sample { name: name.to_owned(), labels, value: value.parse().expect("a number") }
 }
 
 /// The status and the content at a path.
