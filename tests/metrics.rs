@@ -7,7 +7,6 @@ use harness::{
     CoordinatorProcess, Experiment, Outcome, Samples, WorkerProcess, binary, http_get,
     metrics_address, promtool_check_metrics,
 };
-use rusqlite::params;
 
 const LISTEN: [&str; 2] = ["--metrics-listen", "127.0.0.1:0"];
 
@@ -131,37 +130,46 @@ fn an_experiment_can_be_seen_while_it_is_unfinished() {
     let episodes = paused.value("swarm_experiment_episodes_total", &[is_ours]);
     assert_eq!(episodes, paused.value("swarm_episodes_total", &[]));
     assert!(episodes >= paused.value(completed, &[is_ours]) * 20.0);
-    let latest = |name: &str| {
-        let row = format!(
-            "SELECT {name} FROM generations WHERE experiment_id = ?1 ORDER BY generation DESC"
-        );
-        let value: f64 =
-            coordinator.database().query_row(&row, params![id], |row| row.get(0)).unwrap();
-        value
-    };
-    let figures = |samples: &Samples| {
-        assert_eq!(samples.value("swarm_experiment_best_fitness", &[is_ours]), latest("best"));
-        assert_eq!(samples.value("swarm_experiment_mean_fitness", &[is_ours]), latest("mean"));
-        let idle = "swarm_experiment_barrier_idle_ratio";
-        assert_eq!(samples.value(idle, &[is_ours]), latest("idle_share"));
-        let duration = "swarm_experiment_generation_duration_seconds";
-        assert_eq!(samples.value(duration, &[is_ours]), latest("duration_ms") / 1000.0);
-    };
-    figures(&paused);
+    agrees_with_the_database(&paused, &coordinator, id);
+
+    coordinator.process.kill();
+    let is_connected = |samples: &Samples| samples.value("swarm_worker_connected", &[]) == 1.0;
+    scrape_until(&worker_address, "cut off", |samples| !is_connected(samples));
+    coordinator.restart();
+    let address = metrics_address(&coordinator.process);
+    let back = scrape_until(&worker_address, "back", is_connected);
+    assert_eq!(back.value("swarm_worker_connections_total", &[]), 2.0);
+    let known = |samples: &Samples| samples.find(completed, &[is_ours]).is_some();
+    let again = scrape_until(&address, "known again", known);
+    agrees_with_the_database(&again, &coordinator, id);
 
     worker.process.signal("TERM");
     worker.process.wait();
     let left = |samples: &Samples| samples.value("swarm_workers_left_total", &[]) == 1.0;
     scrape_until(&address, "left", left);
-
-    coordinator.process.kill();
-    coordinator.restart();
-    let address = metrics_address(&coordinator.process);
-    let known = |samples: &Samples| samples.find(completed, &[is_ours]).is_some();
-    let again = scrape_until(&address, "known again", known);
-    assert_eq!(again.value(completed, &[is_ours]), coordinator.n_committed(id) as f64);
     coordinator.swarmctl(&["cancel", &text]).expect_success();
     scrape_until(&address, "gone", |samples| samples.find(completed, &[]).is_none());
+}
+
+/// Of the latest completed generation.
+fn agrees_with_the_database(samples: &Samples, coordinator: &CoordinatorProcess, id: u64) {
+    let latest = |column: &str| -> f64 {
+        let query = format!(
+            "SELECT {column} FROM generations WHERE experiment_id = ?1 ORDER BY generation DESC"
+        );
+        coordinator.database().query_row(&query, [id], |row| row.get(0)).unwrap()
+    };
+    let id = id.to_string();
+    for (metric, expected) in [
+        ("generations_completed", latest("generation") + 1.0),
+        ("best_fitness", latest("best")),
+        ("mean_fitness", latest("mean")),
+        ("barrier_idle_ratio", latest("idle_share")),
+        ("generation_duration_seconds", latest("duration_ms") / 1000.0),
+    ] {
+        let value = samples.value(&format!("swarm_experiment_{metric}"), &[("experiment", &id)]);
+        assert_eq!(value, expected, "{metric}");
+    }
 }
 
 #[test]
