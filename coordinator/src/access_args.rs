@@ -73,13 +73,17 @@ impl AccessArgs {
                 return Err(AccessInputError::OneToken { present: "worker", absent: "client" });
             }
         };
-        let tls = match (&self.tls_cert, &self.tls_key) {
-            (Some(certificate), Some(key)) => Some(Tls {
-                identity: Identity::read(certificate, key)?,
-                client_authorities: self.tls_client_ca.as_deref().map(certificates).transpose()?,
-            }),
-            _ => None,
+        Ok(Access { tokens, tls: self.load_tls()?, plaintext: self.plaintext })
+    }
+
+    /// Reads the files of TLS.
+    pub fn load_tls(&self) -> Result<Option<Tls>, PemError> {
+        let (Some(certificate), Some(key)) = (&self.tls_cert, &self.tls_key) else {
+            return Ok(None);
         };
-        Ok(Access { tokens, tls, plaintext: self.plaintext })
+        Ok(Some(Tls {
+            identity: Identity::read(certificate, key)?,
+            client_authorities: self.tls_client_ca.as_deref().map(certificates).transpose()?,
+        }))
     }
 }

@@ -7,6 +7,7 @@
 //! - `driver`: the loop that connects the three with the network
 //! - `rpc`: gRPC services, translation only
 //! - `listener`, `gate`: who gets as far as the services
+//! - `health_check`: asks another process's coordinator how it is
 //! - [`metrics`]: what can be scraped
 //! - [`limits`]: every bound on what the network can ask for
 
@@ -18,6 +19,7 @@ pub mod engine;
 pub mod evolution;
 mod failpoint;
 mod gate;
+mod health_check;
 pub mod ids;
 pub mod limits;
 mod listener;
@@ -31,4 +33,5 @@ mod submission;
 mod throttle;
 
 pub use access::{Access, AccessError, Role, Tls, Tokens};
+pub use health_check::{Unhealthy, health_check};
 pub use server::{Coordinator, CoordinatorConfig, RunError, StartError};

@@ -6,7 +6,7 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use access_args::{AccessArgs, AccessInputError};
 use clap::Parser;
-use coordinator::{Coordinator, CoordinatorConfig, StartError};
+use coordinator::{Coordinator, CoordinatorConfig, StartError, health_check};
 use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -29,6 +29,11 @@ struct Args {
     data_dir: PathBuf,
     #[command(flatten)]
     access: AccessArgs,
+    /// Start nothing; ask the coordinator that runs here with the same --listen and
+    /// --tls-... options whether it is healthy. Exit code 0 if so, 1 if not, and a
+    /// line that says why.
+    #[arg(long)]
+    health_check: bool,
     /// Seconds of silence after which a worker's items go to others.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     lease: u32,
@@ -59,6 +64,9 @@ fn fraction(text: &str) -> Result<f64, String> {
 #[tokio::main]
 async fn main() -> ExitCode {
     let args = Args::parse();
+    if args.health_check {
+        return report_health(&args).await;
+    }
     if let Err(error) = args.log.init() {
         eprintln!("error: {error}");
         return ExitCode::from(2);
@@ -69,6 +77,25 @@ async fn main() -> ExitCode {
             error!("{error}");
             let is_input = error.is::<StartError>() || error.is::<AccessInputError>();
             ExitCode::from(if is_input { 2 } else { 1 })
+        }
+    }
+}
+
+/// Says in one line how the coordinator is.
+async fn report_health(args: &Args) -> ExitCode {
+    let health = async {
+        let tls = args.access.load_tls()?;
+        health_check(args.listen, tls.as_ref()).await?;
+        anyhow::Ok(())
+    };
+    match health.await {
+        Ok(()) => {
+            println!("healthy: the coordinator on {} serves", args.listen);
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("unhealthy: {error}");
+            ExitCode::FAILURE
         }
     }
 }

@@ -8,12 +8,14 @@
 mod credentials;
 mod link;
 mod pem;
+mod pinned;
 mod token;
 mod trouble;
 
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
 pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};
+pub use pinned::{PinError, pinned};
 pub use token::{BEARER, Token, TokenError};
 pub use trouble::tls_trouble;
 

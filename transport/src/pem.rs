@@ -9,7 +9,10 @@ use tonic::transport;
 
 /// A certificate chain and its private key. `Debug` does not show it.
 #[derive(Clone)]
-pub struct Identity(transport::Identity);
+pub struct Identity {
+    chain: Vec<u8>,
+    key: Vec<u8>,
+}
 
 /// Why a file is of no use.
 #[derive(Debug, thiserror::Error)]
@@ -37,12 +40,22 @@ impl Identity {
     pub fn read(certificate: &Path, key: &Path) -> Result<Self, PemError> {
         let chain = read(certificate, "CERTIFICATE-----", "certificate")?;
         let key = read(key, "PRIVATE KEY-----", "private key")?;
-        Ok(Self(transport::Identity::from_pem(chain, key)))
+        Ok(Self { chain, key })
     }
 
     /// As the transport wants it.
     pub fn to_tonic(&self) -> transport::Identity {
-        self.0.clone()
+        transport::Identity::from_pem(&self.chain, &self.key)
+    }
+
+    /// The certificate and those between it and its authority, in PEM form.
+    pub(crate) fn chain(&self) -> &[u8] {
+        &self.chain
+    }
+
+    /// Its private key, in PEM form.
+    pub(crate) fn key(&self) -> &[u8] {
+        &self.key
     }
 }
 

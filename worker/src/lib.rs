@@ -9,8 +9,9 @@ mod convert;
 pub mod metrics;
 mod pool;
 mod session;
+mod session_file;
 
-use std::{io, sync::Arc, time::Duration};
+use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use sim_core::Isa;
 use swarm_transport::{Credentials, Link, LinkError};
@@ -20,10 +21,12 @@ use tracing::{info, warn};
 pub use crate::{
     activity::{Activity, ActivityFigures},
     backoff::Backoff,
+    session_file::{Unhealthy, health_check},
 };
 use crate::{
     pool::{Evaluator, Pool},
     session::{Ended, OpenError, Session},
+    session_file::SessionFile,
 };
 
 /// Most items that a worker computes at the same time.
@@ -53,6 +56,8 @@ pub struct WorkerConfig {
     pub isa: Isa,
     /// Where what it does can be seen.
     pub activity: Arc<Activity>,
+    /// Where [`health_check`] looks whether there is a session with the coordinator.
+    pub session_file: Option<PathBuf>,
 }
 
 impl WorkerConfig {
@@ -67,6 +72,7 @@ impl WorkerConfig {
             credentials: Credentials::default(),
             isa: Isa::best(),
             activity: Arc::default(),
+            session_file: None,
         }
     }
 }
@@ -108,6 +114,14 @@ pub enum WorkerError {
         /// The coordinator's reason.
         refusal: String,
     },
+    /// The session file cannot be written. Fix the input.
+    #[error("cannot write the session file {}: {source}", path.display())]
+    SessionFile {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
     /// The operating system gave no thread.
     #[error("cannot start the threads that compute: {0}")]
     Threads(#[from] io::Error),
@@ -116,7 +130,7 @@ pub enum WorkerError {
 impl WorkerError {
     /// Whether the configuration is at fault.
     pub fn is_input(&self) -> bool {
-        matches!(self, Self::Link(_) | Self::Name(_) | Self::Slots(_))
+        matches!(self, Self::Link(_) | Self::Name(_) | Self::Slots(_) | Self::SessionFile { .. })
     }
 }
 
@@ -138,6 +152,7 @@ async fn run_with(
     evaluator: impl Fn(String) -> Evaluator + Sync,
 ) -> Result<(), WorkerError> {
     let link = link(&config)?;
+    let session_file = session_file(&config)?;
     let activity = &config.activity;
     let pool = Pool::start(config.slots, Arc::clone(activity))?;
     // 0 means that it is not known.
@@ -159,7 +174,15 @@ async fn run_with(
                     slots = config.slots,
                     "connected"
                 );
-                let ended = session.serve(&pool, &shutdown, &evaluator).await;
+                let worker_id = session.worker_id();
+                let session = session.serve(&pool, &shutdown, &evaluator);
+                let ended = match &session_file {
+                    None => session.await,
+                    Some(file) => {
+                        let who = format!("worker {worker_id} of {}", config.coordinator);
+                        file.during(&who, session).await
+                    }
+                };
                 activity.on_disconnected();
                 // What is left was assigned on this stream: it is not ours any more.
                 pool.cancel(|_| true);
@@ -202,6 +225,14 @@ async fn run_with(
             () = tokio::time::sleep(delay) => {}
         }
     }
+}
+
+fn session_file(config: &WorkerConfig) -> Result<Option<SessionFile>, WorkerError> {
+    let file = |path: &PathBuf| {
+        SessionFile::new(path.clone())
+            .map_err(|source| WorkerError::SessionFile { path: path.clone(), source })
+    };
+    config.session_file.as_ref().map(file).transpose()
 }
 
 /// Checks the configuration and describes the connection.

@@ -1,6 +1,13 @@
 //! The `worker` program: computes for a coordinator until it is told to stop.
 
-use std::{env, fs, future::ready, path::PathBuf, process::ExitCode, sync::Arc, thread};
+use std::{
+    env, fs,
+    future::ready,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+    thread,
+};
 
 use clap::Parser;
 use sim_core::Isa;
@@ -44,6 +51,15 @@ struct Args {
     /// is, and no bit [default: the best of this processor]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
     isa: Option<Isa>,
+    /// A file that exists while this worker has a session with its coordinator, and
+    /// is written every two seconds; for --health-check.
+    #[arg(long, value_name = "FILE", env = "SWARM_SESSION_FILE")]
+    session_file: Option<PathBuf>,
+    /// Start nothing; look whether the worker with the same --session-file has a
+    /// session with its coordinator. Exit code 0 if so, 1 if not, and a line that
+    /// says why.
+    #[arg(long, requires = "session_file")]
+    health_check: bool,
     #[command(flatten)]
     metrics: MetricsArgs,
     #[command(flatten)]
@@ -62,6 +78,9 @@ Exit codes:
 #[tokio::main]
 async fn main() -> ExitCode {
     let args = Args::parse();
+    if let (true, Some(file)) = (args.health_check, &args.session_file) {
+        return report_health(file);
+    }
     if let Err(error) = args.log.init() {
         eprintln!("error: {error}");
         return EXIT_INPUT.into();
@@ -82,8 +101,12 @@ async fn main() -> ExitCode {
         }
     };
     let isa = args.isa.unwrap_or_else(Isa::best);
-    let config =
-        WorkerConfig { credentials, isa, ..WorkerConfig::new(args.coordinator, name, slots) };
+    let config = WorkerConfig {
+        credentials,
+        isa,
+        session_file: args.session_file,
+        ..WorkerConfig::new(args.coordinator, name, slots)
+    };
     if let Some(address) = args.metrics.metrics_listen {
         let endpoint = match Endpoint::listen(address).await {
             Ok(endpoint) => endpoint,
@@ -110,6 +133,20 @@ async fn main() -> ExitCode {
                 error if error.is_input() => EXIT_INPUT.into(),
                 _ => EXIT_INTERNAL.into(),
             }
+        }
+    }
+}
+
+/// Says in one line how the worker is.
+fn report_health(session_file: &Path) -> ExitCode {
+    match worker::health_check(session_file) {
+        Ok(session) => {
+            println!("healthy: {session}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("unhealthy: {error}");
+            ExitCode::FAILURE
         }
     }
 }

@@ -34,7 +34,11 @@ pub struct Store {
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The directory cannot be created or written. Fix its path or permissions.
-    #[error("cannot use the data directory {}: {source}", path.display())]
+    #[error(
+        "cannot use the data directory {}: {source}; let the coordinator's user write there, or \
+         choose another with --data-dir",
+        path.display()
+    )]
     Directory {
         /// The directory.
         path: PathBuf,

@@ -1,0 +1,160 @@
+//! A file that says whether a worker has a session with its coordinator, for the
+//! health checks of container engines.
+
+use std::{
+    fs::{self, File},
+    future::Future,
+    io,
+    os::unix::fs::FileExt as _,
+    path::{Path, PathBuf},
+    pin::pin,
+    time::Duration,
+};
+
+use tokio::time::{MissedTickBehavior, interval};
+use tracing::warn;
+
+/// How often the file's date is renewed.
+const RENEWAL: Duration = Duration::from_secs(2);
+/// The age of a file whose worker has stopped or hangs.
+const AGE_MAX: Duration = Duration::from_secs(30);
+
+/// A file that exists while there is a session, and is written again and again.
+#[derive(Debug)]
+pub(crate) struct SessionFile(PathBuf);
+
+/// Why a worker does not count as healthy.
+#[derive(Debug, thiserror::Error)]
+pub enum Unhealthy {
+    /// There is no file.
+    #[error(
+        "the worker has no session with its coordinator ({} does not exist); its log says why",
+        .0.display()
+    )]
+    NoSession(PathBuf),
+    /// The file is old.
+    #[error(
+        "the worker hangs or was killed: {} was written {age_s} s ago, not {} s",
+        path.display(), RENEWAL.as_secs()
+    )]
+    Old {
+        /// The file.
+        path: PathBuf,
+        /// Its age in seconds.
+        age_s: u64,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// What a worker with this session file has a session with.
+pub fn health_check(path: &Path) -> Result<String, Unhealthy> {
+    let error = |source: io::Error| match source.kind() {
+        io::ErrorKind::NotFound => Unhealthy::NoSession(path.into()),
+        _ => Unhealthy::File { path: path.into(), source },
+    };
+    let session = fs::read_to_string(path).map_err(error)?;
+    let written = fs::metadata(path).and_then(|metadata| metadata.modified()).map_err(error)?;
+    // A clock that was set back makes the file one from the future.
+    let age = written.elapsed().unwrap_or_else(|ahead| ahead.duration());
+    if age > AGE_MAX {
+        return Err(Unhealthy::Old { path: path.into(), age_s: age.as_secs() });
+    }
+    Ok(session.trim_end().to_owned())
+}
+
+impl SessionFile {
+    /// Makes sure that the file can be written. There is none at first.
+    pub(crate) fn new(path: PathBuf) -> io::Result<Self> {
+        File::create(&path)?;
+        fs::remove_file(&path)?;
+        Ok(Self(path))
+    }
+
+    /// Has the file say so while a session lasts. It is written by the task that
+    /// serves the session, so a session that hangs lets it grow old.
+    pub(crate) async fn during<T>(&self, text: &str, session: impl Future<Output = T>) -> T {
+        let line = format!("{text}\n");
+        let write = |file: &File| file.write_all_at(line.as_bytes(), 0);
+        let file = File::create(&self.0).and_then(|file| write(&file).map(|()| file));
+        let file =
+            file.inspect_err(|error| warn!("cannot write {}: {error}", self.0.display())).ok();
+        let mut session = pin!(session);
+        let mut renewal = interval(RENEWAL);
+        renewal.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let ended = loop {
+            tokio::select! {
+                biased;
+                ended = &mut session => break ended,
+                _ = renewal.tick() => if let Some(file) = &file {
+                    // One that cannot be written grows old, and is noticed.
+                    let _ = write(file);
+                },
+            }
+        };
+        let _ = fs::remove_file(&self.0);
+        ended
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::SystemTime;
+
+    use tempfile::TempDir;
+
+    use super::*;
+
+    fn place() -> (TempDir, PathBuf) {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("session");
+        (directory, path)
+    }
+
+    /// Waits until the file has been written.
+    async fn written(path: &Path) {
+        while !health_check(path).is_ok_and(|session| session == "worker 1 of x") {
+            tokio::time::sleep(RENEWAL / 100).await;
+        }
+    }
+
+    #[tokio::test]
+    async fn there_is_a_file_as_long_as_there_is_a_session() {
+        let (_directory, path) = place();
+        fs::write(&path, "left by one that was killed").unwrap();
+        let file = SessionFile::new(path.clone()).unwrap();
+        assert!(matches!(health_check(&path), Err(Unhealthy::NoSession(_))));
+        for _session in 0..2 {
+            file.during("worker 1 of x", written(&path)).await;
+            assert!(matches!(health_check(&path), Err(Unhealthy::NoSession(_))));
+        }
+    }
+
+    #[tokio::test]
+    async fn a_file_that_is_not_written_any_more_is_old() {
+        let (_directory, path) = place();
+        let file = SessionFile::new(path.clone()).unwrap();
+        let session = async {
+            written(&path).await;
+            // Nothing writes it before this one waits again.
+            let long_ago = SystemTime::UNIX_EPOCH;
+            File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
+            let error = health_check(&path).unwrap_err();
+            assert!(matches!(error, Unhealthy::Old { .. }), "{error}");
+            written(&path).await;
+        };
+        file.during("worker 1 of x", session).await;
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_noticed_at_the_start() {
+        let (_directory, path) = place();
+        assert!(SessionFile::new(path.join("below")).is_err());
+    }
+}
