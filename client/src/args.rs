@@ -79,6 +79,13 @@ pub enum Command {
     /// Fitness and measures are the same, bit for bit, as in evolution: a champion
     /// in the worlds of its generation gets the fitness that is stored with it.
     Simulate(SimulateArgs),
+    /// Draw the fitness of runs against their generations.
+    ///
+    /// A curve per run: the mean over the individuals of each generation, in a band
+    /// from the worst to the best of them. The same runs give the same file, byte by
+    /// byte.
+    #[command(after_help = help::PLOT)]
+    Plot(PlotArgs),
     /// Measure how fast this machine simulates an experiment.
     ///
     /// Every core evaluates random genotypes for some seconds. Says how long the
@@ -297,6 +304,18 @@ impl ExperimentArgs {
         let checked = file.and_then(|file| file.check(&self.overrides()).map(|_| file));
         checked.map_err(|error| Error::invalid(&self.config, &error))
     }
+}
+
+/// What to draw.
+#[derive(Debug, ClapArgs)]
+pub struct PlotArgs {
+    /// Numbers of experiments of the coordinator, or files that `swarmctl history
+    /// ID --output csv` has written; at most 14.
+    #[arg(required = true, value_name = "ID|FILE")]
+    pub runs: Vec<String>,
+    /// The figure: .svg for documents, .png for everything else.
+    #[arg(long, value_name = "FILE")]
+    pub to: PathBuf,
 }
 
 /// What to measure.

@@ -10,6 +10,7 @@ mod error;
 mod experiment_file;
 #[cfg(test)]
 mod fake_coordinator;
+mod figure;
 mod greeting;
 mod interrupt;
 mod json;

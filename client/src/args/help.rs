@@ -72,6 +72,12 @@ Examples:
   swarmctl simulate experiment.json --experiment 3 --trials 100
   swarmctl simulate experiment.json --genotype champion.json --trace trace.csv";
 
+/// Of `plot`.
+pub const PLOT: &str = "\
+Examples:
+  swarmctl plot 3 4 --to fitness.svg
+  swarmctl plot ga.csv snes.csv --to fitness.png";
+
 /// Of `completions`.
 pub const COMPLETIONS: &str = "\
 Examples:

@@ -8,6 +8,7 @@ mod explain;
 mod history;
 mod list;
 mod logs;
+mod plot;
 mod run;
 mod simulate;
 mod submit;
@@ -43,6 +44,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Simulate(simulation) => {
             return simulate::simulate(settings, &simulation, &mut progress).await;
         }
+        Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
         Command::Completions { shell } => return completions::completions(shell, &mut progress),
         // Stops what it started before it ends.

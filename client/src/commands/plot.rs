@@ -1,0 +1,106 @@
+//! `swarmctl plot`: fitness against generation, as the thesis draws it.
+
+mod source;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::{
+    args::PlotArgs,
+    connection::Connection,
+    error::Error,
+    figure::{CURVES_MAX, Curve, Figure, Format, Point},
+    json,
+    progress::Progress,
+    settings::Settings,
+};
+
+use self::source::{Run, Source};
+
+/// Reads the runs and draws them. The coordinator is asked only for what is not in
+/// a file.
+pub async fn plot(
+    settings: Settings,
+    args: &PlotArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    // Before anything is read.
+    Format::of(&args.to)?;
+    if args.runs.len() > CURVES_MAX {
+        return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} runs")));
+    }
+    let sources: Vec<Source> = args.runs.iter().map(|run| Source::parse(run)).collect();
+    let remote = sources.iter().any(|source| matches!(source, Source::Experiment(_)));
+    let connection = remote.then(|| Connection::open(settings)).transpose()?;
+    let mut runs = Vec::new();
+    for source in &sources {
+        runs.push(match source {
+            Source::File(path) => Run::read(path)?,
+            Source::Experiment(id) => {
+                let connection = connection.as_ref().expect("somebody asks for an experiment");
+                Run::fetch(connection, *id).await?
+            }
+        });
+    }
+    let names = names(&runs);
+    figure(&runs, &names).write(&args.to)?;
+    progress.print(&if progress.is_json() {
+        json::document(&Plotted::new(&runs, &names, &args.to))
+    } else {
+        let n_generations: usize = runs.iter().map(|run| run.points.len()).sum();
+        let runs =
+            if let [run] = &names[..] { run.clone() } else { format!("{} runs", runs.len()) };
+        format!("{runs}: {n_generations} generations in {}", args.to.display())
+    })
+}
+
+/// What is in the figure.
+#[derive(Debug, Serialize)]
+struct Plotted {
+    figure: String,
+    runs: Vec<PlottedRun>,
+}
+
+#[derive(Debug, Serialize)]
+struct PlottedRun {
+    name: String,
+    generations: usize,
+}
+
+impl Plotted {
+    fn new(runs: &[Run], names: &[String], to: &Path) -> Self {
+        let runs = runs.iter().zip(names);
+        let plotted = |(run, name): (&Run, &String)| PlottedRun {
+            name: name.clone(),
+            generations: run.points.len(),
+        };
+        Self { figure: to.to_string_lossy().into_owned(), runs: runs.map(plotted).collect() }
+    }
+}
+
+/// Names for the legend: where two are the same, with what tells them apart.
+fn names(runs: &[Run]) -> Vec<String> {
+    let is_ambiguous = |run: &Run| runs.iter().filter(|other| other.name == run.name).count() > 1;
+    let name = |run: &Run| match is_ambiguous(run) {
+        true => format!("{} ({})", run.name, run.origin),
+        false => run.name.clone(),
+    };
+    runs.iter().map(name).collect()
+}
+
+/// The mean over the individuals, between the worst and the best of them.
+fn figure(runs: &[Run], names: &[String]) -> Figure {
+    let curve = |(run, name): (&Run, &String)| Curve {
+        name: name.clone(),
+        points: run.points.iter().map(Point::from).collect(),
+    };
+    Figure {
+        x_label: "generation".into(),
+        y_label: "fitness".into(),
+        curves: runs.iter().zip(names).map(curve).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

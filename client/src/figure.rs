@@ -1,0 +1,79 @@
+//! Figures: curves with a band around each, as SVG or PNG. The same curves give the
+//! same bytes on every machine: the font is part of the program.
+
+mod draw;
+
+use std::{fs, path::Path};
+
+use crate::error::Error;
+
+/// Curves that one figure can tell apart.
+pub const CURVES_MAX: usize = 14;
+
+/// Curves over the same axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// What x is.
+    pub x_label: String,
+    /// What y is, with its unit.
+    pub y_label: String,
+    /// At most [`CURVES_MAX`], in the order of the legend.
+    pub curves: Vec<Curve>,
+}
+
+/// A line with a band around it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// For the legend.
+    pub name: String,
+    /// By ascending x.
+    pub points: Vec<Point>,
+}
+
+/// A place of a curve; all of it is finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    pub x: f64,
+    /// Lower edge of the band.
+    pub low: f64,
+    /// The line.
+    pub middle: f64,
+    /// Upper edge of the band.
+    pub high: f64,
+}
+
+/// How a figure is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    Svg,
+    Png,
+}
+
+impl Format {
+    /// The format that a file's name asks for.
+    pub fn of(path: &Path) -> Result<Self, Error> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::Input(format!(
+                "{}: a figure's name ends in .svg or .png",
+                path.display()
+            ))),
+        }
+    }
+}
+
+impl Figure {
+    /// Writes the figure in the format that the file's name asks for.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let bytes = match Format::of(path)? {
+            Format::Svg => self.to_svg()?.into_bytes(),
+            Format::Png => self.to_png()?,
+        };
+        fs::write(path, bytes)
+            .map_err(|error| Error::Input(format!("cannot write {}: {error}", path.display())))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,261 @@
+//! How figures look.
+
+use std::{fmt::Display, ops::Range, sync::Once};
+
+use plotters::{
+    coord::Shift,
+    drawing::DrawingAreaErrorKind,
+    element::DashedPathElement,
+    prelude::*,
+    style::{
+        register_font,
+        text_anchor::{HPos, Pos, VPos},
+    },
+};
+
+use super::{CURVES_MAX, Curve, Figure};
+use crate::error::Error;
+
+/// Pixels of a PNG, and units of an SVG: 20 by 12.5 cm at 300 per inch.
+const SIZE: (u32, u32) = (2400, 1500);
+/// How many of them are one unit of an SVG where it is shown.
+const UNITS: u32 = 3;
+
+/// Known to SVG viewers as well.
+const FONT: &str = "sans-serif";
+const FONT_SIZE: i32 = 54;
+const LINE_WIDTH: u32 = 5;
+const BAND_OPACITY: f64 = 0.2;
+const MARGIN: i32 = 36;
+/// Length of a curve's sample in the legend.
+const SAMPLE: i32 = 110;
+const LEGEND_ROW: i32 = 70;
+const N_TICKS: usize = 8;
+
+/// The palette of Okabe and Ito, which colour-blind people can tell apart, without
+/// its yellow, which paper swallows; darker and lighter ones take turns.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(213, 94, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(204, 121, 167),
+];
+
+type Canvas<'a, B> = DrawingArea<B, Shift>;
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
+impl Figure {
+    /// The figure as SVG.
+    pub fn to_svg(&self) -> Result<String, Error> {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            self.draw(&area).map_err(internal)?;
+        }
+        // Drawn finely, shown at the size of text.
+        let (width, height) = SIZE;
+        Ok(svg.replacen(
+            &format!("width=\"{width}\" height=\"{height}\""),
+            &format!("width=\"{}\" height=\"{}\"", width / UNITS, height / UNITS),
+            1,
+        ))
+    }
+
+    /// The figure as PNG.
+    pub fn to_png(&self) -> Result<Vec<u8>, Error> {
+        let (width, height) = SIZE;
+        let mut pixels = vec![0; 3 * width as usize * height as usize];
+        {
+            let area = BitMapBackend::with_buffer(&mut pixels, SIZE).into_drawing_area();
+            self.draw(&area).map_err(internal)?;
+        }
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().map_err(internal)?;
+        writer.write_image_data(&pixels).map_err(internal)?;
+        writer.finish().map_err(internal)?;
+        Ok(bytes)
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &Canvas<'_, B>) -> Drawn<B> {
+        embed_font();
+        area.fill(&WHITE)?;
+        let area = area.margin(MARGIN, MARGIN, MARGIN, MARGIN);
+        let legend = Legend::new(&self.curves, &area)?;
+        let (top, plot) = area.split_vertically(legend.n_rows() * LEGEND_ROW);
+        legend.draw(&top)?;
+        let (x, y) = self.ranges();
+        let mut chart = ChartBuilder::on(&plot)
+            .margin_top(MARGIN)
+            .margin_right(2 * MARGIN)
+            .x_label_area_size(130)
+            .y_label_area_size(180)
+            .build_cartesian_2d(x.clone(), y.clone())?;
+        let (x_ticks, y_ticks) = (tick_step(&x), tick_step(&y));
+        chart
+            .configure_mesh()
+            .x_desc(&self.x_label)
+            .y_desc(&self.y_label)
+            .x_labels(N_TICKS)
+            .y_labels(N_TICKS)
+            .x_label_formatter(&|x| tick(*x, x_ticks))
+            .y_label_formatter(&|y| tick(*y, y_ticks))
+            .label_style((FONT, FONT_SIZE))
+            .axis_desc_style((FONT, FONT_SIZE))
+            .axis_style(BLACK.stroke_width(3))
+            .bold_line_style(BLACK.mix(0.12).stroke_width(2))
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        // Bands first: no band covers a line.
+        for (curve, style) in self.curves.iter().zip(Style::all()) {
+            let lower = curve.points.iter().map(|point| (point.x, point.low));
+            let upper = curve.points.iter().rev().map(|point| (point.x, point.high));
+            let outline: Vec<(f64, f64)> = lower.chain(upper).collect();
+            let fill = style.colour.mix(BAND_OPACITY).filled();
+            chart.draw_series([Polygon::new(outline, fill)])?;
+        }
+        for (curve, style) in self.curves.iter().zip(Style::all()) {
+            let line = curve.points.iter().map(|point| (point.x, point.middle));
+            let line: Vec<(f64, f64)> = line.collect();
+            let stroke = style.colour.stroke_width(LINE_WIDTH);
+            if style.is_dashed {
+                chart.draw_series(DashedLineSeries::new(line, 24, 16, stroke))?;
+            } else {
+                chart.draw_series(LineSeries::new(line, stroke))?;
+            }
+        }
+        area.present()
+    }
+
+    /// Of x all, of y a little more than what the bands cover.
+    fn ranges(&self) -> (Range<f64>, Range<f64>) {
+        let points = || self.curves.iter().flat_map(|curve| &curve.points);
+        let x = extent(points().map(|point| point.x));
+        let y = extent(points().flat_map(|point| [point.low, point.middle, point.high]));
+        let room = 0.03 * (y.end - y.start);
+        // Nothing is gained by an axis that goes a little below zero.
+        let start = if y.start >= 0.0 { (y.start - room).max(0.0) } else { y.start - room };
+        (x, start..y.end + room)
+    }
+}
+
+/// From the least to the greatest value; never empty.
+fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let bounds = values.fold(None, |bounds, value| match bounds {
+        None => Some((value, value)),
+        Some((min, max)) => Some((f64::min(min, value), f64::max(max, value))),
+    });
+    let (min, max) = bounds.unwrap_or((0.0, 1.0));
+    if min < max { min..max } else { min - 0.5..max + 0.5 }
+}
+
+/// About the distance of two ticks.
+fn tick_step(range: &Range<f64>) -> f64 {
+    (range.end - range.start) / N_TICKS as f64
+}
+
+/// A tick's number, with the digits that tell it from the next one.
+fn tick(value: f64, step: f64) -> String {
+    let n_decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.n_decimals$}");
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// How a curve is told from others.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    colour: RGBColor,
+    is_dashed: bool,
+}
+
+impl Style {
+    /// As many as there can be curves.
+    fn all() -> impl Iterator<Item = Self> {
+        (0..CURVES_MAX).map(|index| Self {
+            colour: COLOURS[index % COLOURS.len()],
+            is_dashed: index >= COLOURS.len(),
+        })
+    }
+}
+
+/// The curves' names above the plot, in as many rows as they need.
+struct Legend<'a> {
+    rows: Vec<Vec<Entry<'a>>>,
+}
+
+struct Entry<'a> {
+    x: i32,
+    name: &'a str,
+    style: Style,
+}
+
+impl<'a> Legend<'a> {
+    fn new<B: DrawingBackend>(
+        curves: &'a [Curve],
+        area: &Canvas<'_, B>,
+    ) -> Result<Self, DrawingAreaErrorKind<B::ErrorType>> {
+        let text = TextStyle::from((FONT, FONT_SIZE).into_font());
+        let width = area.dim_in_pixel().0 as i32;
+        let mut rows: Vec<Vec<Entry<'_>>> = vec![Vec::new()];
+        let mut x = MARGIN;
+        for (curve, style) in curves.iter().zip(Style::all()) {
+            let (text_width, _) = area.estimate_text_size(&curve.name, &text)?;
+            let entry_width = SAMPLE + FONT_SIZE / 2 + text_width as i32;
+            if x + entry_width > width && x > MARGIN {
+                rows.push(Vec::new());
+                x = MARGIN;
+            }
+            let row = rows.last_mut().expect("there is a first row");
+            row.push(Entry { x, name: &curve.name, style });
+            x += entry_width + FONT_SIZE;
+        }
+        Ok(Self { rows })
+    }
+
+    fn n_rows(&self) -> i32 {
+        self.rows.len() as i32
+    }
+
+    fn draw<B: DrawingBackend>(&self, area: &Canvas<'_, B>) -> Drawn<B> {
+        let anchor = Pos::new(HPos::Left, VPos::Center);
+        let text = TextStyle::from((FONT, FONT_SIZE).into_font()).pos(anchor);
+        let mut y = LEGEND_ROW / 2;
+        for row in &self.rows {
+            for &Entry { x, name, style } in row {
+                let band = style.colour.mix(BAND_OPACITY).filled();
+                let height = LEGEND_ROW / 4;
+                area.draw(&Rectangle::new([(x, y - height), (x + SAMPLE, y + height)], band))?;
+                let stroke = style.colour.stroke_width(LINE_WIDTH);
+                let line = [(x, y), (x + SAMPLE, y)];
+                if style.is_dashed {
+                    area.draw(&DashedPathElement::new(line, 24, 16, stroke))?;
+                } else {
+                    area.draw(&PathElement::new(line, stroke))?;
+                }
+                area.draw(&Text::new(name, (x + SAMPLE + FONT_SIZE / 2, y), &text))?;
+            }
+            y += LEGEND_ROW;
+        }
+        Ok(())
+    }
+}
+
+/// Makes the font known, which the size of all texts is measured with.
+fn embed_font() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let font = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());
+        assert!(font.is_ok(), "the embedded font is one");
+    });
+}
+
+fn internal(error: impl Display) -> Error {
+    Error::Internal(format!("the figure cannot be drawn: {error}"))
+}
