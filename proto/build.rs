@@ -5,7 +5,12 @@ use std::{env, error::Error, fs, path::PathBuf};
 fn main() -> Result<(), Box<dyn Error>> {
     use prost::Message as _;
 
-    let files = ["swarm/v1/experiment.proto", "swarm/v1/fleet.proto", "swarm/v1/worker.proto"];
+    let files = [
+        "swarm/v1/evaluation.proto",
+        "swarm/v1/experiment.proto",
+        "swarm/v1/fleet.proto",
+        "swarm/v1/worker.proto",
+    ];
     for file in files {
         println!("cargo::rerun-if-changed={file}");
     }

@@ -79,6 +79,15 @@ pub enum Command {
     /// Fitness and measures are the same, bit for bit, as in evolution: a champion
     /// in the worlds of its generation gets the fitness that is stored with it.
     Simulate(SimulateArgs),
+    /// Evaluate a genotype: many episodes under several conditions, every step measured.
+    ///
+    /// The episodes are the same for every genotype and condition, and no evolution
+    /// has met them. There is always the nominal condition, which is the experiment
+    /// file as it is; each of the other options adds conditions beside it. Measures
+    /// and their statistics go to a directory: steps.csv, trials.csv, summary.json.
+    /// They are the same, byte by byte, whoever computes them.
+    #[command(after_help = help::EVALUATE)]
+    Evaluate(EvaluateArgs),
     /// Draw the fitness of runs against their generations.
     ///
     /// A curve per run: the mean over the individuals of each generation, in a band
@@ -306,13 +315,76 @@ impl ExperimentArgs {
     }
 }
 
+/// What to evaluate.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct EvaluateArgs {
+    /// Number of an experiment of the coordinator: its champion and its file.
+    #[arg(required_unless_present = "genotype")]
+    pub id: Option<u64>,
+    /// File of the genotype, such as a champion file.
+    #[arg(long, value_name = "FILE", conflicts_with = "id", requires = "config")]
+    pub genotype: Option<PathBuf>,
+    /// The experiment file that goes with --genotype.
+    #[arg(long, value_name = "FILE", requires = "genotype")]
+    pub config: Option<PathBuf>,
+    /// Episodes per condition.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = value_parser!(u32).range(1..=1000))]
+    pub trials: u32,
+    /// Steps per episode, instead of the file's.
+    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
+    pub steps: Option<u32>,
+    /// A condition for each of these sizes of the swarm. The world keeps its size.
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub robots: Vec<u32>,
+    /// A condition with a perturbation: leader_failure, topology_switch,
+    /// uncontrollable_rotation, stimuli_inhibition; with parameters or defaults.
+    #[arg(long, value_name = "NAME[:KEY=VALUE,...]")]
+    pub perturb: Vec<String>,
+    /// A condition for each of these stimuli: the network gets zeros for it. A name
+    /// of the file's stimuli, or their sensor, such as wireless_receiver:msg or msg.
+    #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
+    pub inhibit: Vec<String>,
+    /// A condition with something else in the experiment file; several changes are
+    /// separated by semicolons.
+    #[arg(long, value_name = "PATH=VALUE[;...]")]
+    pub set: Vec<String>,
+    /// The same, in all conditions, the nominal one too.
+    #[arg(long, value_name = "PATH=VALUE[;...]")]
+    pub base: Vec<String>,
+    /// Rows of steps.csv for every so many steps only.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
+    pub every: u32,
+    /// Share of the fleet, 1 to 1000, beside experiments [default: 100]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    pub priority: Option<u32>,
+    /// Compute in this process, with workers of its own, as `run` does.
+    #[arg(long)]
+    pub local: bool,
+    /// Number of these workers [default: the number of cores]
+    #[arg(long, value_name = "N", requires = "local", value_parser = value_parser!(u16).range(1..=1024))]
+    pub workers: Option<u16>,
+    /// Directory of the results; made if there is none.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    #[command(flatten)]
+    pub isa: IsaArgs,
+}
+
 /// What to draw.
 #[derive(Debug, ClapArgs)]
 pub struct PlotArgs {
     /// Numbers of experiments of the coordinator, or files that `swarmctl history
     /// ID --output csv` has written; at most 14.
-    #[arg(required = true, value_name = "ID|FILE")]
+    #[arg(required_unless_present = "steps", value_name = "ID|FILE")]
     pub runs: Vec<String>,
+    /// Draw an evaluation instead: the directory that `swarmctl evaluate` has written.
+    ///
+    /// A curve per condition: the median over the trials, between the quartiles.
+    #[arg(long, value_name = "DIR", conflicts_with = "runs")]
+    pub steps: Option<PathBuf>,
+    /// Which measure of the evaluation.
+    #[arg(long, value_name = "NAME", requires = "steps")]
+    pub metric: Option<String>,
     /// The figure: .svg for documents, .png for everything else.
     #[arg(long, value_name = "FILE")]
     pub to: PathBuf,

@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use swarm_proto::v1::{
-    CancelExperimentRequest, CompletedGeneration, Event, Experiment, ExplainExperimentRequest,
-    ExplainExperimentResponse, GetChampionRequest, GetChampionResponse, GetExperimentRequest,
-    ListEventsRequest, ListExperimentsRequest, ListGenerationsRequest, ListWorkersRequest,
-    PauseExperimentRequest, ResumeExperimentRequest, SetPriorityRequest, SubmitExperimentRequest,
-    SubmitExperimentResponse, WatchExperimentRequest, WatchExperimentResponse, Worker,
+    CancelExperimentRequest, CompletedGeneration, EvaluateRequest, EvaluateResponse, Event,
+    Experiment, ExplainExperimentRequest, ExplainExperimentResponse, GetChampionRequest,
+    GetChampionResponse, GetExperimentRequest, ListEventsRequest, ListExperimentsRequest,
+    ListGenerationsRequest, ListWorkersRequest, PauseExperimentRequest, ResumeExperimentRequest,
+    SetPriorityRequest, SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
+    WatchExperimentResponse, Worker, evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
 use swarm_transport::{
@@ -42,6 +43,7 @@ pub struct Connection {
     address: String,
     link: Link,
     client: ExperimentServiceClient<Authorised>,
+    evaluations: EvaluationServiceClient<Authorised>,
     fleet: FleetServiceClient<Authorised>,
     patience: Duration,
 }
@@ -70,10 +72,14 @@ impl Connection {
         let fleet = FleetServiceClient::with_interceptor(channel.clone(), link.bearer.clone())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
+        let evaluations =
+            EvaluationServiceClient::with_interceptor(channel.clone(), link.bearer.clone())
+                .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+                .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
         let client = ExperimentServiceClient::with_interceptor(channel, link.bearer.clone())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        Ok(Self { address: address.into(), link, client, fleet, patience: PATIENCE })
+        Ok(Self { address: address.into(), link, client, evaluations, fleet, patience: PATIENCE })
     }
 
     /// The same, but giving up later.
@@ -126,6 +132,21 @@ impl Connection {
         let request = ListExperimentsRequest {};
         let response = self.call(async |client| client.list_experiments(request).await).await?;
         Ok(response.experiments)
+    }
+
+    /// An experiment's file in canonical form.
+    pub async fn config_json(&self, experiment_id: u64) -> Result<String, Error> {
+        let request = GetExperimentRequest { experiment_id };
+        let response = self.call(async |client| client.get_experiment(request).await).await?;
+        Ok(response.config_json)
+    }
+
+    /// What is measured of a genotype; tried once.
+    pub async fn evaluate(
+        &self,
+        request: EvaluateRequest,
+    ) -> Result<Streaming<EvaluateResponse>, Status> {
+        self.evaluations.clone().evaluate(request).await.map(Response::into_inner)
     }
 
     /// Ends an experiment and returns it.

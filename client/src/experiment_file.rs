@@ -44,6 +44,16 @@ pub struct Compiled {
 }
 
 impl ExperimentFile {
+    /// The text of something that is not a file here.
+    pub fn new(path: PathBuf, text: String) -> Self {
+        Self { path, text }
+    }
+
+    /// What is wrong with it.
+    pub fn invalid(&self, error: &ConfigError) -> Error {
+        Error::invalid(&self.path, error)
+    }
+
     /// Reads a file of UTF-8 text of at most 1 MiB.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let problem = |what: String| ConfigError {

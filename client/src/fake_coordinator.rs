@@ -125,7 +125,7 @@ impl ExperimentService for FakeCoordinator {
         request: Request<GetExperimentRequest>,
     ) -> Result<Response<GetExperimentResponse>, Status> {
         let experiment = self.experiment(request.into_inner().experiment_id)?;
-        Ok(Response::new(GetExperimentResponse { experiment }))
+        Ok(Response::new(GetExperimentResponse { experiment, ..Default::default() }))
     }
 
     async fn list_experiments(

@@ -17,8 +17,27 @@ pub struct WorkerId(pub u64);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ItemId(pub u64);
 
+/// Where the numbers of evaluations begin: no store gets there.
+const EVALUATIONS: u64 = 1 << 63;
+
+impl ExperimentId {
+    /// An evaluation, which is no experiment of the store; numbered from 1 by the
+    /// driver.
+    pub fn evaluation(number: u64) -> Self {
+        Self(EVALUATIONS | number)
+    }
+
+    /// Whether it is an evaluation.
+    pub fn is_evaluation(self) -> bool {
+        self.0 & EVALUATIONS != 0
+    }
+}
+
 impl fmt::Display for ExperimentId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_evaluation() {
+            return write!(f, "evaluation {}", self.0 & !EVALUATIONS);
+        }
         self.0.fmt(f)
     }
 }

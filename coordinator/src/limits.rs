@@ -63,6 +63,12 @@ pub const UNFINISHED_MAX: usize = 1000;
 /// Time for what a client changes to be stored before the client is told that it
 /// is not yet.
 pub const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Evaluations that are computed at the same time; more wait, as calls.
+pub const EVALUATIONS_MAX: usize = 16;
+/// Numbers that an evaluation gives, 16 MiB: trials x steps x measures of the task.
+pub const EVALUATION_VALUES_MAX: usize = 1 << 21;
+/// Numbers of one of its trials, 2 MiB: a trial travels in one message.
+pub const TRIAL_VALUES_MAX: usize = 1 << 18;
 /// Events read from the store at once.
 pub const EVENT_PAGE_LEN: u32 = 256;
 /// Generations or events in one answer.

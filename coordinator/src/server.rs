@@ -5,6 +5,7 @@ use std::{convert::Infallible, io, net::SocketAddr, path::PathBuf, time::Duratio
 use swarm_proto::{
     FILE_DESCRIPTOR_SET,
     v1::{
+        evaluation_service_server::EvaluationServiceServer,
         experiment_service_server::ExperimentServiceServer,
         fleet_service_server::FleetServiceServer, worker_service_server::WorkerServiceServer,
     },
@@ -26,7 +27,7 @@ use crate::{
     },
     listener,
     metrics::{Instruments, Source},
-    rpc::{Experiments, Fleet, WelcomeTimes, Workers},
+    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
     shared_store::SharedStore,
     store::{Experiment, Store, StoreError},
     submission::Runnable,
@@ -176,8 +177,10 @@ impl Coordinator {
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let workers = Workers { events: events.clone(), times, shutdown: shutdown.clone() };
         let fleet = Fleet { events: events.clone() };
+        let evaluations = Evaluations::new(events.clone(), shutdown.clone());
         let experiments = Experiments { events, store, shutdown: shutdown.clone() };
         let (health_reporter, health) = tonic_health::server::health_reporter();
+        health_reporter.set_serving::<EvaluationServiceServer<Evaluations>>().await;
         health_reporter.set_serving::<ExperimentServiceServer<Experiments>>().await;
         health_reporter.set_serving::<FleetServiceServer<Fleet>>().await;
         health_reporter.set_serving::<WorkerServiceServer<Workers>>().await;
@@ -197,6 +200,9 @@ impl Coordinator {
         let fleet = FleetServiceServer::new(fleet)
             .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
+        let evaluations = EvaluationServiceServer::new(evaluations)
+            .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
         let experiments = ExperimentServiceServer::new(experiments)
             .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX);
@@ -209,6 +215,7 @@ impl Coordinator {
             .add_service(workers)
             .add_service(fleet)
             .add_service(experiments)
+            .add_service(evaluations)
             .serve_with_incoming_shutdown(
                 listener::accept(listener, CONNECTIONS_MAX, shutdown.clone()),
                 shutdown.clone().cancelled_owned(),

@@ -19,9 +19,9 @@ use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
         Draining, Experiment, ExperimentState, GetExperimentRequest, Heartbeat, Hello, ItemFailure,
-        ItemResult, ItemResults, SubmitExperimentRequest, TrialFitness, WorkRequest, WorkResponse,
-        experiment_service_client::ExperimentServiceClient, item_result::Outcome, work_request,
-        work_response,
+        ItemResult, ItemResults, SubmitExperimentRequest, TrialFitness, TrialMeasures, WorkRequest,
+        WorkResponse, experiment_service_client::ExperimentServiceClient, item_result::Outcome,
+        work_request, work_response,
     },
 };
 use tokio::{runtime::Runtime, sync::mpsc};
@@ -254,6 +254,8 @@ fn message() -> impl Strategy<Value = work_request::Message> {
             .prop_map(|values| Some(Outcome::Fitness(TrialFitness { values }))),
         1 => vec(number(), 0..40)
             .prop_map(|values| Some(Outcome::Fitness(TrialFitness { values }))),
+        1 => vec(number(), 0..40)
+            .prop_map(|values| Some(Outcome::Measures(TrialMeasures { values }))),
         1 => any::<String>().prop_map(|message| Some(Outcome::Failure(ItemFailure { message }))),
         1 => Just(None),
     ];

@@ -8,7 +8,7 @@ pub mod v1 {
 }
 
 /// Version of the worker protocol. Coordinator and worker must agree.
-pub const PROTOCOL_VERSION: u32 = 2;
+pub const PROTOCOL_VERSION: u32 = 3;
 
 /// Most items per slot that a worker is given before it has answered any.
 pub const ITEMS_PER_SLOT_MAX: usize = 16;

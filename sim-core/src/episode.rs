@@ -26,11 +26,9 @@ pub(crate) fn run(
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>, EvaluateError> {
-    let n_at_once = (MAX_LANES / experiment.world.n_robots().max(1)).max(1);
     let mut fitness = Vec::with_capacity(trials.len());
-    for first in trials.clone().step_by(n_at_once) {
-        let last = trials.end.min(first.saturating_add(n_at_once as u32));
-        let mut episodes = Episodes::new(experiment, phenotype, generation, first..last)?;
+    for trials in side_by_side(experiment, trials) {
+        let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
         for step in 0..experiment.n_steps {
             if !keep_going() {
                 return Ok(None);
@@ -40,6 +38,53 @@ pub(crate) fn run(
         fitness.extend(episodes.trials.iter().map(Trial::fitness));
     }
     Ok(Some(fitness))
+}
+
+/// As [`run`], and measures every step: per trial its fitness, and then step by step
+/// all measures, NaN where there is none.
+pub(crate) fn measure(
+    experiment: &Experiment,
+    phenotype: &Phenotype,
+    generation: u64,
+    trials: Range<u32>,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<Option<Vec<f64>>, EvaluateError> {
+    let names = experiment.metric_names();
+    let n_values = experiment.values_per_trial();
+    let mut values = Vec::with_capacity(trials.len() * n_values);
+    for trials in side_by_side(experiment, trials) {
+        let first = values.len();
+        values.resize(first + trials.len() * n_values, f64::NAN);
+        let rows = &mut values[first..];
+        let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
+        for step in 0..experiment.n_steps {
+            if !keep_going() {
+                return Ok(None);
+            }
+            let mut rows = rows.chunks_exact_mut(n_values);
+            let start = 1 + step as usize * names.len();
+            episodes.step(step, |trial, _, _| {
+                let metrics = trial.metrics(step);
+                let row = rows.next().expect("a row per trial");
+                for (value, name) in row[start..].iter_mut().zip(names) {
+                    *value = metrics.get(name).copied().unwrap_or(f64::NAN);
+                }
+            })?;
+        }
+        for (row, trial) in rows.chunks_exact_mut(n_values).zip(&episodes.trials) {
+            row[0] = trial.fitness();
+        }
+    }
+    Ok(Some(values))
+}
+
+/// Parts of the trials that are simulated at once.
+fn side_by_side(experiment: &Experiment, trials: Range<u32>) -> impl Iterator<Item = Range<u32>> {
+    let n_at_once = (MAX_LANES / experiment.world.n_robots().max(1)).max(1);
+    let end = trials.end;
+    trials
+        .step_by(n_at_once)
+        .map(move |first| first..end.min(first.saturating_add(n_at_once as u32)))
 }
 
 /// Simulates the episode of one trial and shows each of its steps to `observe`.

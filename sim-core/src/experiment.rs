@@ -4,10 +4,13 @@ use std::ops::Range;
 
 use crate::config::{ConfigError, ExperimentConfig, FitnessFunction, limits};
 use crate::episode;
+use crate::fitness;
 use crate::genotype::Codec;
 use crate::isa::Isa;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
+#[cfg(doc)]
+use crate::record::Metrics;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 use crate::world::World;
@@ -160,6 +163,37 @@ impl Experiment {
         episode::run(self, &phenotype, generation, trials, keep_going)
     }
 
+    /// Names of the measures of the task, in their order; see [`Metrics`].
+    pub fn metric_names(&self) -> &'static [&'static str] {
+        fitness::metric_names(self.fitness)
+    }
+
+    /// Environment steps of an episode.
+    pub fn n_steps(&self) -> u32 {
+        self.n_steps
+    }
+
+    /// Numbers that [`measure_while`](Self::measure_while) gives per trial.
+    pub fn values_per_trial(&self) -> usize {
+        1 + self.n_steps as usize * self.metric_names().len()
+    }
+
+    /// As [`evaluate_while`](Self::evaluate_while), and measures every step. For
+    /// each trial there are [`values_per_trial`](Self::values_per_trial) numbers: its
+    /// fitness, the same bits as always, and then step by step the value of every
+    /// measure in [`metric_names`](Self::metric_names), NaN where there is none.
+    pub fn measure_while(
+        &self,
+        genotype: &[f64],
+        generation: u64,
+        trials: Range<u32>,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, EvaluateError> {
+        let phenotype = self.phenotype(genotype)?;
+        self.check_trials(&trials)?;
+        episode::measure(self, &phenotype, generation, trials, keep_going)
+    }
+
     /// Simulates the episode of one trial and shows each of its steps to
     /// `observe`. Watching changes nothing: the fitness is
     /// [`evaluate`](Self::evaluate)'s, bit for bit.
@@ -194,7 +228,8 @@ impl Experiment {
         Ok(())
     }
 
-    fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
+    /// Makes sure that a genotype has d genes in \[0, 1\].
+    pub fn check_genotype(&self, genotype: &[f64]) -> Result<(), EvaluateError> {
         let (expected, actual) = (self.genotype_len(), genotype.len());
         if actual != expected {
             return Err(EvaluateError::GenotypeLength { expected, actual });
@@ -211,6 +246,7 @@ mod tests {
     use super::*;
     use crate::config::{GenotypeQuery, SynapseSelector};
     use crate::testing::{experiment_a, genotype, robot};
+    use crate::{EVALUATION, held_out};
 
     #[test]
     fn the_genotype_of_experiment_a_has_about_455_genes() {
@@ -219,6 +255,53 @@ mod tests {
         assert!((445..=465).contains(&d), "{d}");
         assert_eq!(experiment.population_segments(), std::slice::from_ref(&(0..d)));
         assert!(experiment.uncovered_parameters().is_empty());
+    }
+
+    #[test]
+    fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let genotype = genotype(experiment.genotype_len(), 2);
+        let generation = EVALUATION;
+        let n_values = experiment.values_per_trial();
+        assert_eq!(n_values, 1 + 300 * 2);
+        let measure = |trials| {
+            let measured = experiment.measure_while(&genotype, generation, trials, &|| true);
+            measured.unwrap().unwrap()
+        };
+        // More than are simulated at once.
+        let together = measure(0..40);
+        let fitness = experiment.evaluate(&genotype, generation, 0..40).unwrap();
+        assert_eq!(together.len(), 40 * n_values);
+        for (trial, row) in together.chunks_exact(n_values).enumerate() {
+            assert_eq!(row[0].to_bits(), fitness[trial].to_bits());
+        }
+        assert_eq!(measure(31..33), together[31 * n_values..33 * n_values]);
+        let mut watched = Vec::new();
+        let observe = &mut |step: StepRecord| watched.extend(step.metrics.into_values());
+        experiment.simulate(&genotype, generation, 31, observe).unwrap();
+        assert_eq!(watched, together[31 * n_values + 1..32 * n_values]);
+        let stopped = experiment.measure_while(&genotype, generation, 0..1, &|| false);
+        assert_eq!(stopped, Ok(None));
+    }
+
+    #[test]
+    fn trials_of_evaluations_are_those_of_no_generation() {
+        for generation in [0, 1, limits::GENERATIONS] {
+            assert_ne!(generation, EVALUATION);
+            assert_ne!(held_out(generation), EVALUATION);
+        }
+        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let genotype = genotype(experiment.genotype_len(), 2);
+        let start = |generation| {
+            let mut positions = Vec::new();
+            let observe = &mut |step: StepRecord| {
+                positions.extend(step.robots.iter().map(|robot| robot.position));
+            };
+            experiment.simulate(&genotype, generation, 0, observe).unwrap();
+            positions
+        };
+        assert_ne!(start(EVALUATION), start(0));
+        assert_ne!(start(EVALUATION), start(held_out(0)));
     }
 
     #[test]

@@ -60,6 +60,10 @@ pub const fn held_out(generation: u64) -> u64 {
     generation | 1 << 63
 }
 
+/// The address of the trials on which evaluations judge a genotype: the same for
+/// every run, neither a generation of it nor held out by one.
+pub const EVALUATION: u64 = 1 << 62;
+
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work
 /// together only if they agree on it.

@@ -11,13 +11,13 @@ use crate::torus::Vec2;
 ///
 /// | task | measures |
 /// |---|---|
-/// | leader | `one_leader`: 1 if exactly one robot has its LED on, else 0 |
-/// | borderline | `true_positive_rate`, `true_negative_rate`, `accuracy` of the LEDs |
-/// | orientation, alignment | `misalignment`: mean distance to the circular mean heading, radians (Eq. 6.2) |
-/// | light | `light_distance_*`, `center_distance_*`: mean distance to the nearest light and to the swarm's centre of mass, cm, of the `photosensitive` robots and of the `others` |
+/// | leader | `leaders`: robots with the LED on; `one_leader`: 1 if that is exactly one, else 0 |
+/// | borderline | `true_positive_rate`, `true_negative_rate`, `precision`, `accuracy` of the LEDs |
+/// | orientation, alignment | `misalignment`: mean distance to the circular mean heading, radians (Eq. 6.2); `turning`: mean action of the wheels, without its sign |
+/// | light | `light_distance_*`, `near_light_*`, `center_distance_*`: mean distance to the nearest light, share within 80 cm of it, and mean distance to the swarm's centre of mass, cm, of the `photosensitive` robots and of the `others` |
 /// | grouping | `center_distance`: mean distance to the centre of mass, cm |
 ///
-/// A measure of nobody (no light, no photosensitive robot) is absent.
+/// A measure of nobody (no light, no photosensitive robot, no LED on) is absent.
 pub type Metrics = IndexMap<&'static str, f64>;
 
 /// The result of an episode that was watched.

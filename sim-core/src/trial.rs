@@ -266,11 +266,17 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// The step that was judged last, without stimuli, which controllers keep.
-    pub fn record(&self, step: u32, fitness: Option<f64>) -> StepRecord {
+    /// Measures of the step that was judged last.
+    pub fn metrics(&self, step: u32) -> Metrics {
         let mut metrics = Metrics::new();
         let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
         self.fitness.measure(&moment, &mut metrics);
+        metrics
+    }
+
+    /// The step that was judged last, without stimuli, which controllers keep.
+    pub fn record(&self, step: u32, fitness: Option<f64>) -> StepRecord {
+        let metrics = self.metrics(step);
         let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
         StepRecord { step, fitness, metrics, robots: robots.collect(), lights: self.lights.clone() }
     }

@@ -4,7 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use sim_core::{
-    Experiment, Isa,
+    EVALUATION, Experiment, Isa,
     config::{ConfigError, ExperimentConfig},
 };
 use swarm_proto::{
@@ -18,6 +18,9 @@ use crate::{
     pool::{Evaluator, Item, Outcome},
 };
 
+/// Numbers in one message of several results: 4 MiB.
+const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
+
 /// Makes a specification computable. It is compiled by the slot that computes
 /// its first item, once; what is wrong with it is the failure of each item.
 /// `activity`: where robots' steps are counted.
@@ -26,12 +29,19 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) 
     Arc::new(move |item: &Item, keep_going: &dyn Fn() -> bool| {
         let Computable { experiment, robot_steps }: &Computable =
             compiled.get_or_init(|| compile(&config_json, isa)).as_ref().map_err(String::clone)?;
-        let fitness = experiment
-            .evaluate_while(&item.genotype, item.generation, item.trials.clone(), keep_going)
-            .map_err(|error| error.to_string())?;
-        let n_episodes = fitness.as_ref().map_or(0, Vec::len) as u64;
+        let Item { genotype, generation, trials, .. } = item;
+        let computed = match *generation {
+            EVALUATION => {
+                experiment.measure_while(genotype, EVALUATION, trials.clone(), keep_going)
+            }
+            generation => {
+                experiment.evaluate_while(genotype, generation, trials.clone(), keep_going)
+            }
+        };
+        let computed = computed.map_err(|error| error.to_string())?;
+        let n_episodes = computed.as_ref().map_or(0, |_| trials.len()) as u64;
         activity.add_robot_steps(n_episodes * robot_steps);
-        Ok(fitness)
+        Ok(computed)
     })
 }
 
@@ -76,11 +86,29 @@ pub(crate) fn result(outcome: Outcome) -> v1::ItemResult {
     match outcome.fitness {
         Ok(values) => v1::ItemResult {
             item_id: outcome.item_id,
-            outcome: Some(v1::item_result::Outcome::Fitness(v1::TrialFitness { values })),
+            outcome: Some(match outcome.generation {
+                EVALUATION => v1::item_result::Outcome::Measures(v1::TrialMeasures { values }),
+                _ => v1::item_result::Outcome::Fitness(v1::TrialFitness { values }),
+            }),
             compute_us,
         },
         Err(message) => v1::ItemResult { compute_us, ..failure(outcome.item_id, message) },
     }
+}
+
+/// Takes as many of the first results as fit into one message, and at least one.
+pub(crate) fn next_message(ready: &mut Vec<v1::ItemResult>) -> v1::WorkRequest {
+    let mut n_values = 0;
+    let n_fitting = ready.iter().take_while(|result| {
+        n_values += match &result.outcome {
+            Some(v1::item_result::Outcome::Measures(measures)) => measures.values.len(),
+            Some(v1::item_result::Outcome::Fitness(fitness)) => fitness.values.len(),
+            _ => 0,
+        };
+        n_values <= VALUES_PER_MESSAGE_MAX
+    });
+    let n = n_fitting.count().max(1).min(ready.len());
+    results(ready.drain(..n).collect())
 }
 
 /// An item that was not computed.
@@ -100,7 +128,7 @@ pub(crate) fn hello(config: &WorkerConfig, process_id: u64) -> v1::WorkRequest {
     }))
 }
 
-pub(crate) fn results(results: Vec<v1::ItemResult>) -> v1::WorkRequest {
+fn results(results: Vec<v1::ItemResult>) -> v1::WorkRequest {
     request(Message::Results(v1::ItemResults { results }))
 }
 

@@ -30,7 +30,7 @@ pub(crate) struct Item {
     pub(crate) genotype: Vec<f64>,
 }
 
-/// Computes the fitness of an item, one per trial, or says why it cannot. Asks now
+/// Computes the fitness of an item, one per trial, or measures its trials, or says why it cannot. Asks now
 /// and then whether to go on; none if it was stopped.
 pub(crate) type Evaluator =
     Arc<dyn Fn(&Item, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
@@ -39,6 +39,9 @@ pub(crate) type Evaluator =
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub(crate) item_id: u64,
+    /// Whose trials they are.
+    pub(crate) generation: u64,
+    /// One number per trial, or what is measured of each.
     pub(crate) fitness: Result<Vec<f64>, String>,
     pub(crate) duration: Duration,
 }
@@ -207,12 +210,13 @@ fn compute(
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))));
     let duration = started.elapsed();
     let made = match &fitness {
-        Ok(Some(trials)) => Made::Fitness { n_episodes: trials.len() as u64 },
+        Ok(Some(_)) => Made::Fitness { n_episodes: item.trials.len() as u64 },
         Ok(None) => Made::Nothing,
         Err(_) => Made::Failure,
     };
     activity.on_item(made, duration);
-    Some(Outcome { item_id: item.id, fitness: fitness.transpose()?, duration })
+    let &Item { id: item_id, generation, .. } = item;
+    Some(Outcome { item_id, generation, fitness: fitness.transpose()?, duration })
 }
 
 fn panic_message(payload: &(dyn Any + Send)) -> &str {

@@ -3,7 +3,6 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     error::Error,
-    mem,
     sync::Arc,
     time::Duration,
 };
@@ -175,7 +174,7 @@ impl Session {
                     desk.ready.extend(computed.drain(..).map(convert::result));
                 }
                 permit = outbound.reserve(), if !desk.ready.is_empty() => match permit {
-                    Ok(permit) => permit.send(convert::results(mem::take(&mut desk.ready))),
+                    Ok(permit) => permit.send(convert::next_message(&mut desk.ready)),
                     Err(_) => return Ended::Lost { reason: STOPPED_READING.into(), worked },
                 },
             }

@@ -72,11 +72,25 @@ Examples:
   swarmctl simulate experiment.json --experiment 3 --trials 100
   swarmctl simulate experiment.json --genotype champion.json --trace trace.csv";
 
+/// Of `evaluate`.
+pub const EVALUATE: &str = "\
+Paths name places of the experiment file, as its error messages do; values are
+JSON, or text. docs/evaluation.md explains files, measures and statistics.
+
+Examples:
+  swarmctl evaluate 3 --robots 5,10,20,30,50 --to leader/scalability
+  swarmctl evaluate 3 --perturb leader_failure:time_to_failure=50 --to leader/fault
+  swarmctl evaluate 3 --inhibit msg,receiving_direction,state --to leader/stimuli
+  swarmctl evaluate 5 --steps 2000 --to light/path \\
+      --set world.objects.light_red.controller=light_rnd_pos_controller
+  swarmctl evaluate --genotype champion.json --config experiment.json --local --to out";
+
 /// Of `plot`.
 pub const PLOT: &str = "\
 Examples:
   swarmctl plot 3 4 --to fitness.svg
-  swarmctl plot ga.csv snes.csv --to fitness.png";
+  swarmctl plot ga.csv snes.csv --to fitness.png
+  swarmctl plot --steps results/borderline --metric accuracy --to accuracy.svg";
 
 /// Of `completions`.
 pub const COMPLETIONS: &str = "\

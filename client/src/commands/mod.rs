@@ -4,6 +4,7 @@ mod bench;
 mod champion;
 mod completions;
 mod control;
+mod evaluate;
 mod explain;
 mod history;
 mod list;
@@ -49,6 +50,9 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Completions { shell } => return completions::completions(shell, &mut progress),
         // Stops what it started before it ends.
         Command::Run(args) => return run::run(&args, progress, interrupt::token()?).await,
+        Command::Evaluate(args) => {
+            return evaluate::evaluate(settings, &args, progress, interrupt::token()?).await;
+        }
         Command::Remote(command) => command,
     };
     let connection = Connection::open(settings)?;

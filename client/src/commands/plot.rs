@@ -1,10 +1,12 @@
 //! `swarmctl plot`: fitness against generation, as the thesis draws it.
 
 mod source;
+mod steps;
 
 use std::path::Path;
 
 use serde::Serialize;
+use serde_json::json;
 
 use crate::{
     args::PlotArgs,
@@ -27,6 +29,9 @@ pub async fn plot(
 ) -> Result<(), Error> {
     // Before anything is read.
     Format::of(&args.to)?;
+    if let Some(dir) = &args.steps {
+        return plot_steps(dir, args, progress);
+    }
     if args.runs.len() > CURVES_MAX {
         return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} runs")));
     }
@@ -52,6 +57,22 @@ pub async fn plot(
         let runs =
             if let [run] = &names[..] { run.clone() } else { format!("{} runs", runs.len()) };
         format!("{runs}: {n_generations} generations in {}", args.to.display())
+    })
+}
+
+/// Draws what an evaluation has measured.
+fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<(), Error> {
+    let figure = steps::figure(dir, args.metric.as_deref())?;
+    if figure.curves.len() > CURVES_MAX {
+        return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} conditions")));
+    }
+    figure.write(&args.to)?;
+    let conditions: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
+    let to = args.to.display();
+    progress.print(&if progress.is_json() {
+        json::document(&json!({"figure": to.to_string(), "conditions": conditions}))
+    } else {
+        format!("{}: {} in {to}", figure.y_label, conditions.join(", "))
     })
 }
 

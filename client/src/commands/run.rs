@@ -1,7 +1,7 @@
 //! `swarmctl run`: an experiment from file to champion in one process.
 
-mod fleet;
-mod log;
+pub mod fleet;
+pub mod log;
 
 use std::{
     env, fs,

@@ -1,6 +1,6 @@
 //! `swarmctl simulate`: single episodes, as evolution sees them.
 
-mod genotype;
+pub mod genotype;
 mod trace;
 
 use std::{borrow::Cow, path::Path};

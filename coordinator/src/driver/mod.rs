@@ -5,6 +5,7 @@
 //! (evolution's arithmetic, the disk) runs beside it.
 
 mod advance;
+mod evaluations;
 mod figures;
 mod ledger;
 mod requests;
@@ -37,6 +38,8 @@ use crate::{
 };
 
 use advance::{Advanced, RunId, Step};
+pub use evaluations::Evaluation;
+use evaluations::Reply;
 pub use figures::{ExperimentFigures, Figures};
 use ledger::{Change, Entry, Ledger};
 pub use round::Round;
@@ -83,6 +86,8 @@ pub enum Event {
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// A client wants a genotype evaluated.
+    EvaluationRequested(Box<Evaluation>),
     /// A client wonders what becomes of an experiment.
     ActivityRequested(ExperimentId, oneshot::Sender<Activity>),
     /// Somebody scrapes metrics.
@@ -158,6 +163,9 @@ pub struct Driver {
     workers: BTreeMap<WorkerId, ConnectedWorker>,
     experiments: BTreeMap<ExperimentId, Running>,
     n_started: u64,
+    /// Who waits for which evaluation.
+    evaluations: BTreeMap<ExperimentId, Reply>,
+    n_evaluations: u64,
     /// Judged rounds whose conclusions are being drawn and stored.
     advancing: JoinSet<Advanced>,
     /// Everything else that is being stored.
@@ -224,6 +232,8 @@ impl Driver {
             workers: BTreeMap::new(),
             experiments: BTreeMap::new(),
             n_started: 0,
+            evaluations: BTreeMap::new(),
+            n_evaluations: 0,
             advancing: JoinSet::new(),
         }
     }
@@ -249,7 +259,10 @@ impl Driver {
                     Err(error) => panic!("storing a generation: {error}"),
                 },
                 Some(()) = self.ledger.advance() => {}
-                _ = ticks.tick() => self.engine.on_tick(clock::now()),
+                _ = ticks.tick() => {
+                    self.drop_abandoned_evaluations();
+                    self.engine.on_tick(clock::now());
+                }
             }
             while let Some(command) = self.engine.poll_command() {
                 self.carry_out(command);
@@ -295,6 +308,7 @@ impl Driver {
             },
             Event::WorkerLeft { worker, reason } => self.on_worker_left(worker, &reason),
             Event::ExperimentReady(runnable) => self.start(*runnable),
+            Event::EvaluationRequested(evaluation) => self.evaluate(*evaluation),
             Event::Requested { experiment, request, reply } => {
                 self.on_request(experiment, request, reply);
             }
@@ -353,6 +367,16 @@ impl Driver {
             Command::Disconnect { worker, reason, n_items_requeued } => {
                 self.send(worker, ToWorker::Dropped(reason.clone()));
                 self.forget_worker(worker, &reason, n_items_requeued);
+            }
+            Command::FinishGeneration { experiment, mut judged } if experiment.is_evaluation() => {
+                self.finish_evaluation(experiment, Ok(judged.trial_fitness.swap_remove(0)));
+            }
+            Command::FailExperiment { experiment, reason }
+            | Command::PauseExperiment { experiment, reason }
+                if experiment.is_evaluation() =>
+            {
+                error!(%experiment, reason, "evaluation failed");
+                self.finish_evaluation(experiment, Err(reason));
             }
             Command::FinishGeneration { experiment, judged } => {
                 let Some(running) = self.experiments.get_mut(&experiment) else { return };

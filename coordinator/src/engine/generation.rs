@@ -20,6 +20,29 @@ const COPIES_MAX: usize = 3;
 /// Who judged a trial that nobody has judged.
 const NOBODY: WorkerId = WorkerId(0);
 
+/// Numbers of one task of measured trials, half a MiB: results travel in messages of
+/// limited size.
+const VALUES_PER_TASK: usize = 1 << 16;
+
+/// What there is to know of each individual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Trials.
+    pub n_trials: u32,
+    /// Numbers per trial: 1, its fitness, or all that is measured of it.
+    pub n_values: usize,
+}
+
+impl Shape {
+    /// Trials of a task: all, if they are no more than numbers.
+    fn trials_per_task(self) -> u32 {
+        match self.n_values {
+            1 => self.n_trials,
+            n_values => u32::try_from(VALUES_PER_TASK / n_values).unwrap_or(u32::MAX).max(1),
+        }
+    }
+}
+
 /// A part of a generation: one individual on a range of trials.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Task {
@@ -58,7 +81,7 @@ pub struct GenerationInProgress {
     pub number: u64,
     /// Who is judged.
     pub genotypes: Population,
-    n_trials: u32,
+    shape: Shape,
     /// What no worker has been given, in the order in which it will be.
     queue: VecDeque<Task>,
     n_trials_queued: usize,
@@ -68,7 +91,7 @@ pub struct GenerationInProgress {
     pub uncovered: BTreeMap<(Instant, ItemId), WorkerId>,
     /// Work that takes workers down.
     pub blames: Blames,
-    /// Per individual and trial; meaningless until judged.
+    /// Per individual and trial, [`Shape::n_values`] each; meaningless until judged.
     trial_fitness: Vec<Vec<f64>>,
     /// Whose result it is; per individual and trial, in one row.
     judges: Vec<WorkerId>,
@@ -83,26 +106,38 @@ pub struct GenerationInProgress {
     fleet_time_at_start: FleetTime,
 }
 
+/// All there is to do, in tasks.
+fn tasks(n_individuals: usize, shape: Shape) -> impl Iterator<Item = Task> {
+    let n_per_task = shape.trials_per_task();
+    let firsts = move |_| (0..shape.n_trials).step_by(n_per_task.max(1) as usize);
+    (0..n_individuals as u32).flat_map(move |individual| {
+        firsts(individual).map(move |first| {
+            let last = shape.n_trials.min(first.saturating_add(n_per_task));
+            Task { individual, trials: first..last }
+        })
+    })
+}
+
 impl GenerationInProgress {
     /// A generation of which nothing is judged.
     pub fn new(
         number: u64,
         genotypes: Population,
-        n_trials: u32,
+        shape: Shape,
         now: Instant,
         fleet_time: FleetTime,
     ) -> Self {
-        let n_all = genotypes.len() * n_trials as usize;
-        let all = 0..genotypes.len() as u32;
+        let n_all = genotypes.len() * shape.n_trials as usize;
+        let n_values = shape.n_trials as usize * shape.n_values;
         Self {
             number,
-            n_trials,
-            queue: all.map(|individual| Task { individual, trials: 0..n_trials }).collect(),
+            shape,
+            queue: tasks(genotypes.len(), shape).collect(),
             n_trials_queued: n_all,
             holders: BTreeMap::new(),
             uncovered: BTreeMap::new(),
             blames: Blames::default(),
-            trial_fitness: vec![vec![f64::NAN; n_trials as usize]; genotypes.len()],
+            trial_fitness: vec![vec![f64::NAN; n_values]; genotypes.len()],
             judges: vec![NOBODY; n_all],
             names: BTreeMap::new(),
             n_trials_left: n_all,
@@ -122,9 +157,8 @@ impl GenerationInProgress {
         self.uncovered.clear();
         self.queue.clear();
         self.n_trials_queued = 0;
-        for individual in 0..self.genotypes.len() as u32 {
-            let all = Task { individual, trials: 0..self.n_trials };
-            for task in self.unclaimed(&all) {
+        for task in tasks(self.genotypes.len(), self.shape) {
+            for task in self.unclaimed(&task) {
                 self.n_trials_queued += task.trials.len();
                 self.queue.push_back(task);
             }
@@ -142,7 +176,7 @@ impl GenerationInProgress {
     }
 
     fn index(&self, individual: u32, trial: u32) -> usize {
-        individual as usize * self.n_trials as usize + trial as usize
+        individual as usize * self.shape.n_trials as usize + trial as usize
     }
 
     fn is_known(&self, individual: u32, trial: u32) -> bool {
@@ -206,7 +240,12 @@ impl GenerationInProgress {
 
     /// Trials per individual.
     pub fn n_trials(&self) -> u32 {
-        self.n_trials
+        self.shape.n_trials
+    }
+
+    /// Numbers that so many trials give.
+    pub fn n_values(&self, n_trials: usize) -> usize {
+        n_trials * self.shape.n_values
     }
 
     /// Tasks that wait.
@@ -289,29 +328,35 @@ impl GenerationInProgress {
 
     /// Whether a worker's values agree with what is known.
     pub fn compare(&self, task: &Task, fitness: &[f64]) -> Result<(), Disagreement> {
-        for (trial, &value) in task.trials.clone().zip(fitness) {
-            let known = self.trial_fitness[task.individual as usize][trial as usize];
+        for (trial, values) in task.trials.clone().zip(fitness.chunks_exact(self.shape.n_values)) {
             let first = self.judges[self.index(task.individual, trial)];
-            if first != NOBODY && known.to_bits() != value.to_bits() {
-                return Err(Disagreement {
-                    first,
-                    first_name: Arc::clone(&self.names[&first]),
-                    trial,
-                    values: (known, value),
-                });
+            if first == NOBODY {
+                continue;
+            }
+            let known = &self.trial_fitness[task.individual as usize][self.places(trial)];
+            let mut pairs = known.iter().copied().zip(values.iter().copied());
+            if let Some(values) = pairs.find(|(known, value)| known.to_bits() != value.to_bits()) {
+                let first_name = Arc::clone(&self.names[&first]);
+                return Err(Disagreement { first, first_name, trial, values });
             }
         }
         Ok(())
     }
 
+    /// Where the numbers of a trial are among those of its individual.
+    fn places(&self, trial: u32) -> Range<usize> {
+        let first = self.n_values(trial as usize);
+        first..first + self.shape.n_values
+    }
+
     /// Records those values of a task that are not known; returns their number.
     pub fn accept(&mut self, worker: WorkerId, name: &str, task: &Task, fitness: &[f64]) -> usize {
         let mut n_new = 0;
-        for (trial, &value) in task.trials.clone().zip(fitness) {
-            let index = self.index(task.individual, trial);
+        for (trial, values) in task.trials.clone().zip(fitness.chunks_exact(self.shape.n_values)) {
+            let (index, places) = (self.index(task.individual, trial), self.places(trial));
             if self.judges[index] == NOBODY {
                 self.judges[index] = worker;
-                self.trial_fitness[task.individual as usize][trial as usize] = value;
+                self.trial_fitness[task.individual as usize][places].copy_from_slice(values);
                 n_new += 1;
             }
         }
@@ -355,6 +400,9 @@ impl GenerationInProgress {
 
     /// What it is called in messages.
     pub fn name(&self) -> String {
+        if self.number == sim_core::EVALUATION {
+            return "the evaluation".into();
+        }
         match self.number.checked_sub(sim_core::held_out(0)) {
             Some(generation) => format!("the re-evaluation after generation {generation}"),
             None => format!("generation {}", self.number),
@@ -423,8 +471,8 @@ impl GenerationInProgress {
             }
         }
         for (index, n_queued) in claims.into_iter().enumerate() {
-            let individual = (index / self.n_trials as usize) as u32;
-            let trial = (index % self.n_trials as usize) as u32;
+            let n_trials = self.shape.n_trials as usize;
+            let (individual, trial) = ((index / n_trials) as u32, (index % n_trials) as u32);
             let n_copies = self.n_copies(individual, trial);
             let is_known = self.is_known(individual, trial);
             let is_held_back = self.blames.is_held_back(individual, trial);

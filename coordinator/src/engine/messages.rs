@@ -128,7 +128,7 @@ impl fmt::Debug for SharedGenotype {
 pub struct ItemResult {
     /// The assignment.
     pub id: ItemId,
-    /// Fitness per trial, or why there is none.
+    /// Fitness per trial, or all that is measured of each; or why there is none.
     pub outcome: Result<Vec<f64>, String>,
     /// Time the worker says it computed.
     pub compute_time: Duration,
@@ -139,7 +139,7 @@ pub struct ItemResult {
 pub struct JudgedGeneration {
     /// Index of the generation.
     pub generation: u64,
-    /// Fitness per individual and trial.
+    /// Fitness per individual and trial; of an evaluation, all that was measured.
     pub trial_fitness: Vec<Vec<f64>>,
     /// From its start to its last result.
     pub duration: Duration,

@@ -51,7 +51,7 @@ use std::{
 };
 
 use crate::{
-    evolution::Population,
+    evolution::{Genotype, Population},
     ids::{ExperimentId, WorkerId},
     priority::Priority,
 };
@@ -61,7 +61,7 @@ use dispatch::Outgoing;
 use experiment::ExperimentWork;
 pub use figures::{FleetFigures, Tally, WorkFigures};
 use fleet_time::FleetTime;
-use generation::{GenerationInProgress, Task};
+use generation::{GenerationInProgress, Shape, Task};
 use worker::{FULL_LOAD, Worker};
 
 pub use messages::{
@@ -251,12 +251,36 @@ impl Engine {
         genotypes: Population,
         n_trials: u32,
     ) {
+        self.ask(now, id, generation, genotypes, Shape { n_trials, n_values: 1 });
+    }
+
+    /// A genotype is to be evaluated: for the engine a generation of one, of which
+    /// every trial gives `n_values` numbers.
+    pub fn on_evaluation_asked(
+        &mut self,
+        now: Instant,
+        id: ExperimentId,
+        genotype: Genotype,
+        n_trials: u32,
+        n_values: usize,
+    ) {
+        let genotypes = vec![genotype].into();
+        self.ask(now, id, sim_core::EVALUATION, genotypes, Shape { n_trials, n_values });
+    }
+
+    fn ask(
+        &mut self,
+        now: Instant,
+        id: ExperimentId,
+        generation: u64,
+        genotypes: Population,
+        shape: Shape,
+    ) {
         let Some(work) = self.experiments.get_mut(&id) else { return };
         assert!(work.generation.is_none(), "one generation at a time");
         self.fleet_time.advance(now);
         let clock = self.fleet_time;
-        work.generation =
-            Some(GenerationInProgress::new(generation, genotypes, n_trials, now, clock));
+        work.generation = Some(GenerationInProgress::new(generation, genotypes, shape, now, clock));
         self.make_ready(id);
         self.assign(now);
     }

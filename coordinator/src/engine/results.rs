@@ -27,8 +27,10 @@ impl Engine {
             return;
         };
         let n_trials = assignment.task.trials.len();
+        let generation = self.experiments[&assignment.experiment].generation.as_ref();
+        let n_values = generation.map_or(n_trials, |generation| generation.n_values(n_trials));
         if let Ok(fitness) = &result.outcome
-            && fitness.len() != n_trials
+            && fitness.len() != n_values
         {
             let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
             self.drop_worker(now, id, Some("was dropped"), reason);

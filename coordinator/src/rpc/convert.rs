@@ -71,8 +71,9 @@ pub fn item_result(result: v1::ItemResult) -> ItemResult {
         id: ItemId(result.item_id),
         outcome: match result.outcome {
             Some(Outcome::Fitness(fitness)) => Ok(fitness.values),
+            Some(Outcome::Measures(measures)) => Ok(measures.values),
             Some(Outcome::Failure(failure)) => Err(printable(&failure.message)),
-            None => Err("neither fitness nor failure".to_owned()),
+            None => Err("no outcome".to_owned()),
         },
         compute_time: Duration::from_micros(result.compute_us),
     }

@@ -132,8 +132,9 @@ impl ExperimentService for Experiments {
         request: Request<GetExperimentRequest>,
     ) -> Result<Response<GetExperimentResponse>, Status> {
         let experiment = self.find(request.into_inner().experiment_id).await?;
+        let config_json = experiment.config_json.clone();
         let experiment = Some(convert::experiment(experiment));
-        Ok(Response::new(GetExperimentResponse { experiment }))
+        Ok(Response::new(GetExperimentResponse { experiment, config_json }))
     }
 
     async fn list_experiments(
@@ -342,7 +343,7 @@ impl Experiments {
     }
 }
 
-fn read_priority(weight: u32) -> Result<Priority, Status> {
+pub(super) fn read_priority(weight: u32) -> Result<Priority, Status> {
     Priority::new(weight).ok_or_else(|| {
         Status::invalid_argument(format!("priority is {weight}, not within 1..={}", Priority::MAX))
     })
@@ -468,7 +469,7 @@ async fn watch(
 }
 
 /// All problems, one per line, as far as there is room.
-fn problems(error: &ConfigError) -> String {
+pub(super) fn problems(error: &ConfigError) -> String {
     let mut text = String::new();
     for (i, problem) in error.problems.iter().enumerate() {
         let line = problem.to_string();

@@ -40,13 +40,14 @@ pub async fn explain(
             sim_core::FINGERPRINT
         )
     };
+    let rivals = activity.rivals.into_iter().filter(|id| !id.is_evaluation());
     Ok(ExplainExperimentResponse {
         notices: notices(store, &experiment).await?,
         experiment: Some(convert::experiment(experiment)),
         round: activity.round.map(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
-        rivals: activity.rivals.into_iter().map(|id| id.0).collect(),
+        rivals: rivals.map(|id| id.0).collect(),
         store_trouble: store.trouble().unwrap_or_default(),
         incompatible,
     })

@@ -2,6 +2,7 @@
 //! else.
 
 mod convert;
+mod evaluation_service;
 mod experiment_service;
 mod explain;
 mod fleet_service;
@@ -13,6 +14,7 @@ use tonic::Status;
 use crate::store::StoreError;
 
 pub use convert::WelcomeTimes;
+pub use evaluation_service::Evaluations;
 pub use experiment_service::Experiments;
 pub use fleet_service::Fleet;
 pub use worker_service::Workers;

@@ -59,6 +59,8 @@ pub const MESSAGE_LENGTH: u32 = 64;
 pub const LATTICE_POINTS: u32 = 4_096;
 /// Hops of a frame.
 pub const HOPS: u32 = 1_000_000;
+/// Stimuli that a robot's `stimuli_inhibition` zeroes.
+pub const INHIBITIONS: usize = 16;
 /// Target headings of `uncontrollable_rotation`.
 pub const TARGETS: usize = 1_000;
 

@@ -30,6 +30,7 @@ pub use algorithm::*;
 pub use equipment::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
+pub use read::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
 pub use topology::*;

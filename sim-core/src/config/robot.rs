@@ -1,7 +1,7 @@
 //! A robot: its controller, where it starts, and what goes wrong.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::{ActuatorsConfig, Initializer, SensorQuery, SensorsConfig, limits, schema};
 
@@ -74,10 +74,11 @@ pub struct PerturbationsConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "LeaderFailureConfig")]
     pub leader_failure: Option<LeaderFailureConfig>,
-    /// Zeroed stimuli.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "StimuliInhibitionConfig")]
-    pub stimuli_inhibition: Option<StimuliInhibitionConfig>,
+    /// Zeroed stimuli; the robots of each are drawn by themselves. One alone is
+    /// written without a list around it.
+    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "one_or_list")]
+    #[schemars(schema_with = "schema::one_or_list::<StimuliInhibitionConfig>")]
+    pub stimuli_inhibition: Vec<StimuliInhibitionConfig>,
     /// Redrawn positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "TopologySwitchConfig")]
@@ -86,6 +87,16 @@ pub struct PerturbationsConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "UncontrollableRotationConfig")]
     pub uncontrollable_rotation: Option<UncontrollableRotationConfig>,
+}
+
+fn one_or_list<S: Serializer>(
+    inhibitions: &[StimuliInhibitionConfig],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match inhibitions {
+        [one] => one.serialize(serializer),
+        list => list.serialize(serializer),
+    }
 }
 
 /// A robot that has been sole leader too long becomes faulty.

@@ -4,7 +4,7 @@
 //! may say beyond that (keys left out, other forms, keys of the original
 //! simulator) is added by the attributes on them, in the words defined here.
 
-use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use super::{
@@ -140,6 +140,15 @@ pub(super) fn names(_: &mut SchemaGenerator) -> Schema {
 pub(super) fn number_or_numbers(_: &mut SchemaGenerator) -> Schema {
     let number = json!({"type": "number"});
     json_schema!({"anyOf": [number, {"type": "array", "items": number}]})
+}
+
+/// One of a kind, or a list of them.
+pub(super) fn one_or_list<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    let one = generator.subschema_for::<T>();
+    json_schema!({"anyOf": [
+        one,
+        {"type": "array", "items": one, "minItems": 1, "maxItems": limits::INHIBITIONS},
+    ]})
 }
 
 /// A number of robots, or all.

@@ -215,7 +215,7 @@ fn inhibited_light_is_exactly_zero_for_eight_of_ten() {
     let light = inputs(&config, SensorQuery::Light);
     let photosensitive = |trial| {
         let (steps, summary) = watch(&config, 0, trial);
-        assert_eq!(summary.metrics.len(), 4);
+        assert_eq!(summary.metrics.len(), 6);
         let sees = |robot: usize| {
             let mut stimuli = steps.iter().flat_map(|s| &s.robots[robot].stimuli[light.clone()]);
             stimuli.any(|&value| value != 0.0)
@@ -231,10 +231,10 @@ fn inhibited_light_is_exactly_zero_for_eight_of_ten() {
 fn a_deaf_network_sits_on_a_radio_that_works() {
     let mut config = experiment_a();
     let receiver = WholeReceiver::WirelessReceiver;
-    robot(&mut config).perturbations.stimuli_inhibition = Some(StimuliInhibitionConfig {
+    robot(&mut config).perturbations.stimuli_inhibition = vec![StimuliInhibitionConfig {
         stimuli: InhibitedStimulus::Receiver(receiver),
         affected_robots: 10,
-    });
+    }];
     let (steps, _) = watch(&config, 0, 0);
     let robots = || steps.iter().flat_map(|step| &step.robots);
     assert!(robots().all(|robot| robot.stimuli == [0.0; 5]));

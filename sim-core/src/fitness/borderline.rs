@@ -5,6 +5,10 @@ use super::{Fitness, Moment};
 use crate::border;
 use crate::record::Metrics;
 
+/// What is measured beside the fitness.
+pub(super) const METRICS: &[&str] =
+    &["true_positive_rate", "true_negative_rate", "precision", "accuracy"];
+
 /// f = TPR * TNR; just TPR if no robot is in the interior.
 #[derive(Debug)]
 pub(super) struct IdentifyBorderline {
@@ -33,6 +37,9 @@ impl Fitness for IdentifyBorderline {
         let rates = Rates::new(&self.targets, moment.leds);
         metrics.insert("true_positive_rate", rates.true_positive);
         metrics.insert("true_negative_rate", rates.true_negative);
+        if let Some(precision) = rates.precision {
+            metrics.insert("precision", precision);
+        }
         metrics.insert("accuracy", rates.accuracy);
     }
 }
@@ -44,6 +51,8 @@ struct Rates {
     true_positive: f64,
     /// Share of interior robots with the LED off; 1 without any.
     true_negative: f64,
+    /// Share of robots with the LED on that are at the border; none if no LED is on.
+    precision: Option<f64>,
     /// Share of all robots that are right.
     accuracy: f64,
 }
@@ -61,7 +70,9 @@ impl Rates {
             if all == 0 { 1.0 } else { right as f64 / all as f64 }
         };
         let (positive, negative) = (count(true), count(false));
+        let n_on = leds.iter().filter(|&&led| led > 0).count();
         Self {
+            precision: (n_on > 0).then(|| share(positive.0, n_on)),
             true_positive: share(positive.0, positive.1),
             true_negative: share(negative.0, negative.1),
             accuracy: share(positive.0 + negative.0, positive.1 + negative.1),
@@ -71,6 +82,8 @@ impl Rates {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::fitness::metrics;
     use crate::torus::Vec2;
@@ -120,15 +133,43 @@ mod tests {
     #[test]
     fn accuracy_counts_all_robots() {
         let rates = Rates::new(&[true, true, false, false, false], &[1, 0, 0, 0, 1]);
-        let expected = Rates { true_positive: 0.5, true_negative: 2.0 / 3.0, accuracy: 0.6 };
+        let expected = Rates {
+            true_positive: 0.5,
+            true_negative: 2.0 / 3.0,
+            precision: Some(0.5),
+            accuracy: 0.6,
+        };
         assert_eq!(rates, expected);
+        assert_eq!(Rates::new(&[true, false], &[0, 0]).precision, None);
+    }
+
+    proptest! {
+        /// Accuracy is the mean of the rates, weighted with who is where, and what
+        /// is counted right among the LEDs that are on is so among the border, too.
+        #[test]
+        fn rates_agree_with_each_other(robots in prop::collection::vec((any::<bool>(), 0..3_u32), 1..40)) {
+            let (at_border, leds): (Vec<bool>, Vec<u32>) = robots.into_iter().unzip();
+            let Rates { true_positive, true_negative, precision, accuracy } =
+                Rates::new(&at_border, &leds);
+            let n = at_border.len() as f64;
+            let n_border = at_border.iter().filter(|is| **is).count() as f64;
+            let n_on = leds.iter().filter(|led| **led > 0).count() as f64;
+            let right = true_positive * n_border + true_negative * (n - n_border);
+            prop_assert!((accuracy * n - right).abs() < 1e-9);
+            let n_true_positives = if n_border > 0.0 { true_positive * n_border } else { 0.0 };
+            prop_assert!((precision.unwrap_or(0.0) * n_on - n_true_positives).abs() < 1e-9);
+        }
     }
 
     #[test]
     fn the_rates_are_measured() {
         let moment = Moment { positions: &SQUARE, leds: &[1, 1, 0, 0, 0], ..Moment::EMPTY };
-        let expected =
-            [("true_positive_rate", 0.5), ("true_negative_rate", 1.0), ("accuracy", 0.6)];
+        let expected = [
+            ("true_positive_rate", 0.5),
+            ("true_negative_rate", 1.0),
+            ("precision", 1.0),
+            ("accuracy", 0.6),
+        ];
         assert_eq!(metrics(&mut IdentifyBorderline::new(100.0), &moment), expected);
     }
 }

@@ -8,6 +8,9 @@ const FAR: f64 = 100.0;
 /// Robots that are not farther apart than this spoil the step, cm.
 const CROWDED: f64 = 20.0;
 
+/// What is measured beside the fitness.
+pub(super) const METRICS: &[&str] = &["center_distance"];
+
 /// f = mean clip(1 - distance to centroid / 100, 0, 1), or 0 if two robots are
 /// within 20 cm of each other.
 #[derive(Debug)]

@@ -9,6 +9,9 @@ const WEIGHT: f64 = 0.1;
 /// Largest fitness of a step.
 const MAX: f64 = 5.0;
 
+/// What is measured beside the fitness.
+pub(super) const METRICS: &[&str] = &["leaders", "one_leader"];
+
 /// f = min(0.1 c, 5) with exactly one leader, c the number of steps before this
 /// one in which it has been sole leader without interruption; else 0.
 #[derive(Debug, Default)]
@@ -22,7 +25,9 @@ impl Fitness for IdentifyLeader {
         Some(leader.map_or(0.0, |leader| (WEIGHT * f64::from(leader.n_steps - 1)).min(MAX)))
     }
 
-    fn measure(&self, _moment: &Moment<'_>, metrics: &mut Metrics) {
+    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+        let n_leaders = moment.leds.iter().filter(|&&led| led > 0).count();
+        metrics.insert("leaders", n_leaders as f64);
         metrics.insert("one_leader", f64::from(self.leadership.has_leader()));
     }
 }
@@ -61,9 +66,12 @@ mod tests {
     #[test]
     fn one_leader_is_told_from_none_and_several() {
         let mut fitness = IdentifyLeader::default();
-        for (leds, expected) in [([0, 0], 0.0), ([0, 1], 1.0), ([2, 0], 1.0), ([1, 1], 0.0)] {
+        for (leds, n, expected) in
+            [([0, 0], 0.0, 0.0), ([0, 1], 1.0, 1.0), ([2, 0], 1.0, 1.0), ([1, 1], 2.0, 0.0)]
+        {
             let moment = Moment { leds: &leds, ..Moment::EMPTY };
-            assert_eq!(metrics(&mut fitness, &moment), [("one_leader", expected)]);
+            let expected = [("leaders", n), ("one_leader", expected)];
+            assert_eq!(metrics(&mut fitness, &moment), expected);
         }
     }
 }

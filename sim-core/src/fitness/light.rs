@@ -7,6 +7,16 @@ use crate::torus::Vec2;
 /// Distance to the light that counts as near, cm.
 const NEAR: f64 = 80.0;
 
+/// What is measured beside the fitness.
+pub(super) const METRICS: &[&str] = &[
+    "light_distance_photosensitive",
+    "near_light_photosensitive",
+    "center_distance_photosensitive",
+    "light_distance_others",
+    "near_light_others",
+    "center_distance_others",
+];
+
 /// f = share of robots within 80 cm of a light.
 #[derive(Debug)]
 pub(super) struct GotoLight;
@@ -23,9 +33,9 @@ impl Fitness for GotoLight {
     fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
         let torus = moment.torus;
         let centroid = torus.centroid(moment.positions);
-        for (photosensitive, light_distance, center_distance) in [
-            (true, "light_distance_photosensitive", "center_distance_photosensitive"),
-            (false, "light_distance_others", "center_distance_others"),
+        for (photosensitive, [light_distance, near_light, center_distance]) in [
+            (true, [METRICS[0], METRICS[1], METRICS[2]]),
+            (false, [METRICS[3], METRICS[4], METRICS[5]]),
         ] {
             let robots = moment.positions.iter().zip(moment.photosensitive);
             let robots: Vec<Vec2> = robots
@@ -41,6 +51,8 @@ impl Fitness for GotoLight {
                     distances.fold(f64::INFINITY, f64::min)
                 };
                 metrics.insert(light_distance, mean(robots.iter().map(to_light)));
+                let near = |robot| f64::from(to_light(robot) <= NEAR);
+                metrics.insert(near_light, mean(robots.iter().map(near)));
             }
             let to_center = |&robot: &Vec2| torus.distance(robot, centroid);
             metrics.insert(center_distance, mean(robots.iter().map(to_center)));
@@ -78,11 +90,15 @@ mod tests {
         };
         let expected = [
             ("light_distance_photosensitive", 40.0),
+            ("near_light_photosensitive", 1.0),
             ("center_distance_photosensitive", 0.0),
             ("light_distance_others", 40.0),
+            ("near_light_others", 1.0),
             ("center_distance_others", 30.0),
         ];
         assert_eq!(metrics(&mut GotoLight, &moment), expected);
+        let far = Moment { lights: &[Vec2::new(940.0, 0.0)], ..moment };
+        assert_eq!(metrics(&mut GotoLight, &far)[4], ("near_light_others", 0.5));
         let blind = Moment { photosensitive: &[false; 3], lights: &[], ..moment };
         assert_eq!(metrics(&mut GotoLight, &blind), [("center_distance_others", 20.0)]);
     }

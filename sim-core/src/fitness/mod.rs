@@ -64,6 +64,17 @@ pub(crate) trait Fitness {
     fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics);
 }
 
+/// All measures that a fitness function may give, in their order.
+pub(crate) fn metric_names(function: FitnessFunction) -> &'static [&'static str] {
+    match function {
+        FitnessFunction::IdentifyLeader => leader::METRICS,
+        FitnessFunction::IdentifyBorderline => borderline::METRICS,
+        FitnessFunction::OrientationConsensus | FitnessFunction::Alignment => orientation::METRICS,
+        FitnessFunction::GotoLight => light::METRICS,
+        FitnessFunction::Grouping => grouping::METRICS,
+    }
+}
+
 /// The named fitness function at the start of a trial.
 pub(crate) fn new(function: FitnessFunction, world: &World) -> Box<dyn Fitness> {
     match function {

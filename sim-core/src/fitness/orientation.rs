@@ -8,6 +8,9 @@ use crate::torus::{Vec2, angular_difference, wrap_angle};
 
 /// Steps that `alignment` does not judge.
 const N_FIRST_STEPS: u32 = 100;
+/// What is measured beside the fitness.
+pub(super) const METRICS: &[&str] = &["misalignment", "turning"];
+
 /// Spread of headings at which `alignment` is 0, radians.
 const MAX_SPREAD: f64 = 0.4 * PI;
 
@@ -18,13 +21,23 @@ pub(super) struct OrientationConsensus;
 
 impl Fitness for OrientationConsensus {
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
-        let calm = 1.0 - mean(moment.wheels.iter().map(|[right, _]| right.abs()));
+        let calm = 1.0 - turning(moment.wheels);
         Some((1.0 - misalignment(moment.headings) / PI) * calm)
     }
 
     fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
-        metrics.insert("misalignment", misalignment(moment.headings));
+        measure(moment, metrics);
     }
+}
+
+fn measure(moment: &Moment<'_>, metrics: &mut Metrics) {
+    metrics.insert("misalignment", misalignment(moment.headings));
+    metrics.insert("turning", turning(moment.wheels));
+}
+
+/// Mean |right wheel|: robots whose only output turns them.
+fn turning(wheels: &[[f64; 2]]) -> f64 {
+    mean(wheels.iter().map(|[right, _]| right.abs()))
 }
 
 /// Mean distance of headings to their circular mean, radians in \[0, pi\] (Eq. 6.2).
@@ -54,7 +67,7 @@ impl Fitness for Alignment {
     }
 
     fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
-        metrics.insert("misalignment", misalignment(moment.headings));
+        measure(moment, metrics);
     }
 }
 
@@ -108,12 +121,13 @@ mod tests {
 
     #[test]
     fn misalignment_is_measured_from_the_first_step_on() {
-        let moment = moment(&[0.0, PI / 2.0], &[[0.0; 2]; 2], 0);
+        let moment = moment(&[0.0, PI / 2.0], &[[0.5, -0.5], [-0.3, 0.3]], 0);
         for fitness in [&mut OrientationConsensus as &mut dyn Fitness, &mut Alignment] {
             let metrics = metrics(fitness, &moment);
-            assert_eq!(metrics.len(), 1);
+            assert_eq!(metrics.len(), 2);
             assert_eq!(metrics[0].0, "misalignment");
             assert!((metrics[0].1 - PI / 4.0).abs() < 1e-12);
+            assert_eq!(metrics[1], ("turning", 0.4));
         }
     }
 

@@ -22,7 +22,7 @@ const ROTATION_STREAM: usize = 3;
 #[derive(Debug)]
 pub(crate) struct Perturbations {
     leader_failure: Option<LeaderFailure>,
-    inhibition: Option<Inhibition>,
+    inhibitions: Vec<Inhibition>,
     rotation: Option<Rotation>,
     /// Period at which positions are redrawn, steps.
     switch_every: Option<u32>,
@@ -37,13 +37,15 @@ impl Perturbations {
         stream: impl Fn(usize) -> Stream,
     ) -> Self {
         let leader_failure = config.leader_failure.as_ref();
-        let inhibition = config.stimuli_inhibition.as_ref();
         let rotation = config.uncontrollable_rotation.as_ref();
+        let mut inhibiting = stream(INHIBITION_STREAM);
+        let inhibitions = config.stimuli_inhibition.iter();
         Self {
             leader_failure: leader_failure
                 .map(|config| LeaderFailure::new(config.time_to_failure, n_robots)),
-            inhibition: inhibition
-                .map(|config| Inhibition::new(config, n_robots, &mut stream(INHIBITION_STREAM))),
+            inhibitions: inhibitions
+                .map(|config| Inhibition::new(config, n_robots, &mut inhibiting))
+                .collect(),
             rotation: rotation
                 .map(|config| Rotation::new(config, n_robots, &mut stream(ROTATION_STREAM))),
             switch_every: config.topology_switch.as_ref().map(|config| config.every),
@@ -58,7 +60,7 @@ impl Perturbations {
     /// Whether the network of a robot, by its index in the group, gets zeros for a
     /// reading.
     pub fn inhibits(&self, robot: usize, reading: SensorQuery) -> bool {
-        self.inhibition.as_ref().is_some_and(|inhibition| inhibition.inhibits(robot, reading))
+        self.inhibitions.iter().any(|inhibition| inhibition.inhibits(robot, reading))
     }
 
     /// Rewrites the actions of the group.

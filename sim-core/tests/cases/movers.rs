@@ -79,7 +79,7 @@ fn motion_agrees_for_every_kind_of_drive() {
         config.topology.ensembles["OUT_MOT"].activation = activation;
         let swarm = swarm_mut(&mut config);
         swarm.num_instances = 5;
-        swarm.perturbations.stimuli_inhibition = None;
+        swarm.perturbations.stimuli_inhibition.clear();
         swarm.initializers.positions =
             Initializer::RandomGraph { max_rad: 100.0, initial_pos: [995.0, 3.0] };
         let wheels = swarm.actuators.wheel_actuator.as_mut().unwrap();

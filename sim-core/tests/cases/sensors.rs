@@ -171,10 +171,19 @@ fn inhibited_stimuli_agree() {
     ] {
         for affected_robots in [3, 10] {
             swarm_mut(&mut config).perturbations.stimuli_inhibition =
-                Some(StimuliInhibitionConfig { stimuli, affected_robots });
+                vec![StimuliInhibitionConfig { stimuli, affected_robots }];
             let episodes = assert_varied_agreement(&config);
             assert!(episodes.iter().any(|episode| episode.witness.n_inhibited > 0), "{stimuli:?}");
             assert_ne!(whole, fitness(&episodes), "{stimuli:?}");
         }
     }
+    let inhibition =
+        |stimuli, affected_robots| StimuliInhibitionConfig { stimuli, affected_robots };
+    let light = InhibitedStimulus::Reading(SensorQuery::Light);
+    let message = InhibitedStimulus::Reading(SensorQuery::ReceiverMessage);
+    let inhibitions = [inhibition(light, 3), inhibition(message, 4), inhibition(light, 2)];
+    swarm_mut(&mut config).perturbations.stimuli_inhibition = inhibitions[..2].to_vec();
+    let two = assert_varied_agreement(&config);
+    swarm_mut(&mut config).perturbations.stimuli_inhibition = inhibitions.to_vec();
+    assert_ne!(fitness(&two), fitness(&assert_varied_agreement(&config)));
 }

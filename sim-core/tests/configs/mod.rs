@@ -86,10 +86,10 @@ pub fn experiment_d() -> ExperimentConfig {
     robots.actuators.wheel_actuator = Some(wheels());
     robots.initializers.positions = Initializer::RandomUniform { low: 400.0, high: 600.0, size: 2 };
     robots.perturbations = PerturbationsConfig {
-        stimuli_inhibition: Some(StimuliInhibitionConfig {
+        stimuli_inhibition: vec![StimuliInhibitionConfig {
             stimuli: InhibitedStimulus::Reading(SensorQuery::Light),
             affected_robots: 8,
-        }),
+        }],
         ..Default::default()
     };
     let light = LightSourceConfig {

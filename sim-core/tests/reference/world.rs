@@ -36,7 +36,8 @@ pub struct Robot<'a> {
     pub on_air: Option<Frame>,
     pub received: Option<Reception>,
     pub is_faulty: bool,
-    is_inhibited: bool,
+    /// Per entry of `stimuli_inhibition`.
+    is_inhibited: Vec<bool>,
     is_uncontrollable: bool,
     reception: Stream,
     quantisation: Stream,
@@ -160,10 +161,12 @@ impl<'a> Simulation<'a> {
             let mut stream = stream(Purpose::Perturbation, place);
             affected_robots(n, k.unwrap_or(0), &mut stream)
         };
-        let inhibited = draw_affected(
-            perturbations.stimuli_inhibition.as_ref().map(|config| config.affected_robots),
-            1,
-        );
+        let mut inhibiting = stream(Purpose::Perturbation, 1);
+        let inhibited: Vec<Vec<bool>> = perturbations
+            .stimuli_inhibition
+            .iter()
+            .map(|config| affected_robots(n, config.affected_robots, &mut inhibiting))
+            .collect();
         let uncontrollable = draw_affected(
             perturbations.uncontrollable_rotation.as_ref().map(|config| config.affected_robots),
             3,
@@ -185,7 +188,7 @@ impl<'a> Simulation<'a> {
                 on_air: None,
                 received: None,
                 is_faulty: false,
-                is_inhibited: inhibited[i],
+                is_inhibited: inhibited.iter().map(|robots| robots[i]).collect(),
                 is_uncontrollable: uncontrollable[i],
                 reception: stream(Purpose::Reception, number),
                 quantisation: stream(Purpose::Quantisation, number),
@@ -283,14 +286,16 @@ impl<'a> Simulation<'a> {
     /// Eq. 3.8: the stimuli in their order, after `stimuli_inhibition`.
     fn stimuli(&mut self, i: usize, readings: &Readings) -> Vec<f64> {
         let robot = &self.robots[i];
-        let inhibition = robot.config.perturbations.stimuli_inhibition.as_ref();
+        let inhibitions = &robot.config.perturbations.stimuli_inhibition;
         let mut phi = Vec::new();
         for (name, stimulus) in &self.config.topology.stimuli {
             let mut values = readings.get(stimulus.sensor, robot.msg_length());
             assert_eq!(values.len(), stimulus.n as usize, "length of stimulus {name}");
-            if robot.is_inhibited
-                && inhibition.is_some_and(|config| inhibits(config.stimuli, stimulus.sensor))
-            {
+            let is_inhibited = inhibitions
+                .iter()
+                .zip(&robot.is_inhibited)
+                .any(|(config, is_hit)| *is_hit && inhibits(config.stimuli, stimulus.sensor));
+            if is_inhibited {
                 self.witness.n_inhibited += usize::from(values.iter().any(|&value| value != 0.0));
                 values.fill(0.0);
             }

@@ -115,8 +115,8 @@ impl Run {
     }
 }
 
-/// Says what is wrong in one line.
-fn plain(error: &csv::Error) -> String {
+/// Says what is wrong with a table, in one line.
+pub fn plain(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Io(error) => error.to_string(),
         csv::ErrorKind::Deserialize { pos, err } => {

@@ -31,7 +31,8 @@ fn csv(dir: &tempfile::TempDir, name: &str, text: &str) -> String {
 async fn run(coordinator: &str, runs: &[&str], to: PathBuf) -> Result<String, Error> {
     let captured = Captured::default();
     let settings = Settings { coordinator: Some(coordinator.into()), ..Settings::default() };
-    let args = PlotArgs { runs: runs.iter().map(ToString::to_string).collect(), to };
+    let runs = runs.iter().map(ToString::to_string).collect();
+    let args = PlotArgs { runs, steps: None, metric: None, to };
     plot(settings, &args, &mut captured.progress(OutputFormat::Table)).await?;
     Ok(captured.lines().join("\n"))
 }

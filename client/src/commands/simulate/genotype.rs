@@ -18,6 +18,14 @@ pub struct Genotype {
 }
 
 impl Genotype {
+    /// The genotype in a file.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let genes = read(path).map_err(|problem| {
+            Error::Input(format!("no genotype in {}: {problem}", path.display()))
+        })?;
+        Ok(Self { genes, origin: format!("genotype in {}", path.display()) })
+    }
+
     /// The genotype that was asked for; nobody has checked it yet.
     pub async fn choose(
         settings: Settings,
@@ -25,10 +33,7 @@ impl Genotype {
         compiled: &Compiled,
     ) -> Result<Self, Error> {
         if let Some(path) = &args.genotype {
-            let genes = read(path).map_err(|problem| {
-                Error::Input(format!("no genotype in {}: {problem}", path.display()))
-            })?;
-            return Ok(Self { genes, origin: format!("genotype in {}", path.display()) });
+            return Self::read(path);
         }
         if let Some(id) = args.experiment {
             let champion = Connection::open(settings)?.champion(id).await?;

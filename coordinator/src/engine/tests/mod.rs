@@ -1,5 +1,6 @@
 //! The engine, driven through histories of a fleet.
 
+mod evaluations;
 mod fleet;
 mod histories;
 

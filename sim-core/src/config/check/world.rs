@@ -206,8 +206,10 @@ fn perturbations(robot: &RobotConfig, path: &Path, report: &Report<'_>) {
         let path = path.key("leader_failure");
         report.conflict(&path, &[&actuators_path], "needs an `led_actuator`");
     }
-    if let Some(inhibition) = &perturbations.stimuli_inhibition {
+    let inhibitions = &perturbations.stimuli_inhibition;
+    for (index, inhibition) in inhibitions.iter().enumerate() {
         let path = path.key("stimuli_inhibition");
+        let path = if inhibitions.len() > 1 { path.index(index) } else { path };
         affected(inhibition.affected_robots, &path);
         let reading = match inhibition.stimuli {
             InhibitedStimulus::Reading(reading) => reading,

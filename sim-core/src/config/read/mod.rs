@@ -12,7 +12,7 @@ mod topology;
 mod variant;
 mod world;
 
-pub(super) use names::suggestion;
+pub use names::suggestion;
 pub(super) use report::{Path, Report};
 
 use names::check_name;

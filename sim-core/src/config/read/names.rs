@@ -26,7 +26,7 @@ pub(super) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) 
 }
 
 /// The nearest known name, or all of them if none is near.
-pub(in crate::config) fn suggestion<S: AsRef<str>>(name: &str, known: &[S]) -> String {
+pub fn suggestion<S: AsRef<str>>(name: &str, known: &[S]) -> String {
     // A longer one resembles nothing, and the measure takes quadratic time.
     let comparable = name.len() <= limits::NAME_CHARS;
     let name = name.to_lowercase();

@@ -160,11 +160,18 @@ fn transmitter(o: &mut Object<'_>) -> WirelessTransmitterConfig {
 fn perturbations(o: &mut Object<'_>, num_instances: u32) -> PerturbationsConfig {
     PerturbationsConfig {
         leader_failure: o.optional("leader_failure").map(|node| node.object(leader_failure)),
-        stimuli_inhibition: o.optional("stimuli_inhibition").map(|node| {
-            node.object(|o| StimuliInhibitionConfig {
-                stimuli: o.or("stimuli", LIGHT, inhibited_stimulus),
-                affected_robots: affected_robots(o, num_instances),
-            })
+        stimuli_inhibition: o.or("stimuli_inhibition", Vec::new(), |node| {
+            let one = |node: Node<'_>| {
+                node.object(|o| StimuliInhibitionConfig {
+                    stimuli: o.or("stimuli", LIGHT, inhibited_stimulus),
+                    affected_robots: affected_robots(o, num_instances),
+                })
+            };
+            if node.is_list() {
+                node.list(1..=limits::INHIBITIONS).into_iter().map(one).collect()
+            } else {
+                vec![one(node)]
+            }
         }),
         topology_switch: o.optional("topology_switch").map(|node| {
             let default = TopologySwitchConfig::default();

@@ -120,7 +120,7 @@ fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
             &format!("\"stimuli_inhibition\": {form}, \"uncontrollable_rotation\": {form}"),
         ));
         let (_, bots) = config.robots().next().unwrap();
-        assert_eq!(bots.perturbations.stimuli_inhibition.as_ref().unwrap().affected_robots, 4);
+        assert_eq!(bots.perturbations.stimuli_inhibition[0].affected_robots, 4);
         let targets = [270.0_f64, 90.0, 15.0, 180.0].map(f64::to_radians).to_vec();
         assert_eq!(
             bots.perturbations.uncontrollable_rotation,

@@ -173,6 +173,10 @@ impl Robot {
             let whole = reading.starts_with("wireless") && dice.chance(0.3);
             let stimulus = if whole { "wireless_receiver" } else { reading };
             insert(&mut perturbations["stimuli_inhibition"], "stimuli", json!(stimulus));
+            if dice.chance(0.3) {
+                let one = perturbations["stimuli_inhibition"].take();
+                perturbations["stimuli_inhibition"] = json!([one, {"stimuli": reading}]);
+            }
         }
         if self.actuators.contains(&"led_actuator") && dice.chance(0.3) {
             let failure = object(dice, [("time_to_failure", json!(every))]);

@@ -1,0 +1,198 @@
+//! `swarmctl evaluate`: what a genotype is worth, under several conditions.
+
+mod conditions;
+mod files;
+mod measured;
+mod patch;
+mod statistics;
+mod summary;
+
+use std::{fs, path::Path, thread};
+
+use swarm_proto::v1::EvaluateRequest;
+use tokio::task::JoinSet;
+use tokio_util::sync::CancellationToken;
+
+use crate::{
+    args::EvaluateArgs,
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING},
+    error::Error,
+    experiment_file::ExperimentFile,
+    json,
+    progress::Progress,
+    settings::Settings,
+    table::{Column, Table},
+};
+
+use self::{
+    conditions::Condition,
+    measured::Measured,
+    summary::{Subject, Summary},
+};
+use super::{
+    run::{fleet::Fleet, log},
+    simulate::genotype::Genotype,
+};
+
+/// Conditions that are asked for at the same time.
+const CALLS_MAX: usize = 8;
+
+/// Evaluates, and writes the files when all is there.
+pub async fn evaluate(
+    settings: Settings,
+    args: &EvaluateArgs,
+    mut progress: Progress,
+    interrupt: CancellationToken,
+) -> Result<(), Error> {
+    let result = tokio::select! {
+        biased;
+        () = interrupt.cancelled() => {
+            Err(Error::Interrupted("nothing is written; the same command starts over".into()))
+        }
+        result = evaluate_all(settings, args, &mut progress) => result,
+    };
+    progress.clear();
+    result
+}
+
+async fn evaluate_all(
+    settings: Settings,
+    args: &EvaluateArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let remote = (!args.local || args.id.is_some()).then(|| Connection::open(settings));
+    let remote = remote.transpose()?.map(|it| it.with_patience(PATIENCE_WHILE_FOLLOWING));
+    let (file, genotype) = subject(remote.as_ref(), args).await?;
+    let conditions = conditions::all(&file, args)?;
+    for condition in &conditions {
+        condition.check(&genotype)?;
+    }
+    // Rather now than after an hour.
+    fs::create_dir_all(&args.to).map_err(|error| unwritable(&args.to, &error))?;
+    let measured = match remote.filter(|_| !args.local) {
+        Some(connection) => ask_all(&connection, &conditions, &genotype, args, progress).await?,
+        None => compute_here(&conditions, &genotype, args, progress).await?,
+    };
+    files::write_steps(&args.to, &conditions, &measured, args.every)?;
+    files::write_trials(&args.to, &conditions, &measured)?;
+    let summary = Summary::new(&Subject::new(&conditions, &genotype), &conditions, &measured);
+    files::write(&args.to, "summary.json", &(json::document(&summary) + "\n"))?;
+    if progress.is_json() {
+        return progress.print(&json::document(&summary));
+    }
+    progress.print(&table(&summary).to_text(progress.screen()))?;
+    progress.print(&format!(
+        "{} trials each; steps.csv, trials.csv and summary.json in {}",
+        args.trials,
+        args.to.display()
+    ))
+}
+
+/// The experiment file, and the genes.
+async fn subject(
+    remote: Option<&Connection>,
+    args: &EvaluateArgs,
+) -> Result<(ExperimentFile, Vec<f64>), Error> {
+    match (remote, args.id, &args.genotype, &args.config) {
+        (Some(connection), Some(id), ..) => {
+            let champion = connection.champion(id).await?;
+            let text = connection.config_json(id).await?;
+            let file = ExperimentFile::new(format!("experiment {id}").into(), text);
+            Ok((file, champion.genotype))
+        }
+        (_, _, Some(genotype), Some(config)) => {
+            let file =
+                ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error))?;
+            Ok((file, Genotype::read(genotype)?.genes))
+        }
+        _ => Err(Error::Internal("the command line names nothing to evaluate".into())),
+    }
+}
+
+/// Starts a fleet, computes, stops the fleet, whatever happens.
+async fn compute_here(
+    conditions: &[Condition],
+    genotype: &[f64],
+    args: &EvaluateArgs,
+    progress: &mut Progress,
+) -> Result<Vec<Measured>, Error> {
+    log::init(progress.stderr());
+    let n_workers = args
+        .workers
+        .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
+    // An evaluation stores nothing, but its coordinator has a database.
+    let data_dir = tempfile::tempdir()
+        .map_err(|source| Error::Write { what: "a temporary directory".into(), source })?;
+    let mut fleet = Fleet::start(data_dir.path(), n_workers, args.isa.get()).await?;
+    let result = match fleet.connection() {
+        Ok(connection) => tokio::select! {
+            biased;
+            result = ask_all(&connection, conditions, genotype, args, progress) => result,
+            error = fleet.failure() => Err(error),
+        },
+        Err(error) => Err(error),
+    };
+    fleet.shutdown().await;
+    result
+}
+
+/// Asks for all conditions, some at a time, in whatever order they come.
+async fn ask_all(
+    connection: &Connection,
+    conditions: &[Condition],
+    genotype: &[f64],
+    args: &EvaluateArgs,
+    progress: &mut Progress,
+) -> Result<Vec<Measured>, Error> {
+    let mut calls = JoinSet::new();
+    let mut waiting = conditions.iter().enumerate();
+    let mut measured: Vec<Option<Measured>> = conditions.iter().map(|_| None).collect();
+    let mut n_done = 0;
+    loop {
+        while calls.len() < CALLS_MAX
+            && let Some((index, condition)) = waiting.next()
+        {
+            let request = EvaluateRequest {
+                config_json: condition.config.to_canonical_json(),
+                genotype: genotype.to_vec(),
+                trial_count: args.trials,
+                priority: args.priority,
+            };
+            let connection = connection.clone();
+            calls.spawn(async move { (index, measured::ask(&connection, request).await) });
+        }
+        let Some(call) = calls.join_next().await else { break };
+        let (index, result) = call.map_err(|error| Error::Internal(error.to_string()))?;
+        let condition = &conditions[index];
+        measured[index] = Some(result.map_err(|error| condition.blame(error))?);
+        n_done += 1;
+        if !progress.is_json() {
+            progress.remark(&format!("{n_done}/{} {}", conditions.len(), condition.name));
+        }
+    }
+    Ok(measured.into_iter().map(|it| it.expect("every condition has been asked for")).collect())
+}
+
+/// For people: means over trials and steps, with their confidence.
+fn table(summary: &Summary) -> Table {
+    let names = summary.metric_names();
+    let headings = ["fitness"].into_iter().chain(names.iter().map(String::as_str));
+    let headings = headings.map(Column::number);
+    let mut table =
+        Table::new(std::iter::once(Column::new("condition")).chain(headings).collect::<Vec<_>>());
+    for condition in &summary.conditions {
+        let fitness = Some(&condition.fitness);
+        let metrics = names.iter().map(|name| condition.metrics.get(name).map(|it| &it.time_mean));
+        let cells = std::iter::once(fitness).chain(metrics);
+        let cells = cells.map(|estimate| estimate.map_or("-".into(), ToString::to_string));
+        table.push(std::iter::once(condition.name.clone()).chain(cells).collect::<Vec<_>>());
+    }
+    table
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> Error {
+    Error::Input(format!("cannot write {}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests;

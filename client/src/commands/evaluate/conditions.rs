@@ -1,0 +1,235 @@
+//! Conditions: the experiment file as it is, and with something changed.
+
+use indexmap::IndexMap;
+use sim_core::{
+    Experiment,
+    config::{ConfigError, ExperimentConfig, suggestion},
+};
+
+use super::patch::{Change, Json};
+use crate::{
+    args::EvaluateArgs,
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides},
+    json,
+};
+
+/// Conditions of one evaluation.
+const CONDITIONS_MAX: usize = 64;
+
+/// Under what a genotype is evaluated.
+#[derive(Debug, Clone)]
+pub struct Condition {
+    /// For tables and legends.
+    pub name: String,
+    /// Beyond the nominal condition.
+    pub changes: Vec<Change>,
+    /// The experiment file, changed.
+    pub config: ExperimentConfig,
+    pub experiment: Experiment,
+}
+
+impl Condition {
+    /// Makes sure that the genotype fits.
+    pub fn check(&self, genotype: &[f64]) -> Result<(), Error> {
+        let checked = self.experiment.check_genotype(genotype);
+        let misfit = |error| Error::Input(format!("the genotype does not fit: {error}"));
+        checked.map_err(|error| self.blame(misfit(error)))
+    }
+
+    /// A refusal of this condition says so.
+    pub fn blame(&self, error: Error) -> Error {
+        match error {
+            Error::Input(problem) => Error::Input(format!("condition {}: {problem}", self.name)),
+            error => error,
+        }
+    }
+
+    /// Number of robots that are evaluated.
+    pub fn n_robots(&self) -> u32 {
+        let evolvable = &self.config.algorithm.evolvable_object;
+        let mut robots = self.config.robots().filter(|(name, _)| name == evolvable);
+        robots.next().map_or(0, |(_, robot)| robot.num_instances)
+    }
+}
+
+/// All conditions that the arguments ask for, the nominal one first.
+pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>, Error> {
+    let overrides = Overrides { steps: args.steps, ..Overrides::default() };
+    let compiled = file.compile(&overrides).map_err(|error| file.invalid(&error))?;
+    let mut base = to_json(&compiled.config);
+    for text in &args.base {
+        for change in parsed("--base", text)? {
+            change.apply(&mut base).map_err(|problem| Error::Input(format!("--base {problem}")))?;
+        }
+    }
+    let nominal = Nominal { config: read("--base", &base)?, base };
+    let mut conditions = vec![nominal.condition("nominal".into(), Vec::new())?];
+    for &n in &args.robots {
+        conditions.push(nominal.condition(format!("robots={n}"), nominal.robots(n))?);
+    }
+    for text in &args.perturb {
+        conditions.push(nominal.condition(text.clone(), nominal.perturbation(text)?)?);
+    }
+    for name in &args.inhibit {
+        let changes = nominal.inhibition(name)?;
+        conditions.push(nominal.condition(format!("inhibit={name}"), changes)?);
+    }
+    for text in &args.set {
+        conditions.push(nominal.condition(text.clone(), parsed("--set", text)?)?);
+    }
+    if conditions.len() > CONDITIONS_MAX {
+        return Err(Error::Input(format!("at most {CONDITIONS_MAX} conditions at once")));
+    }
+    for (index, condition) in conditions.iter().enumerate() {
+        if conditions[..index].iter().any(|other| other.name == condition.name) {
+            return Err(Error::Input(format!("condition {} is there twice", condition.name)));
+        }
+    }
+    Ok(conditions)
+}
+
+/// What conditions are made from.
+struct Nominal {
+    config: ExperimentConfig,
+    base: Json,
+}
+
+impl Nominal {
+    fn condition(&self, name: String, changes: Vec<Change>) -> Result<Condition, Error> {
+        let input = |problem: String| Error::Input(format!("condition {name}: {problem}"));
+        let mut file = self.base.clone();
+        for change in &changes {
+            change.apply(&mut file).map_err(input)?;
+        }
+        let config = read(&format!("condition {name}"), &file)?;
+        let experiment = Experiment::compile(&config).map_err(|error| input(problems(&error)))?;
+        Ok(Condition { name, changes, config, experiment })
+    }
+
+    fn evolvable(&self) -> &str {
+        &self.config.algorithm.evolvable_object
+    }
+
+    fn place(&self, key: &str) -> String {
+        format!("world.objects.{}.{key}", self.evolvable())
+    }
+
+    /// What stands at a key of the robots.
+    fn robots_have(&self, key: &str) -> Option<&Json> {
+        self.base.get(["world", "objects", self.evolvable(), key])
+    }
+
+    fn perturbations(&self) -> Option<&IndexMap<String, Json>> {
+        self.robots_have("perturbations")?.object()
+    }
+
+    /// Another size of the swarm, with the same share of affected robots.
+    fn robots(&self, n: u32) -> Vec<Change> {
+        let was = self.robots_have("num_instances").and_then(Json::number).unwrap_or(1).max(1);
+        let mut changes = vec![Change::new(self.place("num_instances"), u64::from(n).into())];
+        let scaled = |key: String, perturbation: &Json| {
+            let affected = perturbation.get(["affected_robots"])?.number()?;
+            // Rounded to the nearest.
+            let affected = (2 * affected * u64::from(n) + was) / (2 * was);
+            let path = self.place(&format!("perturbations.{key}.affected_robots"));
+            Some(Change::new(path, affected.into()))
+        };
+        for (key, value) in self.perturbations().into_iter().flatten() {
+            match value {
+                Json::List(list) => {
+                    let each = list.iter().enumerate();
+                    changes.extend(each.filter_map(|(i, it)| scaled(format!("{key}.{i}"), it)));
+                }
+                one => changes.extend(scaled(key.clone(), one)),
+            }
+        }
+        changes
+    }
+
+    /// `NAME`, `NAME:KEY=VALUE,...` or `NAME:{...}`.
+    fn perturbation(&self, text: &str) -> Result<Vec<Change>, Error> {
+        let (name, params) = text.split_once(':').unwrap_or((text, ""));
+        let params = match Json::parse(params) {
+            Json::Object(params) => params,
+            _ => parameters(params)
+                .map_err(|problem| Error::Input(format!("--perturb {text}: {problem}")))?,
+        };
+        let path = self.place(&format!("perturbations.{name}"));
+        Ok(vec![Change::new(path, Json::Object(params))])
+    }
+
+    /// All robots lose a stimulus, beside what they have lost already.
+    fn inhibition(&self, name: &str) -> Result<Vec<Change>, Error> {
+        let stimuli = self.base.get(["topology", "stimuli"]).and_then(Json::object);
+        let sensors: Vec<(&str, &str)> = stimuli
+            .into_iter()
+            .flatten()
+            .filter_map(|(name, stimulus)| Some((name.as_str(), stimulus.get(["sensor"])?.text()?)))
+            .collect();
+        let short = |sensor: &str| sensor.rsplit(':').next().is_some_and(|it| it == name);
+        let sensor = sensors
+            .iter()
+            .find(|(stimulus, sensor)| *stimulus == name || *sensor == name || short(sensor))
+            .map(|&(_, sensor)| sensor)
+            .ok_or_else(|| {
+                let known = sensors.iter().flat_map(|(stimulus, sensor)| [*stimulus, *sensor]);
+                let short = sensors.iter().filter_map(|(_, sensor)| sensor.split(':').nth(1));
+                let known: Vec<&str> = known.chain(short).collect();
+                let suggestion = suggestion(name, &known);
+                Error::Input(format!("--inhibit {name}: no stimulus has this name; {suggestion}"))
+            })?;
+        let parameters = [("stimuli", sensor), ("affected_robots", "all")];
+        let parameters =
+            parameters.map(|(key, value)| (key.to_owned(), Json::Scalar(value.into())));
+        let inhibition = Json::Object(parameters.into());
+        let path = self.place("perturbations.stimuli_inhibition");
+        let before = self.perturbations().and_then(|all| all.get("stimuli_inhibition"));
+        let value = match before {
+            None => inhibition,
+            Some(Json::List(list)) => {
+                Json::List(list.iter().cloned().chain([inhibition]).collect())
+            }
+            Some(one) => Json::List(vec![one.clone(), inhibition]),
+        };
+        Ok(vec![Change::new(path, value)])
+    }
+}
+
+fn parsed(option: &str, text: &str) -> Result<Vec<Change>, Error> {
+    Change::parse_all(text).map_err(|problem| Error::Input(format!("{option} {problem}")))
+}
+
+/// Reads `KEY=VALUE,...`; commas within brackets do not separate.
+fn parameters(text: &str) -> Result<IndexMap<String, Json>, String> {
+    let mut depth = 0;
+    let separate = |c: char| {
+        depth += i32::from("[{".contains(c)) - i32::from("]}".contains(c));
+        c == ',' && depth == 0
+    };
+    let parts: Vec<&str> = text.split(separate).filter(|part| !part.trim().is_empty()).collect();
+    let parameter = |part: &&str| {
+        let (key, value) =
+            part.split_once('=').ok_or_else(|| format!("`{part}`: expected KEY=VALUE"))?;
+        Ok((key.trim().to_owned(), Json::parse(value.trim())))
+    };
+    parts.iter().map(parameter).collect()
+}
+
+fn to_json(config: &ExperimentConfig) -> Json {
+    Json::parse(&config.to_canonical_json())
+}
+
+fn read(whose: &str, file: &Json) -> Result<ExperimentConfig, Error> {
+    match ExperimentConfig::from_json(&json::line(file), "") {
+        Ok((config, _)) => Ok(config),
+        Err(error) => Err(Error::Input(format!("{whose}: {}", problems(&error)))),
+    }
+}
+
+/// Lines of a file that nobody has written mean nothing.
+fn problems(error: &ConfigError) -> String {
+    let mut error = error.clone();
+    error.problems.iter_mut().for_each(|problem| problem.line = None);
+    error.to_string()
+}

@@ -1,0 +1,131 @@
+//! Statistics of samples. Sums run in the order of the trials, so that the same
+//! trials give the same bits.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// Upper 2.5 % point of the standard normal distribution: 95 % of it lie within.
+const Z: f64 = 1.959_963_984_540_054;
+
+/// Median and quartiles, by linear interpolation between the sorted values.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quartiles {
+    pub median: f64,
+    pub q1: f64,
+    pub q3: f64,
+}
+
+impl Quartiles {
+    /// None of no values.
+    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
+        let quantile = |p: f64| {
+            let place = p * last as f64;
+            let low = place as usize;
+            let high = (low + 1).min(last);
+            values[low] + (place - low as f64) * (values[high] - values[low])
+        };
+        Some(Self { median: quantile(0.5), q1: quantile(0.25), q3: quantile(0.75) })
+    }
+}
+
+/// What a sample says of the mean of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Size of the sample.
+    pub n: usize,
+    pub mean: f64,
+    /// Of the sample, with n - 1 in its denominator; 0 for n = 1.
+    pub standard_deviation: f64,
+    /// mean -+ z s / sqrt(n).
+    pub ci95: [f64; 2],
+    /// Of shares: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportion_ci95: Option<[f64; 2]>,
+    #[serde(flatten)]
+    pub quartiles: Quartiles,
+    pub min: f64,
+    pub max: f64,
+}
+
+impl Estimate {
+    /// None of no values; `is_share`: whether they lie in [0, 1].
+    pub fn of(values: &[f64], is_share: bool) -> Option<Self> {
+        let quartiles = Quartiles::of(values.to_vec())?;
+        let n = values.len() as f64;
+        let mean = mean(values)?;
+        let squares = values.iter().fold(0.0, |sum, value| sum + (value - mean) * (value - mean));
+        let deviation = if n > 1.0 { (squares / (n - 1.0)).sqrt() } else { 0.0 };
+        let around = |radius: f64| [mean - radius, mean + radius];
+        // Rounding must not make the root's argument negative.
+        let proportion = || around(Z * ((mean * (1.0 - mean)).max(0.0) / n).sqrt());
+        Some(Self {
+            n: values.len(),
+            mean,
+            standard_deviation: deviation,
+            ci95: around(Z * deviation / n.sqrt()),
+            proportion_ci95: is_share.then(proportion),
+            quartiles,
+            min: values.iter().copied().fold(f64::INFINITY, f64::min),
+            max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        })
+    }
+}
+
+impl fmt::Display for Estimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.4} +- {:.4}", self.mean, self.ci95[1] - self.mean)
+    }
+}
+
+/// None of no values.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    let sum = values.iter().fold(0.0, |sum, value| sum + value);
+    (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_interpolate_as_numpy_does() {
+        // numpy.quantile([4, 1, 3, 2], [0.5, 0.25, 0.75])
+        let quartiles = Quartiles::of(vec![4.0, 1.0, 3.0, 2.0]).unwrap();
+        assert_eq!(quartiles, Quartiles { median: 2.5, q1: 1.75, q3: 3.25 });
+        let one = Quartiles::of(vec![7.0]).unwrap();
+        assert_eq!(one, Quartiles { median: 7.0, q1: 7.0, q3: 7.0 });
+        assert_eq!(Quartiles::of(vec![]), None);
+    }
+
+    #[test]
+    fn the_interval_of_a_proportion_is_that_of_equation_6_1() {
+        // 40 of 50: 0.8 -+ 1.96 sqrt(0.8 * 0.2 / 50).
+        let values: Vec<f64> = (0..50).map(|trial| f64::from(u8::from(trial < 40))).collect();
+        let [low, high] = Estimate::of(&values, true).unwrap().proportion_ci95.unwrap();
+        assert!((low - 0.689_128).abs() < 1e-6 && (high - 0.910_872).abs() < 1e-6, "{low} {high}");
+    }
+
+    #[test]
+    fn the_interval_of_a_mean_is_that_of_its_standard_error() {
+        let estimate = Estimate::of(&[1.0, 2.0, 3.0, 4.0], false).unwrap();
+        assert_eq!((estimate.mean, estimate.min, estimate.max), (2.5, 1.0, 4.0));
+        assert!((estimate.standard_deviation - 1.290_994).abs() < 1e-6);
+        assert!((estimate.ci95[1] - estimate.mean - 1.265_151).abs() < 1e-6);
+        assert_eq!(estimate.proportion_ci95, None);
+    }
+
+    #[test]
+    fn a_sample_of_one_or_of_equals_has_no_spread() {
+        for values in [&[0.1][..], &[0.1; 50]] {
+            let estimate = Estimate::of(values, true).unwrap();
+            assert!(estimate.standard_deviation < 1e-15);
+            assert!((estimate.ci95[0] - 0.1).abs() < 1e-15);
+        }
+        let all = Estimate::of(&[1.0; 3], true).unwrap();
+        assert_eq!(all.proportion_ci95, Some([1.0, 1.0]));
+        assert_eq!(Estimate::of(&[], true), None);
+    }
+}

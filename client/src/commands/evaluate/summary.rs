@@ -1,0 +1,149 @@
+//! The summary: what was evaluated, and estimates of what it is worth.
+
+use indexmap::IndexMap;
+use serde::Serialize;
+use serde_json::Value;
+use sha2::{Digest as _, Sha256};
+
+use coordinator::evolution::Digest;
+
+use super::{
+    conditions::Condition,
+    measured::Measured,
+    patch::Json,
+    statistics::{Estimate, mean},
+};
+
+/// What was evaluated.
+#[derive(Debug, Clone, Serialize)]
+pub struct Subject {
+    name: String,
+    swarmctl: &'static str,
+    simulation: &'static str,
+    /// SHA-256 of the genes, each as little-endian f64.
+    genotype_digest: String,
+    genes: usize,
+    fitness_function: Value,
+    seed: u64,
+    /// Address of the trials.
+    trials_of: String,
+    steps: u32,
+}
+
+impl Subject {
+    /// The genotype under conditions, the nominal one first.
+    pub fn new(conditions: &[Condition], genotype: &[f64]) -> Self {
+        let config = &conditions[0].config;
+        let algorithm = &config.algorithm;
+        let mut hash = Sha256::new();
+        genotype.iter().for_each(|gene| hash.update(gene.to_bits().to_le_bytes()));
+        let digest: [u8; 32] = hash.finalize().into();
+        Self {
+            name: config.name.clone(),
+            swarmctl: env!("CARGO_PKG_VERSION"),
+            simulation: sim_core::FINGERPRINT,
+            genotype_digest: digest.iter().map(|byte| format!("{byte:02x}")).collect(),
+            genes: genotype.len(),
+            fitness_function: serde_json::to_value(algorithm.fitness_function)
+                .expect("a name serialises"),
+            seed: config.seed,
+            trials_of: format!("generation {}", sim_core::EVALUATION),
+            steps: algorithm.evaluation_steps,
+        }
+    }
+}
+
+/// The file summary.json.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    #[serde(flatten)]
+    subject: Subject,
+    pub conditions: Vec<ConditionSummary>,
+}
+
+/// One condition.
+#[derive(Debug, Clone, Serialize)]
+pub struct ConditionSummary {
+    pub name: String,
+    /// Of the experiment file, changed; as the coordinator shows it.
+    config_digest: String,
+    changes: IndexMap<String, Json>,
+    robots: u32,
+    pub fitness: Estimate,
+    /// Those that there are.
+    pub metrics: IndexMap<String, MetricSummary>,
+}
+
+/// One measure.
+#[derive(Debug, Clone, Serialize)]
+pub struct MetricSummary {
+    unit: &'static str,
+    /// Of its means over the steps.
+    pub time_mean: Estimate,
+    /// Of its values in the last step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    end: Option<Estimate>,
+}
+
+impl Summary {
+    pub fn new(subject: &Subject, conditions: &[Condition], measured: &[Measured]) -> Self {
+        let conditions = conditions.iter().zip(measured).map(|(condition, measured)| {
+            let fitness: Vec<f64> = measured.trials.iter().map(|trial| trial.fitness).collect();
+            let changes = condition.changes.iter();
+            ConditionSummary {
+                name: condition.name.clone(),
+                config_digest: Digest::of_config(&condition.config).to_string(),
+                changes: changes.map(|it| (it.path.clone(), it.value.clone())).collect(),
+                robots: condition.n_robots(),
+                fitness: Estimate::of(&fitness, false).expect("there are trials"),
+                metrics: metrics(measured),
+            }
+        });
+        Self { subject: subject.clone(), conditions: conditions.collect() }
+    }
+
+    /// All measures of all conditions.
+    pub fn metric_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in self.conditions.iter().flat_map(|condition| condition.metrics.keys()) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+        names
+    }
+}
+
+fn metrics(measured: &Measured) -> IndexMap<String, MetricSummary> {
+    let summary = |(metric, name): (usize, &String)| {
+        let means: Vec<f64> = (0..measured.trials.len())
+            .filter_map(|trial| time_mean(measured, trial, metric))
+            .collect();
+        let ends = measured.at_step(measured.n_steps - 1, metric);
+        let (unit, is_share) = unit(name);
+        let summary = MetricSummary {
+            unit,
+            time_mean: Estimate::of(&means, is_share)?,
+            end: Estimate::of(&ends, is_share),
+        };
+        Some((name.clone(), summary))
+    };
+    measured.metrics.iter().enumerate().filter_map(summary).collect()
+}
+
+/// Mean of a measure over the steps of a trial that have it.
+pub fn time_mean(measured: &Measured, trial: usize, metric: usize) -> Option<f64> {
+    let values: Vec<f64> = measured.course(trial, metric).filter(|value| !value.is_nan()).collect();
+    mean(&values)
+}
+
+/// What a measure counts in, and whether it is a share of something.
+fn unit(metric: &str) -> (&'static str, bool) {
+    match metric {
+        "leaders" => ("robots", false),
+        "misalignment" => ("rad", false),
+        "turning" => ("share of the greatest speed", true),
+        distance if distance.contains("_distance") => ("cm", false),
+        _ => ("share", true),
+    }
+}

@@ -1,0 +1,107 @@
+//! Curves of an evaluation: a measure against the step, per condition.
+
+use std::path::Path;
+
+use indexmap::{IndexMap, IndexSet};
+use serde::Deserialize;
+
+use super::source::plain;
+use crate::{
+    error::Error,
+    figure::{Curve, Figure, Point},
+};
+
+/// What is drawn of a row of `steps.csv`.
+#[derive(Debug, Deserialize)]
+struct Row {
+    condition: String,
+    step: u64,
+    metric: String,
+    median: f64,
+    q1: f64,
+    q3: f64,
+}
+
+/// The median of a measure between its quartiles, per condition of the evaluation in
+/// a directory. No measure need be named if there is only one.
+pub fn figure(dir: &Path, metric: Option<&str>) -> Result<Figure, Error> {
+    let path = dir.join("steps.csv");
+    let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
+    let mut reader = csv::Reader::from_path(&path).map_err(|error| problem(plain(&error)))?;
+    let rows: Vec<Row> = reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
+        problem(format!("{}; expected what `swarmctl evaluate` writes", plain(&error)))
+    })?;
+    let metrics: IndexSet<&str> = rows.iter().map(|row| row.metric.as_str()).collect();
+    let known = || metrics.iter().copied().collect::<Vec<_>>().join(", ");
+    let metric = match metric {
+        Some(name) if metrics.contains(name) => name,
+        Some(name) => return Err(problem(format!("no measure `{name}`; there are: {}", known()))),
+        None if metrics.len() == 1 => metrics[0],
+        None => return Err(problem(format!("choose a measure with --metric: {}", known()))),
+    };
+    let mut curves: IndexMap<&str, Vec<Point>> = IndexMap::new();
+    for row in rows.iter().filter(|row| row.metric == metric) {
+        let Row { q1: low, median: middle, q3: high, .. } = *row;
+        if [low, middle, high].iter().all(|value| value.is_finite()) {
+            let point = Point { x: row.step as f64, low, middle, high };
+            curves.entry(&row.condition).or_default().push(point);
+        }
+    }
+    let curve = |(name, points): (&str, Vec<Point>)| Curve { name: name.to_owned(), points };
+    Ok(Figure {
+        x_label: "step".into(),
+        y_label: metric.replace('_', " "),
+        curves: curves.into_iter().map(curve).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    const STEPS: &str = "\
+condition,step,metric,n,median,q1,q3,mean
+nominal,0,leaders,50,3,2,4,3
+nominal,0,one_leader,50,0,0,1,0.25
+nominal,5,leaders,50,1,1,2,1.5
+\"robots=5, faulty\",0,leaders,50,2,1,2,2
+";
+
+    fn drawn(text: &str, metric: Option<&str>) -> Result<Figure, Error> {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("steps.csv"), text).unwrap();
+        figure(dir.path(), metric)
+    }
+
+    #[test]
+    fn a_curve_per_condition_goes_from_quartile_to_quartile() {
+        let figure = drawn(STEPS, Some("leaders")).unwrap();
+        assert_eq!((&*figure.x_label, &*figure.y_label), ("step", "leaders"));
+        let names: Vec<&str> = figure.curves.iter().map(|curve| &*curve.name).collect();
+        assert_eq!(names, ["nominal", "robots=5, faulty"]);
+        let last = figure.curves[0].points[1];
+        assert_eq!(last, Point { x: 5.0, low: 1.0, middle: 1.0, high: 2.0 });
+    }
+
+    #[test]
+    fn the_measure_is_chosen_by_name_unless_it_is_alone() {
+        for metric in [None, Some("leader")] {
+            let error = drawn(STEPS, metric).unwrap_err().to_string();
+            assert!(error.ends_with(": leaders, one_leader"), "{error}");
+        }
+        let one: String = STEPS.lines().take(2).map(|line| format!("{line}\n")).collect();
+        assert_eq!(drawn(&one, None).unwrap().curves.len(), 1);
+    }
+
+    #[test]
+    fn what_is_no_evaluation_is_refused_in_one_line() {
+        for text in ["a,b\n1,2\n", "", "condition,step,metric,n,median,q1,q3,mean\na,b,c\n"] {
+            let error = drawn(text, None).unwrap_err();
+            assert_eq!((error.exit_code(), error.to_string().lines().count()), (2, 1), "{error}");
+        }
+        let error = figure(Path::new("missing"), None).unwrap_err();
+        assert!(error.to_string().starts_with("missing/steps.csv: No such file"), "{error}");
+    }
+}
