@@ -24,11 +24,11 @@ for file in ca.pem coordinator.pem coordinator.key; do
     if [ -d "secrets/$file" ]; then rmdir "secrets/$file"; fi
 done
 cd secrets
-new="req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes"
+new() { openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes "$@"; }
 if [ ! -e ca.key ]; then
-    openssl $new -days 3650 -keyout ca.key -out ca.pem -subj "/CN=swarm CA" 2>/dev/null
+    new -days 3650 -keyout ca.key -out ca.pem -subj "/CN=swarm CA" 2>/dev/null
 fi
-openssl $new -days 365 -CA ca.pem -CAkey ca.key -keyout coordinator.key.new \
+new -days 365 -CA ca.pem -CAkey ca.key -keyout coordinator.key.new \
     -out coordinator.pem.new -subj "/CN=coordinator" \
     -addext "basicConstraints=critical,CA:FALSE" -addext "subjectAltName=$names"
 chmod 444 ca.pem coordinator.key.new coordinator.pem.new

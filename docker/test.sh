@@ -64,7 +64,7 @@ choose_base_images() {
     export BUILD_IMAGE=rust:1-slim-bookworm RUNTIME_IMAGE=debian:bookworm-slim
     local image missing=0
     for image in $BUILD_IMAGE $RUNTIME_IMAGE; do
-        has_image $image || timeout 300 docker pull -q $image || missing=1
+        has_image "$image" || timeout 300 docker pull -q "$image" || missing=1
     done
     ((missing)) || return 0
     step "no registry: stand-ins for the base images"
