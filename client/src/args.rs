@@ -1,6 +1,9 @@
 //! The command line.
 
+mod evaluate;
 mod help;
+mod plot;
+mod simulate;
 
 use std::{path::PathBuf, time::Duration};
 
@@ -10,9 +13,13 @@ use sim_core::Isa;
 
 use crate::{
     error::Error,
-    experiment_file::{Compiled, ExperimentFile, Overrides},
+    experiment_file::{ExperimentFile, Overrides},
     settings::Settings,
 };
+
+pub use evaluate::EvaluateArgs;
+pub use plot::PlotArgs;
+pub use simulate::SimulateArgs;
 
 /// Evolves controllers for swarms of robots.
 #[derive(Debug, Parser)]
@@ -315,81 +322,6 @@ impl ExperimentArgs {
     }
 }
 
-/// What to evaluate.
-#[derive(Debug, Clone, ClapArgs)]
-pub struct EvaluateArgs {
-    /// Number of an experiment of the coordinator: its champion and its file.
-    #[arg(required_unless_present = "genotype")]
-    pub id: Option<u64>,
-    /// File of the genotype, such as a champion file.
-    #[arg(long, value_name = "FILE", conflicts_with = "id", requires = "config")]
-    pub genotype: Option<PathBuf>,
-    /// The experiment file that goes with --genotype.
-    #[arg(long, value_name = "FILE", requires = "genotype")]
-    pub config: Option<PathBuf>,
-    /// Episodes per condition.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = value_parser!(u32).range(1..=1000))]
-    pub trials: u32,
-    /// Steps per episode, instead of the file's.
-    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
-    pub steps: Option<u32>,
-    /// A condition for each of these sizes of the swarm. The world keeps its size.
-    #[arg(long, value_name = "N,...", value_delimiter = ',')]
-    pub robots: Vec<u32>,
-    /// A condition with a perturbation: leader_failure, topology_switch,
-    /// uncontrollable_rotation, stimuli_inhibition; with parameters or defaults.
-    #[arg(long, value_name = "NAME[:KEY=VALUE,...]")]
-    pub perturb: Vec<String>,
-    /// A condition for each of these stimuli: the network gets zeros for it. A name
-    /// of the file's stimuli, or their sensor, such as wireless_receiver:msg or msg.
-    #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
-    pub inhibit: Vec<String>,
-    /// A condition with something else in the experiment file; several changes are
-    /// separated by semicolons.
-    #[arg(long, value_name = "PATH=VALUE[;...]")]
-    pub set: Vec<String>,
-    /// The same, in all conditions, the nominal one too.
-    #[arg(long, value_name = "PATH=VALUE[;...]")]
-    pub base: Vec<String>,
-    /// Rows of steps.csv for every so many steps only.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
-    pub every: u32,
-    /// Share of the fleet, 1 to 1000, beside experiments [default: 100]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
-    pub priority: Option<u32>,
-    /// Compute in this process, with workers of its own, as `run` does.
-    #[arg(long)]
-    pub local: bool,
-    /// Number of these workers [default: the number of cores]
-    #[arg(long, value_name = "N", requires = "local", value_parser = value_parser!(u16).range(1..=1024))]
-    pub workers: Option<u16>,
-    /// Directory of the results; made if there is none.
-    #[arg(long, value_name = "DIR")]
-    pub to: PathBuf,
-    #[command(flatten)]
-    pub isa: IsaArgs,
-}
-
-/// What to draw.
-#[derive(Debug, ClapArgs)]
-pub struct PlotArgs {
-    /// Numbers of experiments of the coordinator, or files that `swarmctl history
-    /// ID --output csv` has written; at most 14.
-    #[arg(required_unless_present = "steps", value_name = "ID|FILE")]
-    pub runs: Vec<String>,
-    /// Draw an evaluation instead: the directory that `swarmctl evaluate` has written.
-    ///
-    /// A curve per condition: the median over the trials, between the quartiles.
-    #[arg(long, value_name = "DIR", conflicts_with = "runs")]
-    pub steps: Option<PathBuf>,
-    /// Which measure of the evaluation.
-    #[arg(long, value_name = "NAME", requires = "steps")]
-    pub metric: Option<String>,
-    /// The figure: .svg for documents, .png for everything else.
-    #[arg(long, value_name = "FILE")]
-    pub to: PathBuf,
-}
-
 /// What to measure.
 #[derive(Debug, ClapArgs)]
 pub struct BenchArgs {
@@ -418,79 +350,6 @@ impl IsaArgs {
     /// The level to use.
     pub fn get(self) -> Isa {
         self.isa.unwrap_or_else(Isa::best)
-    }
-}
-
-/// What to simulate.
-#[derive(Debug, Clone, ClapArgs)]
-#[command(after_help = help::SIMULATE)]
-pub struct SimulateArgs {
-    /// The experiment file.
-    pub config: PathBuf,
-    /// File of the genotype: a JSON list of genes, or an object with a `genotype`,
-    /// such as a champion file.
-    ///
-    /// Without it, and without --experiment, genes are drawn uniformly from the
-    /// streams (seed, generation 0, trial 0, evolution, population): the first
-    /// individual of a GA.
-    #[arg(long, value_name = "FILE", conflicts_with = "experiment")]
-    pub genotype: Option<PathBuf>,
-    /// Take the champion of this experiment of the coordinator.
-    #[arg(long, value_name = "ID")]
-    pub experiment: Option<u64>,
-    /// Seed of all randomness, instead of the file's.
-    #[arg(long, value_name = "S")]
-    pub seed: Option<u64>,
-    /// Generation, from 0, whose worlds to simulate.
-    #[arg(long, value_name = "G", default_value_t = 0)]
-    pub generation: u64,
-    /// Number of trials, instead of the file's.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
-    pub trials: Option<u32>,
-    /// Number of steps per trial, instead of the file's.
-    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
-    pub steps: Option<u32>,
-    /// Write everything that every robot does to this CSV file.
-    ///
-    /// One row per trial, step and robot. Columns:
-    ///
-    ///   trial, step, robot       numbers, from 0
-    ///   object                   the robot's object in the experiment file
-    ///   x_cm, y_cm               position at the end of the step
-    ///   heading_rad              heading at the end of the step, in [0, 2 pi)
-    ///   wheel_right, wheel_left  actions, in [-1, 1]
-    ///   led                      colour, 0 off
-    ///   mode                     send or relay
-    ///   message_0, ...           own message; on the air if the mode is send
-    ///   frame_originator         robot whose message was received; empty if none
-    ///   frame_hops               emissions of that message, from 1
-    ///   frame_sector             sector that received it, from 0
-    ///   frame_signal             its strength, in (0, 1]
-    ///   stimulus_NAME_0, ...     inputs of the controller
-    ///   light_0_x_cm, ...        positions of the lights during the step
-    ///   step_fitness             fitness of the step; empty if it does not count
-    ///   metric_NAME, ...         measures of the task in this step
-    ///
-    /// The last three kinds are the same for all robots of a step.
-    #[arg(long, value_name = "FILE", verbatim_doc_comment)]
-    pub trace: Option<PathBuf>,
-    #[command(flatten)]
-    pub isa: IsaArgs,
-}
-
-impl SimulateArgs {
-    /// What to change.
-    pub fn overrides(&self) -> Overrides {
-        let Self { seed, steps, trials, .. } = *self;
-        Overrides { seed, steps, trials, ..Overrides::default() }
-    }
-
-    /// What the file describes, changed.
-    pub fn compiled(&self) -> Result<Compiled, Error> {
-        let file = ExperimentFile::read(&self.config);
-        let compiled = file.and_then(|file| file.compile(&self.overrides()));
-        let compiled = compiled.map_err(|error| Error::invalid(&self.config, &error))?;
-        Ok(Compiled { experiment: compiled.experiment.with_isa(self.isa.get()), ..compiled })
     }
 }
 
