@@ -30,8 +30,8 @@ pub(crate) struct Item {
     pub(crate) genotype: Vec<f64>,
 }
 
-/// Computes the fitness of an item, one per trial, or measures its trials, or says why it cannot. Asks now
-/// and then whether to go on; none if it was stopped.
+/// Computes the fitness of an item, one per trial, or measures its trials, or says
+/// why it cannot. Asks now and then whether to go on; none if it was stopped.
 pub(crate) type Evaluator =
     Arc<dyn Fn(&Item, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
 
