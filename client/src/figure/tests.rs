@@ -1,3 +1,5 @@
+//! What a figure shows, as SVG and as PNG.
+
 use super::*;
 
 fn curve(name: &str, points: &[(f64, f64, f64, f64)]) -> Curve {

@@ -1,3 +1,5 @@
+//! Conditions, statistics and files of an evaluation, and how it is asked for.
+
 use std::path::PathBuf;
 
 use serde_json::{Value, json};

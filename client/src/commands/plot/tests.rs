@@ -1,3 +1,5 @@
+//! Where the curves of a figure come from, and what is refused.
+
 use std::{fs, path::PathBuf};
 
 use swarm_proto::v1::{Event, Experiment, GenerationSummary, event::Kind};
