@@ -47,6 +47,7 @@ impl Default for Calls {
             swarm_proto::FILE_DESCRIPTOR_SET,
             tonic_health::pb::FILE_DESCRIPTOR_SET,
             tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
+            tonic_reflection::pb::v1alpha::FILE_DESCRIPTOR_SET,
         ];
         Self {
             methods: Arc::new(files.into_iter().flat_map(methods).collect()),
@@ -203,10 +204,18 @@ mod tests {
         drop(call(&calls, list, Some(Code::Unauthenticated)).await);
         drop(call(&calls, list, Some(Code::Unauthenticated)).await);
         drop(call(&calls, "/grpc.health.v1.Health/Check", Some(Code::NotFound)).await);
+        let reflections = ["v1", "v1alpha"]
+            .map(|name| format!("grpc.reflection.{name}.ServerReflection/ServerReflectionInfo"));
+        for path in &reflections {
+            drop(call(&calls, &format!("/{path}"), Some(Code::Ok)).await);
+        }
         for path in ["/", "/swarm.v1.ExperimentService/Other", "/a/b"] {
             drop(call(&calls, path, Some(Code::Unimplemented)).await);
         }
+        let [v1, v1alpha] = reflections;
         let expected = [
+            ((v1, "OK"), 1),
+            ((v1alpha, "OK"), 1),
             (("grpc.health.v1.Health/Check".to_owned(), "NOT_FOUND"), 1),
             ((list[1..].to_owned(), "OK"), 1),
             ((list[1..].to_owned(), "UNAUTHENTICATED"), 2),
