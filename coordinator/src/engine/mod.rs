@@ -40,6 +40,7 @@ mod fleet_time;
 mod generation;
 mod messages;
 mod results;
+mod standings;
 mod worker;
 
 use std::{
@@ -62,7 +63,8 @@ use experiment::ExperimentWork;
 pub use figures::{FleetFigures, Tally, WorkFigures};
 use fleet_time::FleetTime;
 use generation::{GenerationInProgress, Shape, Task};
-use worker::{FULL_LOAD, Worker};
+use standings::Standings;
+use worker::Worker;
 
 pub use messages::{
     Command, FleetSize, Introduction, Item, ItemResult, JudgedGeneration, SharedGenotype,
@@ -111,45 +113,6 @@ pub struct Engine {
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
     tally: Tally,
-}
-
-/// The workers, sorted by what they can take.
-#[derive(Debug, Default)]
-struct Standings {
-    /// Workers with credit, least loaded first, and among those the fastest.
-    available: BTreeSet<(u64, u32, WorkerId)>,
-    /// Workers with items that wait behind others, most loaded last.
-    backlogged: BTreeSet<(u64, WorkerId)>,
-    /// Slots that may have an item and have none.
-    n_idle_slots: usize,
-    /// Slots that may have an item.
-    n_usable_slots: usize,
-}
-
-impl Standings {
-    fn add(&mut self, id: WorkerId, worker: &Worker) {
-        let load = worker.load();
-        if worker.has_credit() {
-            self.available.insert((load, worker.pace_rank(), id));
-        }
-        if load > FULL_LOAD {
-            self.backlogged.insert((load, id));
-        }
-        self.n_idle_slots += worker.n_idle_slots();
-        self.n_usable_slots += if worker.is_usable() { worker.n_slots() } else { 0 };
-    }
-
-    fn remove(&mut self, id: WorkerId, worker: &Worker) {
-        let load = worker.load();
-        if worker.has_credit() {
-            self.available.remove(&(load, worker.pace_rank(), id));
-        }
-        if load > FULL_LOAD {
-            self.backlogged.remove(&(load, id));
-        }
-        self.n_idle_slots -= worker.n_idle_slots();
-        self.n_usable_slots -= if worker.is_usable() { worker.n_slots() } else { 0 };
-    }
 }
 
 impl Engine {

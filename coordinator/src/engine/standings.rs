@@ -1,0 +1,48 @@
+//! Who could take work, and who has too much of it.
+
+use std::collections::BTreeSet;
+
+use crate::ids::WorkerId;
+
+use super::worker::{FULL_LOAD, Worker};
+
+/// The workers, sorted by what they can take.
+#[derive(Debug, Default)]
+pub struct Standings {
+    /// Workers with credit, least loaded first, and among those the fastest.
+    pub available: BTreeSet<(u64, u32, WorkerId)>,
+    /// Workers with items that wait behind others, most loaded last.
+    pub backlogged: BTreeSet<(u64, WorkerId)>,
+    /// Slots that may have an item and have none.
+    pub n_idle_slots: usize,
+    /// Slots that may have an item.
+    pub n_usable_slots: usize,
+}
+
+impl Standings {
+    /// Sorts a worker in.
+    pub fn add(&mut self, id: WorkerId, worker: &Worker) {
+        let load = worker.load();
+        if worker.has_credit() {
+            self.available.insert((load, worker.pace_rank(), id));
+        }
+        if load > FULL_LOAD {
+            self.backlogged.insert((load, id));
+        }
+        self.n_idle_slots += worker.n_idle_slots();
+        self.n_usable_slots += if worker.is_usable() { worker.n_slots() } else { 0 };
+    }
+
+    /// Takes a worker out, as it was when it was added.
+    pub fn remove(&mut self, id: WorkerId, worker: &Worker) {
+        let load = worker.load();
+        if worker.has_credit() {
+            self.available.remove(&(load, worker.pace_rank(), id));
+        }
+        if load > FULL_LOAD {
+            self.backlogged.remove(&(load, id));
+        }
+        self.n_idle_slots -= worker.n_idle_slots();
+        self.n_usable_slots -= if worker.is_usable() { worker.n_slots() } else { 0 };
+    }
+}
