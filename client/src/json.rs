@@ -223,10 +223,14 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
     }
 }
 
-/// A champion, all of it, as `champion` prints it.
+/// A champion, all of it and of what it is one, as `champion` prints it.
 #[derive(Debug, Serialize)]
 pub struct ChampionDocument<'a> {
     experiment: u64,
+    name: &'a str,
+    seed: u64,
+    simulation: &'a str,
+    config_digest: &'a str,
     #[serde(flatten)]
     summary: ChampionSummary,
     trial_fitness: &'a [f64],
@@ -236,9 +240,16 @@ pub struct ChampionDocument<'a> {
 
 impl<'a> ChampionDocument<'a> {
     /// Fails if the network is not JSON.
-    pub fn new(champion: &'a GetChampionResponse) -> serde_json::Result<Self> {
+    pub fn new(
+        experiment: &'a Experiment,
+        champion: &'a GetChampionResponse,
+    ) -> serde_json::Result<Self> {
         Ok(Self {
             experiment: champion.experiment_id,
+            name: &experiment.name,
+            seed: experiment.seed,
+            simulation: &experiment.simulation,
+            config_digest: &experiment.config_digest,
             summary: champion.into(),
             trial_fitness: &champion.trial_fitness,
             genotype: &champion.genotype,
@@ -360,12 +371,24 @@ mod tests {
     }
 
     #[test]
-    fn a_champion_contains_its_network() {
+    fn a_champion_contains_its_network_and_what_it_was_evolved_with() {
         let champion = champion();
-        let value = serde_json::to_value(ChampionDocument::new(&champion).unwrap()).unwrap();
+        let experiment = Experiment {
+            name: "leader".into(),
+            seed: 7,
+            config_digest: "c0".repeat(32),
+            simulation: "sim-core 1".into(),
+            ..Experiment::default()
+        };
+        let document = ChampionDocument::new(&experiment, &champion).unwrap();
+        let value = serde_json::to_value(document).unwrap();
+        assert_eq!(value["name"], "leader");
+        assert_eq!(value["seed"], 7);
+        assert_eq!(value["config_digest"], "c0".repeat(32));
+        assert_eq!(value["simulation"], "sim-core 1");
         assert_eq!(value["network"]["neurons"][0]["tau"], 0.1);
         assert_eq!(value["genotype"][1].as_f64().unwrap().to_bits(), (1.0f64 / 3.0).to_bits());
         let broken = GetChampionResponse { network_json: "{".into(), ..champion };
-        assert!(ChampionDocument::new(&broken).is_err());
+        assert!(ChampionDocument::new(&experiment, &broken).is_err());
     }
 }

@@ -19,6 +19,10 @@ pub struct PlotArgs {
     /// Which measure of the evaluation.
     #[arg(long, value_name = "NAME", requires = "steps")]
     pub metric: Option<String>,
+    /// Which condition of the evaluation; several times for several, in this order.
+    /// All of them if none is named.
+    #[arg(long = "condition", value_name = "NAME", requires = "steps")]
+    pub conditions: Vec<String>,
     /// The figure: .svg for documents, .png for everything else.
     #[arg(long, value_name = "FILE")]
     pub to: PathBuf,

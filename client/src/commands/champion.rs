@@ -1,6 +1,6 @@
 //! `swarmctl champion`: the best genotype so far, as JSON.
 
-use swarm_proto::v1::GetChampionResponse;
+use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use crate::{connection::Connection, error::Error, json, progress::Progress};
 
@@ -10,13 +10,17 @@ pub async fn champion(
     experiment_id: u64,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    let experiment = connection.experiment(experiment_id).await?;
     let champion = connection.champion(experiment_id).await?;
-    progress.print(&champion_document(&champion)?)
+    progress.print(&champion_document(&experiment, &champion)?)
 }
 
 /// A champion as `champion` prints it and `run` stores it.
-pub fn champion_document(champion: &GetChampionResponse) -> Result<String, Error> {
-    let document = json::ChampionDocument::new(champion).map_err(|error| {
+pub fn champion_document(
+    experiment: &Experiment,
+    champion: &GetChampionResponse,
+) -> Result<String, Error> {
+    let document = json::ChampionDocument::new(experiment, champion).map_err(|error| {
         Error::Internal(format!("the coordinator's network is not JSON: {error}"))
     })?;
     Ok(json::document(&document))

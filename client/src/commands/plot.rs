@@ -62,7 +62,7 @@ pub async fn plot(
 
 /// Draws what an evaluation has measured.
 fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<(), Error> {
-    let figure = steps::figure(dir, args.metric.as_deref())?;
+    let figure = steps::figure(dir, args.metric.as_deref(), &args.conditions)?;
     if figure.curves.len() > CURVES_MAX {
         return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} conditions")));
     }

@@ -149,7 +149,7 @@ fn write_champion(
     champion: &GetChampionResponse,
 ) -> Result<PathBuf, Error> {
     let path = data_dir.join(champion_file_name(experiment));
-    fs::write(&path, champion_document(champion)? + "\n")
+    fs::write(&path, champion_document(experiment, champion)? + "\n")
         .map_err(|source| Error::Write { what: path.display().to_string(), source })?;
     Ok(path)
 }
@@ -213,8 +213,9 @@ mod tests {
             network_json: "{}".into(),
             ..GetChampionResponse::default()
         };
-        let path = write_champion(dir.path(), &experiment(3, "a"), &champion).unwrap();
+        let experiment = experiment(3, "a");
+        let path = write_champion(dir.path(), &experiment, &champion).unwrap();
         let stored = fs::read_to_string(path).unwrap();
-        assert_eq!(stored, champion_document(&champion).unwrap() + "\n");
+        assert_eq!(stored, champion_document(&experiment, &champion).unwrap() + "\n");
     }
 }

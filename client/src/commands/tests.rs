@@ -78,6 +78,7 @@ fn script() -> Script {
             digest: "2".repeat(64),
             priority: 100,
             last_sequence: 5,
+            simulation: "sim-core 0.0.0 format 0".into(),
             ..Experiment::default()
         },
         champion: Some(GetChampionResponse {

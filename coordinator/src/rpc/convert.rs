@@ -130,6 +130,7 @@ pub fn experiment(experiment: Experiment) -> v1::Experiment {
         digest: experiment.digest,
         priority: experiment.priority.weight(),
         last_sequence: experiment.last_sequence,
+        simulation: experiment.fingerprint,
     }
 }
 

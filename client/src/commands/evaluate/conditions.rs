@@ -22,7 +22,7 @@ const CONDITIONS_MAX: usize = 64;
 pub struct Condition {
     /// For tables and legends.
     pub name: String,
-    /// Beyond the nominal condition.
+    /// Beyond the nominal condition; of that one, beyond the experiment file.
     pub changes: Vec<Change>,
     /// The experiment file, changed.
     pub config: ExperimentConfig,
@@ -58,13 +58,16 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
     let overrides = Overrides { steps: args.steps, ..Overrides::default() };
     let compiled = file.compile(&overrides).map_err(|error| file.invalid(&error))?;
     let mut base = to_json(&compiled.config);
+    let mut base_changes = Vec::new();
     for text in &args.base {
         for change in parsed("--base", text)? {
             change.apply(&mut base).map_err(|problem| Error::Input(format!("--base {problem}")))?;
+            base_changes.push(change);
         }
     }
     let nominal = Nominal { config: read("--base", &base)?, base };
-    let mut conditions = vec![nominal.condition("nominal".into(), Vec::new())?];
+    let unchanged = nominal.condition("nominal".into(), Vec::new())?;
+    let mut conditions = vec![Condition { changes: base_changes, ..unchanged }];
     for &n in &args.robots {
         conditions.push(nominal.condition(format!("robots={n}"), nominal.robots(n))?);
     }

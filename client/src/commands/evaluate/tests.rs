@@ -129,6 +129,14 @@ fn changes_make_a_condition_or_all_of_them() {
         assert_eq!((&config["world"]["height"], &config["seed"]), (&json!(2000.0), &json!(7)));
         assert_eq!(config["algorithm"]["evaluation_steps"], 50);
     }
+    // What changed everywhere is told of the nominal condition alone.
+    let paths = [0, 1].map(|index| {
+        let changes = conditions[index].changes.iter();
+        changes.map(|change| change.path.clone()).collect::<Vec<_>>()
+    });
+    let expected =
+        [strings(&["world.height", "seed"]), strings(&[&path[..path.find('=').unwrap()]])];
+    assert_eq!(paths, expected);
 }
 
 #[test]

@@ -23,8 +23,8 @@ struct Row {
 }
 
 /// The median of a measure between its quartiles, per condition of the evaluation in
-/// a directory. No measure need be named if there is only one.
-pub fn figure(dir: &Path, metric: Option<&str>) -> Result<Figure, Error> {
+/// a directory. No measure need be named if there is only one; no conditions are all.
+pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result<Figure, Error> {
     let path = dir.join("steps.csv");
     let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
     let mut reader = csv::Reader::from_path(&path).map_err(|error| problem(plain(&error)))?;
@@ -47,11 +47,21 @@ pub fn figure(dir: &Path, metric: Option<&str>) -> Result<Figure, Error> {
             curves.entry(&row.condition).or_default().push(point);
         }
     }
-    let curve = |(name, points): (&str, Vec<Point>)| Curve { name: name.to_owned(), points };
+    let names: Vec<&str> = match conditions {
+        [] => curves.keys().copied().collect(),
+        some => some.iter().map(String::as_str).collect(),
+    };
+    let curve = |name: &&str| match curves.get(name) {
+        Some(points) => Ok(Curve { name: (*name).to_owned(), points: points.clone() }),
+        None => {
+            let known = curves.keys().copied().collect::<Vec<_>>().join(", ");
+            Err(problem(format!("no condition `{name}` with that measure; there are: {known}")))
+        }
+    };
     Ok(Figure {
         x_label: "step".into(),
         y_label: metric.replace('_', " "),
-        curves: curves.into_iter().map(curve).collect(),
+        curves: names.iter().map(curve).collect::<Result<_, _>>()?,
     })
 }
 
@@ -72,7 +82,7 @@ nominal,5,leaders,50,1,1,2,1.5
     fn drawn(text: &str, metric: Option<&str>) -> Result<Figure, Error> {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("steps.csv"), text).unwrap();
-        figure(dir.path(), metric)
+        figure(dir.path(), metric, &[])
     }
 
     #[test]
@@ -83,6 +93,21 @@ nominal,5,leaders,50,1,1,2,1.5
         assert_eq!(names, ["nominal", "robots=5, faulty"]);
         let last = figure.curves[0].points[1];
         assert_eq!(last, Point { x: 5.0, low: 1.0, middle: 1.0, high: 2.0 });
+    }
+
+    #[test]
+    fn conditions_are_drawn_in_the_order_in_which_they_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("steps.csv"), STEPS).unwrap();
+        let named = |metric, names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+            figure(dir.path(), Some(metric), &names)
+        };
+        let figure = named("leaders", &["robots=5, faulty", "nominal"]).unwrap();
+        let names: Vec<&str> = figure.curves.iter().map(|curve| &*curve.name).collect();
+        assert_eq!(names, ["robots=5, faulty", "nominal"]);
+        let error = named("one_leader", &["robots=5, faulty"]).unwrap_err().to_string();
+        assert!(error.ends_with("there are: nominal"), "{error}");
     }
 
     #[test]
@@ -101,7 +126,7 @@ nominal,5,leaders,50,1,1,2,1.5
             let error = drawn(text, None).unwrap_err();
             assert_eq!((error.exit_code(), error.to_string().lines().count()), (2, 1), "{error}");
         }
-        let error = figure(Path::new("missing"), None).unwrap_err();
+        let error = figure(Path::new("missing"), None, &[]).unwrap_err();
         assert!(error.to_string().starts_with("missing/steps.csv: No such file"), "{error}");
     }
 }

@@ -34,7 +34,7 @@ async fn run(coordinator: &str, runs: &[&str], to: PathBuf) -> Result<String, Er
     let captured = Captured::default();
     let settings = Settings { coordinator: Some(coordinator.into()), ..Settings::default() };
     let runs = runs.iter().map(ToString::to_string).collect();
-    let args = PlotArgs { runs, steps: None, metric: None, to };
+    let args = PlotArgs { runs, steps: None, metric: None, conditions: Vec::new(), to };
     plot(settings, &args, &mut captured.progress(OutputFormat::Table)).await?;
     Ok(captured.lines().join("\n"))
 }
