@@ -1,0 +1,153 @@
+//! What is in `results/` is what this program computes: whoever repeats a run gets
+//! its bits. The whole of it takes hours; its beginning and its champion do not.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use coordinator::evolution::Digest;
+use harness::{swarmctl, workspace_file};
+use serde_json::Value;
+use sim_core::config::ExperimentConfig;
+
+/// Generations that are computed again.
+const N_GENERATIONS: usize = 3;
+
+/// A run in `results/`.
+struct Run {
+    /// Of its files, without their endings.
+    stem: String,
+    champion: Value,
+    history: Vec<BTreeMap<String, String>>,
+}
+
+impl Run {
+    fn read(champion: &Path) -> Self {
+        let stem = champion.file_stem().unwrap().to_str().unwrap().to_owned();
+        let champion = serde_json::from_str(&fs::read_to_string(champion).unwrap()).unwrap();
+        let history = fs::read_to_string(results(&format!("histories/{stem}.csv"))).unwrap();
+        let mut lines = history.lines().map(|line| line.split(',').map(str::to_owned));
+        let keys: Vec<String> = lines.next().unwrap().collect();
+        let history = lines.map(|values| keys.iter().cloned().zip(values).collect()).collect();
+        Self { stem, champion, history }
+    }
+
+    fn all() -> Vec<Self> {
+        let entries = fs::read_dir(results("champions")).unwrap();
+        let mut champions: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+        champions.sort();
+        champions.iter().map(|path| Self::read(path)).collect()
+    }
+
+    fn seed(&self) -> String {
+        self.champion["seed"].to_string()
+    }
+
+    fn config_path(&self) -> String {
+        let name = self.champion["name"].as_str().unwrap();
+        workspace_file(&format!("configs/{name}.json")).to_str().unwrap().to_owned()
+    }
+
+    /// The experiment file, with the run's seed.
+    fn config(&self) -> ExperimentConfig {
+        let text = fs::read_to_string(self.config_path()).unwrap();
+        let (mut config, _) = ExperimentConfig::from_json(&text, "").unwrap();
+        config.seed = self.champion["seed"].as_u64().unwrap();
+        config
+    }
+}
+
+fn results(path: &str) -> PathBuf {
+    workspace_file("results").join(path)
+}
+
+#[test]
+fn runs_are_complete_and_of_the_shipped_experiments() {
+    let runs = Run::all();
+    assert!(!runs.is_empty());
+    for run in &runs {
+        let config = run.config();
+        assert_eq!(run.stem, format!("{}-{}", config.name, config.seed));
+        assert_eq!(run.champion["config_digest"], Digest::of_config(&config).to_string());
+        assert_eq!(run.champion["simulation"], sim_core::FINGERPRINT);
+        assert_eq!(run.history.len() as u64, config.algorithm.generations, "{}", run.stem);
+        for (i, generation) in run.history.iter().enumerate() {
+            assert_eq!(generation["generation"], i.to_string(), "{}", run.stem);
+        }
+    }
+    assert_eq!(fs::read_dir(results("histories")).unwrap().count(), runs.len());
+}
+
+#[test]
+fn runs_that_are_repeated_begin_with_the_same_bits() {
+    for run in Run::all() {
+        let data_dir = tempfile::tempdir().unwrap();
+        let generations = N_GENERATIONS.to_string();
+        let lines = swarmctl([
+            "run",
+            &run.config_path(),
+            "--seed",
+            &run.seed(),
+            "--generations",
+            &generations,
+            "--data-dir",
+            data_dir.path().to_str().unwrap(),
+        ])
+        .expect_success()
+        .json_lines();
+        let again: Vec<&str> = lines[..N_GENERATIONS]
+            .iter()
+            .map(|generation| generation["digest"].as_str().unwrap())
+            .collect();
+        let published: Vec<&str> = run.history[..N_GENERATIONS]
+            .iter()
+            .map(|generation| generation["digest"].as_str())
+            .collect();
+        assert_eq!(again, published, "{}", run.stem);
+    }
+}
+
+/// Trials do not depend on how many there are, so a few of them are enough.
+#[test]
+fn evaluations_that_are_repeated_have_the_same_bits() {
+    let evaluations = fs::read_dir(results("evaluations")).unwrap();
+    let mut evaluations: Vec<PathBuf> = evaluations.map(|entry| entry.unwrap().path()).collect();
+    evaluations.sort();
+    assert!(!evaluations.is_empty());
+    for evaluation in evaluations {
+        let stem = evaluation.file_name().unwrap().to_str().unwrap();
+        let summary: Value =
+            serde_json::from_str(&fs::read_to_string(evaluation.join("summary.json")).unwrap())
+                .unwrap();
+        let run = Run::read(&results(&format!("champions/{stem}.json")));
+        let again = tempfile::tempdir().unwrap();
+        let mut args: Vec<String> =
+            ["evaluate", "--local", "--trials", "2", "--genotype"].map(str::to_owned).into();
+        args.push(results(&format!("champions/{stem}.json")).to_str().unwrap().to_owned());
+        args.extend(["--config".to_owned(), run.config_path()]);
+        args.extend(["--base".to_owned(), format!("seed={}", run.seed())]);
+        args.extend(["--steps".to_owned(), summary["steps"].to_string()]);
+        args.extend(["--to".to_owned(), again.path().to_str().unwrap().to_owned()]);
+        for (index, condition) in summary["conditions"].as_array().unwrap().iter().enumerate() {
+            let changes = condition["changes"].as_object().unwrap().iter();
+            let changes = changes.map(|(path, value)| format!("{path}={value}"));
+            if index == 0 {
+                args.extend(changes.flat_map(|change| ["--base".to_owned(), change]));
+            } else {
+                let changes: Vec<String> = changes.collect();
+                args.extend(["--set".to_owned(), changes.join("; ")]);
+            }
+        }
+        swarmctl(&args).expect_success();
+        // Without the conditions' names: here they are what they change.
+        let rows = |directory: &Path| -> Vec<String> {
+            let text = fs::read_to_string(directory.join("trials.csv")).unwrap();
+            let rows = text.lines().skip(1).map(|row| row.rsplitn(5, ',').collect::<Vec<_>>());
+            rows.filter(|row| ["0", "1"].contains(&row[3])).map(|row| row[..4].join(",")).collect()
+        };
+        assert_eq!(rows(again.path()), rows(&evaluation), "{stem}");
+    }
+}
