@@ -110,6 +110,37 @@ fn runs_that_are_repeated_begin_with_the_same_bits() {
     }
 }
 
+#[test]
+fn champions_have_the_fitness_for_which_they_were_chosen() {
+    for run in Run::all() {
+        // Means of a distribution were in no generation; evaluations are about those.
+        let trials = run.champion["trial_fitness"].as_array().unwrap();
+        if trials.is_empty() {
+            continue;
+        }
+        let again = swarmctl([
+            "simulate",
+            &run.config_path(),
+            "--genotype",
+            results(&format!("champions/{}.json", run.stem)).to_str().unwrap(),
+            "--seed",
+            &run.seed(),
+            "--generation",
+            &run.champion["generation"].to_string(),
+        ])
+        .expect_success()
+        .json();
+        let bits = |fitness: &Value| fitness.as_f64().unwrap().to_bits();
+        let again: Vec<u64> = again["trials"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|trial| bits(&trial["fitness"]))
+            .collect();
+        assert_eq!(again, trials.iter().map(bits).collect::<Vec<_>>(), "{}", run.stem);
+    }
+}
+
 /// Trials do not depend on how many there are, so a few of them are enough.
 #[test]
 fn evaluations_that_are_repeated_have_the_same_bits() {
