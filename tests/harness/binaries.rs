@@ -10,7 +10,9 @@ use std::{
 /// Path of one of the workspace's programs: `coordinator`, `worker`, `swarmctl`.
 ///
 /// Cargo builds programs only for the tests of their own package, so the first
-/// call builds them all, into the directory and profile of the running test.
+/// call builds them all, into the directory and profile of the running test. It
+/// names a test, too: with one, libraries have the features that `cargo test
+/// --workspace` has given them, and need not be compiled a second time.
 pub fn binary(name: &str) -> PathBuf {
     static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
     DIRECTORY.get_or_init(build).join(name)
@@ -26,7 +28,7 @@ fn build() -> PathBuf {
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args(["build", "--quiet", "--bins", "-p", "coordinator", "-p", "worker", "-p", "swarmctl"])
+        .args(["build", "--quiet", "--workspace", "--bins", "--test", "documents"])
         .args(["--profile", profile, "--target-dir"])
         .arg(directory.parent().expect("cargo's layout"))
         .current_dir(env!("CARGO_MANIFEST_DIR"))
