@@ -60,6 +60,9 @@ fn a_champion_in_the_worlds_of_its_generation_has_the_fitness_that_is_stored() {
     let file = lines.last().unwrap()["champion_file"].as_str().unwrap();
     let champion: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     let generation = champion["generation"].to_string();
+    // What it was evolved with.
+    assert_eq!(champion["simulation"], sim_core::FINGERPRINT);
+    assert_eq!(champion["seed"], 99);
 
     let args = ["--genotype", file, "--seed", "99", "--generation", &generation];
     let simulation = simulated(&path, &args);
