@@ -18,9 +18,9 @@ pub(crate) fn experiment_c() -> ExperimentConfig {
     read(include_str!("../../configs/orientation_consensus_snes.json"))
 }
 
-/// Light follower.
+/// Light follower, with noise.
 pub(crate) fn experiment_d() -> ExperimentConfig {
-    read(include_str!("../../configs/light_follower_snes.json"))
+    read(include_str!("../../configs/light_follower_thesis_sensors_snes.json"))
 }
 
 fn read(text: &str) -> ExperimentConfig {

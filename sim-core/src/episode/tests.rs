@@ -447,7 +447,7 @@ const GOLDEN: [[u64; 2]; 4] = [
     [0x3f35_d867_c3ec_e2a6, 0x3f50_624d_d2f1_a9fd],
     [0x3fc2_4fa4_fa4f_a4fa, 0x3fb9_4567_89ab_cdf1],
     [0x3f5e_4cf9_9743_c459, 0x3f61_6c17_ec1f_610f],
-    [0x3fa5_59b3_d07c_84e7, 0x3fa0_a3d7_0a3d_70ae],
+    [0x3fa1_a9fb_e76c_8b55, 0x3f97_2474_538e_f35f],
 ];
 
 #[test]

@@ -35,7 +35,7 @@ fn every_task_is_shipped_for_the_ga_and_for_snes() {
         ("orientation_consensus", FitnessFunction::OrientationConsensus, 10),
         ("orientation_consensus_alignment", FitnessFunction::Alignment, 10),
         ("light_follower", FitnessFunction::GotoLight, 10),
-        ("light_follower_original_light", FitnessFunction::GotoLight, 10),
+        ("light_follower_thesis_sensors", FitnessFunction::GotoLight, 10),
     ];
     for (task, fitness, n_robots) in tasks {
         for algorithm in ["ga", "snes"] {
