@@ -68,7 +68,7 @@ impl Subject {
 }
 
 fn compiled(config_json: &str) -> sim_core::Experiment {
-    let (config, _) = sim_core::config::ExperimentConfig::from_json(config_json, "").unwrap();
+    let (config, _) = experiment_file::ExperimentConfig::from_json(config_json, "").unwrap();
     sim_core::Experiment::compile(&config).unwrap()
 }
 

@@ -8,10 +8,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use coordinator::evolution::Digest;
+use evolution::Digest;
+use experiment_file::ExperimentConfig;
 use harness::{swarmctl, workspace_file};
 use serde_json::Value;
-use sim_core::config::ExperimentConfig;
 
 /// Generations that are computed again.
 const N_GENERATIONS: usize = 3;
@@ -71,7 +71,10 @@ fn runs_are_complete_and_of_the_shipped_experiments() {
     for run in &runs {
         let config = run.config();
         assert_eq!(run.stem, format!("{}-{}", config.name, config.seed));
-        assert_eq!(run.champion["config_digest"], Digest::of_config(&config).to_string());
+        assert_eq!(
+            run.champion["config_digest"],
+            Digest::of_config(&config, sim_core::FINGERPRINT).to_string()
+        );
         assert_eq!(run.champion["simulation"], sim_core::FINGERPRINT);
         assert_eq!(run.history.len() as u64, config.algorithm.generations, "{}", run.stem);
         for (i, generation) in run.history.iter().enumerate() {

@@ -9,12 +9,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use experiment_file::ExperimentConfig;
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, workspace_file};
+use numeric::random::{Purpose, Stream};
 use serde_json::json;
-use sim_core::{
-    config::ExperimentConfig,
-    random::{Purpose, Stream},
-};
 
 const N_ROUNDS: usize = 5;
 /// The first generation of a round sets up, the others are timed.

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sim_core::config::ConfigError;
+use experiment_file::ConfigError;
 use swarm_transport::tls_trouble;
 use tonic::{Code, Status};
 

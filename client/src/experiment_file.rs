@@ -6,11 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use coordinator::evolution::Evolution;
-use sim_core::{
-    Experiment,
-    config::{ConfigError, ExperimentConfig, Problem, limits},
-};
+use evolution::Evolution;
+use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
+use sim_core::Experiment;
 use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::error::{Error, prefix_lines};
@@ -73,7 +71,11 @@ impl ExperimentFile {
     /// Makes sure, as the coordinator will, that the experiment can be evolved.
     pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
         let compiled = self.compile(overrides)?;
-        Evolution::new(&compiled.config, compiled.experiment.population_segments())?;
+        Evolution::new(
+            &compiled.config,
+            compiled.experiment.population_segments(),
+            sim_core::FINGERPRINT,
+        )?;
         Ok(compiled)
     }
 

@@ -1,7 +1,7 @@
 //! The coordinator: owns every experiment's evolution, hands genotypes to
 //! workers, keeps every completed generation.
 //!
-//! - [`evolution`]: which genotypes to judge next (pure)
+//! - the crate `evolution`: which genotypes to evaluate next (pure)
 //! - [`engine`]: which worker computes what (pure, synchronous)
 //! - [`store`]: SQLite, one transaction per generation
 //! - `driver`: the loop that connects the three with the network
@@ -16,7 +16,6 @@ mod calls;
 mod clock;
 mod driver;
 pub mod engine;
-pub mod evolution;
 mod failpoint;
 mod gate;
 mod health_check;

@@ -3,15 +3,15 @@
 
 use std::sync::Arc;
 
-use sim_core::config::{ConfigError, ExperimentConfig};
+use experiment_file::{ConfigError, ExperimentConfig};
 
 use crate::{
     driver::Round,
-    evolution::{Digest, Evolution},
     ids::ExperimentId,
     priority::Priority,
     store::{self, ExperimentState, Generation, NewExperiment, StoreError},
 };
+use evolution::{Digest, Evolution};
 
 /// What a client submits.
 #[derive(Debug, Clone, Default)]
@@ -74,12 +74,13 @@ impl Submission {
             (config, _) = ExperimentConfig::from_json(&config.to_canonical_json(), &name)?;
         }
         let experiment = sim_core::Experiment::compile(&config)?;
-        let evolution = Evolution::new(&config, experiment.population_segments())?;
+        let evolution =
+            Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)?;
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         warnings.extend(experiment.uncovered_parameters().iter().cloned());
         let new = NewExperiment {
             request_id: self.request_id,
-            config_digest: Digest::of_config(&config),
+            config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
             genotype_len: experiment.genotype_len(),
             checkpoint: checkpoint_json(&evolution),
             priority: self.priority,

@@ -12,8 +12,8 @@ mod configs;
 #[path = "../tests/reference/mod.rs"]
 mod reference;
 
+use numeric::random::{Purpose, Stream};
 use sim_core::Experiment;
-use sim_core::random::{Purpose, Stream};
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d};
 

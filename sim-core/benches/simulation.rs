@@ -17,9 +17,9 @@ mod reference;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use experiment_file::{ExperimentConfig, Initializer};
+use numeric::random::{Purpose, Stream};
 use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
-use sim_core::config::{ExperimentConfig, Initializer};
-use sim_core::random::{Purpose, Stream};
 use sim_core::{Experiment, Isa};
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d, swarm_mut};

@@ -6,9 +6,9 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use crate::experiment::{EvaluateError, Experiment};
-use crate::isa::Isa;
 use crate::lanes::Lanes;
 use crate::network::ctrnn::Ctrnn;
+use numeric::Isa;
 
 /// The network of a genotype, at work without robots.
 #[derive(Debug)]

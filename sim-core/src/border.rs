@@ -61,9 +61,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::config::Initializer;
     use crate::initializers::Positions;
-    use crate::random::{Purpose, Stream};
+    use experiment_file::Initializer;
+    use numeric::random::{Purpose, Stream};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

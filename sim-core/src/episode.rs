@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use indexmap::IndexMap;
 
-use crate::config::RobotController;
 use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
 use crate::experiment::{EvaluateError, Experiment};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
+use experiment_file::RobotController;
 
 /// Lanes that are simulated side by side: enough to share the weights, few enough
 /// to stay in the cache.

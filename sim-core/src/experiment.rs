@@ -2,11 +2,9 @@
 
 use std::ops::Range;
 
-use crate::config::{ConfigError, ExperimentConfig, FitnessFunction, limits};
 use crate::episode;
 use crate::fitness;
 use crate::genotype::Codec;
-use crate::isa::Isa;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 #[cfg(doc)]
@@ -14,6 +12,8 @@ use crate::record::Metrics;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 use crate::world::World;
+use experiment_file::{ConfigError, ExperimentConfig, FitnessFunction, limits};
+use numeric::Isa;
 
 /// Trials whose start is tried out when an experiment is compiled.
 const N_TRIED_TRIALS: u32 = 8;
@@ -244,9 +244,9 @@ impl Experiment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{GenotypeQuery, SynapseSelector};
     use crate::testing::{experiment_a, genotype, robot};
     use crate::{EVALUATION, held_out};
+    use experiment_file::{GenotypeQuery, SynapseSelector};
 
     #[test]
     fn the_genotype_of_experiment_a_has_about_455_genes() {

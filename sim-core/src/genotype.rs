@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use crate::config::{
-    EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter, SynapseSelector,
-    TopologyConfig,
-};
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
-use crate::random::{Purpose, Stream};
+use experiment_file::{
+    EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter, SynapseSelector,
+    TopologyConfig,
+};
+use numeric::random::{Purpose, Stream};
 
 /// What each gene means.
 #[derive(Debug, Clone)]

@@ -1,8 +1,8 @@
 //! Lights and how they move.
 
-use crate::config::LightController;
-use crate::random::Stream;
 use crate::torus::{Torus, Vec2, wrap_angle};
+use experiment_file::LightController;
+use numeric::random::Stream;
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
@@ -94,7 +94,7 @@ impl LightPath {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 800.0 };
 

@@ -1,6 +1,6 @@
 //! Collects what is wrong with an experiment while it is compiled.
 
-use crate::config::{ConfigError, Problem};
+use experiment_file::{ConfigError, Problem};
 
 /// Problems found so far.
 #[derive(Debug, Default)]

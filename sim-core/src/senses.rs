@@ -1,13 +1,13 @@
 //! What robots perceive: the readings that stimuli are made of.
 
 use crate::communication::Mode;
-use crate::config::SensorQuery;
 use crate::neighbours::Neighbours;
-use crate::random::Stream;
 use crate::sensors::Viewpoint;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::RobotGroup;
+use experiment_file::SensorQuery;
+use numeric::random::Stream;
 
 /// Readings of the robots of one group in one trial, beside those of the radio;
 /// empty without the sensor.

@@ -1,7 +1,7 @@
 //! The shipped experiments, for tests to vary.
 
-use crate::config::{ExperimentConfig, ObjectConfig, RobotConfig};
-use crate::random::{Purpose, Stream};
+use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig};
+use numeric::random::{Purpose, Stream};
 
 /// Leader selection.
 pub(crate) fn experiment_a() -> ExperimentConfig {

@@ -4,21 +4,21 @@
 use std::mem;
 
 use crate::communication::{Mode, Radio};
-use crate::config::SensorQuery;
 use crate::controllers::Controller;
 use crate::experiment::{EvaluateError, Experiment};
 use crate::fitness::{self, Fitness, Moment};
-use crate::isa::Isa;
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::perturbations::Perturbations;
-use crate::random::{Purpose, Stream};
 use crate::record::{Metrics, StepRecord};
 use crate::senses::{Senses, Surroundings};
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::{Fixtures, Site, World};
+use experiment_file::SensorQuery;
+use numeric::Isa;
+use numeric::random::{Purpose, Stream};
 
 /// Steps at the start of an episode in which every robot sends.
 const N_FIRST_STEPS_SENDING: u32 = 10;
@@ -310,8 +310,8 @@ impl<'a> Trial<'a> {
 mod tests {
     use super::*;
     use crate::communication::Origin;
-    use crate::config::{ExperimentConfig, Initializer};
     use crate::testing::{experiment_a, robot};
+    use experiment_file::{ExperimentConfig, Initializer};
 
     /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
     fn line(n: u32) -> ExperimentConfig {

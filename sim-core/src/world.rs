@@ -3,16 +3,16 @@
 use std::ops::Range;
 
 use crate::communication::{Antenna, Quantiser, Receiver};
-use crate::config::{
-    GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig, PerturbationsConfig,
-    RobotConfig, RobotController, SensorQuery, SensorsConfig, WorldConfig,
-};
 use crate::drive::Drive;
 use crate::initializers::{Headings, Positions};
 use crate::network::Network;
 use crate::problems::Problems;
 use crate::sensors::{Decay, DistanceSensor, GroundSensor, LightSensor};
 use crate::torus::Torus;
+use experiment_file::{
+    GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig, PerturbationsConfig,
+    RobotConfig, RobotController, SensorQuery, SensorsConfig, WorldConfig,
+};
 
 /// Communication range of robots without radio, cm.
 const DEFAULT_RANGE: f64 = 100.0;

@@ -9,9 +9,9 @@ mod reference;
 
 use std::ops::Range;
 
+use experiment_file::ExperimentConfig;
+use numeric::random::{Purpose, Stream};
 use sim_core::Experiment;
-use sim_core::config::ExperimentConfig;
-use sim_core::random::{Purpose, Stream};
 
 use reference::Episode;
 

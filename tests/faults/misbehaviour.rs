@@ -7,8 +7,8 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use experiment_file::ExperimentConfig;
 use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello, undisturbed};
-use sim_core::config::ExperimentConfig;
 use swarm_proto::v1::{
     Draining, ExperimentSpec, Heartbeat, Hello, Item, ItemResult, ItemResults,
     SubmitExperimentRequest, TrialFitness, WorkRequest, WorkResponse, item_result::Outcome,

@@ -3,10 +3,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use sim_core::{
-    EVALUATION, Experiment, Isa,
-    config::{ConfigError, ExperimentConfig},
-};
+use experiment_file::{ConfigError, ExperimentConfig};
+use sim_core::{EVALUATION, Experiment, Isa};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},

@@ -7,12 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use experiment_file::ExperimentConfig;
+use numeric::random::{Purpose, Stream};
 use serde::Serialize;
-use sim_core::{
-    Experiment, Isa,
-    config::ExperimentConfig,
-    random::{Purpose, Stream},
-};
+use sim_core::{Experiment, Isa};
 
 use crate::{
     args::BenchArgs,

@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use experiment_file::{AlgorithmName, ConfigError, Problem};
 use serde::Serialize;
-use sim_core::config::{AlgorithmName, ConfigError, Problem};
 
 use crate::{
     error::Error,

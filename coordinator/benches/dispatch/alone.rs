@@ -7,11 +7,11 @@ use std::{
 };
 
 use coordinator::{
-    evolution::{Digest, Evolution},
     priority::Priority,
     store::{Generation, GenerationCommit, NewExperiment, Store},
 };
-use sim_core::config::ExperimentConfig;
+use evolution::{Digest, Evolution};
+use experiment_file::ExperimentConfig;
 use tempfile::TempDir;
 
 use super::{instant_workers::median, ms};
@@ -33,12 +33,13 @@ pub fn measure(file: &str) -> Alone {
     let (config, _) = ExperimentConfig::from_json(file, "").expect("the file is right");
     let experiment = sim_core::Experiment::compile(&config).expect("the file is right");
     let mut evolution =
-        Evolution::new(&config, experiment.population_segments()).expect("the file is right");
+        Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)
+            .expect("the file is right");
     let directory = TempDir::new().expect("a temporary directory");
     let mut store = Store::open(directory.path()).expect("a new database");
     let new = NewExperiment {
         request_id: None,
-        config_digest: Digest::of_config(&config),
+        config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
         genotype_len: experiment.genotype_len(),
         checkpoint: checkpoint(&evolution),
         priority: Priority::default(),

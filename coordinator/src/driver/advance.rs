@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use sim_core::config::ExperimentConfig;
+use experiment_file::ExperimentConfig;
 use swarm_telemetry::Histogram;
 use tokio::task;
 use tokio_util::sync::CancellationToken;

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 use tracing::{debug, info};
 
-use crate::{clock, evolution::Genotype, ids::ExperimentId, priority::Priority};
+use crate::{clock, ids::ExperimentId, priority::Priority};
+use evolution::Genotype;
 
 use super::Driver;
 

@@ -13,7 +13,7 @@ mod round;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use sim_core::config::ExperimentConfig;
+use experiment_file::ExperimentConfig;
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinSet,

@@ -3,13 +3,11 @@
 
 use std::sync::Arc;
 
-use sim_core::{config::ExperimentConfig, held_out};
+use experiment_file::ExperimentConfig;
+use sim_core::held_out;
 
-use crate::{
-    engine::JudgedGeneration,
-    evolution::{Asked, Champion, Evolution, EvolutionError, Origin, Population, Reevaluation},
-    store::Generation,
-};
+use crate::{engine::JudgedGeneration, store::Generation};
+use evolution::{Asked, Champion, Evolution, EvolutionError, Origin, Population, Reevaluation};
 
 /// What the fleet judges at once.
 #[derive(Debug)]

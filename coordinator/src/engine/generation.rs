@@ -8,10 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::{
-    evolution::Population,
-    ids::{ItemId, WorkerId},
-};
+use crate::ids::{ItemId, WorkerId};
+use evolution::Population;
 
 use super::{FleetTime, JudgedGeneration, blame::Blames};
 

@@ -8,10 +8,8 @@ use std::{
     time::Duration,
 };
 
-use crate::{
-    evolution::{Genotype, Population},
-    ids::{ExperimentId, ItemId, WorkerId},
-};
+use crate::ids::{ExperimentId, ItemId, WorkerId};
+use evolution::{Genotype, Population};
 
 /// What the shell has to do.
 #[derive(Debug, Clone, PartialEq)]

@@ -52,10 +52,10 @@ use std::{
 };
 
 use crate::{
-    evolution::{Genotype, Population},
     ids::{ExperimentId, WorkerId},
     priority::Priority,
 };
+use evolution::{Genotype, Population};
 
 pub use activity::{Activity, HeldItems, RoundActivity};
 use dispatch::Outgoing;

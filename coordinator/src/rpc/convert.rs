@@ -10,11 +10,11 @@ use tonic::Status;
 use crate::{
     driver::ToWorker,
     engine::{Item, ItemResult, WorkerStatus},
-    evolution::HeldOut,
     ids::ItemId,
     limits::TEXT_LEN_MAX,
     store::{Event, EventKind, Experiment, ExperimentState, Generation},
 };
+use evolution::HeldOut;
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,8 @@
 
 use std::{pin::Pin, sync::Arc};
 
-use sim_core::{
-    Experiment,
-    config::{ExperimentConfig, limits},
-};
+use experiment_file::{ExperimentConfig, limits};
+use sim_core::Experiment;
 use swarm_proto::v1::{
     EvaluateRequest, EvaluateResponse, MeasuredTask, MeasuredTrial, evaluate_response::Message,
     evaluation_service_server::EvaluationService,

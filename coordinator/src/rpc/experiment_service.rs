@@ -2,7 +2,7 @@
 
 use std::pin::Pin;
 
-use sim_core::config::{ConfigError, ExperimentConfig};
+use experiment_file::{ConfigError, ExperimentConfig};
 use swarm_proto::v1::{
     CancelExperimentRequest, CancelExperimentResponse, ExplainExperimentRequest,
     ExplainExperimentResponse, GetChampionRequest, GetChampionResponse, GetExperimentRequest,
@@ -28,7 +28,6 @@ use tracing::info;
 use crate::{
     clock,
     driver::{self, Event, EventSender},
-    evolution::{Evolution, Origin},
     failpoint,
     ids::ExperimentId,
     limits::{
@@ -40,6 +39,7 @@ use crate::{
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
     submission::{Checked, Runnable, Submission},
 };
+use evolution::{Evolution, Origin};
 
 use super::{convert, explain, history, shutting_down, store_status};
 

@@ -2,10 +2,8 @@
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
-use crate::{
-    evolution::{Champion, HeldOut, Origin},
-    ids::ExperimentId,
-};
+use crate::ids::ExperimentId;
+use evolution::{Champion, HeldOut, Origin};
 
 use super::StoreError;
 

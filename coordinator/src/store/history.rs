@@ -2,7 +2,8 @@
 
 use rusqlite::{Row, params};
 
-use crate::{evolution::Statistics, ids::ExperimentId};
+use crate::ids::ExperimentId;
+use evolution::Statistics;
 
 use super::{Event, EventKind, ExperimentState, Generation, Result, Store, StoreError};
 

@@ -18,7 +18,8 @@ use std::{
 
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 
-use crate::{evolution::Champion, failpoint, ids::ExperimentId, priority::Priority};
+use crate::{failpoint, ids::ExperimentId, priority::Priority};
+use evolution::Champion;
 
 pub use records::{Event, EventKind, Experiment, ExperimentState, Generation, NewExperiment};
 

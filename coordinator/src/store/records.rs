@@ -1,12 +1,9 @@
 //! What the store keeps, as plain data.
 
-use sim_core::config::ExperimentConfig;
+use experiment_file::ExperimentConfig;
 
-use crate::{
-    evolution::{Digest, Statistics},
-    ids::ExperimentId,
-    priority::Priority,
-};
+use crate::{ids::ExperimentId, priority::Priority};
+use evolution::{Digest, Statistics};
 
 /// Where an experiment stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

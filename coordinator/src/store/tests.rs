@@ -2,10 +2,8 @@
 
 use std::fs;
 
-use crate::{
-    evolution::{Champion, Evolution, HeldOut, Origin, Statistics},
-    submission::{Submission, checkpoint_json},
-};
+use crate::submission::{Submission, checkpoint_json};
+use evolution::{Champion, Evolution, HeldOut, Origin, Statistics};
 
 use super::*;
 

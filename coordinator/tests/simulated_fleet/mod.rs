@@ -13,10 +13,10 @@ use coordinator::{
         Command, Engine, EngineConfig, Introduction, Item, ItemResult, JudgedGeneration,
         WorkerStatus,
     },
-    evolution::Population,
     ids::{ExperimentId, ItemId, WorkerId},
     priority::Priority,
 };
+use evolution::Population;
 
 /// What a call of the simulation costs beside its trials, in trials.
 const CALL_OVERHEAD: f64 = 0.4;

@@ -5,12 +5,12 @@ use super::Mode;
 use super::frame::{Ether, Origin};
 use super::hearing::Hearing;
 use super::quantisation::Scratch;
-use crate::isa::Isa;
 use crate::neighbours::Neighbours;
-use crate::random::Stream;
 use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
+use numeric::Isa;
+use numeric::random::Stream;
 
 /// State of the wireless link.
 #[derive(Debug)]

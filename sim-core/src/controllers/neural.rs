@@ -1,12 +1,12 @@
 //! Robots run by the network that a genotype encodes.
 
 use super::{Action, Controller};
-use crate::isa::Isa;
 use crate::lanes::Lanes;
 use crate::network::ctrnn::Ctrnn;
 use crate::network::decoding::Output;
 use crate::network::{Network, Phenotype};
-use crate::random::Stream;
+use numeric::Isa;
+use numeric::random::Stream;
 
 /// One network, its state in every lane, and the decoding of its outputs.
 #[derive(Debug)]

@@ -2,16 +2,16 @@
 
 use std::f64::consts::TAU;
 
-use crate::config::{
+use crate::testing::*;
+use crate::torus::{Torus, Vec2, angular_difference};
+use crate::{EpisodeSummary, Experiment, Isa, Mode, StepRecord};
+use experiment_file::{
     ActuatorQuery, DistanceSensorConfig, ExperimentConfig, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LeaderFailureConfig, LightController,
     ObjectConfig, PositionInitializers, RobotController, SensorQuery, StimuliInhibitionConfig,
     StimulusConfig, SynapseGroupConfig, TopologySwitchConfig, UncontrollableRotationConfig,
     WholeReceiver,
 };
-use crate::testing::*;
-use crate::torus::{Torus, Vec2, angular_difference};
-use crate::{EpisodeSummary, Experiment, Isa, Mode, StepRecord};
 
 const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

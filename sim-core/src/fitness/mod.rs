@@ -6,11 +6,11 @@ mod leader;
 mod light;
 mod orientation;
 
-use crate::config::FitnessFunction;
 use crate::record::Metrics;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
+use experiment_file::FitnessFunction;
 
 /// What a fitness function sees of a step: the robots that are judged, as they
 /// acted and after they moved, and the lights before they move.

@@ -4,9 +4,9 @@ mod random_graph;
 
 use std::f64::consts::TAU;
 
-use crate::config::Initializer;
-use crate::random::Stream;
 use crate::torus::{Torus, Vec2, wrap_angle};
+use experiment_file::Initializer;
+use numeric::random::Stream;
 
 /// An initialiser that cannot place all its objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,7 +130,7 @@ fn fixed<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 500.0 };
 

@@ -2,8 +2,8 @@
 //! at a time. Steps turn tangential away from the centre and are drawn back to it.
 
 use super::Unplaceable;
-use crate::random::Stream;
 use crate::torus::{Torus, Vec2};
+use numeric::random::Stream;
 
 /// Scale of a step, cm.
 const STEP: f64 = 80.0;
@@ -89,7 +89,7 @@ fn stands(candidate: Vec2, placed: &[Vec2], torus: &Torus) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

@@ -5,9 +5,9 @@ use std::ops::Range;
 use indexmap::IndexMap;
 
 use super::{Ensemble, Stimulus};
-use crate::config::TopologyConfig;
 use crate::problems::Problems;
-use crate::random::{Purpose, Stream};
+use experiment_file::TopologyConfig;
+use numeric::random::{Purpose, Stream};
 
 /// Where a synapse comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,11 +6,11 @@ use indexmap::IndexMap;
 
 use super::Ensemble;
 use crate::communication::Mode;
-use crate::config::{ActuatorQuery, DecodingConfig, TopologyConfig};
 use crate::controllers::Action;
 use crate::lanes::Lanes;
 use crate::problems::Problems;
-use crate::random::{Stream, sample};
+use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig};
+use numeric::random::{Stream, sample};
 
 /// An ensemble that drives an actuator.
 #[derive(Debug, Clone)]
@@ -135,7 +135,7 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     /// Actions of `n` neurons with the given activities.
     fn decode(

@@ -9,10 +9,10 @@ use std::ops::Range;
 
 use indexmap::IndexMap;
 
-use crate::config::{Activation, NeuronParams, SensorQuery, TopologyConfig};
 use crate::problems::Problems;
 use connections::{Synapse, SynapseGroup};
 use decoding::Output;
+use experiment_file::{Activation, NeuronParams, SensorQuery, TopologyConfig};
 
 /// Structure of a network.
 #[derive(Debug, Clone)]

@@ -8,10 +8,10 @@ use inhibition::Inhibition;
 use leader_failure::LeaderFailure;
 use rotation::Rotation;
 
-use crate::config::{PerturbationsConfig, SensorQuery};
-use crate::random::Stream;
 use crate::swarm::Swarm;
 use crate::world::RobotGroup;
+use experiment_file::{PerturbationsConfig, SensorQuery};
+use numeric::random::Stream;
 
 /// Stream numbers of the perturbations that draw robots: their places in
 /// [`PerturbationsConfig`]. Part of the format of a run.
@@ -89,8 +89,8 @@ fn draw_affected(n_affected: u32, n_robots: usize, stream: &mut Stream) -> Vec<b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::TopologySwitchConfig;
-    use crate::random::Purpose;
+    use experiment_file::TopologySwitchConfig;
+    use numeric::random::Purpose;
 
     fn stream(number: usize) -> Stream {
         Stream::new(0, 0, 0, Purpose::Perturbation, number as u64)

@@ -2,9 +2,9 @@
 //! whatever their network wants.
 
 use super::draw_affected;
-use crate::config::UncontrollableRotationConfig;
-use crate::random::Stream;
 use crate::torus::{angular_difference, wrap_angle};
+use experiment_file::UncontrollableRotationConfig;
+use numeric::random::Stream;
 
 /// Action of the right wheel, and minus that of the left, while turning.
 const TURNING: f64 = 0.3;
@@ -55,7 +55,7 @@ impl Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     const TURN: [f64; 2] = [0.3, -0.3];
     const HOLD: [f64; 2] = [0.0, 0.0];

@@ -2,8 +2,8 @@
 
 use super::{Decay, perturb, take_sectors};
 use crate::neighbours::Neighbour;
-use crate::random::Stream;
 use crate::torus::wrap_angle;
+use numeric::random::Stream;
 
 /// A distance sensor.
 #[derive(Debug, Clone)]
@@ -42,8 +42,8 @@ mod tests {
 
     use super::*;
     use crate::neighbours::Neighbours;
-    use crate::random::Purpose;
     use crate::torus::{Torus, Vec2};
+    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

@@ -1,8 +1,8 @@
 //! Light sensor: per sector the sum over the lights of its colour.
 
 use super::{Decay, Viewpoint, perturb};
-use crate::random::Stream;
 use crate::torus::Vec2;
+use numeric::random::Stream;
 
 /// A light sensor and the lights that it can see.
 #[derive(Debug, Clone)]
@@ -46,8 +46,8 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
-    use crate::random::Purpose;
     use crate::torus::Torus;
+    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

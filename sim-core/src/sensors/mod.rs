@@ -9,8 +9,8 @@ pub(crate) use distance::DistanceSensor;
 pub(crate) use ground::GroundSensor;
 pub(crate) use light::LightSensor;
 
-use crate::random::Stream;
 use crate::torus::{Torus, Vec2, angular_difference, sector_angle, wrap_angle};
+use numeric::random::Stream;
 
 /// How what a robot perceives fades with distance and angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +94,7 @@ fn perturb(readings: &mut [f64], noise_deviation: f64, noise: &mut Stream) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Purpose;
+    use numeric::random::Purpose;
 
     #[test]
     fn noise_has_its_variance_and_readings_stay_in_range() {

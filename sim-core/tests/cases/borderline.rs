@@ -1,7 +1,7 @@
 //! Experiment B: alpha shapes, components, the border of the torus, positions
 //! that change under the network.
 
-use sim_core::config::{Initializer, TopologySwitchConfig};
+use experiment_file::{Initializer, TopologySwitchConfig};
 
 use crate::configs::{experiment_b, receiver_mut, swarm_mut, transmitter_mut};
 use crate::{assert_agreement, random_genotype, spread};

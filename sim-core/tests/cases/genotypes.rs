@@ -1,10 +1,10 @@
 //! What a genotype means: queries, segments, connections, defaults.
 
-use sim_core::Experiment;
-use sim_core::config::{
+use experiment_file::{
     EnsembleSelector, ExperimentConfig, FitnessFunction, GenotypeQuery, NeuronParameter,
     NeuronParams, SynapseGroupConfig, SynapseSelector,
 };
+use sim_core::Experiment;
 
 use crate::configs::{experiment_a, experiment_c, experiment_d};
 use crate::{assert_agreement, random_genotype, reference, spread};

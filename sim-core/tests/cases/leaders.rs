@@ -1,6 +1,6 @@
 //! Experiment A: the radio, the decoders, leaders and their failure.
 
-use sim_core::config::{
+use experiment_file::{
     Activation, ActuatorQuery, DecodingConfig, ExperimentConfig, FitnessFunction,
     LeaderFailureConfig,
 };

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use sim_core::config::{
+use experiment_file::{
     Activation, DecodingConfig, ExperimentConfig, FitnessFunction, Initializer, ObjectConfig,
     UncontrollableRotationConfig,
 };

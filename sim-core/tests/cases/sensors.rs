@@ -1,6 +1,6 @@
 //! Lights, distances, ground areas, noise, and stimuli that are taken away.
 
-use sim_core::config::{
+use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
     LightSourceConfig, ObjectConfig, PositionInitializers, SensorQuery, StimuliInhibitionConfig,

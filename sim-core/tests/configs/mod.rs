@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use experiment_file::*;
 use indexmap::IndexMap;
-use sim_core::config::*;
 
 /// Experiment A, leader selection (section 5.1).
 pub fn experiment_a() -> ExperimentConfig {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use sim_core::config::WirelessTransmitterConfig;
+use experiment_file::WirelessTransmitterConfig;
 
 use super::torus::{Torus, Vector, angular_difference, sector_direction};
 use super::world::Robot;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use sim_core::config::FitnessFunction;
+use experiment_file::FitnessFunction;
 
 use super::alpha_shape::borderline;
 use super::lights::Light;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use sim_core::config::{LightController, LightParams, LightSourceConfig};
-use sim_core::random::Stream;
+use experiment_file::{LightController, LightParams, LightSourceConfig};
+use numeric::random::Stream;
 
 use super::torus::{Torus, Vector, norm};
 
@@ -80,8 +80,8 @@ impl<'a> Light<'a> {
 
 #[test]
 fn an_orbiting_light_spirals_outwards_from_the_centre() {
-    use sim_core::config::{Initializer, PositionInitializers};
-    use sim_core::random::Purpose;
+    use experiment_file::{Initializer, PositionInitializers};
+    use numeric::random::Purpose;
 
     let torus = Torus { width: 1000.0, height: 1000.0 };
     let config = LightSourceConfig {

@@ -26,7 +26,7 @@ pub use network::genes;
 pub use witness::Witness;
 pub use world::Simulation;
 
-use sim_core::config::ExperimentConfig;
+use experiment_file::ExperimentConfig;
 
 /// An episode from its first to its last step.
 pub struct Episode {

@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use sim_core::config::{
+use experiment_file::{
     Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter,
     SynapseSelector, TopologyConfig,
 };
-use sim_core::random::{Purpose, Stream};
+use numeric::random::{Purpose, Stream};
 
 /// What a gene encodes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! What goes wrong in a swarm (chapter 6).
 
-use sim_core::config::{
+use experiment_file::{
     InhibitedStimulus, SensorQuery, UncontrollableRotationConfig, WholeReceiver,
 };
-use sim_core::random::Stream;
+use numeric::random::Stream;
 
 use super::torus::angular_difference;
 

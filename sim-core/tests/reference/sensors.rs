@@ -1,8 +1,8 @@
 //! The sensors of section 3.2.2. Each returns its readings without knowing who
 //! asks for them.
 
-use sim_core::config::{DistanceSensorConfig, GroundSensorConfig, LightSensorConfig, SensorQuery};
-use sim_core::random::Stream;
+use experiment_file::{DistanceSensorConfig, GroundSensorConfig, LightSensorConfig, SensorQuery};
+use numeric::random::Stream;
 
 use super::communication::Reception;
 use super::lights::Light;

@@ -1,10 +1,10 @@
 //! The world and the order of one step: sense, control, act, judge, move lights.
 
-use sim_core::config::{
+use experiment_file::{
     ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams, Initializer,
     ObjectConfig, RobotConfig, RobotController, WirelessTransmitterConfig,
 };
-use sim_core::random::{Purpose, Stream};
+use numeric::random::{Purpose, Stream};
 
 use super::actuators::{self, Actions};
 use super::communication::{Frame, Reception, quantise, receive};

@@ -1,10 +1,8 @@
 //! Conditions: the experiment file as it is, and with something changed.
 
+use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
-use sim_core::{
-    Experiment,
-    config::{ConfigError, ExperimentConfig, suggestion},
-};
+use sim_core::Experiment;
 
 use super::patch::{Change, Json};
 use crate::{

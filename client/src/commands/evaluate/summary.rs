@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
-use coordinator::evolution::Digest;
+use evolution::Digest;
 
 use super::{
     conditions::Condition,
@@ -92,7 +92,8 @@ impl Summary {
             let changes = condition.changes.iter();
             ConditionSummary {
                 name: condition.name.clone(),
-                config_digest: Digest::of_config(&condition.config).to_string(),
+                config_digest: Digest::of_config(&condition.config, sim_core::FINGERPRINT)
+                    .to_string(),
                 changes: changes.map(|it| (it.path.clone(), it.value.clone())).collect(),
                 robots: condition.n_robots(),
                 fitness: Estimate::of(&fitness, false).expect("there are trials"),

@@ -2,8 +2,8 @@
 
 use std::{fmt, fs, path::Path};
 
+use numeric::random::{Purpose, Stream};
 use serde_json::Value;
-use sim_core::random::{Purpose, Stream};
 
 use crate::{
     args::SimulateArgs, connection::Connection, error::Error, experiment_file::Compiled,
@@ -77,7 +77,7 @@ fn random(compiled: &Compiled) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use coordinator::evolution::Evolution;
+    use evolution::Evolution;
 
     use super::*;
     use crate::experiment_file::{ExperimentFile, Overrides, tests::shipped};
@@ -87,7 +87,7 @@ mod tests {
         let file = ExperimentFile::read(&shipped("leader_selection_ga")).unwrap();
         let compiled = file.compile(&Overrides { seed: Some(7), ..Overrides::default() }).unwrap();
         let segments = compiled.experiment.population_segments();
-        let evolution = Evolution::new(&compiled.config, segments).unwrap();
+        let evolution = Evolution::new(&compiled.config, segments, sim_core::FINGERPRINT).unwrap();
         assert_eq!(random(&compiled), evolution.ask().genotypes[0][..]);
     }
 

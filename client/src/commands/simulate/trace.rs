@@ -6,11 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use experiment_file::{ExperimentConfig, RobotController};
 use indexmap::IndexSet;
-use sim_core::{
-    Mode, ReceivedFrame, RobotRecord, StepRecord,
-    config::{ExperimentConfig, RobotController},
-};
+use sim_core::{Mode, ReceivedFrame, RobotRecord, StepRecord};
 
 use crate::error::Error;
 

@@ -6,9 +6,9 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::squash;
-use crate::config::Activation;
-use crate::isa::Isa;
 use crate::lanes::Lanes;
+use experiment_file::Activation;
+use numeric::Isa;
 
 /// Vectors are aligned to this many bytes: a cache line.
 const ALIGNMENT: usize = 64;

@@ -22,10 +22,10 @@ mod squash;
 
 use super::connections::Source;
 use super::{Network, Phenotype};
-use crate::config::Activation;
-use crate::isa::Isa;
 use crate::lanes::Lanes;
+use experiment_file::Activation;
 use kernel::{Chunk, Coupling, Kernel, Pair};
+use numeric::Isa;
 
 /// Vectors per row of a chunk, at most: two neurons' sums then fit in registers.
 const MAX_CHUNK_WIDTH: usize = 4;

@@ -12,8 +12,8 @@ use std::f64::consts::LOG2_E;
 
 use pulp::Simd;
 
-use crate::config::Activation;
 use crate::exp2::{Exp2, exp2_parts};
+use experiment_file::Activation;
 
 /// y for an argument of 1.
 pub(super) fn scale(activation: Activation) -> f64 {
@@ -67,7 +67,7 @@ mod tests {
 
     use super::*;
     use crate::exp2::MAX_EXPONENT;
-    use crate::isa::Isa;
+    use numeric::Isa;
 
     /// Both functions of every y of a slice, paired with some other y.
     struct Squash<'a> {

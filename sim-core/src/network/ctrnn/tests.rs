@@ -1,9 +1,9 @@
 //! The network against its equations, and against itself on other processors.
 
 use super::*;
-use crate::config::ExperimentConfig;
 use crate::problems::Problems;
 use crate::testing::experiment_a;
+use experiment_file::ExperimentConfig;
 
 /// The equation as it stands, in f64, for one robot.
 fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut [f64]) -> Vec<f64> {

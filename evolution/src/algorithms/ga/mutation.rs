@@ -1,0 +1,94 @@
+//! Mutation: genes change at random.
+
+use experiment_file::{GaParams, MutationOperator};
+use numeric::random::Stream;
+use serde::{Deserialize, Serialize};
+
+/// How a gene mutates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Mutation {
+    /// g + N(0, sigma^2) (Eq. 2.12).
+    Gaussian {
+        /// Standard deviation.
+        sigma: f64,
+    },
+    /// U(0, 1), whatever the gene was.
+    Uniform,
+}
+
+impl Mutation {
+    /// As configured.
+    pub fn new(params: &GaParams) -> Self {
+        match params.mutation_operator {
+            MutationOperator::Gaussian => Self::Gaussian { sigma: params.mutation_sigma },
+            MutationOperator::Uniform => Self::Uniform,
+        }
+    }
+
+    /// Mutates each gene with probability `p`; the result may lie outside
+    /// \[0, 1\].
+    pub fn mutate(self, genotype: &mut [f64], p: f64, rng: &mut Stream) {
+        for gene in genotype {
+            if rng.bernoulli(p) {
+                match self {
+                    Self::Gaussian { sigma } => *gene += sigma * rng.normal(),
+                    Self::Uniform => *gene = rng.uniform(),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use numeric::random::Purpose;
+
+    use super::*;
+
+    const N: usize = 100_000;
+
+    fn mutated(mutation: Mutation, p: f64) -> Vec<f64> {
+        let mut genes = vec![0.5; N];
+        mutation.mutate(&mut genes, p, &mut Stream::new(4, 0, 0, Purpose::Evolution, 0));
+        genes.retain(|&gene| gene != 0.5);
+        genes
+    }
+
+    fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
+        values.clone().sum::<f64>() / values.count() as f64
+    }
+
+    #[test]
+    fn each_gene_mutates_with_the_given_probability() {
+        for mutation in [Mutation::Gaussian { sigma: 0.5 }, Mutation::Uniform] {
+            for p in [0.0, 0.05, 0.5, 1.0] {
+                let share = mutated(mutation, p).len() as f64 / N as f64;
+                assert!((share - p).abs() < 0.006, "{mutation:?} {p}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn gaussian_mutation_has_its_mean_and_variance() {
+        let sigma = 0.3_f64.sqrt();
+        let genes = mutated(Mutation::Gaussian { sigma }, 1.0);
+        let change = genes.iter().map(|gene| gene - 0.5);
+        assert!(mean(change.clone()).abs() < 0.006);
+        let variance = mean(change.clone().map(|x| x * x));
+        let kurtosis = mean(change.map(|x| x * x * x * x)) / (variance * variance);
+        assert!((variance - 0.3).abs() < 0.006, "{variance}");
+        assert!((kurtosis - 3.0).abs() < 0.1, "{kurtosis}");
+    }
+
+    #[test]
+    fn uniform_mutation_forgets_the_gene() {
+        let genes = mutated(Mutation::Uniform, 1.0);
+        assert!(genes.iter().all(|gene| (0.0..1.0).contains(gene)));
+        let mut counts = [0.0; 10];
+        genes.iter().for_each(|gene| counts[(gene * 10.0) as usize] += 1.0);
+        let expected = genes.len() as f64 / 10.0;
+        let chi_squared: f64 =
+            counts.iter().map(|count| (count - expected) * (count - expected) / expected).sum();
+        assert!(chi_squared < 27.9, "9 degrees of freedom, p = 0.001: {chi_squared}");
+    }
+}

@@ -1,0 +1,105 @@
+//! OpenAI's evolution strategy.
+//!
+//! Salimans, Ho, Chen, Sidor, Sutskever: "Evolution strategies as a scalable
+//! alternative to reinforcement learning", arXiv 1703.03864 (2017): mirrored
+//! perturbations, centred ranks, and Adam (Kingma, Ba: arXiv 1412.6980,
+//! Algorithm 1) on the estimated gradient.
+
+use experiment_file::OpenAiEsParams;
+use numeric::random::Stream;
+use serde::{Deserialize, Serialize};
+
+use super::{Sample, Strategy, draw_normals};
+
+/// A Gaussian whose mean mu, kept in \[0, 1\], learns, and whose standard
+/// deviation sigma is the same for all genes and constant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OpenAiEs {
+    mu: Vec<f64>,
+    mu_init: f64,
+    sigma: f64,
+    learning_rate: f64,
+    beta1: f64,
+    beta2: f64,
+    weight_decay: f64,
+    /// Adam's moments of the gradient, and its number of steps.
+    first_moment: Vec<f64>,
+    second_moment: Vec<f64>,
+    n_updates: u64,
+}
+
+/// Adam's epsilon.
+const EPSILON: f64 = 1e-8;
+
+impl OpenAiEs {
+    /// The first distribution over `d` genes.
+    pub fn new(params: &OpenAiEsParams, d: usize) -> Self {
+        Self {
+            mu: vec![params.mu_init; d],
+            mu_init: params.mu_init,
+            sigma: params.sigma,
+            learning_rate: params.learning_rate,
+            beta1: params.beta1,
+            beta2: params.beta2,
+            weight_decay: params.weight_decay,
+            first_moment: vec![0.0; d],
+            second_moment: vec![0.0; d],
+            n_updates: 0,
+        }
+    }
+}
+
+impl Strategy for OpenAiEs {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mu)
+    }
+
+    /// g_2k = clip(mu + sigma * e_k), g_2k+1 = clip(mu - sigma * e_k),
+    /// e_k ~ N(0, I). The last individual of an odd population is mu itself: it
+    /// takes its place in the ranking and adds nothing to the gradient.
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        let d = self.mu.len();
+        let mut normals = Vec::with_capacity(population_size);
+        for e in draw_normals(population_size / 2, d, rng) {
+            let mirrored = e.iter().map(|e| -e).collect();
+            normals.extend([e, mirrored]);
+        }
+        normals.resize(population_size, vec![0.0; d]);
+        let genotypes = normals
+            .iter()
+            .map(|e| (0..d).map(|j| (self.mu[j] + self.sigma * e[j]).clamp(0.0, 1.0)).collect())
+            .collect();
+        Sample::new(genotypes, normals)
+    }
+
+    /// With the centred ranks c = 1/2 (best) to -1/2 (worst), evenly spaced:
+    /// gradient = sum_i c_i e_i / (P sigma) - weight_decay * (mu - mu_init),
+    /// and a step of Adam uphill.
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
+        let d = self.mu.len();
+        let n = ranking.len();
+        let mut centred_rank = vec![0.0; n];
+        for (place, &individual) in ranking.iter().enumerate() {
+            centred_rank[individual] = 0.5 - place as f64 / (n - 1) as f64;
+        }
+        let mut sum = vec![0.0; d];
+        for (rank, e) in centred_rank.iter().zip(&sample.normals) {
+            for j in 0..d {
+                sum[j] += rank * e[j];
+            }
+        }
+
+        self.n_updates += 1;
+        let correction1 = 1.0 - libm::pow(self.beta1, self.n_updates as f64);
+        let correction2 = 1.0 - libm::pow(self.beta2, self.n_updates as f64);
+        let moments = self.first_moment.iter_mut().zip(&mut self.second_moment);
+        for ((mu, sum), (first, second)) in self.mu.iter_mut().zip(&sum).zip(moments) {
+            let pull = self.weight_decay * (*mu - self.mu_init);
+            let gradient = sum / (n as f64 * self.sigma) - pull;
+            *first = self.beta1 * *first + (1.0 - self.beta1) * gradient;
+            *second = self.beta2 * *second + (1.0 - self.beta2) * gradient * gradient;
+            let step = (*first / correction1) / ((*second / correction2).sqrt() + EPSILON);
+            *mu = (*mu + self.learning_rate * step).clamp(0.0, 1.0);
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Separable natural evolution strategy.
+//!
+//! Schaul, Glasmachers, Schmidhuber: "High dimensions and heavy tails for
+//! natural evolution strategies", GECCO 2011; Wierstra et al.: "Natural
+//! evolution strategies", JMLR 15 (2014); the thesis's Algorithm 3.
+
+use experiment_file::SnesParams;
+use numeric::random::Stream;
+use serde::{Deserialize, Serialize};
+
+use super::{Sample, Strategy, draw_normals, finite_exp};
+use crate::ranking::utility_per_individual;
+
+/// A Gaussian with a diagonal covariance, per gene: mean mu and standard
+/// deviation sigma, both kept in \[0, 1\] (section 3.4.3).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snes {
+    mu: Vec<f64>,
+    sigma: Vec<f64>,
+    eta_mu: f64,
+    eta_sigma: f64,
+}
+
+impl Snes {
+    /// The first distribution over `d` genes.
+    pub fn new(params: &SnesParams, d: usize) -> Self {
+        let default_eta_sigma = (3.0 + libm::log(d as f64)) / (5.0 * (d as f64).sqrt());
+        Self {
+            mu: vec![params.mu_init; d],
+            sigma: vec![params.sigma_init; d],
+            eta_mu: params.eta_mu,
+            eta_sigma: params.eta_sigma.unwrap_or(default_eta_sigma),
+        }
+    }
+}
+
+impl Strategy for Snes {
+    fn mean(&self) -> Option<&[f64]> {
+        Some(&self.mu)
+    }
+
+    /// g_i = clip(mu + sigma * s_i), s_i ~ N(0, I).
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        let d = self.mu.len();
+        let normals = draw_normals(population_size, d, rng);
+        let genotypes = normals
+            .iter()
+            .map(|s| (0..d).map(|j| (self.mu[j] + self.sigma[j] * s[j]).clamp(0.0, 1.0)).collect())
+            .collect();
+        Sample::new(genotypes, normals)
+    }
+
+    /// mu += eta_mu * sigma * sum_i u_i s_i;
+    /// sigma *= exp(eta_sigma / 2 * sum_i u_i (s_i^2 - 1)).
+    /// The draws enter as they were, not as clipping left them.
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
+        let d = self.mu.len();
+        let mut gradient_mu = vec![0.0; d];
+        let mut gradient_sigma = vec![0.0; d];
+        for (utility, s) in utility_per_individual(ranking).iter().zip(&sample.normals) {
+            for j in 0..d {
+                gradient_mu[j] += utility * s[j];
+                gradient_sigma[j] += utility * (s[j] * s[j] - 1.0);
+            }
+        }
+        for j in 0..d {
+            let step = self.eta_mu * self.sigma[j] * gradient_mu[j];
+            self.mu[j] = (self.mu[j] + step).clamp(0.0, 1.0);
+            let factor = finite_exp(self.eta_sigma / 2.0 * gradient_sigma[j]);
+            self.sigma[j] = (self.sigma[j] * factor).clamp(0.0, 1.0);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The digest chain: one hash that covers every bit of a run so far.
+//!
+//! Link -1 is SHA-256 of the UTF-8 text
+//! `swarmevo digest 1\n<fingerprint of the simulation>\n<canonical config>`, where the
+//! canonical configuration has its seed but not what cannot change a bit of a
+//! generation: the name is empty, `generations` is 0, `target_fitness` absent.
+//! Link g is SHA-256 of link g-1 (32 bytes), g (u64), every gene of every
+//! individual, every fitness of every trial of every individual (f64, bit for
+//! bit); numbers little-endian, individuals in index order.
+//!
+//! Re-evaluations of champions have a chain of their own, which hangs on that one.
+//! It starts with 32 zero bytes; the next link is SHA-256 of the link before it,
+//! the link of the latest generation, every gene of every candidate, every fitness
+//! of every trial of every candidate.
+
+use std::{fmt, str::FromStr};
+
+use experiment_file::ExperimentConfig;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use super::Genotype;
+
+/// One link of the chain.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Digest([u8; 32]);
+
+impl Digest {
+    /// Link -1. `simulation`: the fingerprint of what computes fitness.
+    pub fn of_config(config: &ExperimentConfig, simulation: &str) -> Self {
+        let mut config = config.clone();
+        config.name.clear();
+        config.algorithm.generations = 0;
+        config.algorithm.target_fitness = None;
+        let mut hash = Sha256::new();
+        hash.update("swarmevo digest 1\n");
+        hash.update(simulation);
+        hash.update("\n");
+        hash.update(config.to_canonical_json());
+        Self(hash.finalize().into())
+    }
+
+    /// The link after this one.
+    pub fn next(self, generation: u64, genotypes: &[Genotype], trial_fitness: &[Vec<f64>]) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(self.0);
+        hash.update(generation.to_le_bytes());
+        let mut bytes = Vec::new();
+        for values in genotypes.iter().chain(trial_fitness) {
+            bytes.resize(size_of_val(&values[..]), 0);
+            for (bytes, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
+                bytes.copy_from_slice(&value.to_bits().to_le_bytes());
+            }
+            hash.update(&bytes);
+        }
+        Self(hash.finalize().into())
+    }
+
+    /// The link after this one in the chain of re-evaluations, after the
+    /// generation of link `generation`.
+    pub fn next_champion<'a>(
+        self,
+        generation: Self,
+        genotypes: impl Iterator<Item = &'a [f64]>,
+        trial_fitness: &'a [Vec<f64>],
+    ) -> Self {
+        let mut hash = Sha256::new();
+        hash.update(self.0);
+        hash.update(generation.0);
+        for value in genotypes.flatten().chain(trial_fitness.iter().flatten()) {
+            hash.update(value.to_bits().to_le_bytes());
+        }
+        Self(hash.finalize().into())
+    }
+}
+
+impl fmt::Display for Digest {
+    /// Hexadecimal.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Not 64 hexadecimal digits.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("a digest is 64 hexadecimal digits")]
+pub struct ParseDigestError;
+
+impl FromStr for Digest {
+    type Err = ParseDigestError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut bytes = [0; 32];
+        if text.len() != 64 || !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+            return Err(ParseDigestError);
+        }
+        for (i, byte) in bytes.iter_mut().enumerate() {
+            *byte =
+                u8::from_str_radix(&text[2 * i..2 * i + 2], 16).map_err(|_| ParseDigestError)?;
+        }
+        Ok(Self(bytes))
+    }
+}
+
+impl From<Digest> for String {
+    fn from(digest: Digest) -> Self {
+        digest.to_string()
+    }
+}
+
+impl TryFrom<String> for Digest {
+    type Error = ParseDigestError;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
+    }
+}

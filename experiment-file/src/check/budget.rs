@@ -1,0 +1,134 @@
+//! What an experiment costs, against the [`limits`].
+
+use crate::read::{Path, Report};
+use crate::{
+    AlgorithmName, ExperimentConfig, ObjectConfig, RobotConfig, RobotController, TopologyConfig,
+    limits,
+};
+
+pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
+    let network = NetworkSize::of(&config.topology);
+    network_size(&network, report);
+    generation(config, &network, report);
+    episode(config, &network, report);
+}
+
+struct NetworkSize {
+    n_inputs: u64,
+    n_neurons: u64,
+    /// If every possible one exists.
+    n_synapses: u64,
+}
+
+impl NetworkSize {
+    fn of(topology: &TopologyConfig) -> Self {
+        let size = |name: &String| {
+            let stimulus = || topology.stimuli.get(name).map(|stimulus| stimulus.n);
+            let ensemble = topology.ensembles.get(name).map(|ensemble| ensemble.n);
+            u64::from(ensemble.or_else(stimulus).unwrap_or(0))
+        };
+        let size_of_all = |names: &[String]| names.iter().map(size).sum::<u64>();
+        let groups = topology.synapses.values();
+        Self {
+            n_inputs: topology.stimuli.values().map(|stimulus| u64::from(stimulus.n)).sum(),
+            n_neurons: topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum(),
+            n_synapses: groups
+                .map(|group| size_of_all(&group.pre) * size_of_all(&group.post))
+                .sum(),
+        }
+    }
+}
+
+/// Reports a cost that exceeds its limit; `parts` are what it depends on.
+fn limit(cost: u64, limit: u64, what: &str, path: &Path, parts: &[&Path], report: &Report<'_>) {
+    if cost > limit {
+        report
+            .conflict(path, parts, || format!("{cost} {what} are more than the limit of {limit}"));
+    }
+}
+
+fn network_size(network: &NetworkSize, report: &Report<'_>) {
+    let topology = Path::from(["topology"]);
+    let [stimuli, ensembles, synapses] =
+        ["stimuli", "ensembles", "synapses"].map(|key| topology.key(key));
+    let &NetworkSize { n_inputs, n_neurons, n_synapses } = network;
+    limit(n_inputs, limits::INPUTS.into(), "inputs", &stimuli, &[], report);
+    limit(n_neurons, limits::NEURONS.into(), "neurons", &ensembles, &[], report);
+    let parts = [&stimuli, &ensembles];
+    limit(n_synapses, limits::SYNAPSES, "possible synapses", &synapses, &parts, report);
+}
+
+/// What the coordinator keeps of a generation.
+fn generation(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>) {
+    let algorithm = Path::from(["algorithm"]);
+    let topology = Path::from(["topology"]);
+    let size_path = algorithm.key("population_size");
+    let size = u64::from(config.algorithm.population_size);
+    let n_trials = size * u64::from(config.algorithm.num_evaluations);
+    let what = "trials per generation";
+    let parts = [&algorithm.key("num_evaluations")];
+    limit(n_trials, limits::TRIALS_PER_GENERATION, what, &size_path, &parts, report);
+
+    let n_genes = network.n_synapses + 3 * network.n_neurons;
+    let what = "possible genes per generation";
+    let parts = [&topology];
+    limit(size * n_genes, limits::GENES_PER_GENERATION, what, &size_path, &parts, report);
+    if matches!(config.algorithm.name, AlgorithmName::Xnes | AlgorithmName::CmaEs) {
+        let what = "possible genes for an algorithm with a full matrix";
+        let path = algorithm.key("name");
+        limit(n_genes, limits::GENES_OF_FULL_MATRIX, what, &path, &parts, report);
+    }
+}
+
+/// What a worker computes and keeps for an episode.
+fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>) {
+    let path = Path::from(["world", "objects"]);
+    let algorithm = Path::from(["algorithm"]);
+    let topology = Path::from(["topology"]);
+    let is_robot = |object: &&ObjectConfig| matches!(object, ObjectConfig::Robot(_));
+    let count = |object: &ObjectConfig| u64::from(object.num_instances());
+    let objects = config.world.objects.values();
+    let n_robots: u64 = objects.clone().filter(is_robot).map(count).sum();
+    let n_fixtures: u64 = objects.filter(|object| !is_robot(object)).map(count).sum();
+    let n_steps = u64::from(config.algorithm.evaluation_steps);
+    limit(n_robots, limits::ROBOTS.into(), "robots", &path, &[], report);
+    limit(n_fixtures, limits::FIXTURES.into(), "lights and ground areas", &path, &[], report);
+
+    let states = n_robots * (network.n_inputs + network.n_neurons);
+    let what = "inputs and neurons of all robots";
+    limit(states, limits::NETWORK_STATES, what, &path, &[&topology], report);
+
+    let steps_path = algorithm.key("evaluation_steps");
+    let what = "steps of all robots per trial";
+    limit(n_robots * n_steps, limits::ROBOT_STEPS, what, &steps_path, &[&path], report);
+
+    let n_sensed = n_robots + n_fixtures;
+    let of_robot = |robot: &RobotConfig| {
+        let substep = network.n_synapses + network.n_neurons;
+        let think = match robot.controller {
+            RobotController::NeuralController => substep * u64::from(config.topology.time_scale),
+            RobotController::BraitenbergLightFollower => 0,
+        };
+        let sense = n_sensed * n_sectors(robot);
+        u64::from(robot.num_instances) * (think + sense + n_lattice_points(robot))
+    };
+    let per_step: u64 = config.robots().map(|(_, robot)| of_robot(robot)).sum();
+    let cost = per_step.saturating_mul(n_steps);
+    let what = "operations per episode";
+    let parts = [&path, &topology];
+    limit(cost, limits::EPISODE_OPERATIONS, what, &steps_path, &parts, report);
+}
+
+fn n_sectors(robot: &RobotConfig) -> u64 {
+    let sensors = &robot.sensors;
+    let receiver = sensors.wireless_receiver.as_ref().map_or(0, |sensor| sensor.n_sectors);
+    let light = sensors.light_sensor.as_ref().map_or(0, |sensor| sensor.n_sectors);
+    let distance = sensors.distance_sensor.as_ref().map_or(0, |sensor| sensor.n_sectors);
+    u64::from(receiver + light + distance)
+}
+
+fn n_lattice_points(robot: &RobotConfig) -> u64 {
+    let transmitter = robot.actuators.wireless_transmitter.as_ref();
+    let quantizing = transmitter.filter(|transmitter| transmitter.quantize);
+    quantizing.map_or(0, |transmitter| u64::from(transmitter.n_symbols))
+}

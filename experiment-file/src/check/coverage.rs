@@ -1,0 +1,171 @@
+//! Which query of the genotype covers which part of the network.
+
+use std::fmt;
+
+use crate::read::{Path, Report, suggestion};
+use crate::{
+    EnsembleSelector, GenotypeQuery, NeuronParameter, SynapseGroupConfig, SynapseSelector,
+    TopologyConfig,
+};
+
+/// The evolvable parts of a network and who claimed them.
+pub(super) struct Coverage<'a> {
+    topology: &'a TopologyConfig,
+    parts: Vec<Part<'a>>,
+}
+
+struct Part<'a> {
+    kind: PartKind<'a>,
+    /// The query that covers it and its population.
+    owner: Option<(&'a GenotypeQuery, &'a str)>,
+}
+
+/// What a query takes as a whole or not at all.
+#[derive(Clone, Copy)]
+enum PartKind<'a> {
+    /// The weights of a group's synapses from one of its names.
+    Weights { group: &'a str, pre: &'a str, source: Source },
+    /// A parameter of an ensemble's neurons.
+    Neurons { parameter: NeuronParameter, ensemble: &'a str },
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Source {
+    Sensory,
+    Hidden,
+    Motor,
+}
+
+impl<'a> Coverage<'a> {
+    pub(super) fn new(topology: &'a TopologyConfig) -> Self {
+        let source = |name: &str| {
+            if topology.stimuli.contains_key(name) {
+                Source::Sensory
+            } else if topology.outputs.values().any(|output| output.ensemble == name) {
+                Source::Motor
+            } else {
+                Source::Hidden
+            }
+        };
+        let evolvable = |config: &SynapseGroupConfig| config.trainable && config.p > 0.0;
+        let groups = topology.synapses.iter().filter(|(_, config)| evolvable(config));
+        let weights = groups.flat_map(|(group, config)| {
+            let pre = config.pre.iter();
+            pre.map(move |pre| PartKind::Weights { group, pre, source: source(pre) })
+        });
+        let neurons = topology.ensembles.keys().flat_map(|ensemble| {
+            [NeuronParameter::Bias, NeuronParameter::Tau, NeuronParameter::Gain]
+                .map(|parameter| PartKind::Neurons { parameter, ensemble })
+        });
+        let parts = weights.chain(neurons).map(|kind| Part { kind, owner: None }).collect();
+        Self { topology, parts }
+    }
+
+    /// Gives `query` what it asks for; reports what it cannot have.
+    pub(super) fn claim(
+        &mut self,
+        query: &'a GenotypeQuery,
+        population: &'a str,
+        path: &Path,
+        report: &Report<'_>,
+    ) {
+        let part = |key| Path::from(["topology", key]);
+        let [stimuli, ensembles, synapses] =
+            ["stimuli", "ensembles", "synapses"].map(|map| part(map).keys());
+        if self.n_meanings(query) != 1 {
+            let others = [&stimuli, &ensembles, &synapses];
+            return report.conflict(path, &others, || self.explain(query));
+        }
+        let others = match query {
+            GenotypeQuery::Neurons(..) => vec![ensembles],
+            GenotypeQuery::Weights(_) => vec![stimuli, part("synapses"), part("outputs")],
+        };
+        let others: Vec<&Path> = others.iter().collect();
+        let (mut matches, mut taken) = (false, None);
+        for part in self.parts.iter_mut().filter(|part| part.kind.is_selected_by(query)) {
+            matches = true;
+            match part.owner {
+                None => part.owner = Some((query, population)),
+                Some(owner) => taken = taken.or(Some((part.kind, owner))),
+            }
+        }
+        if let Some((part, (other, population))) = taken {
+            report.conflict(path, &others, || {
+                format!("covers {part} a second time, after `{other}` of population `{population}`")
+            });
+        } else if !matches {
+            report.conflict(path, &others, "covers nothing that can evolve");
+        }
+    }
+
+    /// How many things the last part of `query` may mean.
+    fn n_meanings(&self, query: &GenotypeQuery) -> usize {
+        let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
+        match query {
+            GenotypeQuery::Neurons(_, EnsembleSelector::Named(name)) => {
+                usize::from(ensembles.contains_key(name))
+            }
+            GenotypeQuery::Weights(SynapseSelector::Named(name)) => {
+                let is_source = ensembles.contains_key(name) || stimuli.contains_key(name);
+                usize::from(is_source) + usize::from(synapses.contains_key(name))
+            }
+            _ => 1,
+        }
+    }
+
+    /// Why the last part of `query` does not mean exactly one thing.
+    fn explain(&self, query: &GenotypeQuery) -> String {
+        let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
+        let (name, what, known): (&str, &str, Vec<&String>) = match query {
+            GenotypeQuery::Neurons(_, selector) => {
+                (selector.as_str(), "ensemble", ensembles.keys().collect())
+            }
+            GenotypeQuery::Weights(selector) => {
+                let known = ensembles.keys().chain(stimuli.keys()).chain(synapses.keys());
+                (selector.as_str(), "ensemble, stimulus or synapse group", known.collect())
+            }
+        };
+        if self.n_meanings(query) > 1 {
+            format!("ambiguous: `{name}` is a synapse group, and an ensemble or stimulus")
+        } else {
+            format!("no {what} is named `{name}`; {}", suggestion(name, &known))
+        }
+    }
+}
+
+impl PartKind<'_> {
+    fn is_selected_by(&self, query: &GenotypeQuery) -> bool {
+        match (self, query) {
+            (Self::Weights { group, pre, source }, GenotypeQuery::Weights(selector)) => {
+                match selector {
+                    SynapseSelector::All => true,
+                    SynapseSelector::Sensory => *source == Source::Sensory,
+                    SynapseSelector::Hidden => *source == Source::Hidden,
+                    SynapseSelector::Motor => *source == Source::Motor,
+                    SynapseSelector::Named(name) => name == group || name == pre,
+                }
+            }
+            (Self::Neurons { parameter, ensemble }, GenotypeQuery::Neurons(queried, selector)) => {
+                parameter == queried
+                    && match selector {
+                        EnsembleSelector::All => true,
+                        EnsembleSelector::Named(name) => name == ensemble,
+                    }
+            }
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for PartKind<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Weights { group, pre, .. } => {
+                write!(f, "the weights of group `{group}` from `{pre}`")
+            }
+            Self::Neurons { parameter, ensemble } => {
+                write!(f, "the {parameter} of ensemble `{ensemble}`")
+            }
+        }
+    }
+}

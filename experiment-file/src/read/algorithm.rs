@@ -1,0 +1,27 @@
+//! Reads `algorithm`.
+
+use super::node::{Node, Object};
+use super::population::population;
+use crate::{AlgorithmConfig, AlgorithmName, FitnessFunction, limits};
+
+pub(super) fn algorithm(o: &mut Object<'_>) -> AlgorithmConfig {
+    let name = o.required("name").variant(&[]);
+    AlgorithmConfig {
+        name: name.unwrap_or(AlgorithmName::Ga),
+        evolvable_object: o.required("evolvable_object").name(),
+        population_size: o.required("population_size").u32(1..=limits::POPULATION),
+        generations: o.required("generations").u64(1..=limits::GENERATIONS),
+        evaluation_steps: o.required("evaluation_steps").u32(1..=limits::STEPS),
+        num_evaluations: o.required("num_evaluations").u32(1..=limits::TRIALS),
+        fitness_function: o
+            .required("fitness_function")
+            .variant(&[])
+            .unwrap_or(FitnessFunction::Grouping),
+        target_fitness: o.optional("target_fitness").map(Node::quantity),
+        champion_every: o.or("champion_every", 10, |node| node.u64(1..=limits::GENERATIONS)),
+        champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
+        populations: o
+            .required("populations")
+            .map(1, |_, node| node.object(|o| population(o, name))),
+    }
+}

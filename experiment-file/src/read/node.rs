@@ -1,0 +1,400 @@
+//! Cursors over the syntax tree: what a reader of one value or object needs.
+//!
+//! A reader never stops at a problem. It reports it and goes on with a
+//! placeholder, so that one pass finds everything that is wrong with a file.
+
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use indexmap::IndexMap;
+use jsonc_parser::ast::{self, Value};
+use serde::Deserialize;
+
+use super::names::{check_name, suggestion, unknown_name};
+use super::report::{Excerpt, Message, Path, Report};
+use super::variant::variant;
+use crate::{NamedMap, limits};
+
+type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
+
+/// One value of the file; or, after a problem, a silent stand-in for one.
+pub(super) struct Node<'a> {
+    report: &'a Report<'a>,
+    path: Path,
+    value: Option<&'a Value<'a>>,
+}
+
+impl<'a> Node<'a> {
+    pub(super) fn root(report: &'a Report<'a>, value: &'a Value<'a>) -> Self {
+        Self { report, path: Path::default(), value: Some(value) }
+    }
+
+    /// Reports a problem of this value.
+    pub(super) fn problem(&self, message: impl Message) {
+        if self.value.is_some() {
+            self.report.problem(&self.path, message);
+        }
+    }
+
+    pub(super) fn is_null(&self) -> bool {
+        matches!(self.value, Some(Value::NullKeyword(_)))
+    }
+
+    pub(super) fn is_string(&self) -> bool {
+        matches!(self.value, Some(Value::StringLit(_)))
+    }
+
+    pub(super) fn is_list(&self) -> bool {
+        matches!(self.value, Some(Value::Array(_)))
+    }
+
+    pub(super) fn is(&self, text: &str) -> bool {
+        matches!(self.value, Some(Value::StringLit(literal)) if literal.value == text)
+    }
+
+    pub(super) fn bool(self) -> bool {
+        match self.value {
+            Some(Value::BooleanLit(literal)) => literal.value,
+            _ => self.wrong_type("true or false"),
+        }
+    }
+
+    pub(super) fn string(self) -> Option<&'a str> {
+        match self.value {
+            Some(Value::StringLit(literal)) => Some(&literal.value),
+            _ => self.wrong_type("a string"),
+        }
+    }
+
+    /// A string that is shown to people and refers to things.
+    pub(super) fn name(self) -> String {
+        let (report, path) = (self.report, self.path.clone());
+        let Some(name) = self.string() else {
+            return String::new();
+        };
+        if let Err(message) = check_name(name) {
+            report.problem(&path, message);
+        }
+        name.to_owned()
+    }
+
+    /// One name, or a list of names.
+    pub(super) fn names(self) -> Vec<String> {
+        if self.is_list() {
+            self.list(1..=limits::ENTRIES).into_iter().map(Node::name).collect()
+        } else {
+            vec![self.name()]
+        }
+    }
+
+    pub(super) fn u64(self, range: RangeInclusive<u64>) -> u64 {
+        let (min, max) = (*range.start(), *range.end());
+        let Some(Value::NumberLit(literal)) = self.value else {
+            self.wrong_type::<()>("a whole number");
+            return min;
+        };
+        let found = Excerpt(literal.value);
+        let digits = literal.value.strip_prefix('-').unwrap_or(literal.value);
+        match literal.value.parse() {
+            Ok(number) if range.contains(&number) => return number,
+            _ if !digits.bytes().all(|byte| byte.is_ascii_digit()) => {
+                self.problem(format!("expected a whole number, found {found}"));
+            }
+            _ if min == max => self.problem(format!("must be {min}, is {found}")),
+            _ => self.problem(format!("must be between {min} and {max}, is {found}")),
+        }
+        min
+    }
+
+    pub(super) fn u32(self, range: RangeInclusive<u32>) -> u32 {
+        let number = self.u64((*range.start()).into()..=(*range.end()).into());
+        number.try_into().unwrap_or(*range.start())
+    }
+
+    pub(super) fn number(self, range: RangeInclusive<f64>) -> f64 {
+        let (min, max) = (*range.start(), *range.end());
+        let must =
+            if min == max { format!("be {min}") } else { format!("be between {min} and {max}") };
+        self.number_that(&must, min, |x| range.contains(&x))
+    }
+
+    /// A quantity > 0.
+    pub(super) fn positive(self) -> f64 {
+        const MAX: f64 = limits::MAGNITUDE;
+        let range = MAX.recip()..=MAX;
+        self.number_that(&format!("be positive and at most {MAX}"), MAX, |x| range.contains(&x))
+    }
+
+    fn number_that(self, must: &str, placeholder: f64, is_right: impl Fn(f64) -> bool) -> f64 {
+        let Some(Value::NumberLit(literal)) = self.value else {
+            self.wrong_type::<()>("a number");
+            return placeholder;
+        };
+        match literal.value.parse::<f64>() {
+            Ok(number) if is_right(number) => number,
+            _ => {
+                self.problem(|| format!("must {must}, is {}", Excerpt(literal.value)));
+                placeholder
+            }
+        }
+    }
+
+    /// A quantity of either sign.
+    pub(super) fn quantity(self) -> f64 {
+        self.number(-limits::MAGNITUDE..=limits::MAGNITUDE)
+    }
+
+    /// A quantity >= 0.
+    pub(super) fn amount(self) -> f64 {
+        self.number(0.0..=limits::MAGNITUDE)
+    }
+
+    pub(super) fn probability(self) -> f64 {
+        self.number(0.0..=1.0)
+    }
+
+    /// The variant of `T` that a string names. `unsupported`: names that the
+    /// original simulator knows and this one does not.
+    pub(super) fn variant<T: Deserialize<'a>>(self, unsupported: &[&str]) -> Option<T> {
+        let (report, path) = (self.report, self.path.clone());
+        let name = self.string()?;
+        variant(name)
+            .map_err(|error| {
+                report.problem(&path, || unknown_name(name, error.expected, unsupported))
+            })
+            .ok()
+    }
+
+    /// A string in a notation of its own.
+    pub(super) fn parsed<T: FromStr<Err: ToString>>(self) -> Option<T> {
+        let (report, path) = (self.report, self.path.clone());
+        let parsed = self.string()?.parse();
+        parsed.map_err(|error: T::Err| report.problem(&path, error.to_string())).ok()
+    }
+
+    /// One of the given strings; for unions whose variants have parameters.
+    pub(super) fn one_of(
+        self,
+        expected: &[&'static str],
+        unsupported: &[&str],
+    ) -> Option<&'static str> {
+        let (report, path) = (self.report, self.path.clone());
+        let name = self.string()?;
+        let found = expected.iter().find(|known| **known == name).copied();
+        if found.is_none() {
+            report.problem(&path, || unknown_name(name, expected, unsupported));
+        }
+        found
+    }
+
+    /// The elements of a list of bounded length.
+    pub(super) fn list(self, lengths: RangeInclusive<usize>) -> Vec<Node<'a>> {
+        let Some(Value::Array(array)) = self.value else {
+            return self.wrong_type("a list");
+        };
+        let n = array.elements.len();
+        if !lengths.contains(&n) {
+            let (min, max) = lengths.into_inner();
+            let expected = if min == max { min.to_string() } else { format!("{min} to {max}") };
+            self.problem(format!("expected a list of {expected} elements, found {n}"));
+            return Vec::new();
+        }
+        let elements = array.elements.iter().enumerate();
+        elements.map(|(i, element)| self.inner(self.path.index(i), Some(element))).collect()
+    }
+
+    /// A point or vector.
+    pub(super) fn pair(self) -> [f64; 2] {
+        match <[Node<'a>; 2]>::try_from(self.list(2..=2)) {
+            Ok(elements) => elements.map(Node::quantity),
+            Err(_) => [0.0; 2],
+        }
+    }
+
+    /// An object with known keys. Keys that `read` asks for are known; what is
+    /// left over is reported.
+    pub(super) fn object<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
+        let properties = self.properties();
+        self.read_object(properties, read)
+    }
+
+    /// An object with known keys; or a string, which stands for an object with
+    /// nothing but this `name`.
+    pub(super) fn object_or_name<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
+        match self.value {
+            Some(name @ Value::StringLit(_)) => {
+                self.read_object(Some(IndexMap::from([("name", name)])), read)
+            }
+            _ => self.object(read),
+        }
+    }
+
+    fn read_object<T>(
+        self,
+        properties: Option<Properties<'a>>,
+        read: impl FnOnce(&mut Object<'a>) -> T,
+    ) -> T {
+        let mut object = Object {
+            report: self.report,
+            path: self.path,
+            is_silent: properties.is_none(),
+            properties: properties.unwrap_or_default(),
+            known: Vec::new(),
+        };
+        let result = read(&mut object);
+        object.finish();
+        result
+    }
+
+    /// An object whose keys are names that the file chooses.
+    pub(super) fn map<T>(
+        self,
+        min_entries: usize,
+        mut read: impl FnMut(&str, Node<'a>) -> T,
+    ) -> NamedMap<T> {
+        let Some(properties) = self.properties() else {
+            return NamedMap::new();
+        };
+        if properties.len() < min_entries {
+            self.problem(format!("expected at least {min_entries} entry"));
+        }
+        let entries = properties.into_iter().map(|(name, value)| {
+            let node = self.inner(self.path.key(name), Some(value));
+            if let Err(message) = check_name(name) {
+                node.problem(message);
+            }
+            (name.to_owned(), read(name, node))
+        });
+        entries.collect()
+    }
+
+    /// The properties of an object, the first of each name.
+    fn properties(&self) -> Option<Properties<'a>> {
+        let Some(Value::Object(ast::Object { properties, .. })) = self.value else {
+            return self.wrong_type("an object");
+        };
+        let (n, limit) = (properties.len(), limits::ENTRIES);
+        if n > limit {
+            self.problem(format!("has {n} entries, the limit is {limit}"));
+            return None;
+        }
+        let mut by_name = IndexMap::with_capacity(n);
+        for property in properties {
+            let name = property.name.as_str();
+            if by_name.contains_key(name) {
+                let path = self.path.key(name);
+                self.report.problem_at(&path, property.range.start, "duplicate key");
+            } else {
+                by_name.insert(name, &property.value);
+            }
+        }
+        Some(by_name)
+    }
+
+    fn inner(&self, path: Path, value: Option<&'a Value<'a>>) -> Self {
+        Self { report: self.report, path, value }
+    }
+
+    fn wrong_type<T: Default>(&self, expected: &str) -> T {
+        let found = match self.value {
+            None => return T::default(),
+            Some(Value::StringLit(_)) => "a string",
+            Some(Value::NumberLit(_)) => "a number",
+            Some(Value::BooleanLit(_)) => "true or false",
+            Some(Value::Object(_)) => "an object",
+            Some(Value::Array(_)) => "a list",
+            Some(Value::NullKeyword(_)) => "null",
+        };
+        self.problem(format!("expected {expected}, found {found}"));
+        T::default()
+    }
+}
+
+/// The properties of one object; or, after a problem, a silent stand-in.
+pub(super) struct Object<'a> {
+    report: &'a Report<'a>,
+    path: Path,
+    is_silent: bool,
+    /// Those that nobody has asked for yet.
+    properties: Properties<'a>,
+    known: Vec<&'static str>,
+}
+
+impl<'a> Object<'a> {
+    pub(super) fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
+        self.known.push(key);
+        let value = self.properties.swap_remove(key)?;
+        Some(Node { report: self.report, path: self.path.key(key), value: Some(value) })
+    }
+
+    pub(super) fn required(&mut self, key: &'static str) -> Node<'a> {
+        self.optional(key).unwrap_or_else(|| {
+            self.problem(key, || format!("missing key `{key}`"));
+            Node { report: self.report, path: self.path.key(key), value: None }
+        })
+    }
+
+    /// The value of an optional key, or its default.
+    pub(super) fn or<T>(
+        &mut self,
+        key: &'static str,
+        default: T,
+        read: impl FnOnce(Node<'a>) -> T,
+    ) -> T {
+        self.optional(key).map_or(default, read)
+    }
+
+    /// An optional object; a missing one is read as an empty one.
+    pub(super) fn inner<T>(
+        &mut self,
+        key: &'static str,
+        read: impl FnOnce(&mut Object<'a>) -> T,
+    ) -> T {
+        if let Some(node) = self.optional(key) {
+            return node.object(read);
+        }
+        read(&mut Object {
+            report: self.report,
+            path: self.path.key(key),
+            is_silent: self.is_silent,
+            properties: IndexMap::new(),
+            known: Vec::new(),
+        })
+    }
+
+    /// Refuses keys by name that the original simulator knows.
+    pub(super) fn unsupported(&mut self, keys: &[&str]) {
+        for key in keys {
+            if self.properties.swap_remove(*key).is_some() {
+                self.report.problem(&self.path.key(key), "not supported");
+            }
+        }
+    }
+
+    /// Accepts a key that has no effect here, with a warning that says why.
+    pub(super) fn ignored(&mut self, key: &'static str, why: &str) {
+        if self.optional(key).is_some() {
+            self.report.warning(&self.path.key(key), format!("ignored: {why}"));
+        }
+    }
+
+    /// Accepts whatever keys are left, because what is known here depends on
+    /// something unreadable.
+    pub(super) fn accept_rest(&mut self) {
+        self.properties.clear();
+    }
+
+    /// Reports a problem of a key, whether the file has it or not.
+    pub(super) fn problem(&self, key: &str, message: impl Message) {
+        if !self.is_silent {
+            self.report.problem(&self.path.key(key), message);
+        }
+    }
+
+    fn finish(self) {
+        for name in self.properties.keys() {
+            let message = || format!("unknown key; {}", suggestion(name, &self.known));
+            self.report.problem(&self.path.key(name), message);
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! Collects the problems of a file and finds the place of each.
+
+use std::cell::RefCell;
+use std::fmt::{self, Write as _};
+use std::iter;
+use std::rc::Rc;
+
+use jsonc_parser::ast::Value;
+use jsonc_parser::common::Ranged as _;
+
+use crate::{ConfigError, Problem, limits};
+
+/// A place in the file, from the root. Cheap to extend: every value that is
+/// read has one.
+#[derive(Clone, Default)]
+pub(crate) struct Path(Option<Rc<Step>>);
+
+struct Step {
+    parent: Path,
+    segment: Segment,
+}
+
+#[derive(Clone, PartialEq)]
+enum Segment {
+    Key(String),
+    Index(usize),
+    /// The set of keys of a map.
+    Keys,
+}
+
+impl Path {
+    pub(crate) fn key(&self, key: &str) -> Self {
+        self.join(Segment::Key(key.to_owned()))
+    }
+
+    pub(crate) fn index(&self, index: usize) -> Self {
+        self.join(Segment::Index(index))
+    }
+
+    /// The set of keys of the map at this place; what relies on it does not
+    /// rely on the values.
+    pub(crate) fn keys(&self) -> Self {
+        self.join(Segment::Keys)
+    }
+
+    fn join(&self, segment: Segment) -> Self {
+        Self(Some(Rc::new(Step { parent: self.clone(), segment })))
+    }
+
+    fn segments(&self) -> Vec<&Segment> {
+        let steps = iter::successors(self.0.as_deref(), |step| step.parent.0.as_deref());
+        let mut segments: Vec<_> = steps.map(|step| &step.segment).collect();
+        segments.reverse();
+        segments
+    }
+
+    /// Whether one of the two contains the other.
+    fn overlaps(&self, other: &Self) -> bool {
+        self.segments().into_iter().zip(other.segments()).all(|(a, b)| a == b)
+    }
+}
+
+impl<const N: usize> From<[&str; N]> for Path {
+    fn from(keys: [&str; N]) -> Self {
+        keys.into_iter().fold(Self::default(), |path, key| path.key(key))
+    }
+}
+
+impl fmt::Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, segment) in self.segments().into_iter().enumerate() {
+            match segment {
+                Segment::Key(key) if i == 0 => write!(f, "{}", Excerpt(key))?,
+                Segment::Key(key) => write!(f, ".{}", Excerpt(key))?,
+                Segment::Index(index) => write!(f, "[{index}]")?,
+                Segment::Keys => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Text of the file, fit for a message: one line, of bounded length.
+pub(crate) struct Excerpt<'a>(pub(crate) &'a str);
+
+impl fmt::Display for Excerpt<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, c) in self.0.chars().enumerate() {
+            if i == limits::NAME_CHARS {
+                return f.write_char('…');
+            }
+            if c.is_control() {
+                write!(f, "{}", c.escape_default())?;
+            } else {
+                f.write_char(c)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What is wrong; or a function that finds the words, called only if there is
+/// room for them, for those that are costly to find.
+pub(crate) trait Message {
+    fn text(self) -> String;
+}
+
+impl Message for &str {
+    fn text(self) -> String {
+        self.to_owned()
+    }
+}
+
+impl Message for String {
+    fn text(self) -> String {
+        self
+    }
+}
+
+impl<F: FnOnce() -> String> Message for F {
+    fn text(self) -> String {
+        self()
+    }
+}
+
+/// Everything that is remarkable about a file.
+pub(crate) struct Report<'a> {
+    root: &'a Value<'a>,
+    text: &'a str,
+    remarks: RefCell<Remarks>,
+}
+
+#[derive(Default)]
+struct Remarks {
+    problems: Vec<Located>,
+    warnings: Vec<Located>,
+    /// Problems beyond [`limits::PROBLEMS`].
+    n_omitted: usize,
+    /// Places whose value stands for an unreadable one.
+    broken: Vec<Path>,
+}
+
+struct Located {
+    offset: usize,
+    problem: Problem,
+}
+
+impl<'a> Report<'a> {
+    pub(crate) fn new(text: &'a str, root: &'a Value<'a>) -> Self {
+        Self { root, text, remarks: RefCell::default() }
+    }
+
+    /// Reports what is wrong at `path`, and marks the place as broken.
+    pub(crate) fn problem(&self, path: &Path, message: impl Message) {
+        if self.has_room() {
+            let (shown, offset) = self.locate(path);
+            self.add(&shown, offset, message.text());
+            self.remarks.borrow_mut().broken.push(path.clone());
+        }
+    }
+
+    /// Reports what is wrong with the text at `offset`, which is about `path`.
+    pub(crate) fn problem_at(&self, path: &Path, offset: usize, message: impl Message) {
+        if self.has_room() {
+            self.add(path, offset, message.text());
+        }
+    }
+
+    /// Reports what is wrong at `path` in relation to `others`, unless one of
+    /// these places is broken: then it may merely follow from that.
+    pub(crate) fn conflict(&self, path: &Path, others: &[&Path], message: impl Message) {
+        let follows = {
+            let remarks = self.remarks.borrow();
+            let mut places = others.iter().copied().chain([path]);
+            places.any(|place| remarks.broken.iter().any(|broken| broken.overlaps(place)))
+        };
+        if !follows && self.has_room() {
+            let (shown, offset) = self.locate(path);
+            self.add(&shown, offset, message.text());
+        }
+    }
+
+    /// Reports a key that is accepted and ignored.
+    pub(crate) fn warning(&self, path: &Path, message: impl Message) {
+        if self.remarks.borrow().warnings.len() < limits::PROBLEMS {
+            let (shown, offset) = self.locate(path);
+            let remark = self.remark(&shown, offset, message.text());
+            self.remarks.borrow_mut().warnings.push(remark);
+        }
+    }
+
+    /// Whether every problem so far is listed, so that all broken places are
+    /// known.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.remarks.borrow().n_omitted == 0
+    }
+
+    /// The warnings, or the problems, each in the order of the file.
+    pub(crate) fn finish(self) -> Result<Vec<Problem>, ConfigError> {
+        fn in_order(mut remarks: Vec<Located>) -> Vec<Problem> {
+            remarks.sort_by_key(|remark| remark.offset);
+            remarks.into_iter().map(|remark| remark.problem).collect()
+        }
+        let Remarks { problems, warnings, n_omitted, .. } = self.remarks.into_inner();
+        if problems.is_empty() {
+            return Ok(in_order(warnings));
+        }
+        let mut problems = in_order(problems);
+        if n_omitted > 0 {
+            let message = format!("and {n_omitted} more problems");
+            problems.push(Problem { path: String::new(), line: None, message });
+        }
+        Err(ConfigError { problems })
+    }
+
+    /// Counts the problem if there is no room to list it.
+    fn has_room(&self) -> bool {
+        let mut remarks = self.remarks.borrow_mut();
+        let has_room = remarks.problems.len() < limits::PROBLEMS;
+        remarks.n_omitted += usize::from(!has_room);
+        has_room
+    }
+
+    fn add(&self, path: &Path, offset: usize, message: String) {
+        let remark = self.remark(path, offset, message);
+        self.remarks.borrow_mut().problems.push(remark);
+    }
+
+    fn remark(&self, path: &Path, offset: usize, message: String) -> Located {
+        let newlines = self.text.as_bytes()[..offset].iter().filter(|&&byte| byte == b'\n');
+        let line = Some(1 + newlines.count());
+        Located { offset, problem: Problem { path: path.to_string(), line, message } }
+    }
+
+    /// The deepest part of `path` that the file has, and its offset.
+    fn locate(&self, path: &Path) -> (Path, usize) {
+        let mut value = self.root;
+        let mut located = (Path::default(), value.range().start);
+        for segment in path.segments() {
+            let inner = match (segment, value) {
+                (Segment::Key(key), Value::Object(object)) => {
+                    let property = object.properties.iter().find(|p| p.name.as_str() == key);
+                    property.map(|property| (property.range.start, &property.value))
+                }
+                (&Segment::Index(index), Value::Array(array)) => {
+                    array.elements.get(index).map(|element| (element.range().start, element))
+                }
+                _ => None,
+            };
+            let Some((offset, inner)) = inner else {
+                break;
+            };
+            located = (located.0.join(segment.clone()), offset);
+            value = inner;
+        }
+        located
+    }
+}

@@ -1,0 +1,161 @@
+//! Reads `world`: the arena, lights, ground areas, start values.
+
+use super::node::{Node, Object};
+use super::robot::robot;
+use crate::world::DEFAULT_WORLD_SIZE;
+use crate::{
+    GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightParams,
+    LightSourceConfig, ObjectConfig, PositionInitializers, WorldConfig, limits,
+};
+
+pub(super) fn world(o: &mut Object<'_>) -> WorldConfig {
+    for key in ["world_delay", "render_connections"] {
+        o.ignored(key, "it concerns the original simulator's window");
+    }
+    let size = |node: Node<'_>| node.number(1.0..=limits::MAGNITUDE);
+    let height = o.or("height", DEFAULT_WORLD_SIZE, size);
+    let width = o.or("width", DEFAULT_WORLD_SIZE, size);
+    let center = [width / 2.0, height / 2.0];
+    let objects = o.required("objects").map(1, |_, node| node.object(|o| object(o, center)));
+    WorldConfig { height, width, objects }
+}
+
+fn object(o: &mut Object<'_>, center: [f64; 2]) -> ObjectConfig {
+    const KNOWN: [&str; 3] = ["robot", "light_source", "ground_area"];
+    for key in ["positions", "orientations"] {
+        o.ignored(key, "`initializers` say where objects start");
+    }
+    match o.required("type").one_of(&KNOWN, &["food_area", "nest"]) {
+        Some("robot") => ObjectConfig::Robot(robot(o, center)),
+        Some("light_source") => ObjectConfig::LightSource(light_source(o, center)),
+        Some(_) => ObjectConfig::GroundArea(ground_area(o, center)),
+        None => {
+            o.accept_rest();
+            ObjectConfig::GroundArea(GroundAreaConfig {
+                num_instances: 1,
+                initializers: PositionInitializers {
+                    positions: Initializer::Fixed { values: vec![vec![0.0; 2]] },
+                },
+                params: GroundAreaParams::default(),
+            })
+        }
+    }
+}
+
+fn light_source(o: &mut Object<'_>, center: [f64; 2]) -> LightSourceConfig {
+    let default = LightParams::default();
+    LightSourceConfig {
+        num_instances: o.required("num_instances").u32(1..=limits::FIXTURES),
+        controller: o.or("controller", LightController::Static {}, light_controller),
+        initializers: position_initializers(o, center),
+        params: o.inner("params", |o| {
+            o.ignored("static", "`controller` says how a light moves");
+            LightParams {
+                range: o.or("range", default.range, Node::positive),
+                color: o.or("color", default.color, Node::name),
+            }
+        }),
+    }
+}
+
+/// A name, an object of `name` and `params`, or null for none.
+fn light_controller(node: Node<'_>) -> LightController {
+    const KNOWN: [&str; 3] = ["static", "light_orbit_controller", "light_rnd_pos_controller"];
+    if node.is_null() {
+        return LightController::Static {};
+    }
+    node.object_or_name(|o| {
+        let Some(name) = o.required("name").one_of(&KNOWN, &["light_prey_controller"]) else {
+            o.accept_rest();
+            return LightController::Static {};
+        };
+        o.inner("params", |o| match name {
+            "light_orbit_controller" => LightController::LightOrbitController {},
+            "light_rnd_pos_controller" => LightController::LightRndPosController {
+                every: o.or("every", 50, |node| node.u32(1..=limits::STEPS)),
+                step: o.or("step", 0.03, Node::probability),
+            },
+            _ => LightController::Static {},
+        })
+    })
+}
+
+fn ground_area(o: &mut Object<'_>, center: [f64; 2]) -> GroundAreaConfig {
+    let default = GroundAreaParams::default();
+    if let Some(controller) = o.optional("controller").filter(|node| !node.is_null()) {
+        controller.problem("a ground area has no controller; expected null or no such key");
+    }
+    GroundAreaConfig {
+        num_instances: o.required("num_instances").u32(1..=limits::FIXTURES),
+        initializers: position_initializers(o, center),
+        params: o.inner("params", |o| GroundAreaParams {
+            range: o.or("range", default.range, Node::positive),
+            color: o.or("color", default.color, Node::name),
+        }),
+    }
+}
+
+fn position_initializers(o: &mut Object<'_>, center: [f64; 2]) -> PositionInitializers {
+    o.required("initializers").object(|o| {
+        o.ignored("orientations", "only robots have a heading");
+        PositionInitializers { positions: positions(o.required("positions"), center) }
+    })
+}
+
+/// `center`: of the world, the default centre of arrangements.
+pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
+    const KNOWN: [&str; 4] = ["fixed", "random_uniform", "random_circumference", "random_graph"];
+    node.object(|o| {
+        let Some(name) = o.required("name").one_of(&KNOWN, &["grid_graph"]) else {
+            o.accept_rest();
+            return Initializer::Fixed { values: vec![vec![0.0; 2]] };
+        };
+        o.inner("params", |o| match name {
+            "fixed" => fixed(o, 2),
+            "random_uniform" => random_uniform(o, 2, 100.0, 900.0),
+            "random_circumference" => Initializer::RandomCircumference {
+                radius: o.or("radius", 130.0, Node::amount),
+                center: o.or("center", center, Node::pair),
+            },
+            _ => Initializer::RandomGraph {
+                max_rad: o.or("max_rad", 300.0, Node::positive),
+                initial_pos: o.or("initial_pos", center, Node::pair),
+            },
+        })
+    })
+}
+
+/// Headings; by default uniform on the circle.
+pub(super) fn orientations(node: Option<Node<'_>>) -> Initializer {
+    const FULL_TURN: f64 = std::f64::consts::TAU;
+    let Some(node) = node else {
+        return Initializer::RandomUniform { low: 0.0, high: FULL_TURN, size: 1 };
+    };
+    node.object(|o| {
+        let Some(name) = o.required("name").one_of(&["fixed", "random_uniform"], &[]) else {
+            o.accept_rest();
+            return Initializer::Fixed { values: vec![vec![0.0]] };
+        };
+        o.inner("params", |o| match name {
+            "fixed" => fixed(o, 1),
+            _ => random_uniform(o, 1, 0.0, FULL_TURN),
+        })
+    })
+}
+
+fn fixed(o: &mut Object<'_>, n_components: usize) -> Initializer {
+    const MAX: usize = limits::ROBOTS as usize;
+    let vector = |node: Node<'_>| -> Vec<f64> {
+        node.list(n_components..=n_components).into_iter().map(Node::quantity).collect()
+    };
+    let values = o.required("values").list(1..=MAX);
+    Initializer::Fixed { values: values.into_iter().map(vector).collect() }
+}
+
+fn random_uniform(o: &mut Object<'_>, n_components: u32, low: f64, high: f64) -> Initializer {
+    Initializer::RandomUniform {
+        low: o.or("low", low, Node::quantity),
+        high: o.or("high", high, Node::quantity),
+        size: o.or("size", n_components, |node| node.u32(n_components..=n_components)),
+    }
+}

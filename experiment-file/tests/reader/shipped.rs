@@ -1,0 +1,78 @@
+//! The experiments that the project ships.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::accept;
+use experiment_file::FitnessFunction;
+
+/// Every shipped file: its stem and its text.
+pub(super) fn shipped() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = entries.collect();
+    paths.sort();
+    let text = |path: &PathBuf| fs::read_to_string(path).unwrap();
+    let stem = |path: &PathBuf| path.file_stem().unwrap().to_str().unwrap().to_owned();
+    paths.iter().map(|path| (stem(path), text(path))).collect()
+}
+
+#[test]
+fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
+    for (stem, text) in shipped() {
+        assert_eq!(accept(&text).name, stem);
+    }
+}
+
+#[test]
+fn every_task_is_shipped_for_the_ga_and_for_snes() {
+    let shipped = shipped();
+    let tasks = [
+        ("leader_selection", FitnessFunction::IdentifyLeader, 10),
+        ("borderline", FitnessFunction::IdentifyBorderline, 20),
+        ("orientation_consensus", FitnessFunction::OrientationConsensus, 10),
+        ("orientation_consensus_alignment", FitnessFunction::Alignment, 10),
+        ("light_follower", FitnessFunction::GotoLight, 10),
+        ("light_follower_thesis_sensors", FitnessFunction::GotoLight, 10),
+    ];
+    for (task, fitness, n_robots) in tasks {
+        for algorithm in ["ga", "snes"] {
+            let name = format!("{task}_{algorithm}");
+            let (_, text) = shipped.iter().find(|(stem, _)| *stem == name).expect(&name);
+            let config = accept(text);
+            assert_eq!(config.algorithm.fitness_function, fitness);
+            assert_eq!(
+                config.robots().map(|(_, robot)| robot.num_instances).sum::<u32>(),
+                n_robots
+            );
+        }
+    }
+    assert_eq!(shipped.len(), 2 * tasks.len() + 1);
+}
+
+/// A reader of the file sees the constants, whatever the defaults are.
+#[test]
+fn shipped_files_state_every_constant_of_sensors_and_actuators() {
+    for (stem, text) in shipped() {
+        let file: Value = serde_json::from_str(&text).unwrap();
+        let canonical: Value = serde_json::from_str(&accept(&text).to_canonical_json()).unwrap();
+        for (name, object) in canonical["world"]["objects"].as_object().unwrap() {
+            for part in ["sensors", "actuators", "initializers", "params"] {
+                let stated = &file["world"]["objects"][name][part];
+                assert_same_keys(&object[part], stated, &format!("{stem}: {name}.{part}"));
+            }
+        }
+    }
+}
+
+fn assert_same_keys(expected: &Value, stated: &Value, place: &str) {
+    let Some(expected) = expected.as_object() else {
+        return;
+    };
+    for (key, inner) in expected {
+        assert!(stated.get(key).is_some(), "{place}.{key} is not stated");
+        assert_same_keys(inner, &stated[key], &format!("{place}.{key}"));
+    }
+}

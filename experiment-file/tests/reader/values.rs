@@ -1,0 +1,205 @@
+//! What a right file means: defaults, alternatives, the canonical form.
+
+use super::{BASE, accept, edited, read};
+use experiment_file::{
+    Activation, AlgorithmName, AlgorithmParams, GaParams, Initializer, LightController,
+    LightSourceConfig, NeuronParams, ObjectConfig, RobotController, SnesParams,
+    UncontrollableRotationConfig, json_schema,
+};
+
+#[test]
+fn what_a_file_omits_has_its_documented_default() {
+    let config = accept(BASE);
+    assert_eq!((config.seed, config.topology.seed), (0, 821));
+    assert_eq!((config.topology.dt, config.topology.time_scale), (0.1, 20));
+    assert_eq!((config.world.height, config.world.width), (1000.0, 1000.0));
+    assert_eq!(config.topology.ensembles["H"].activation, Activation::Sigmoid);
+    assert_eq!(config.topology.ensembles["H"].params, NeuronParams::default());
+    assert!(config.topology.synapses["out"].trainable);
+    let (_, bots) = config.robots().next().unwrap();
+    let receiver = bots.sensors.wireless_receiver.as_ref().unwrap();
+    assert_eq!((receiver.n_sectors, receiver.range, receiver.max_hops), (4, 100.0, 10));
+    let transmitter = bots.actuators.wireless_transmitter.as_ref().unwrap();
+    assert_eq!((transmitter.quantize, transmitter.n_levels()), (true, 4));
+    let headings = Initializer::RandomUniform { low: 0.0, high: std::f64::consts::TAU, size: 1 };
+    assert_eq!(bots.initializers.orientations, headings);
+}
+
+#[test]
+fn the_name_is_name_else_checkpoint_file_else_the_default() {
+    let name = r#""name": "base","#;
+    let both = r#""checkpoint_file": "chk", "name": "base","#;
+    assert_eq!(accept(&edited(name, both)).name, "base");
+    assert_eq!(accept(&edited(name, r#""checkpoint_file": "chk","#)).name, "chk");
+    assert_eq!(accept(&edited(name, r#""checkpoint_file": null,"#)).name, "default");
+    assert_eq!(accept(&edited(name, "")).name, "default");
+}
+
+#[test]
+fn one_bound_serves_all_queries() {
+    let config = accept(&edited("[1.5, 0.75]", "0.5"));
+    assert_eq!(config.algorithm.populations["neurons"].max_vals, [0.5, 0.5]);
+}
+
+#[test]
+fn operators_stand_in_params_or_in_the_population() {
+    let config = accept(BASE);
+    let expected = AlgorithmParams::Ga(GaParams { num_elite: 2, ..GaParams::default() });
+    assert_eq!(config.algorithm.populations["neurons"].params, expected);
+}
+
+#[test]
+fn gains_is_another_name_of_gain() {
+    let queries = r#""neurons:bias:all", "neurons:tau:H""#;
+    let config = accept(&edited(queries, r#""neurons:gains:all", "neurons:tau:H""#));
+    let queries = &config.algorithm.populations["neurons"].objects;
+    assert_eq!(queries[0].to_string(), "neurons:gain:all");
+}
+
+#[test]
+fn the_neuron_model_has_several_names_and_forms() {
+    let model = r#""neuron_model": "rate_model","#;
+    for form in [r#""neuron_model": "ctrnn","#, r#""neurons": {"model": "ctrnn"},"#, ""] {
+        assert_eq!(accept(&edited(model, form)), accept(BASE), "{form}");
+    }
+}
+
+#[test]
+fn activation_stands_in_the_ensemble_or_in_its_params() {
+    let direct = r#""activation": "tanh""#;
+    let inner = r#""params": {"activation": "tanh"}"#;
+    assert_eq!(accept(&edited(direct, inner)), accept(BASE));
+}
+
+#[test]
+fn light_controllers_have_three_forms() {
+    let controller = |form: &str| {
+        let config = accept(&edited(r#""controller": null"#, &format!("\"controller\": {form}")));
+        match config.world.objects["lamp"].clone() {
+            ObjectConfig::LightSource(LightSourceConfig { controller, .. }) => controller,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(controller("null"), LightController::Static {});
+    let random = LightController::LightRndPosController { every: 50, step: 0.03 };
+    assert_eq!(controller(r#""light_rnd_pos_controller""#), random);
+    let slow = r#"{"name": "light_rnd_pos_controller", "params": {"every": 90}}"#;
+    let random = LightController::LightRndPosController { every: 90, step: 0.03 };
+    assert_eq!(controller(slow), random);
+}
+
+#[test]
+fn constants_of_the_original_are_translated() {
+    let sensors = r#""light_sensor": {}"#;
+    let config = accept(&edited(sensors, r#""light_sensor": {"noise_sigma": 0.5}"#));
+    let (_, bots) = config.robots().next().unwrap();
+    assert_eq!(bots.sensors.light_sensor.as_ref().unwrap().noise_variance, 0.25);
+    let wheels = r#""wheel_actuator": {}"#;
+    let config = accept(&edited(wheels, r#""wheel_actuator": {"dt": 1.65, "min_thresh": 0.0}"#));
+    let (_, bots) = config.robots().next().unwrap();
+    assert!((bots.actuators.wheel_actuator.as_ref().unwrap().step_duration - 0.33).abs() < 1e-12);
+    let controller = r#""controller": "neural_controller","#;
+    let vehicle = r#"{"type": "robot", "num_instances": 1, "controller": "Braitenberg2",
+        "sensors": {"light_sensor": {}}, "actuators": {"wheel_actuator": {}},
+        "initializers": {"positions": {"name": "random_uniform"}}}"#;
+    let config = accept(&edited(r#""lamp": {"#, &format!(r#""car": {vehicle}, "lamp": {{"#)));
+    let cars: Vec<_> = config.robots().map(|(_, robot)| robot.controller).collect();
+    assert_eq!(
+        cars,
+        [RobotController::NeuralController, RobotController::BraitenbergLightFollower]
+    );
+    assert!(BASE.contains(controller));
+}
+
+#[test]
+fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
+    let perturbation = r#""stimuli_inhibition": {"affected_robots": 2}"#;
+    for form in [r#"{"affected_robots": "all"}"#, "{}"] {
+        let config = accept(&edited(
+            perturbation,
+            &format!("\"stimuli_inhibition\": {form}, \"uncontrollable_rotation\": {form}"),
+        ));
+        let (_, bots) = config.robots().next().unwrap();
+        assert_eq!(bots.perturbations.stimuli_inhibition[0].affected_robots, 4);
+        let targets = [270.0_f64, 90.0, 15.0, 180.0].map(f64::to_radians).to_vec();
+        assert_eq!(
+            bots.perturbations.uncontrollable_rotation,
+            Some(UncontrollableRotationConfig {
+                affected_robots: 4,
+                start: 200,
+                targets,
+                switch_at: 600,
+            })
+        );
+    }
+}
+
+#[test]
+fn what_steers_the_original_alone_is_ignored_with_a_warning_each() {
+    let name = r#""name": "base","#;
+    let text = edited(name, r#""name": "base", "num_processes": 8, "render": true,"#)
+        .replace(r#""name": "GA""#, r#""name": "SNES""#)
+        .replace(
+            r#""objects": {"#,
+            r#""world_delay": 1, "render_connections": false, "objects": {"#,
+        )
+        .replace(r#""type": "light_source""#, r#""type": "light_source", "positions": "random""#);
+    let (config, warnings) = read(&text).unwrap();
+    let paths: Vec<&str> = warnings.iter().map(|warning| warning.path.as_str()).collect();
+    assert_eq!(
+        paths,
+        [
+            "num_processes",
+            "render",
+            "algorithm.populations.neurons.num_elite",
+            "world.world_delay",
+            "world.render_connections",
+            "world.objects.lamp.positions",
+        ]
+    );
+    assert_eq!(
+        warnings[2].to_string(),
+        "line 46: algorithm.populations.neurons.num_elite: ignored: only the genetic algorithm \
+         has it"
+    );
+    assert_eq!(config.algorithm.name, AlgorithmName::Snes);
+    let params = &config.algorithm.populations["neurons"].params;
+    assert_eq!(*params, AlgorithmParams::Snes(SnesParams::default()));
+}
+
+#[test]
+fn the_order_of_decoding_has_no_meaning() {
+    let msg = r#"      "msg": {"scheme": "IdentityDecoding", "params": {"is_cat": false}},
+"#;
+    let wheels = r#"      "wheels": {"scheme": "IdentityDecoding"}
+"#;
+    let text = edited(msg, "").replace(
+        wheels,
+        r#""wheels": {"scheme": "IdentityDecoding"},
+        "msg": {"scheme": "IdentityDecoding"}"#,
+    );
+    assert_eq!(accept(&text).to_canonical_json(), accept(BASE).to_canonical_json());
+}
+
+#[test]
+fn the_canonical_form_is_a_file_of_the_same_meaning() {
+    let config = accept(BASE);
+    let canonical = config.to_canonical_json();
+    let again = accept(&canonical);
+    assert_eq!(again, config);
+    assert_eq!(again.to_canonical_json(), canonical);
+}
+
+#[test]
+fn a_file_may_name_its_schema() {
+    let name = r#""name": "base","#;
+    let text = edited(name, r#""$schema": "experiment.schema.json", "name": "base","#);
+    assert_eq!(accept(&text), accept(BASE));
+    let file: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(jsonschema::is_valid(&json_schema(), &file));
+}
+
+#[test]
+fn a_byte_order_mark_is_ignored() {
+    assert_eq!(accept(&format!("\u{feff}{BASE}")), accept(BASE));
+}

@@ -1,0 +1,109 @@
+//! Which vector instructions the simulation uses. They decide how fast it is, and
+//! nothing else: every level computes the same bits.
+
+use std::fmt;
+use std::str::FromStr;
+
+use pulp::{Arch, WithSimd};
+
+/// A level of vector instructions that this processor has.
+#[derive(Clone, Copy)]
+pub struct Isa(Arch);
+
+impl Isa {
+    /// The fastest level of this processor.
+    pub fn best() -> Self {
+        Self(Arch::new())
+    }
+
+    /// All levels of this processor, the slowest first.
+    pub fn available() -> Vec<Self> {
+        let mut levels = vec![Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            levels.extend(pulp::x86::V3::try_new().map(Arch::V3));
+            levels.extend(pulp::x86::V4::try_new().map(Arch::V4));
+        }
+        #[cfg(target_arch = "aarch64")]
+        levels.extend(pulp::aarch64::Neon::try_new().map(Arch::Neon));
+        levels.into_iter().map(Self).collect()
+    }
+
+    /// `portable`, `avx2` (with FMA), `avx512` or `neon`.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Arch::Scalar => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Arch::V3(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Arch::V4(_) => "avx512",
+            #[cfg(target_arch = "aarch64")]
+            Arch::Neon(_) => "neon",
+            _ => "other",
+        }
+    }
+
+    /// Runs an operation that is compiled for this level.
+    pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
+        self.0.dispatch(operation)
+    }
+
+    /// Lanes of f32 per vector.
+    pub fn vector_len(self) -> usize {
+        struct VectorLen;
+        impl WithSimd for VectorLen {
+            type Output = usize;
+            fn with_simd<S: pulp::Simd>(self, _simd: S) -> usize {
+                S::F32_LANES
+            }
+        }
+        self.run(VectorLen)
+    }
+}
+
+impl fmt::Debug for Isa {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl fmt::Display for Isa {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// This processor has no such level.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("this processor offers {available}, not {name:?}")]
+pub struct UnknownIsa {
+    name: String,
+    available: String,
+}
+
+impl FromStr for Isa {
+    type Err = UnknownIsa;
+
+    fn from_str(name: &str) -> Result<Self, UnknownIsa> {
+        let levels = Self::available();
+        levels.iter().find(|level| level.name() == name).copied().ok_or_else(|| UnknownIsa {
+            name: name.to_owned(),
+            available: levels.iter().map(|level| level.name()).collect::<Vec<_>>().join(", "),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_found_by_their_names_and_the_best_is_the_last() {
+        for isa in Isa::available() {
+            assert_eq!(isa.name().parse::<Isa>().unwrap().name(), isa.name());
+        }
+        assert_eq!(Isa::available().last().unwrap().name(), Isa::best().name());
+        let error = "abacus".parse::<Isa>().unwrap_err().to_string();
+        assert!(error.contains("portable") && error.contains("abacus"), "{error}");
+    }
+}

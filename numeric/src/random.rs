@@ -1,0 +1,346 @@
+//! Random streams addressed by what they are for.
+//!
+//! A stream is ChaCha8 whose 256-bit key *is* its address, four little-endian
+//! 64-bit words `[seed, generation, trial, purpose]`, and whose 64-bit stream
+//! number is the robot. Streams of different addresses are independent, no
+//! stream depends on who draws from it or when, and any other program with a
+//! ChaCha8 can reproduce every number of a run.
+//!
+//! The index of an individual is not part of an address: individuals of a
+//! generation meet the same worlds and the same noise (common random numbers).
+//!
+//! Derived values, so that they too can be reproduced elsewhere:
+//! - `u64`: two consecutive 32-bit outputs, low word first;
+//! - uniform in \[0, 1): `(u64 >> 11) * 2^-53`;
+//! - an integer below n: `floor(uniform * n)`;
+//! - standard normal: the quantile function (Wichura 1988, AS 241, PPND16) of
+//!   `(k + 0.5) * 2^-52` with `k = u64 >> 12`. One draw gives one normal, so draws stay
+//!   countable; and its logarithm comes from `libm`, where the crates for
+//!   distributions would use the platform's as soon as any dependency asks for
+//!   their `std` feature.
+
+use pulp::{Simd, WithSimd};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::Isa;
+
+/// What a stream is for. The numbers are part of the format of a run: never
+/// reuse one for something else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u64)]
+pub enum Purpose {
+    /// Start positions of an object of the world; stream = index of the object.
+    Positions = 1,
+    /// Start headings; stream = index of the object.
+    Orientations = 2,
+    /// Robots affected by a perturbation; stream = its place in
+    /// [`PerturbationsConfig`](crate::config::PerturbationsConfig).
+    Perturbation = 3,
+    /// Which valid frame a receiver takes; stream = robot, one draw per step.
+    Reception = 4,
+    /// Which symbol a message becomes; stream = robot, one draw per step.
+    Quantisation = 5,
+    /// Stochastic decoding; stream = robot, per step one draw per stochastic
+    /// output neuron (threshold) or output (softmax), in the order of outputs.
+    Decoding = 6,
+    /// Sensor noise; stream = robot, one normal per sector and step, light
+    /// sensor first.
+    SensorNoise = 7,
+    /// Movement of lights; stream = light.
+    LightMovement = 8,
+    /// Which synapses exist; seed = `topology.seed`, stream = index of the group.
+    Connections = 9,
+    /// Weights outside the genotype; as [`Connections`](Self::Connections).
+    FixedWeights = 10,
+    /// Variation in evolution; trial = 0, stream = index of the population.
+    Evolution = 11,
+}
+
+/// A random stream; see the module's text for its address and its values.
+#[derive(Debug, Clone)]
+pub struct Stream(ChaCha8Rng);
+
+impl Stream {
+    /// The stream of this address, at its beginning.
+    pub fn new(seed: u64, generation: u64, trial: u64, purpose: Purpose, stream: u64) -> Self {
+        let mut key = [0; 32];
+        let words = [seed, generation, trial, purpose as u64];
+        for (bytes, word) in key.chunks_exact_mut(8).zip(words) {
+            bytes.copy_from_slice(&word.to_le_bytes());
+        }
+        let mut rng = ChaCha8Rng::from_seed(key);
+        rng.set_stream(stream);
+        Self(rng)
+    }
+
+    /// Uniform in \[0, 1), a multiple of 2^-53.
+    pub fn uniform(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 * TWO_POW_MINUS_53
+    }
+
+    /// Uniform in 0..n. `n` must not be 0.
+    pub fn below(&mut self, n: usize) -> usize {
+        debug_assert!(n > 0, "no integer is below 0");
+        // The product can round up to n for huge n only; min keeps the promise.
+        ((self.uniform() * n as f64) as usize).min(n - 1)
+    }
+
+    /// True with probability `p`.
+    pub fn bernoulli(&mut self, p: f64) -> bool {
+        self.uniform() < p
+    }
+
+    /// Passes over `n` draws of any kind.
+    pub fn skip(&mut self, n: usize) {
+        for _ in 0..n {
+            self.0.next_u64();
+        }
+    }
+
+    /// Standard normal.
+    pub fn normal(&mut self) -> f64 {
+        standard_normal_quantile(self.probability())
+    }
+
+    /// Fills `values` with what [`normal`](Self::normal) would draw one by one, to
+    /// the bit, in less than half the time.
+    pub fn fill_normal(&mut self, values: &mut [f64]) {
+        values.fill_with(|| self.probability());
+        Isa::best().run(StandardNormalQuantiles(values));
+    }
+
+    /// Uniform in (0, 1).
+    fn probability(&mut self) -> f64 {
+        // 52 bits, so that adding a half is exact and the quantile stays finite.
+        let k = self.0.next_u64() >> 12;
+        (k as f64 + 0.5) * TWO_POW_MINUS_52
+    }
+}
+
+/// The index that a uniform `u` in \[0, 1) draws with probabilities proportional
+/// to `weights`: the smallest i with w_0 + ... + w_i > u * total. `weights` are
+/// not negative, and one at least is positive.
+pub fn sample(weights: &[f64], u: f64) -> usize {
+    let total = weights.iter().fold(0.0, |sum, weight| sum + weight);
+    let mut sum = 0.0;
+    let drawn = weights.iter().position(|weight| {
+        sum += weight;
+        sum > u * total
+    });
+    drawn.unwrap_or(weights.len() - 1)
+}
+
+const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
+const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
+
+/// Quantile of N(0, 1) at `p` in (0, 1); Wichura, "Algorithm AS 241: The
+/// Percentage Points of the Normal Distribution", Applied Statistics 37 (1988),
+/// routine PPND16, relative accuracy about 1e-16.
+fn standard_normal_quantile(p: f64) -> f64 {
+    let q = p - 0.5;
+    if is_central(q) {
+        return central_quantile(q);
+    }
+    let tail = if q < 0.0 { p } else { 1.0 - p };
+    let r = (-libm::log(tail)).sqrt();
+    let magnitude = if r <= 5.0 {
+        let r = r - 1.6;
+        horner(&MIDDLE_NUMERATOR, r) / horner(&MIDDLE_DENOMINATOR, r)
+    } else {
+        let r = r - 5.0;
+        horner(&TAIL_NUMERATOR, r) / horner(&TAIL_DENOMINATOR, r)
+    };
+    if q < 0.0 { -magnitude } else { magnitude }
+}
+
+/// Whether `p` = q + 0.5 is not in a tail: 85 of 100 are not.
+fn is_central(q: f64) -> bool {
+    q.abs() <= 0.425
+}
+
+#[inline(always)]
+fn central_quantile(q: f64) -> f64 {
+    let r = 0.180625 - q * q;
+    q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
+}
+
+/// Replaces probabilities by their quantiles. All of them are taken to be central
+/// first: without a branch, the compiler computes several at once.
+struct StandardNormalQuantiles<'a>(&'a mut [f64]);
+
+impl WithSimd for StandardNormalQuantiles<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        const N: usize = 64;
+        for values in self.0.chunks_mut(N) {
+            let mut probabilities = [0.5; N];
+            probabilities[..values.len()].copy_from_slice(values);
+            let quantiles = probabilities.map(|p| central_quantile(p - 0.5));
+            for ((value, p), central) in values.iter_mut().zip(probabilities).zip(quantiles) {
+                *value = if is_central(p - 0.5) { central } else { standard_normal_quantile(p) };
+            }
+        }
+    }
+}
+
+/// Polynomial with the coefficients of x^0, x^1, ...
+#[inline(always)]
+fn horner(coefficients: &[f64; 8], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * x + coefficient)
+}
+
+const CENTRE_NUMERATOR: [f64; 8] = [
+    3.387_132_872_796_366_5,
+    1.331_416_678_917_843_8e2,
+    1.971_590_950_306_551_3e3,
+    1.373_169_376_550_946e4,
+    4.592_195_393_154_987e4,
+    6.726_577_092_700_87e4,
+    3.343_057_558_358_813e4,
+    2.509_080_928_730_122_7e3,
+];
+const CENTRE_DENOMINATOR: [f64; 8] = [
+    1.0,
+    4.231_333_070_160_091e1,
+    6.871_870_074_920_579e2,
+    5.394_196_021_424_751e3,
+    2.121_379_430_158_66e4,
+    3.930_789_580_009_271e4,
+    2.872_908_573_572_194_3e4,
+    5.226_495_278_852_854e3,
+];
+const MIDDLE_NUMERATOR: [f64; 8] = [
+    1.423_437_110_749_683_5,
+    4.630_337_846_156_546,
+    5.769_497_221_460_691,
+    3.647_848_324_763_204_5,
+    1.270_458_252_452_368_4,
+    2.417_807_251_774_506e-1,
+    2.272_384_498_926_918_4e-2,
+    7.745_450_142_783_414e-4,
+];
+const MIDDLE_DENOMINATOR: [f64; 8] = [
+    1.0,
+    2.053_191_626_637_759,
+    1.676_384_830_183_803_8,
+    6.897_673_349_851e-1,
+    1.481_039_764_274_800_8e-1,
+    1.519_866_656_361_645_7e-2,
+    5.475_938_084_995_345e-4,
+    1.050_750_071_644_416_9e-9,
+];
+const TAIL_NUMERATOR: [f64; 8] = [
+    6.657_904_643_501_103,
+    5.463_784_911_164_114,
+    1.784_826_539_917_291_3,
+    2.965_605_718_285_048_7e-1,
+    2.653_218_952_657_612_4e-2,
+    1.242_660_947_388_078_4e-3,
+    2.711_555_568_743_487_6e-5,
+    2.010_334_399_292_288_1e-7,
+];
+const TAIL_DENOMINATOR: [f64; 8] = [
+    1.0,
+    5.998_322_065_558_88e-1,
+    1.369_298_809_227_358e-1,
+    1.487_536_129_085_061_5e-2,
+    7.868_691_311_456_133e-4,
+    1.846_318_317_510_054_8e-5,
+    1.421_511_758_316_446e-7,
+    2.044_263_103_389_939_8e-15,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_match_tables() {
+        // scipy.stats.norm.ppf
+        for (p, expected) in [
+            (0.5, 0.0),
+            (0.025, -1.959963984540054),
+            (0.975, 1.959963984540054),
+            (1e-10, -6.361340902404056),
+            (0.3, -0.5244005127080409),
+            (1e-16, -8.222082216130435),
+        ] {
+            let q = standard_normal_quantile(p);
+            assert!((q - expected).abs() <= 1e-14 * expected.abs().max(1.0), "{p}: {q} {expected}");
+        }
+    }
+
+    #[test]
+    fn many_normals_at_once_are_those_drawn_one_by_one() {
+        for n in [0, 1, 63, 64, 65, 10_000] {
+            let stream = Stream::new(n, 1, 0, Purpose::Evolution, 2);
+            let mut one_by_one = stream.clone();
+            let expected: Vec<u64> = (0..n).map(|_| one_by_one.normal().to_bits()).collect();
+            for isa in Isa::available() {
+                let mut stream = stream.clone();
+                let mut values: Vec<f64> = (0..n).map(|_| stream.probability()).collect();
+                isa.run(StandardNormalQuantiles(&mut values));
+                let bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();
+                assert_eq!(bits, expected, "{n} by {isa}");
+            }
+            let mut at_once = stream;
+            at_once.fill_normal(&mut vec![0.0; n as usize]);
+            assert_eq!(at_once.uniform(), one_by_one.uniform(), "as many draws");
+        }
+    }
+
+    #[test]
+    fn sampling_follows_the_weights_in_order() {
+        let weights = [0.0, 1.0, 0.0, 3.0];
+        assert_eq!(sample(&weights, 0.0), 1);
+        assert_eq!(sample(&weights, 0.249), 1);
+        assert_eq!(sample(&weights, 0.25), 3);
+        assert_eq!(sample(&weights, 1.0 - TWO_POW_MINUS_53), 3);
+    }
+
+    #[test]
+    fn streams_of_different_addresses_differ() {
+        let addresses = [
+            Stream::new(1, 2, 3, Purpose::Positions, 4),
+            Stream::new(0, 2, 3, Purpose::Positions, 4),
+            Stream::new(1, 0, 3, Purpose::Positions, 4),
+            Stream::new(1, 2, 0, Purpose::Positions, 4),
+            Stream::new(1, 2, 3, Purpose::Orientations, 4),
+            Stream::new(1, 2, 3, Purpose::Positions, 0),
+        ];
+        let mut first: Vec<u64> = addresses.map(|mut s| s.uniform().to_bits()).to_vec();
+        first.sort_unstable();
+        first.dedup();
+        assert_eq!(first.len(), 6);
+    }
+
+    #[test]
+    fn values_have_their_moments() {
+        let mut stream = Stream::new(0, 0, 0, Purpose::Evolution, 0);
+        let n = 100_000;
+        let normals: Vec<f64> = (0..n).map(|_| stream.normal()).collect();
+        let mean = normals.iter().sum::<f64>() / n as f64;
+        let variance = normals.iter().map(|x| x * x).sum::<f64>() / n as f64;
+        assert!(mean.abs() < 0.015 && (variance - 1.0).abs() < 0.02, "{mean} {variance}");
+        let counts = (0..n).fold([0u32; 7], |mut counts, _| {
+            counts[stream.below(7)] += 1;
+            counts
+        });
+        for count in counts {
+            assert!((f64::from(count) * 7.0 / n as f64 - 1.0).abs() < 0.04, "{counts:?}");
+        }
+    }
+
+    /// Minted with the first version of the format: changing it changes every run.
+    #[test]
+    fn first_values_of_a_stream_are_fixed() {
+        let mut stream = Stream::new(7, 1, 2, Purpose::Reception, 3);
+        let bits: Vec<u64> = (0..3).map(|_| stream.uniform().to_bits()).collect();
+        assert_eq!(bits, GOLDEN, "{bits:#x?}");
+    }
+
+    const GOLDEN: [u64; 3] = [0x3fc9_d8a5_d071_9b48, 0x3fd1_2cdc_bff9_8392, 0x3fec_a42c_521e_63da];
+}
