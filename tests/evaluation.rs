@@ -67,9 +67,9 @@ impl Subject {
     }
 }
 
-fn compiled(config_json: &str) -> sim_core::Experiment {
+fn compiled(config_json: &str) -> sim_core::Simulation {
     let (config, _) = experiment_file::ExperimentConfig::from_json(config_json, "").unwrap();
-    sim_core::Experiment::compile(&config).unwrap()
+    sim_core::Simulation::compile(&config).unwrap()
 }
 
 const CONDITIONS: [&str; 6] =

@@ -64,7 +64,7 @@ fn fleet_seconds(coordinator: &CoordinatorProcess, id: u64) -> f64 {
 
 /// Seconds that one thread takes for as many genotypes as a generation has.
 fn alone_seconds(config: &ExperimentConfig, seed: u64) -> f64 {
-    let experiment = sim_core::Experiment::compile(config).expect("a shipped file is right");
+    let experiment = sim_core::Simulation::compile(config).expect("a shipped file is right");
     let mut genes = Stream::new(seed, 0, 0, Purpose::Evolution, 0);
     let start = Instant::now();
     for _ in 0..config.algorithm.population_size {

@@ -8,7 +8,7 @@ use std::{
 
 use evolution::Evolution;
 use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
-use sim_core::Experiment;
+use sim_core::Simulation;
 use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::error::{Error, prefix_lines};
@@ -36,7 +36,7 @@ pub struct Overrides {
 #[derive(Debug)]
 pub struct Compiled {
     pub config: ExperimentConfig,
-    pub experiment: Experiment,
+    pub experiment: Simulation,
     /// What the file says and nobody heeds, and what keeps its default.
     pub warnings: Vec<Problem>,
 }
@@ -83,7 +83,7 @@ impl ExperimentFile {
     pub fn compile(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
         let (config, mut warnings) = ExperimentConfig::from_json(&self.text, &self.default_name())?;
         let config = overrides.apply(config)?;
-        let experiment = Experiment::compile(&config)?;
+        let experiment = Simulation::compile(&config)?;
         warnings.extend(experiment.uncovered_parameters().iter().cloned().map(unlocated));
         Ok(Compiled { config, experiment, warnings })
     }

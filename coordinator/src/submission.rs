@@ -73,7 +73,7 @@ impl Submission {
             let name = config.name.clone();
             (config, _) = ExperimentConfig::from_json(&config.to_canonical_json(), &name)?;
         }
-        let experiment = sim_core::Experiment::compile(&config)?;
+        let experiment = sim_core::Simulation::compile(&config)?;
         let evolution =
             Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)?;
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();

@@ -13,7 +13,7 @@ mod configs;
 mod reference;
 
 use numeric::random::{Purpose, Stream};
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d};
 
@@ -27,13 +27,13 @@ fn main() {
         "", "same trajectory", "mean (f32 network)", "mean (f64)", "mean difference", "correlation"
     );
     for config in [experiment_a(), experiment_b(), experiment_c(), experiment_d()] {
-        let experiment = Experiment::compile(&config).expect("the configuration is valid");
+        let simulation = Simulation::compile(&config).expect("the configuration is valid");
         let fitness: Vec<(f64, f64)> = (0..N_GENOTYPES)
             .map(|seed| {
                 let mut stream = Stream::new(seed, 0, 0, Purpose::Evolution, 0);
-                let n_genes = experiment.genotype_len();
+                let n_genes = simulation.genotype_len();
                 let genotype: Vec<f64> = (0..n_genes).map(|_| stream.uniform()).collect();
-                let fitness = experiment.evaluate(&genotype, seed, 0..1).expect("it is valid");
+                let fitness = simulation.evaluate(&genotype, seed, 0..1).expect("it is valid");
                 (fitness[0], reference::run(&config, &genotype, seed, 0).fitness)
             })
             .collect();

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use experiment_file::{ExperimentConfig, Initializer};
 use numeric::random::{Purpose, Stream};
 use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
-use sim_core::{Experiment, Isa};
+use sim_core::{Isa, Simulation};
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d, swarm_mut};
 
@@ -66,10 +66,10 @@ fn kernel(isas: &[Isa]) {
     let config = experiment_a();
     let genotype = genotype(&config, 1);
     for &isa in isas {
-        let experiment = compile(&config, isa);
-        let (n_synapses, n_substeps) = network_size(&experiment);
+        let simulation = compile(&config, isa);
+        let (n_synapses, n_substeps) = network_size(&simulation);
         let n_lanes = 50;
-        let mut load = NetworkLoad::new(&experiment, &genotype, n_lanes).expect("a valid genotype");
+        let mut load = NetworkLoad::new(&simulation, &genotype, n_lanes).expect("a valid genotype");
         let [step, reference, peak] = medians([
             &mut || seconds_per(|| load.step()),
             &mut || reference_step(&config, &genotype),
@@ -120,10 +120,10 @@ fn items(isa: Isa) {
     println!("\nitems ({isa}): time per trial, relative to that in an item of {N_TRIALS}");
     println!("{:20} {:>10} {:>10} {:>10} {:>10}", "trials of the item", 1, 2, 3, 4);
     for config in [experiment_a(), experiment_b(), experiment_c(), experiment_d()] {
-        let experiment = compile(&config, isa);
+        let simulation = compile(&config, isa);
         let genotype = genotype(&config, 1);
         let per_trial = |n_trials: u32| {
-            let evaluate = || experiment.evaluate(&genotype, 0, 0..n_trials).expect("it is valid");
+            let evaluate = || simulation.evaluate(&genotype, 0, 0..n_trials).expect("it is valid");
             seconds_per(evaluate) / f64::from(n_trials)
         };
         let [one, two, three, four, all] = medians([
@@ -157,7 +157,7 @@ fn header() {
 }
 
 fn compare(name: &str, config: &ExperimentConfig, isa: Isa) {
-    let experiment = compile(config, isa);
+    let simulation = compile(config, isa);
     let genotypes: Vec<Vec<f64>> = (0..8).map(|seed| genotype(config, seed)).collect();
     let n_robots = n_robots(config);
     let robot_steps = f64::from(n_robots * config.algorithm.evaluation_steps * N_TRIALS);
@@ -170,7 +170,7 @@ fn compare(name: &str, config: &ExperimentConfig, isa: Isa) {
             seconds_per(|| {
                 turn += 1;
                 let genotype = &genotypes[turn % genotypes.len()];
-                black_box(experiment.evaluate(genotype, 0, 0..N_TRIALS).expect("it is valid"))
+                black_box(simulation.evaluate(genotype, 0, 0..N_TRIALS).expect("it is valid"))
             }) / robot_steps
         },
         &mut || {
@@ -222,8 +222,8 @@ fn medians<const N: usize>(mut measurements: [&mut dyn FnMut() -> f64; N]) -> [f
     })
 }
 
-fn compile(config: &ExperimentConfig, isa: Isa) -> Experiment {
-    Experiment::compile(config).expect("the configuration is valid").with_isa(isa)
+fn compile(config: &ExperimentConfig, isa: Isa) -> Simulation {
+    Simulation::compile(config).expect("the configuration is valid").with_isa(isa)
 }
 
 fn n_robots(config: &ExperimentConfig) -> u32 {

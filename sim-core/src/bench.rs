@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use crate::experiment::{EvaluateError, Experiment};
 use crate::lanes::Lanes;
 use crate::network::ctrnn::Ctrnn;
+use crate::simulation::{EvaluateError, Simulation};
 use numeric::Isa;
 
 /// The network of a genotype, at work without robots.
@@ -20,12 +20,12 @@ pub struct NetworkLoad {
 impl NetworkLoad {
     /// In `n_lanes` lanes with different stimuli.
     pub fn new(
-        experiment: &Experiment,
+        simulation: &Simulation,
         genotype: &[f64],
         n_lanes: usize,
     ) -> Result<Self, EvaluateError> {
-        let phenotype = experiment.phenotype(genotype)?;
-        let network = &experiment.network;
+        let phenotype = simulation.phenotype(genotype)?;
+        let network = &simulation.network;
         let n_inputs = network.stimuli.values().last().map_or(0, |stimulus| stimulus.inputs.end);
         let mut stimuli = Lanes::new(n_inputs, n_lanes);
         for input in 0..n_inputs {
@@ -33,7 +33,7 @@ impl NetworkLoad {
                 stimuli.set(input, lane, ((lane + 3 * input) % 11) as f32 / 11.0);
             }
         }
-        Ok(Self { ctrnn: Ctrnn::new(experiment.isa, network, &phenotype, n_lanes), stimuli })
+        Ok(Self { ctrnn: Ctrnn::new(simulation.isa, network, &phenotype, n_lanes), stimuli })
     }
 
     /// One environment step.
@@ -43,8 +43,8 @@ impl NetworkLoad {
 }
 
 /// Synapses between neurons, and substeps per environment step.
-pub fn network_size(experiment: &Experiment) -> (usize, u32) {
-    let network = &experiment.network;
+pub fn network_size(simulation: &Simulation) -> (usize, u32) {
+    let network = &simulation.network;
     let is_recurrent = |synapse: &&crate::network::connections::Synapse| {
         matches!(synapse.pre, crate::network::connections::Source::Neuron(_))
     };

@@ -6,10 +6,10 @@ use std::ops::Range;
 use indexmap::IndexMap;
 
 use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
-use crate::experiment::{EvaluateError, Experiment};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
 use crate::record::{EpisodeSummary, StepRecord};
+use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::Trial;
 use experiment_file::RobotController;
 
@@ -20,16 +20,16 @@ const MAX_LANES: usize = 256;
 /// Simulates one episode per trial and returns their fitness, in order; none if
 /// `keep_going`, asked before every step, has said no.
 pub(crate) fn run(
-    experiment: &Experiment,
+    simulation: &Simulation,
     phenotype: &Phenotype,
     generation: u64,
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>, EvaluateError> {
     let mut fitness = Vec::with_capacity(trials.len());
-    for trials in side_by_side(experiment, trials) {
-        let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
-        for step in 0..experiment.n_steps {
+    for trials in side_by_side(simulation, trials) {
+        let mut episodes = Episodes::new(simulation, phenotype, generation, trials)?;
+        for step in 0..simulation.n_steps {
             if !keep_going() {
                 return Ok(None);
             }
@@ -43,21 +43,21 @@ pub(crate) fn run(
 /// As [`run`], and measures every step: per trial its fitness, and then step by step
 /// all measures, NaN where there is none.
 pub(crate) fn measure(
-    experiment: &Experiment,
+    simulation: &Simulation,
     phenotype: &Phenotype,
     generation: u64,
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>, EvaluateError> {
-    let names = experiment.metric_names();
-    let n_values = experiment.values_per_trial();
+    let names = simulation.metric_names();
+    let n_values = simulation.values_per_trial();
     let mut values = Vec::with_capacity(trials.len() * n_values);
-    for trials in side_by_side(experiment, trials) {
+    for trials in side_by_side(simulation, trials) {
         let first = values.len();
         values.resize(first + trials.len() * n_values, f64::NAN);
         let rows = &mut values[first..];
-        let mut episodes = Episodes::new(experiment, phenotype, generation, trials)?;
-        for step in 0..experiment.n_steps {
+        let mut episodes = Episodes::new(simulation, phenotype, generation, trials)?;
+        for step in 0..simulation.n_steps {
             if !keep_going() {
                 return Ok(None);
             }
@@ -79,8 +79,8 @@ pub(crate) fn measure(
 }
 
 /// Parts of the trials that are simulated at once.
-fn side_by_side(experiment: &Experiment, trials: Range<u32>) -> impl Iterator<Item = Range<u32>> {
-    let n_at_once = (MAX_LANES / experiment.world.n_robots().max(1)).max(1);
+fn side_by_side(simulation: &Simulation, trials: Range<u32>) -> impl Iterator<Item = Range<u32>> {
+    let n_at_once = (MAX_LANES / simulation.world.n_robots().max(1)).max(1);
     let end = trials.end;
     trials
         .step_by(n_at_once)
@@ -89,15 +89,15 @@ fn side_by_side(experiment: &Experiment, trials: Range<u32>) -> impl Iterator<It
 
 /// Simulates the episode of one trial and shows each of its steps to `observe`.
 pub(crate) fn watch(
-    experiment: &Experiment,
+    simulation: &Simulation,
     phenotype: &Phenotype,
     generation: u64,
     trial: u32,
     observe: &mut dyn FnMut(StepRecord),
 ) -> Result<EpisodeSummary, EvaluateError> {
-    let mut episodes = Episodes::new(experiment, phenotype, generation, trial..trial + 1)?;
+    let mut episodes = Episodes::new(simulation, phenotype, generation, trial..trial + 1)?;
     let mut sums: IndexMap<&'static str, (f64, u32)> = IndexMap::new();
-    for step in 0..experiment.n_steps {
+    for step in 0..simulation.n_steps {
         episodes.step(step, |trial, brains, fitness| {
             let mut record = trial.record(step, fitness);
             for brain in brains {
@@ -124,15 +124,15 @@ struct Episodes<'a> {
 
 impl<'a> Episodes<'a> {
     fn new(
-        experiment: &'a Experiment,
+        simulation: &'a Simulation,
         phenotype: &Phenotype,
         generation: u64,
         trials: Range<u32>,
     ) -> Result<Self, EvaluateError> {
-        let trials = trials.map(|trial| Trial::new(experiment, generation, trial));
+        let trials = trials.map(|trial| Trial::new(simulation, generation, trial));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
-        let groups = 0..experiment.world.groups.len();
-        let brain = |group| Brain::new(experiment, group, phenotype, trials.len());
+        let groups = 0..simulation.world.groups.len();
+        let brain = |group| Brain::new(simulation, group, phenotype, trials.len());
         let brains = groups.map(brain).collect();
         Ok(Self { trials, brains })
     }
@@ -169,18 +169,18 @@ struct Brain<'a> {
 
 impl<'a> Brain<'a> {
     fn new(
-        experiment: &'a Experiment,
+        simulation: &'a Simulation,
         group_index: usize,
         phenotype: &Phenotype,
         n_trials: usize,
     ) -> Self {
-        let group = &experiment.world.groups[group_index];
+        let group = &simulation.world.groups[group_index];
         let n_lanes = n_trials * group.robots.len();
         let n_inputs = group.stimuli.last().map_or(0, |(_, inputs)| inputs.end);
         let controller: Box<dyn Controller> = match group.controller {
             RobotController::NeuralController => Box::new(NeuralController::new(
-                experiment.isa,
-                &experiment.network,
+                simulation.isa,
+                &simulation.network,
                 phenotype,
                 n_lanes,
             )),

@@ -23,7 +23,6 @@ mod controllers;
 mod drive;
 mod episode;
 mod exp2;
-mod experiment;
 mod fitness;
 mod genotype;
 mod initializers;
@@ -37,6 +36,7 @@ mod problems;
 mod record;
 mod senses;
 mod sensors;
+mod simulation;
 mod swarm;
 #[cfg(test)]
 mod testing;
@@ -45,9 +45,9 @@ mod trial;
 mod world;
 
 pub use communication::Mode;
-pub use experiment::{EvaluateError, Experiment};
 pub use numeric::{Isa, UnknownIsa};
 pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
+pub use simulation::{EvaluateError, Simulation};
 pub use torus::Vec2;
 
 /// The address of the held-out trials that belong to a generation: worlds and

@@ -23,7 +23,7 @@ pub type Metrics = IndexMap<&'static str, f64>;
 /// The result of an episode that was watched.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeSummary {
-    /// The same as [`Experiment::evaluate`](crate::Experiment::evaluate) gives.
+    /// The same as [`Simulation::evaluate`](crate::Simulation::evaluate) gives.
     pub fitness: f64,
     /// Means over the steps.
     pub metrics: Metrics,

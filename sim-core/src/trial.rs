@@ -5,7 +5,6 @@ use std::mem;
 
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
-use crate::experiment::{EvaluateError, Experiment};
 use crate::fitness::{self, Fitness, Moment};
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
@@ -13,6 +12,7 @@ use crate::neighbours::Neighbours;
 use crate::perturbations::Perturbations;
 use crate::record::{Metrics, StepRecord};
 use crate::senses::{Senses, Surroundings};
+use crate::simulation::{EvaluateError, Simulation};
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::{Fixtures, Site, World};
@@ -104,12 +104,12 @@ impl Address {
 impl<'a> Trial<'a> {
     /// The trial before its first step.
     pub fn new(
-        experiment: &'a Experiment,
+        simulation: &'a Simulation,
         generation: u64,
         trial: u32,
     ) -> Result<Self, EvaluateError> {
-        let world = &experiment.world;
-        let address = Address { seed: experiment.seed, generation, trial };
+        let world = &simulation.world;
+        let address = Address { seed: simulation.seed, generation, trial };
         let mut positions = Vec::with_capacity(world.n_robots());
         let mut headings = Vec::with_capacity(world.n_robots());
         let mut groups = Vec::with_capacity(world.groups.len());
@@ -154,7 +154,7 @@ impl<'a> Trial<'a> {
         Ok(Self {
             world,
             address,
-            isa: experiment.isa,
+            isa: simulation.isa,
             swarm,
             neighbours: Neighbours::new(world.sensing_range(), n_robots),
             radio,
@@ -164,7 +164,7 @@ impl<'a> Trial<'a> {
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
             noise: address.streams(Purpose::SensorNoise, n_robots),
-            fitness: fitness::new(experiment.fitness, world),
+            fitness: fitness::new(simulation.fitness, world),
             fitness_sum: 0.0,
             n_judged_steps: 0,
         })
@@ -338,8 +338,8 @@ mod tests {
 
     #[test]
     fn a_frame_crosses_a_line_one_hop_per_step_and_dies_at_max_hops() {
-        let experiment = Experiment::compile(&line(14)).unwrap();
-        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let simulation = Simulation::compile(&line(14)).unwrap();
+        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
         let mut modes = [Mode::Relay; 14];
         modes[0] = Mode::Send;
         step(&mut trial, &modes, [1.0, 0.0]);
@@ -366,8 +366,8 @@ mod tests {
 
     #[test]
     fn nothing_is_heard_in_the_first_step_and_everyone_sends_in_the_first_ten() {
-        let experiment = Experiment::compile(&line(2)).unwrap();
-        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let simulation = Simulation::compile(&line(2)).unwrap();
+        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
         for step in 0..12 {
             trial.sense(step).unwrap();
             // On the air: the frames of step - 1.
@@ -380,8 +380,8 @@ mod tests {
 
     #[test]
     fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
-        let experiment = Experiment::compile(&line(2)).unwrap();
-        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let simulation = Simulation::compile(&line(2)).unwrap();
+        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
         let read = |trial: &Trial<'_>, query| {
             trial.groups[0].senses.reading(query, &trial.swarm, 0, 0).values().to_vec()
         };
@@ -405,8 +405,8 @@ mod tests {
 
     #[test]
     fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
-        let experiment = Experiment::compile(&line(3)).unwrap();
-        let mut trial = Trial::new(&experiment, 0, 0).unwrap();
+        let simulation = Simulation::compile(&line(3)).unwrap();
+        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
         step(&mut trial, &[Mode::Send; 3], [0.0; 2]);
         let mut from_right = 0;
         for _ in 0..2000 {

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use experiment_file::ExperimentConfig;
 use numeric::random::{Purpose, Stream};
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 use reference::Episode;
 
@@ -37,9 +37,9 @@ fn assert_agreement(
 ) -> Vec<Episode> {
     let episodes: Vec<Episode> =
         trials.clone().map(|trial| reference::run(config, genotype, generation, trial)).collect();
-    let experiment = Experiment::compile(config).expect("the configuration is valid");
-    assert_eq!(experiment.genotype_len(), genotype.len());
-    let fitness = experiment
+    let simulation = Simulation::compile(config).expect("the configuration is valid");
+    assert_eq!(simulation.genotype_len(), genotype.len());
+    let fitness = simulation
         .evaluate(genotype, generation, trials.clone())
         .expect("genotype and trials belong to the experiment");
     assert_eq!(fitness.len(), episodes.len());

@@ -26,7 +26,7 @@ const GENERATIONS: u64 = 6;
 /// A worker in the middle of an experiment, with items in its hands.
 struct Intruder {
     worker: HandWorker,
-    experiment: sim_core::Experiment,
+    experiment: sim_core::Simulation,
     generation: u64,
     items: Vec<Item>,
 }
@@ -75,12 +75,12 @@ impl Intruder {
     }
 }
 
-fn compile(spec: &ExperimentSpec) -> sim_core::Experiment {
+fn compile(spec: &ExperimentSpec) -> sim_core::Simulation {
     let (config, _) = ExperimentConfig::from_json(&spec.config_json, "").unwrap();
-    sim_core::Experiment::compile(&config).unwrap()
+    sim_core::Simulation::compile(&config).unwrap()
 }
 
-fn evaluate(experiment: &sim_core::Experiment, generation: u64, item: &Item) -> Vec<f64> {
+fn evaluate(experiment: &sim_core::Simulation, generation: u64, item: &Item) -> Vec<f64> {
     let trials = item.first_trial..item.first_trial + item.trial_count;
     experiment.evaluate(&item.genotype, generation, trials).unwrap()
 }

@@ -4,7 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use experiment_file::{ConfigError, ExperimentConfig};
-use sim_core::{EVALUATION, Experiment, Isa};
+use sim_core::{EVALUATION, Isa, Simulation};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},
@@ -45,7 +45,7 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) 
 
 /// A compiled specification.
 struct Computable {
-    experiment: Experiment,
+    experiment: Simulation,
     /// Environment steps of an episode, summed over robots.
     robot_steps: u64,
 }
@@ -57,7 +57,7 @@ fn compile(config_json: &str, isa: Isa) -> Result<Computable, String> {
 
 fn computable(config_json: &str, isa: Isa) -> Result<Computable, ConfigError> {
     let (config, _warnings) = ExperimentConfig::from_json(config_json, "")?;
-    let experiment = Experiment::compile(&config)?.with_isa(isa);
+    let experiment = Simulation::compile(&config)?.with_isa(isa);
     let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
     Ok(Computable {
         experiment,

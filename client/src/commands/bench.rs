@@ -10,7 +10,7 @@ use std::{
 use experiment_file::ExperimentConfig;
 use numeric::random::{Purpose, Stream};
 use serde::Serialize;
-use sim_core::{Experiment, Isa};
+use sim_core::{Isa, Simulation};
 
 use crate::{
     args::BenchArgs,
@@ -48,7 +48,7 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
     progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
 }
 
-fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Experiment), Error> {
+fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Simulation), Error> {
     if let Some(path) = path {
         let compiled = ExperimentFile::read(path)
             .and_then(|file| file.compile(&Overrides::default()))
@@ -57,7 +57,7 @@ fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Experiment), Err
     }
     let (config, _warnings) =
         ExperimentConfig::from_json(DEFAULT, "default").expect("a shipped file is right");
-    let experiment = Experiment::compile(&config).expect("a shipped file is right");
+    let experiment = Simulation::compile(&config).expect("a shipped file is right");
     Ok((config, experiment))
 }
 
@@ -71,7 +71,7 @@ struct Speed {
 
 impl Speed {
     /// Evaluates one genotype after the other, for `duration` at least.
-    fn of_core(experiment: &Experiment, n_trials: u32, core: u64, duration: Duration) -> Self {
+    fn of_core(experiment: &Simulation, n_trials: u32, core: u64, duration: Duration) -> Self {
         let mut genes = Stream::new(0, 0, 0, Purpose::Evolution, core);
         let start: Instant = clock::now();
         let mut n_genotypes = 0;

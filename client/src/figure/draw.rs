@@ -161,7 +161,7 @@ fn tick_step(range: &Range<f64>) -> f64 {
 
 /// A tick's number, with the digits that tell it from the next one.
 fn tick(value: f64, step: f64) -> String {
-    let n_decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    let n_decimals = (-libm::log10(step).floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.n_decimals$}");
     let text =
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

@@ -31,7 +31,7 @@ pub struct Alone {
 /// Runs an experiment without engine and network.
 pub fn measure(file: &str) -> Alone {
     let (config, _) = ExperimentConfig::from_json(file, "").expect("the file is right");
-    let experiment = sim_core::Experiment::compile(&config).expect("the file is right");
+    let experiment = sim_core::Simulation::compile(&config).expect("the file is right");
     let mut evolution =
         Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)
             .expect("the file is right");

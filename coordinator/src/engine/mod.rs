@@ -330,7 +330,7 @@ impl Engine {
         let Some(generation) = &work.generation else { return false };
         let place = [id.0, generation.number, u64::from(task.individual)];
         let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
-        (hash as f64) < self.config.audit_fraction * 2_f64.powi(64)
+        (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
     }
 
     /// A process is alive, so that no work has taken it down.

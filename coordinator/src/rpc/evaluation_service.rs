@@ -3,7 +3,7 @@
 use std::{pin::Pin, sync::Arc};
 
 use experiment_file::{ExperimentConfig, limits};
-use sim_core::Experiment;
+use sim_core::Simulation;
 use swarm_proto::v1::{
     EvaluateRequest, EvaluateResponse, MeasuredTask, MeasuredTrial, evaluate_response::Message,
     evaluation_service_server::EvaluationService,
@@ -104,7 +104,7 @@ impl Checked {
         }
         let config = ExperimentConfig::from_json(&config_json, "");
         let compiled = config.and_then(|(config, _)| {
-            let experiment = Experiment::compile(&config)?;
+            let experiment = Simulation::compile(&config)?;
             Ok((config, experiment))
         });
         let (config, experiment) =

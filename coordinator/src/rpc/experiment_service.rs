@@ -488,7 +488,7 @@ pub(super) fn problems(error: &ConfigError) -> String {
 fn network_json(config_json: &str, genotype: &[f64]) -> Result<String, String> {
     let (config, _) =
         ExperimentConfig::from_json(config_json, "").map_err(|error| error.to_string())?;
-    let experiment = sim_core::Experiment::compile(&config).map_err(|error| error.to_string())?;
+    let experiment = sim_core::Simulation::compile(&config).map_err(|error| error.to_string())?;
     let network = experiment.network_json(genotype).map_err(|error| error.to_string())?;
     Ok(network.to_string())
 }

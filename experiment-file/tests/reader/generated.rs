@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::generator::{Dice, damage, experiment};
 use super::{accept, read};
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 /// Files that are right, and damaged variants of each.
 const N_FILES: u64 = 5_000;
@@ -67,7 +67,7 @@ fn accepted_files_can_be_simulated() {
         let mut file = experiment(&mut Dice::new(index));
         file["algorithm"]["evaluation_steps"] = json!(101);
         let (config, _) = read(&file.to_string()).unwrap();
-        if let Ok(experiment) = Experiment::compile(&config) {
+        if let Ok(experiment) = Simulation::compile(&config) {
             let genotype = vec![0.5; experiment.genotype_len()];
             let fitness = experiment.evaluate(&genotype, 0, 0..1).unwrap();
             assert!(fitness[0].is_finite(), "{file}");

@@ -1,4 +1,5 @@
 //! The reader of experiment files, from outside.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod generated;
 mod generator;

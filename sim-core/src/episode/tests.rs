@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::testing::*;
 use crate::torus::{Torus, Vec2, angular_difference};
-use crate::{EpisodeSummary, Experiment, Isa, Mode, StepRecord};
+use crate::{EpisodeSummary, Isa, Mode, Simulation, StepRecord};
 use experiment_file::{
     ActuatorQuery, DistanceSensorConfig, ExperimentConfig, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LeaderFailureConfig, LightController,
@@ -21,10 +21,10 @@ fn experiments() -> [ExperimentConfig; 4] {
 
 /// The episode of a random genotype.
 fn watch(config: &ExperimentConfig, seed: u64, trial: u32) -> (Vec<StepRecord>, EpisodeSummary) {
-    let experiment = Experiment::compile(config).unwrap();
-    let genotype = genotype(experiment.genotype_len(), seed);
+    let simulation = Simulation::compile(config).unwrap();
+    let genotype = genotype(simulation.genotype_len(), seed);
     let mut steps = Vec::new();
-    let summary = experiment.simulate(&genotype, 0, trial, &mut |step| steps.push(step)).unwrap();
+    let summary = simulation.simulate(&genotype, 0, trial, &mut |step| steps.push(step)).unwrap();
     assert_eq!(steps.len(), config.algorithm.evaluation_steps as usize);
     (steps, summary)
 }
@@ -58,12 +58,12 @@ fn add_stimulus(config: &mut ExperimentConfig, name: &str, n: u32, sensor: Senso
 fn watching_and_company_change_no_bit() {
     for (mut config, seed) in experiments().into_iter().zip(0..) {
         config.algorithm.evaluation_steps = 150;
-        let experiment = Experiment::compile(&config).unwrap();
-        let genotype = genotype(experiment.genotype_len(), seed);
-        let together = experiment.evaluate(&genotype, 3, 0..5).unwrap();
+        let simulation = Simulation::compile(&config).unwrap();
+        let genotype = genotype(simulation.genotype_len(), seed);
+        let together = simulation.evaluate(&genotype, 3, 0..5).unwrap();
         for trial in [0, 4] {
-            let alone = experiment.evaluate(&genotype, 3, trial..trial + 1).unwrap()[0];
-            let watched = experiment.simulate(&genotype, 3, trial, &mut |_| {}).unwrap().fitness;
+            let alone = simulation.evaluate(&genotype, 3, trial..trial + 1).unwrap()[0];
+            let watched = simulation.simulate(&genotype, 3, trial, &mut |_| {}).unwrap().fitness;
             let expected = together[trial as usize].to_bits();
             assert_eq!((alone.to_bits(), watched.to_bits()), (expected, expected));
         }
@@ -74,11 +74,11 @@ fn watching_and_company_change_no_bit() {
 fn many_trials_are_as_many_fitnesses_in_order() {
     let mut config = experiment_a();
     (config.algorithm.evaluation_steps, config.algorithm.num_evaluations) = (30, 60);
-    let experiment = Experiment::compile(&config).unwrap();
-    let genotype = genotype(experiment.genotype_len(), 18);
-    let together = experiment.evaluate(&genotype, 0, 1..60).unwrap();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = genotype(simulation.genotype_len(), 18);
+    let together = simulation.evaluate(&genotype, 0, 1..60).unwrap();
     let alone =
-        (1..60).map(|trial| experiment.evaluate(&genotype, 0, trial..trial + 1).unwrap()[0]);
+        (1..60).map(|trial| simulation.evaluate(&genotype, 0, trial..trial + 1).unwrap()[0]);
     assert_eq!(together, alone.collect::<Vec<_>>());
     assert!(together.iter().any(|&fitness| fitness > 0.0));
 }
@@ -100,8 +100,8 @@ fn fitness_is_the_mean_of_the_steps_that_count() {
 #[test]
 fn everything_is_finite_and_in_range() {
     for config in experiments() {
-        let experiment = Experiment::compile(&config).unwrap();
-        let d = experiment.genotype_len();
+        let simulation = Simulation::compile(&config).unwrap();
+        let d = simulation.genotype_len();
         for genes in [vec![0.0; d], vec![1.0; d], genotype(d, 9)] {
             let mut check = |step: StepRecord| {
                 for robot in &step.robots {
@@ -114,7 +114,7 @@ fn everything_is_finite_and_in_range() {
                 assert!(step.fitness.unwrap_or(0.0).is_finite());
                 assert!(step.metrics.values().all(|value| value.is_finite()));
             };
-            let summary = experiment.simulate(&genes, 0, 0, &mut check).unwrap();
+            let summary = simulation.simulate(&genes, 0, 0, &mut check).unwrap();
             assert!((0.0..=5.0).contains(&summary.fitness));
         }
     }
@@ -433,9 +433,9 @@ fn fitness_bits_are_fixed_on_every_instruction_set() {
         let bits: Vec<[u64; 2]> = experiments()
             .into_iter()
             .map(|config| {
-                let experiment = Experiment::compile(&config).unwrap().with_isa(isa);
-                let genotype = genotype(experiment.genotype_len(), 18);
-                let fitness = experiment.evaluate(&genotype, 1, 0..2).unwrap();
+                let simulation = Simulation::compile(&config).unwrap().with_isa(isa);
+                let genotype = genotype(simulation.genotype_len(), 18);
+                let fitness = simulation.evaluate(&genotype, 1, 0..2).unwrap();
                 [fitness[0].to_bits(), fitness[1].to_bits()]
             })
             .collect();
@@ -455,10 +455,10 @@ fn fitness_bits_do_not_depend_on_how_trials_are_split_into_items() {
     for mut config in experiments() {
         config.algorithm.evaluation_steps = 40;
         for isa in Isa::available() {
-            let experiment = Experiment::compile(&config).unwrap().with_isa(isa);
-            let genotype = genotype(experiment.genotype_len(), 4);
+            let simulation = Simulation::compile(&config).unwrap().with_isa(isa);
+            let genotype = genotype(simulation.genotype_len(), 4);
             let bits = |trials: std::ops::Range<u32>| -> Vec<u64> {
-                let fitness = experiment.evaluate(&genotype, 2, trials).unwrap();
+                let fitness = simulation.evaluate(&genotype, 2, trials).unwrap();
                 fitness.into_iter().map(f64::to_bits).collect()
             };
             let whole = bits(0..5);

@@ -4,7 +4,7 @@ use experiment_file::{
     EnsembleSelector, ExperimentConfig, FitnessFunction, GenotypeQuery, NeuronParameter,
     NeuronParams, SynapseGroupConfig, SynapseSelector,
 };
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 use crate::configs::{experiment_a, experiment_c, experiment_d};
 use crate::{assert_agreement, random_genotype, reference, spread};
@@ -51,8 +51,8 @@ fn connect_all(config: &mut ExperimentConfig) {
 /// The length of the genotype, on which both implementations agree.
 fn genotype_len(config: &ExperimentConfig) -> usize {
     let len = reference::genes(config).len();
-    let experiment = Experiment::compile(config).expect("the configuration is valid");
-    assert_eq!(experiment.genotype_len(), len);
+    let simulation = Simulation::compile(config).expect("the configuration is valid");
+    assert_eq!(simulation.genotype_len(), len);
     len
 }
 
@@ -110,8 +110,8 @@ fn every_population_has_its_segment() {
             &[(weights("motor"), -3.0, 3.0), (neurons(Gain, "OUT_LED"), 0.0, 1.0)],
         ],
     );
-    let experiment = Experiment::compile(&config).expect("the configuration is valid");
-    assert_eq!(experiment.population_segments(), [0..74, 74..84, 84..133]);
+    let simulation = Simulation::compile(&config).expect("the configuration is valid");
+    assert_eq!(simulation.population_segments(), [0..74, 74..84, 84..133]);
     assert_eq!(genotype_len(&config), 133);
 }
 

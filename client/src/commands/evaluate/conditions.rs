@@ -2,7 +2,7 @@
 
 use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 use super::patch::{Change, Json};
 use crate::{
@@ -24,7 +24,7 @@ pub struct Condition {
     pub changes: Vec<Change>,
     /// The experiment file, changed.
     pub config: ExperimentConfig,
-    pub experiment: Experiment,
+    pub experiment: Simulation,
 }
 
 impl Condition {
@@ -104,7 +104,7 @@ impl Nominal {
             change.apply(&mut file).map_err(input)?;
         }
         let config = read(&format!("condition {name}"), &file)?;
-        let experiment = Experiment::compile(&config).map_err(|error| input(problems(&error)))?;
+        let experiment = Simulation::compile(&config).map_err(|error| input(problems(&error)))?;
         Ok(Condition { name, changes, config, experiment })
     }
 

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use sim_core::Experiment;
+use sim_core::Simulation;
 
 use super::*;
 use crate::experiment_file::tests::quickstart;
@@ -18,7 +18,7 @@ fn config(objects: &str) -> ExperimentConfig {
 
 /// Heading and rows of the first trial, and what they were made from.
 fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
-    let experiment = Experiment::compile(config).unwrap();
+    let experiment = Simulation::compile(config).unwrap();
     let genotype = vec![0.6; experiment.genotype_len()];
     let (mut rows, mut records) = (Rows::new(Vec::new(), config), Vec::new());
     let mut observe = |record| {
@@ -104,7 +104,7 @@ fn a_failure_is_reported_at_the_end() {
     if full.exists() {
         let config = config("");
         let mut trace = Trace::create(full, &config).unwrap();
-        let experiment = Experiment::compile(&config).unwrap();
+        let experiment = Simulation::compile(&config).unwrap();
         let genotype = vec![0.5; experiment.genotype_len()];
         experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, &record)).unwrap();
         assert!(trace.finish().unwrap_err().to_string().starts_with("cannot write /dev/full: "));

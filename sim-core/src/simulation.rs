@@ -20,7 +20,7 @@ const N_TRIED_TRIALS: u32 = 8;
 
 /// A compiled experiment: (genotype, generation, trials) -> fitness.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub struct Simulation {
     pub(crate) isa: Isa,
     pub(crate) seed: u64,
     pub(crate) n_steps: u32,
@@ -74,7 +74,7 @@ pub enum EvaluateError {
     },
 }
 
-impl Experiment {
+impl Simulation {
     /// Compiles a configuration that the reader of experiment files accepts. What
     /// only compiling can find (an initialiser that cannot be met, say) is
     /// reported in the same way.
@@ -86,7 +86,7 @@ impl Experiment {
         let world =
             World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
         problems.check()?;
-        let experiment = Self {
+        let simulation = Self {
             isa: Isa::best(),
             seed: config.seed,
             n_steps: algorithm.evaluation_steps,
@@ -97,9 +97,9 @@ impl Experiment {
             world: world.expect("a world without problems is one"),
         };
         let mut problems = Problems::default();
-        for trial in 0..experiment.n_trials.min(N_TRIED_TRIALS) {
+        for trial in 0..simulation.n_trials.min(N_TRIED_TRIALS) {
             if let Err(EvaluateError::Unplaceable { object, index, .. }) =
-                Trial::new(&experiment, 0, trial)
+                Trial::new(&simulation, 0, trial)
             {
                 let path = format!("world.objects.{object}.initializers.positions");
                 problems.add(path, format!("no place for number {index} in trial {trial}"));
@@ -107,7 +107,7 @@ impl Experiment {
             }
         }
         problems.check()?;
-        Ok(experiment)
+        Ok(simulation)
     }
 
     /// The same experiment, simulated with other vector instructions than the
@@ -250,27 +250,27 @@ mod tests {
 
     #[test]
     fn the_genotype_of_experiment_a_has_about_455_genes() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let d = experiment.genotype_len();
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let d = simulation.genotype_len();
         assert!((445..=465).contains(&d), "{d}");
-        assert_eq!(experiment.population_segments(), std::slice::from_ref(&(0..d)));
-        assert!(experiment.uncovered_parameters().is_empty());
+        assert_eq!(simulation.population_segments(), std::slice::from_ref(&(0..d)));
+        assert!(simulation.uncovered_parameters().is_empty());
     }
 
     #[test]
     fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let genotype = genotype(experiment.genotype_len(), 2);
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let genotype = genotype(simulation.genotype_len(), 2);
         let generation = EVALUATION;
-        let n_values = experiment.values_per_trial();
+        let n_values = simulation.values_per_trial();
         assert_eq!(n_values, 1 + 300 * 2);
         let measure = |trials| {
-            let measured = experiment.measure_while(&genotype, generation, trials, &|| true);
+            let measured = simulation.measure_while(&genotype, generation, trials, &|| true);
             measured.unwrap().unwrap()
         };
         // More than are simulated at once.
         let together = measure(0..40);
-        let fitness = experiment.evaluate(&genotype, generation, 0..40).unwrap();
+        let fitness = simulation.evaluate(&genotype, generation, 0..40).unwrap();
         assert_eq!(together.len(), 40 * n_values);
         for (trial, row) in together.chunks_exact(n_values).enumerate() {
             assert_eq!(row[0].to_bits(), fitness[trial].to_bits());
@@ -278,9 +278,9 @@ mod tests {
         assert_eq!(measure(31..33), together[31 * n_values..33 * n_values]);
         let mut watched = Vec::new();
         let observe = &mut |step: StepRecord| watched.extend(step.metrics.into_values());
-        experiment.simulate(&genotype, generation, 31, observe).unwrap();
+        simulation.simulate(&genotype, generation, 31, observe).unwrap();
         assert_eq!(watched, together[31 * n_values + 1..32 * n_values]);
-        let stopped = experiment.measure_while(&genotype, generation, 0..1, &|| false);
+        let stopped = simulation.measure_while(&genotype, generation, 0..1, &|| false);
         assert_eq!(stopped, Ok(None));
     }
 
@@ -290,14 +290,14 @@ mod tests {
             assert_ne!(generation, EVALUATION);
             assert_ne!(held_out(generation), EVALUATION);
         }
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let genotype = genotype(experiment.genotype_len(), 2);
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let genotype = genotype(simulation.genotype_len(), 2);
         let start = |generation| {
             let mut positions = Vec::new();
             let observe = &mut |step: StepRecord| {
                 positions.extend(step.robots.iter().map(|robot| robot.position));
             };
-            experiment.simulate(&genotype, generation, 0, observe).unwrap();
+            simulation.simulate(&genotype, generation, 0, observe).unwrap();
             positions
         };
         assert_ne!(start(EVALUATION), start(0));
@@ -306,24 +306,24 @@ mod tests {
 
     #[test]
     fn an_evaluation_stops_when_it_is_told_to() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let genotype = genotype(experiment.genotype_len(), 1);
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let genotype = genotype(simulation.genotype_len(), 1);
         let n_asked = std::cell::Cell::new(0);
         let keep_going = || n_asked.replace(n_asked.get() + 1) < 7;
-        assert_eq!(experiment.evaluate_while(&genotype, 0, 0..2, &keep_going), Ok(None));
+        assert_eq!(simulation.evaluate_while(&genotype, 0, 0..2, &keep_going), Ok(None));
         assert_eq!(n_asked.get(), 8, "asked before every step");
-        let whole = experiment.evaluate(&genotype, 0, 0..2).unwrap();
-        assert_eq!(experiment.evaluate_while(&genotype, 0, 0..2, &|| true), Ok(Some(whole)));
+        let whole = simulation.evaluate(&genotype, 0, 0..2).unwrap();
+        assert_eq!(simulation.evaluate_while(&genotype, 0, 0..2, &|| true), Ok(Some(whole)));
     }
 
     #[test]
     fn a_trial_does_not_depend_on_the_trials_beside_it() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
         for seed in 0..3 {
-            let genotype = genotype(experiment.genotype_len(), seed);
-            let together = experiment.evaluate(&genotype, 7, 0..5).unwrap();
+            let genotype = genotype(simulation.genotype_len(), seed);
+            let together = simulation.evaluate(&genotype, 7, 0..5).unwrap();
             for trial in 0..5 {
-                let alone = experiment.evaluate(&genotype, 7, trial..trial + 1).unwrap();
+                let alone = simulation.evaluate(&genotype, 7, trial..trial + 1).unwrap();
                 assert_eq!(alone[0].to_bits(), together[trial as usize].to_bits());
             }
         }
@@ -331,12 +331,12 @@ mod tests {
 
     #[test]
     fn fitness_varies_with_genotype_generation_and_trial_only() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
         let mut seen = Vec::new();
         for seed in 0..20 {
-            let genotype = genotype(experiment.genotype_len(), seed);
-            let fitness = experiment.evaluate(&genotype, 0, 0..5).unwrap();
-            assert_eq!(fitness, experiment.evaluate(&genotype, 0, 0..5).unwrap());
+            let genotype = genotype(simulation.genotype_len(), seed);
+            let fitness = simulation.evaluate(&genotype, 0, 0..5).unwrap();
+            assert_eq!(fitness, simulation.evaluate(&genotype, 0, 0..5).unwrap());
             assert!(fitness.iter().all(|f| (0.0..=2.45).contains(f)), "{fitness:?}");
             seen.push(fitness);
         }
@@ -347,20 +347,20 @@ mod tests {
 
     #[test]
     fn genotypes_and_trials_are_checked() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let d = experiment.genotype_len();
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let d = simulation.genotype_len();
         let mut genes = vec![0.5; d];
-        let short = experiment.evaluate(&genes[1..], 0, 0..1);
+        let short = simulation.evaluate(&genes[1..], 0, 0..1);
         assert_eq!(short, Err(EvaluateError::GenotypeLength { expected: d, actual: d - 1 }));
         for trials in [0..0, 1000..1001, 0..1001] {
             let expected = EvaluateError::Trials { trials: trials.clone() };
-            assert_eq!(experiment.evaluate(&genes, 0, trials), Err(expected));
+            assert_eq!(simulation.evaluate(&genes, 0, trials), Err(expected));
         }
         genes[3] = 1.5;
-        let outside = experiment.network_json(&genes);
+        let outside = simulation.network_json(&genes);
         assert_eq!(outside, Err(EvaluateError::GeneOutOfRange { index: 3, value: 1.5 }));
         genes[3] = f64::NAN;
-        assert!(experiment.evaluate(&genes, 0, 0..1).is_err());
+        assert!(simulation.evaluate(&genes, 0, 0..1).is_err());
     }
 
     #[test]
@@ -368,7 +368,7 @@ mod tests {
         let mut config = experiment_a();
         (config.world.width, config.world.height) = (100.0, 100.0);
         robot(&mut config).num_instances = 50;
-        let error = Experiment::compile(&config).unwrap_err();
+        let error = Simulation::compile(&config).unwrap_err();
         assert_eq!(error.problems[0].path, "world.objects.robotA.initializers.positions");
     }
 
@@ -379,7 +379,7 @@ mod tests {
         config.topology.synapses[0].pre = vec!["nobody".into()];
         config.algorithm.populations[0].objects =
             vec![GenotypeQuery::Weights(SynapseSelector::Named("nothing".into()))];
-        let error = Experiment::compile(&config).unwrap_err();
+        let error = Simulation::compile(&config).unwrap_err();
         let paths: Vec<&str> = error.problems.iter().map(|problem| &*problem.path).collect();
         assert_eq!(
             paths,
@@ -393,9 +393,9 @@ mod tests {
 
     #[test]
     fn the_network_can_be_read() {
-        let experiment = Experiment::compile(&experiment_a()).unwrap();
-        let d = experiment.genotype_len();
-        let json = experiment.network_json(&vec![0.5; d]).unwrap();
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let d = simulation.genotype_len();
+        let json = simulation.network_json(&vec![0.5; d]).unwrap();
         assert_eq!(json["neurons"].as_array().unwrap().len(), 24);
         assert_eq!(json["synapses"].as_array().unwrap().len(), d - 3 * 24);
         assert_eq!(json["synapses"][0]["weight"], 0.0);
