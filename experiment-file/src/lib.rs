@@ -1,12 +1,64 @@
 //! The experiment file as types, with every default filled in.
 //!
-//! Reading one is [`ExperimentConfig::from_json`]: strict, and it reports every
-//! problem of a file at once. Serialising one gives the *canonical form*: all
-//! keys present in a fixed order, and itself a valid experiment file that reads
-//! back to an equal value. Workers get it, digests hash it.
+//! [`ExperimentConfig::from_json`] reads one. It is strict, and it reports every
+//! problem of a file at once:
+//!
+//! ```
+//! use experiment_file::ExperimentConfig;
+//!
+//! let text = r#"{
+//!   "topology": {
+//!     "stimuli": {"light": {"n": 4, "sensor": "light_sensor"}},
+//!     "ensembles": {"H": {"n": 5}, "OUT": {"n": 2, "activation": "tanh"}},
+//!     "synapses": {"in": {"pre": "light", "post": "H"}, "out": {"pre": "H", "post": "OUT"}},
+//!     "outputs": {"wheels": {"ensemble": "OUT", "actuator": "wheel_actuator"}},
+//!     "decoding": {"wheels": {"scheme": "IdentityDecoding"}}
+//!   },
+//!   "algorithm": {
+//!     "name": "SNES", "evolvable_object": "robot", "fitness_function": "goto_light",
+//!     "population_size": 20, "generations": 10, "evaluation_steps": 200, "num_evaluations": 2,
+//!     "populations": {
+//!       "all": {"objects": ["synapses:weights:all"], "min_vals": -3, "max_vals": 3}
+//!     }
+//!   },
+//!   "world": {"objects": {
+//!     "robot": {
+//!       "type": "robot", "num_instances": 5, "controller": "neural_controller",
+//!       "sensors": {"light_sensor": {"n_sectors": 4}}, "actuators": {"wheel_actuator": {}},
+//!       "initializers": {"positions": {"name": "random_uniform"}}
+//!     },
+//!     "lamp": {
+//!       "type": "light_source", "num_instances": 1, "controller": null,
+//!       "initializers": {"positions": {"name": "fixed", "params": {"values": [[500, 500]]}}}
+//!     }
+//!   }}
+//! }"#;
+//! let (config, warnings) = ExperimentConfig::from_json(text, "example")?;
+//! assert_eq!((config.name.as_str(), config.topology.ensembles["H"].n), ("example", 5));
+//! assert!(warnings.is_empty());
+//!
+//! // Two mistakes, two problems, each with its line and its path.
+//! let wrong = text.replace(r#""pre": "light""#, r#""pre": "night""#).replace(": 10", ": -10");
+//! let error = ExperimentConfig::from_json(&wrong, "example").unwrap_err();
+//! assert_eq!(
+//!     error.to_string(),
+//!     "line 5: topology.synapses.in.pre: no ensemble or stimulus is named `night`; \
+//!      did you mean `light`?\n\
+//!      line 11: algorithm.generations: must be between 1 and 10000000, is -10"
+//! );
+//! # Ok::<(), experiment_file::ConfigError>(())
+//! ```
+//!
+//! Serialising an [`ExperimentConfig`] gives its *canonical form*: all keys present
+//! in a fixed order, and itself a valid experiment file that reads back to an equal
+//! value. Workers get it, digests hash it.
 //!
 //! Lengths are centimetres, times environment steps, angles radians, unless a
 //! field says otherwise.
+//!
+//! `read` turns text into values, `check` looks at how the values relate to each
+//! other, and both write what they find to a `report`; `schema` describes the same
+//! format for editors.
 
 mod algorithm;
 mod check;
@@ -15,6 +67,7 @@ pub mod limits;
 mod problem;
 mod query;
 mod read;
+mod report;
 mod robot;
 mod schema;
 mod topology;
@@ -28,11 +81,13 @@ pub use algorithm::*;
 pub use equipment::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
-pub use read::suggestion;
+pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
 pub use topology::*;
 pub use world::*;
+
+use report::Report;
 
 /// Maps whose order carries meaning (order of inputs, of segments, of robots).
 pub type NamedMap<T> = indexmap::IndexMap<String, T>;
@@ -65,7 +120,16 @@ impl ExperimentConfig {
     /// (keys that are accepted and ignored), or every problem of the file.
     /// `default_name` names an experiment whose file gives no name.
     pub fn from_json(text: &str, default_name: &str) -> Result<(Self, Vec<Problem>), ConfigError> {
-        read::read(text, default_name)
+        // RFC 8259 lets readers ignore a byte order mark, and some editors write one.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let root = read::parse(text)?;
+        let report = Report::new(text, &root);
+        let config = read::read(&report, &root, default_name);
+        if report.is_complete() {
+            check::check(&config, &report);
+        }
+        let warnings = report.finish()?;
+        Ok((config, warnings))
     }
 
     /// The swarms with their names, in the order that numbers the robots.

@@ -1,6 +1,6 @@
 //! What an experiment costs, against the [`limits`].
 
-use crate::read::{Path, Report};
+use crate::report::{Path, Report};
 use crate::{
     AlgorithmName, ExperimentConfig, ObjectConfig, RobotConfig, RobotController, TopologyConfig,
     limits,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::read::{Path, Report, suggestion};
+use crate::report::{Path, Report, suggestion};
 use crate::{
     EnsembleSelector, GenotypeQuery, NeuronParameter, SynapseGroupConfig, SynapseSelector,
     TopologyConfig,

@@ -1,6 +1,6 @@
 //! The genotype: queries that match something, once; their bounds; operators.
 
-use crate::read::{Path, Report};
+use crate::report::{Path, Report};
 use crate::{
     AlgorithmConfig, AlgorithmParams, ExperimentConfig, GenotypeQuery, NeuronParameter,
     PopulationConfig, limits,

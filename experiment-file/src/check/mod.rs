@@ -12,7 +12,7 @@ mod task;
 mod world;
 
 use super::ExperimentConfig;
-use super::read::Report;
+use super::report::Report;
 
 /// Reports everything that does not fit together.
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::read::{Path, Report, suggestion};
+use crate::report::{Path, Report, suggestion};
 use crate::{ActuatorQuery, DecodingConfig, TopologyConfig};
 
 pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {

@@ -1,6 +1,6 @@
 //! The task: what evolves, and whether its fitness can be measured.
 
-use crate::read::{Path, Report, suggestion};
+use crate::report::{Path, Report, suggestion};
 use crate::{
     ActuatorQuery, ExperimentConfig, FitnessFunction, NamedMap, ObjectConfig, RobotController,
 };

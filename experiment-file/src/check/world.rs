@@ -1,6 +1,6 @@
 //! The world's objects: what robots carry and suffer, where objects start.
 
-use crate::read::{Path, Report};
+use crate::report::{Path, Report};
 use crate::{
     ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, ObjectConfig, RobotConfig,
     RobotController, SensorQuery, TopologyConfig, WirelessTransmitterConfig, limits,

@@ -1,42 +1,34 @@
-//! Reads experiment files: text -> syntax tree -> values -> relations between
-//! them. Each stage reports all it finds; nothing is accepted in part.
+//! Reads experiment files: text -> syntax tree -> values. Each stage reports all
+//! it finds; nothing is accepted in part. How the values relate to each other is
+//! for `check` to see.
 
 mod algorithm;
-mod names;
 mod node;
 mod parse;
 mod population;
-mod report;
 mod robot;
 mod topology;
 mod variant;
 mod world;
 
-pub use names::suggestion;
-pub(super) use report::{Path, Report};
+pub(super) use parse::parse;
 
-use names::check_name;
+use jsonc_parser::ast::Value;
 use node::{Node, Object};
 
-use super::check::check;
-use super::{ConfigError, ExperimentConfig, Problem};
+use super::ExperimentConfig;
+use super::report::{Report, check_name};
 
-/// See [`ExperimentConfig::from_json`].
-pub(super) fn read(
-    text: &str,
+/// The experiment of a syntax tree. What is unreadable is reported, and a
+/// placeholder stands in its place.
+pub(super) fn read<'a>(
+    report: &'a Report<'a>,
+    root: &'a Value<'a>,
     default_name: &str,
-) -> Result<(ExperimentConfig, Vec<Problem>), ConfigError> {
-    // RFC 8259 lets readers ignore a byte order mark, and some editors write one.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let root = parse::parse(text)?;
-    let report = Report::new(text, &root);
-    let mut config = Node::root(&report, &root).object(|o| experiment(o, default_name));
-    if report.is_complete() {
-        check(&config, &report);
-    }
-    let warnings = report.finish()?;
+) -> ExperimentConfig {
+    let mut config = Node::root(report, root).object(|o| experiment(o, default_name));
     config.sort_decoding();
-    Ok((config, warnings))
+    config
 }
 
 fn experiment(o: &mut Object<'_>, default_name: &str) -> ExperimentConfig {

@@ -10,9 +10,8 @@ use indexmap::IndexMap;
 use jsonc_parser::ast::{self, Value};
 use serde::Deserialize;
 
-use super::names::{check_name, suggestion, unknown_name};
-use super::report::{Excerpt, Message, Path, Report};
 use super::variant::variant;
+use crate::report::{Excerpt, Message, Path, Report, check_name, suggestion, unknown_name};
 use crate::{NamedMap, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;

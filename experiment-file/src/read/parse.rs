@@ -7,7 +7,7 @@ use serde::de::IgnoredAny;
 use crate::{ConfigError, Problem, limits};
 
 /// Parses strict JSON (RFC 8259) of bounded size and depth.
-pub(super) fn parse(text: &str) -> Result<Value<'_>, ConfigError> {
+pub(crate) fn parse(text: &str) -> Result<Value<'_>, ConfigError> {
     if text.len() > limits::FILE_BYTES {
         let limit = limits::FILE_BYTES;
         let message = format!("the file has {} bytes, the limit is {limit}", text.len());

@@ -1,7 +1,7 @@
 //! Reads `topology`.
 
-use super::names::suggestion;
 use super::node::{Node, Object};
+use crate::report::suggestion;
 use crate::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
 use crate::{
     Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronParams,

@@ -1,10 +1,10 @@
-//! Names: which are fit, and which was meant.
+//! Names: which ones are allowed, and what to say about an unknown one.
 
-use super::report::Excerpt;
+use super::Excerpt;
 use crate::limits;
 
 /// Whether a name can be shown to people.
-pub(super) fn check_name(name: &str) -> Result<(), String> {
+pub(crate) fn check_name(name: &str) -> Result<(), String> {
     let (n, limit) = (name.chars().count(), limits::NAME_CHARS);
     if n == 0 {
         Err("a name must not be empty".to_owned())
@@ -17,7 +17,9 @@ pub(super) fn check_name(name: &str) -> Result<(), String> {
     }
 }
 
-pub(super) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) -> String {
+/// What is wrong with a name that is none of `expected`; `unsupported` are those
+/// that the original simulator knows and this one does not.
+pub(crate) fn unknown_name(name: &str, expected: &[&str], unsupported: &[&str]) -> String {
     if unsupported.contains(&name) {
         format!("not supported: `{name}`; {}", known_names(expected))
     } else {

@@ -1,84 +1,21 @@
-//! Collects the problems of a file and finds the place of each.
+//! Collects the problems of a file and finds the place of each. The reader and
+//! the checks both write to it.
+
+mod names;
+mod path;
 
 use std::cell::RefCell;
 use std::fmt::{self, Write as _};
-use std::iter;
-use std::rc::Rc;
 
 use jsonc_parser::ast::Value;
 use jsonc_parser::common::Ranged as _;
 
+pub use names::suggestion;
+pub(crate) use names::{check_name, unknown_name};
+pub(crate) use path::Path;
+use path::Segment;
+
 use crate::{ConfigError, Problem, limits};
-
-/// A place in the file, from the root. Cheap to extend: every value that is
-/// read has one.
-#[derive(Clone, Default)]
-pub(crate) struct Path(Option<Rc<Step>>);
-
-struct Step {
-    parent: Path,
-    segment: Segment,
-}
-
-#[derive(Clone, PartialEq)]
-enum Segment {
-    Key(String),
-    Index(usize),
-    /// The set of keys of a map.
-    Keys,
-}
-
-impl Path {
-    pub(crate) fn key(&self, key: &str) -> Self {
-        self.join(Segment::Key(key.to_owned()))
-    }
-
-    pub(crate) fn index(&self, index: usize) -> Self {
-        self.join(Segment::Index(index))
-    }
-
-    /// The set of keys of the map at this place; what relies on it does not
-    /// rely on the values.
-    pub(crate) fn keys(&self) -> Self {
-        self.join(Segment::Keys)
-    }
-
-    fn join(&self, segment: Segment) -> Self {
-        Self(Some(Rc::new(Step { parent: self.clone(), segment })))
-    }
-
-    fn segments(&self) -> Vec<&Segment> {
-        let steps = iter::successors(self.0.as_deref(), |step| step.parent.0.as_deref());
-        let mut segments: Vec<_> = steps.map(|step| &step.segment).collect();
-        segments.reverse();
-        segments
-    }
-
-    /// Whether one of the two contains the other.
-    fn overlaps(&self, other: &Self) -> bool {
-        self.segments().into_iter().zip(other.segments()).all(|(a, b)| a == b)
-    }
-}
-
-impl<const N: usize> From<[&str; N]> for Path {
-    fn from(keys: [&str; N]) -> Self {
-        keys.into_iter().fold(Self::default(), |path, key| path.key(key))
-    }
-}
-
-impl fmt::Display for Path {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, segment) in self.segments().into_iter().enumerate() {
-            match segment {
-                Segment::Key(key) if i == 0 => write!(f, "{}", Excerpt(key))?,
-                Segment::Key(key) => write!(f, ".{}", Excerpt(key))?,
-                Segment::Index(index) => write!(f, "[{index}]")?,
-                Segment::Keys => {}
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Text of the file, fit for a message: one line, of bounded length.
 pub(crate) struct Excerpt<'a>(pub(crate) &'a str);
