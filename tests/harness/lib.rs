@@ -13,6 +13,7 @@ mod process;
 mod prometheus;
 mod proxy;
 mod python;
+mod skip;
 
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
@@ -24,3 +25,4 @@ pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};
 pub use prometheus::{Prometheus, promtool_check_config, promtool_check_metrics};
 pub use proxy::{Direction, Proxy, Traffic};
 pub use python::{PythonClient, RunningPythonClient};
+pub use skip::{skipped, skipped_for_want_of};

@@ -3,14 +3,14 @@
 use std::{
     env,
     ffi::OsString,
-    io::{self, BufRead as _, BufReader, Read as _, Write as _},
+    io::{BufRead as _, BufReader, Read as _},
     path::{Path, PathBuf},
     process::{Child, ChildStdout, Command, Stdio},
 };
 
 use tempfile::TempDir;
 
-use crate::{Outcome, workspace_file};
+use crate::{Outcome, skipped_for_want_of, workspace_file};
 
 /// Where `.ci/run` puts a Python with what the example requires.
 const VIRTUAL_ENVIRONMENT: &str = "target/python/bin/python";
@@ -23,16 +23,15 @@ pub struct PythonClient {
 }
 
 impl PythonClient {
-    /// None, and a word past the capture of the test's output, without a Python.
+    /// None, and a line that says that the test is skipped, without a Python.
     pub fn find() -> Option<Self> {
         let interpreter = env::var_os("SWARM_TEST_PYTHON")
             .map_or_else(|| workspace_file(VIRTUAL_ENVIRONMENT), PathBuf::from);
         if !interpreter.exists() {
-            let _ = writeln!(
-                io::stderr(),
-                "SKIPPED: no Python with grpcio at {}; for one: python3 -m venv target/python && \
+            skipped_for_want_of(
+                &format!("Python with grpcio at {}", interpreter.display()),
+                "python3 -m venv target/python && \
                  target/python/bin/pip install -r client/examples/requirements.txt",
-                interpreter.display()
             );
             return None;
         }

@@ -1,5 +1,4 @@
 //! What the documents promise is tested by tests that exist.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
     collections::BTreeSet,

@@ -2,7 +2,6 @@
 //!
 //! Every test asserts that its fault has happened, and that the digests of all
 //! generations and of the champion equal those of an undisturbed run.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 // They need failpoints, which optimised programs do not have.
 #[cfg(debug_assertions)]

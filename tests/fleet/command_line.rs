@@ -1,5 +1,4 @@
 //! What people see: results, errors that say what to do, exit codes.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, io::Write as _, net::TcpListener, thread};
 

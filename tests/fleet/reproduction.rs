@@ -1,6 +1,5 @@
 //! What is in `results/` is what this program computes: whoever repeats a run gets
 //! its bits. The whole of it takes hours; its beginning and its champion do not.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
     collections::BTreeMap,

@@ -1,6 +1,5 @@
 //! Experiments are steered while they run: paused, resumed, reprioritised,
 //! watched over.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, undisturbed};
 use swarm_proto::v1::{

@@ -1,5 +1,4 @@
 //! The health checks of the programs, as container engines run them.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{path::Path, process::Command};
 

@@ -1,5 +1,4 @@
 //! What needs no fleet: checking experiment files, and simulating episodes.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
     fs,

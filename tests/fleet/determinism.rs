@@ -1,5 +1,4 @@
 //! The same configuration and seed give the same bits on any fleet.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl};
 use serde_json::Value;

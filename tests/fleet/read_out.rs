@@ -1,6 +1,5 @@
 //! What `swarmctl` reads out of a fleet: history, events, how experiments end, and
 //! why nothing happens.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess};
 use serde_json::Value;

@@ -1,5 +1,4 @@
 //! The page on logs knows every line that the programs write at INFO and above.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{collections::BTreeSet, fs, path::Path};
 

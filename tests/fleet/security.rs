@@ -1,5 +1,4 @@
 //! Who is let in, what they are told otherwise, and what nobody gets to see.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::{fs, process::Command};

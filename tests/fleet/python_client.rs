@@ -1,5 +1,4 @@
 //! `client/examples/submit.py`: any language with gRPC is a client.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::fs;
 

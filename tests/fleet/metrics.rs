@@ -1,11 +1,10 @@
 //! What can be scraped agrees with what the fleet did.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{process::Command, thread, time::Duration};
 
 use harness::{
     CoordinatorProcess, Experiment, Outcome, Samples, WorkerProcess, binary, http_get,
-    metrics_address, promtool_check_metrics,
+    metrics_address, promtool_check_metrics, skipped_for_want_of,
 };
 
 const LISTEN: [&str; 2] = ["--metrics-listen", "127.0.0.1:0"];
@@ -38,7 +37,7 @@ fn scrape_until(address: &str, what: &str, holds: impl Fn(&Samples) -> bool) -> 
 fn check_with_promtool(samples: &Samples) {
     match promtool_check_metrics(&samples.text) {
         Some(said) => assert_eq!(said, "", "{}", samples.text),
-        None => eprintln!("SKIPPED: promtool is not installed (Debian package `prometheus`)"),
+        None => skipped_for_want_of("promtool", "apt-get install prometheus"),
     }
 }
 

@@ -1,5 +1,4 @@
 //! The wire protocol, spoken by hand.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::collections::BTreeSet;
 

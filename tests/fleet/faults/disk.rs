@@ -1,17 +1,15 @@
 //! Disks that are full or read-only, and databases that refuse a write for good.
 
-use std::io::{self, Write as _};
-
-use harness::{CoordinatorProcess, LogLine, SmallDisk, WorkerProcess, run_coordinator};
+use harness::{CoordinatorProcess, LogLine, SmallDisk, WorkerProcess, run_coordinator, skipped};
 
 use super::{OTHER, TINY, wait_for_assignment};
 
 /// A disk that can be filled; without the privilege to mount one, the test is
-/// skipped, and says so past the capture of its output.
+/// skipped.
 fn small_disk() -> Option<SmallDisk> {
     let disk = SmallDisk::mount(2 << 20);
     if disk.is_none() {
-        let _ = writeln!(io::stderr(), "SKIPPED: this process may not mount a file system");
+        skipped("this process may not mount a file system");
     }
     disk
 }

@@ -1,17 +1,16 @@
 //! The page on metrics and the dashboard know the metrics that there are, and a real
 //! Prometheus has something to show in every panel.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
 use harness::{
     CoordinatorProcess, Experiment, Prometheus, WorkerProcess, metrics_address,
-    promtool_check_config, workspace_file,
+    promtool_check_config, skipped_for_want_of, workspace_file,
 };
 use serde_json::Value;
 use swarm_telemetry::{Kind, Metric};
 
-const MISSING: &str = "SKIPPED: Prometheus is not installed (Debian package `prometheus`)";
+const INSTALL: &str = "apt-get install prometheus";
 
 fn all_metrics() -> Vec<&'static Metric> {
     coordinator::metrics::METRICS.iter().chain(worker::metrics::METRICS).collect()
@@ -87,7 +86,7 @@ fn the_dashboard_asks_for_metrics_that_there_are() {
 fn promtool_accepts_the_configuration() {
     match promtool_check_config(&workspace_file("docker/prometheus.yml")) {
         Some(verdict) => assert_eq!(verdict, Ok(())),
-        None => eprintln!("{MISSING}"),
+        None => skipped_for_want_of("promtool", INSTALL),
     }
 }
 
@@ -100,7 +99,7 @@ fn every_panel_shows_something_to_a_real_prometheus() {
     let addresses = [&coordinator.process, &worker.process].map(metrics_address);
     let targets = [("coordinator", addresses[0].as_str()), ("worker", addresses[1].as_str())];
     let Some(prometheus) = Prometheus::start(&targets) else {
-        eprintln!("{MISSING}");
+        skipped_for_want_of("Prometheus", INSTALL);
         return;
     };
     coordinator.submit(&Experiment::tiny(1_000_000).path());

@@ -1,5 +1,4 @@
 //! Evaluations: the same files whoever computes them, and whatever happens meanwhile.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{collections::BTreeMap, fs, path::Path};
 

@@ -1,0 +1,19 @@
+//! Whole fleets of real processes: one program, a module for each subject.
+//!
+//! `cargo test -p fleet-tests --test fleet faults::` runs one subject.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod command_line;
+mod determinism;
+mod evaluation;
+mod faults;
+mod health;
+mod metrics;
+mod monitoring;
+mod protocol;
+mod python_client;
+mod read_out;
+mod reproduction;
+mod security;
+mod simulate;
+mod steering;
