@@ -3,3 +3,4 @@
 
 mod logs;
 mod reliability;
+mod versions;

@@ -1,0 +1,42 @@
+//! One version of Rust is named everywhere: the one that CI compiles with.
+
+use std::fs;
+
+use harness::workspace_file;
+
+/// What is between two texts in a file of the workspace; the first occurrence.
+fn between(path: &str, before: &str, after: &str) -> String {
+    let text = fs::read_to_string(workspace_file(path)).unwrap();
+    let rest = text.split_once(before).unwrap_or_else(|| panic!("{path}: no `{before}`")).1;
+    let found = rest.split_once(after).unwrap_or_else(|| panic!("{path}: no `{after}`")).0;
+    found.to_owned()
+}
+
+#[test]
+fn every_file_that_names_a_version_of_rust_names_the_same() {
+    let pinned = between("rust-toolchain.toml", "channel = \"", "\"");
+    let minor = pinned.strip_suffix(".0").expect("the first release of a minor version");
+    let image = format!("rust:{minor}-slim-bookworm");
+    assert_eq!(between("Cargo.toml", "rust-version = \"", "\""), minor);
+    for page in ["README.md", "CONTRIBUTING.md"] {
+        let text = fs::read_to_string(workspace_file(page)).unwrap();
+        assert!(text.contains(&format!("Rust {minor}")), "{page} does not name Rust {minor}");
+    }
+    assert_eq!(between("docker/Dockerfile", "BUILD_IMAGE=", "\n"), image);
+    assert_eq!(between("docker/compose.yaml", "${BUILD_IMAGE:-", "}"), image);
+    assert_eq!(between("docker/test.sh", "BUILD_IMAGE=", " "), image);
+    assert_eq!(between("docs/docker.md", "`BUILD_IMAGE`, `RUNTIME_IMAGE` | `", "`"), image);
+}
+
+#[test]
+fn images_are_built_from_every_crate_of_the_workspace() {
+    let members = between("Cargo.toml", "members = [", "]");
+    let context = fs::read_to_string(workspace_file(".dockerignore")).unwrap();
+    let missing: Vec<&str> = members
+        .split('"')
+        .skip(1)
+        .step_by(2)
+        .filter(|member| !context.lines().any(|line| line.strip_prefix('!') == Some(*member)))
+        .collect();
+    assert!(missing.is_empty(), ".dockerignore leaves out {missing:?}");
+}
