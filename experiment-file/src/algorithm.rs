@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{GenotypeQuery, NamedMap, limits, schema};
+use super::{FitnessFunction, GenotypeQuery, NamedMap, limits, schema};
 
 /// Evolution and evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -67,24 +67,6 @@ pub enum AlgorithmName {
     /// OpenAI's evolution strategy.
     #[serde(rename = "openaiES")]
     OpenAiEs,
-}
-
-/// Fitness functions; see `fitness`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FitnessFunction {
-    /// Experiment A: one robot, and the same one, has its LED on.
-    IdentifyLeader,
-    /// Experiment B: robots on the swarm's border have their LED on.
-    IdentifyBorderline,
-    /// Experiment C, Eq. 5.5.
-    OrientationConsensus,
-    /// Experiment C as in the original simulator.
-    Alignment,
-    /// Experiment D: robots near the light.
-    GotoLight,
-    /// Robots near their centroid, but not on top of each other.
-    Grouping,
 }
 
 /// One population: its segment of the genotype and its algorithm's parameters.

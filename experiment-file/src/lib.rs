@@ -60,30 +60,36 @@
 //! other, and both write what they find to a `report`; `schema` describes the same
 //! format for editors.
 
+mod actuators;
 mod algorithm;
 mod check;
-mod equipment;
+mod fitness;
 pub mod limits;
+mod node;
 mod problem;
 mod query;
 mod read;
 mod report;
 mod robot;
 mod schema;
+mod sensors;
 mod topology;
+mod variant;
 mod world;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
+pub use actuators::*;
 pub use algorithm::*;
-pub use equipment::*;
+pub use fitness::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
 pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
+pub use sensors::*;
 pub use topology::*;
 pub use world::*;
 

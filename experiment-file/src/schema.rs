@@ -67,6 +67,20 @@ fn add_property(schema: &mut Schema, key: &str, value: Value) {
     }
 }
 
+/// Optional objects are absent, never null.
+pub(super) fn without_null(schema: &mut Schema) {
+    let properties = schema.get_mut("properties").and_then(Value::as_object_mut);
+    for property in
+        properties.into_iter().flat_map(Map::values_mut).filter_map(Value::as_object_mut)
+    {
+        if let Some(Value::Array(variants)) = property.remove("anyOf") {
+            for variant in variants.into_iter().filter(|variant| variant["type"] != "null") {
+                property.extend(variant.as_object().cloned().unwrap_or_default());
+            }
+        }
+    }
+}
+
 /// Another name of a variant.
 pub(super) fn also(name: &str) -> impl Fn(&mut Schema) {
     move |schema| {

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{NamedMap, limits, schema};
+use super::{NamedMap, SensorQuery, limits, schema};
 
 /// Of [`TopologyConfig::dt`].
 pub(super) const DEFAULT_DT: f64 = 0.1;
@@ -60,37 +60,6 @@ pub struct StimulusConfig {
     pub n: u32,
     /// Where the values come from.
     pub sensor: SensorQuery,
-}
-
-/// A reading of a robot, by the name that config files use.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-pub enum SensorQuery {
-    /// Message of the chosen frame; `msg_length` values.
-    #[serde(rename = "wireless_receiver:msg")]
-    ReceiverMessage,
-    /// Strength of the chosen frame; 1 value.
-    #[serde(rename = "wireless_receiver:signal")]
-    ReceiverSignal,
-    /// (cos, sin) of the sector that received it; 2 values.
-    #[serde(rename = "wireless_receiver:receiving_direction")]
-    ReceiverReceivingDirection,
-    /// (cos, sin) of the emitter's sector that faced the receiver; 2 values.
-    #[serde(rename = "wireless_receiver:sending_direction")]
-    ReceiverSendingDirection,
-    /// Own communication mode, 1 send, 0 relay; 1 value.
-    #[serde(rename = "wireless_receiver:state")]
-    ReceiverState,
-    /// Light per sector; `n_sectors` values.
-    #[serde(rename = "light_sensor")]
-    Light,
-    /// Nearness of other robots per sector; `n_sectors` values.
-    #[serde(rename = "distance_sensor")]
-    Distance,
-    /// 1 on a ground area of the sensor's colour; 1 value.
-    #[serde(rename = "ground_sensor")]
-    Ground,
 }
 
 /// One group of neurons.
@@ -171,6 +140,18 @@ pub enum ActuatorQuery {
     /// Communication mode, 1 send, 0 relay.
     #[serde(rename = "wireless_transmitter:state")]
     Mode,
+}
+
+impl ActuatorQuery {
+    /// Its name in the file.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Wheels => "wheel_actuator",
+            Self::Led => "led_actuator",
+            Self::Message => "wireless_transmitter",
+            Self::Mode => "wireless_transmitter:state",
+        }
+    }
 }
 
 /// One group of synapses: every (pre, post) pair of neurons exists with

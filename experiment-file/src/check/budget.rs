@@ -109,7 +109,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
             RobotController::NeuralController => substep * u64::from(config.topology.time_scale),
             RobotController::BraitenbergLightFollower => 0,
         };
-        let sense = n_sensed * n_sectors(robot);
+        let sense = n_sensed * u64::from(robot.sensors.n_sectors());
         u64::from(robot.num_instances) * (think + sense + n_lattice_points(robot))
     };
     let per_step: u64 = config.robots().map(|(_, robot)| of_robot(robot)).sum();
@@ -117,14 +117,6 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let what = "operations per episode";
     let parts = [&path, &topology];
     limit(cost, limits::EPISODE_OPERATIONS, what, &steps_path, &parts, report);
-}
-
-fn n_sectors(robot: &RobotConfig) -> u64 {
-    let sensors = &robot.sensors;
-    let receiver = sensors.wireless_receiver.as_ref().map_or(0, |sensor| sensor.n_sectors);
-    let light = sensors.light_sensor.as_ref().map_or(0, |sensor| sensor.n_sectors);
-    let distance = sensors.distance_sensor.as_ref().map_or(0, |sensor| sensor.n_sectors);
-    u64::from(receiver + light + distance)
 }
 
 fn n_lattice_points(robot: &RobotConfig) -> u64 {

@@ -1,12 +1,8 @@
 //! The task: what evolves, and whether its fitness can be measured.
 
+use crate::fitness::Need;
 use crate::report::{Path, Report, suggestion};
-use crate::{
-    ActuatorQuery, ExperimentConfig, FitnessFunction, NamedMap, ObjectConfig, RobotController,
-};
-
-/// Steps that `alignment` does not count.
-const ALIGNMENT_SETTLING_STEPS: u32 = 100;
+use crate::{ExperimentConfig, NamedMap, ObjectConfig, RobotController};
 
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
     evolvable_object(config, report);
@@ -38,40 +34,45 @@ fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
     report.conflict(&path, &[&object_path], || format!("`{name}` {problem}"));
 }
 
+/// The experiment has what the fitness function needs.
 fn fitness(config: &ExperimentConfig, report: &Report<'_>) {
-    let algorithm = Path::from(["algorithm"]);
-    let path = algorithm.key("fitness_function");
-    let needs_output_to = |actuator: ActuatorQuery, name: &str| {
-        let outputs = &config.topology.outputs;
-        if !outputs.values().any(|output| output.actuator == actuator) {
-            let others = each(&Path::from(["topology", "outputs"]), outputs, "actuator");
-            report.conflict(&path, &each_ref(&others), || format!("needs an output to `{name}`"));
-        }
-    };
-    match config.algorithm.fitness_function {
-        FitnessFunction::IdentifyLeader | FitnessFunction::IdentifyBorderline => {
-            needs_output_to(ActuatorQuery::Led, "led_actuator");
-        }
-        FitnessFunction::OrientationConsensus | FitnessFunction::Alignment => {
-            needs_output_to(ActuatorQuery::Wheels, "wheel_actuator");
-        }
-        FitnessFunction::GotoLight => {
-            let objects = &config.world.objects;
-            let is_light = |object: &ObjectConfig| matches!(object, ObjectConfig::LightSource(_));
-            if !objects.values().any(is_light) {
-                let others = each(&Path::from(["world", "objects"]), objects, "type");
-                report.conflict(&path, &each_ref(&others), "needs a `light_source` in the world");
+    let path = Path::from(["algorithm", "fitness_function"]);
+    let function = config.algorithm.fitness_function;
+    for need in function.needs() {
+        match *need {
+            Need::OutputTo(actuator) => {
+                let outputs = &config.topology.outputs;
+                if !outputs.values().any(|output| output.actuator == actuator) {
+                    let others = each(&Path::from(["topology", "outputs"]), outputs, "actuator");
+                    report.conflict(&path, &each_ref(&others), || {
+                        format!("needs an output to `{}`", actuator.name())
+                    });
+                }
+            }
+            Need::Light => {
+                let objects = &config.world.objects;
+                let is_light =
+                    |object: &ObjectConfig| matches!(object, ObjectConfig::LightSource(_));
+                if !objects.values().any(is_light) {
+                    let others = each(&Path::from(["world", "objects"]), objects, "type");
+                    report.conflict(
+                        &path,
+                        &each_ref(&others),
+                        "needs a `light_source` in the world",
+                    );
+                }
+            }
+            Need::StepsBeyond(first) => {
+                let steps = config.algorithm.evaluation_steps;
+                if steps <= first {
+                    let steps_path = Path::from(["algorithm", "evaluation_steps"]);
+                    report.conflict(&steps_path, &[&path], || {
+                        let name = function.name();
+                        format!("is {steps}, but `{name}` counts from step {first} on")
+                    });
+                }
             }
         }
-        FitnessFunction::Grouping => {}
-    }
-    let steps = config.algorithm.evaluation_steps;
-    if config.algorithm.fitness_function == FitnessFunction::Alignment
-        && steps <= ALIGNMENT_SETTLING_STEPS
-    {
-        report.conflict(&algorithm.key("evaluation_steps"), &[&path], || {
-            format!("is {steps}, but `alignment` counts from step {ALIGNMENT_SETTLING_STEPS} on")
-        });
     }
 }
 

@@ -76,7 +76,7 @@ fn network_ports(
                 });
             }
             Some(len) if len != n => {
-                let sensor_path = sensors_path.key(sensor_key(sensor));
+                let sensor_path = sensors_path.key(sensor.sensor_key());
                 let others = [&controller_path, &sensor_path, &path.key("sensor")];
                 report.conflict(&path.key("n"), &others, || {
                     format!("is {n}, but the reading of robot `{name}` has length {len}")
@@ -105,19 +105,6 @@ fn network_ports(
                 format!("is {n}, but messages of robot `{name}` have `msg_length` {msg_length}")
             });
         }
-    }
-}
-
-fn sensor_key(reading: SensorQuery) -> &'static str {
-    match reading {
-        SensorQuery::ReceiverMessage
-        | SensorQuery::ReceiverSignal
-        | SensorQuery::ReceiverReceivingDirection
-        | SensorQuery::ReceiverSendingDirection
-        | SensorQuery::ReceiverState => "wireless_receiver",
-        SensorQuery::Light => "light_sensor",
-        SensorQuery::Distance => "distance_sensor",
-        SensorQuery::Ground => "ground_sensor",
     }
 }
 

@@ -3,18 +3,16 @@
 //! for `check` to see.
 
 mod algorithm;
-mod node;
 mod parse;
 mod population;
 mod robot;
 mod topology;
-mod variant;
 mod world;
 
 pub(super) use parse::parse;
 
+use crate::node::{self, Node, Object};
 use jsonc_parser::ast::Value;
-use node::{Node, Object};
 
 use super::ExperimentConfig;
 use super::report::{Report, check_name};

@@ -1,13 +1,12 @@
-//! Reads a robot: sensors, actuators, perturbations.
+//! Reads a robot: actuators, perturbations.
 
 use super::node::{Node, Object};
 use super::world::{orientations, positions};
 use crate::{
-    ActuatorsConfig, DistanceSensorConfig, GroundSensorConfig, InhibitedStimulus,
-    LeaderFailureConfig, LedActuatorConfig, LightSensorConfig, PerturbationsConfig, RobotConfig,
-    RobotController, RobotInitializers, RobotParams, SensorQuery, SensorsConfig,
-    StimuliInhibitionConfig, TopologySwitchConfig, UncontrollableRotationConfig,
-    WheelActuatorConfig, WholeReceiver, WirelessReceiverConfig, WirelessTransmitterConfig, limits,
+    ActuatorsConfig, InhibitedStimulus, LeaderFailureConfig, LedActuatorConfig,
+    PerturbationsConfig, RobotConfig, RobotController, RobotInitializers, RobotParams, SensorQuery,
+    SensorsConfig, StimuliInhibitionConfig, TopologySwitchConfig, UncontrollableRotationConfig,
+    WheelActuatorConfig, WholeReceiver, WirelessTransmitterConfig, limits,
 };
 
 /// `center`: of the world.
@@ -21,7 +20,7 @@ pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2]) -> RobotConfig {
             .required("controller")
             .variant(&UNSUPPORTED)
             .unwrap_or(RobotController::NeuralController),
-        sensors: o.inner("sensors", sensors),
+        sensors: o.inner("sensors", SensorsConfig::read),
         actuators: o.inner("actuators", actuators),
         initializers: o.required("initializers").object(|o| RobotInitializers {
             positions: positions(o.required("positions"), center),
@@ -32,81 +31,6 @@ pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2]) -> RobotConfig {
             trainable: o.or("trainable", default.trainable, Node::bool),
         }),
     }
-}
-
-fn sensors(o: &mut Object<'_>) -> SensorsConfig {
-    o.unsupported(&[
-        "food_area_sensor",
-        "food_sensor",
-        "neighborhood_pos_sensor",
-        "neighbors_state_sensor",
-        "nest_sensor",
-        "own_orientation_sensor",
-        "own_position_sensor",
-    ]);
-    SensorsConfig {
-        wireless_receiver: o.optional("wireless_receiver").map(|node| node.object(receiver)),
-        light_sensor: o.optional("light_sensor").map(|node| node.object(light_sensor)),
-        distance_sensor: o.optional("distance_sensor").map(|node| node.object(distance_sensor)),
-        ground_sensor: o.optional("ground_sensor").map(|node| {
-            let default = GroundSensorConfig::default();
-            node.object(|o| GroundSensorConfig { color: o.or("color", default.color, Node::name) })
-        }),
-    }
-}
-
-fn receiver(o: &mut Object<'_>) -> WirelessReceiverConfig {
-    let default = WirelessReceiverConfig::default();
-    o.ignored("noise_sigma", "reception has no noise");
-    WirelessReceiverConfig {
-        n_sectors: o.or("n_sectors", default.n_sectors, sectors),
-        range: o.or("range", default.range, Node::positive),
-        msg_length: o.or("msg_length", default.msg_length, message_length),
-        max_hops: o.or("max_hops", default.max_hops, |node| node.u32(1..=limits::HOPS)),
-        decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
-        decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
-    }
-}
-
-fn light_sensor(o: &mut Object<'_>) -> LightSensorConfig {
-    let default = LightSensorConfig::default();
-    LightSensorConfig {
-        n_sectors: o.or("n_sectors", default.n_sectors, sectors),
-        range: o.or("range", default.range, Node::positive),
-        color: o.or("color", default.color, Node::name),
-        decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
-        decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
-        noise_variance: noise_variance(o, default.noise_variance),
-    }
-}
-
-fn distance_sensor(o: &mut Object<'_>) -> DistanceSensorConfig {
-    let default = DistanceSensorConfig::default();
-    DistanceSensorConfig {
-        n_sectors: o.or("n_sectors", default.n_sectors, sectors),
-        range: o.or("range", default.range, Node::positive),
-        decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
-        decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
-        noise_variance: noise_variance(o, default.noise_variance),
-    }
-}
-
-/// The original states the standard deviation.
-fn noise_variance(o: &mut Object<'_>, default: f64) -> f64 {
-    let sigma = o.optional("noise_sigma");
-    let variance = o.optional("noise_variance");
-    if let (Some(sigma), Some(_)) = (&sigma, &variance) {
-        sigma.problem("`noise_variance` says the same");
-    }
-    let from_sigma = |node: Node<'_>| {
-        let sigma = node.number(0.0..=limits::MAGNITUDE.sqrt());
-        sigma * sigma
-    };
-    variance.map(Node::amount).or_else(|| sigma.map(from_sigma)).unwrap_or(default)
-}
-
-fn sectors(node: Node<'_>) -> u32 {
-    node.u32(1..=limits::SECTORS)
 }
 
 fn message_length(node: Node<'_>) -> u32 {

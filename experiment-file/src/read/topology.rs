@@ -2,6 +2,7 @@
 
 use super::node::{Node, Object};
 use crate::report::suggestion;
+use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
 use crate::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
 use crate::{
     Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronParams,
@@ -43,25 +44,10 @@ fn neuron_model(o: &mut Object<'_>) {
 }
 
 fn stimulus(o: &mut Object<'_>) -> StimulusConfig {
-    const UNSUPPORTED: [&str; 14] = [
-        "food_area_sensor",
-        "food_sensor",
-        "neighborhood_pos_sensor",
-        "neighbors_state_sensor",
-        "nest_sensor",
-        "own_orientation_sensor",
-        "own_position_sensor",
-        "wireless_receiver",
-        "wireless_receiver:am_i_sender",
-        "wireless_receiver:am_i_targeted",
-        "wireless_receiver:destination",
-        "wireless_receiver:n_hops",
-        "wireless_receiver:priority",
-        "wireless_receiver:sender",
-    ];
+    let unsupported = [&UNSUPPORTED[..], &UNSUPPORTED_READINGS[..]].concat();
     StimulusConfig {
         n: o.required("n").u32(1..=limits::INPUTS),
-        sensor: o.required("sensor").variant(&UNSUPPORTED).unwrap_or(SensorQuery::Ground),
+        sensor: o.required("sensor").variant(&unsupported).unwrap_or(SensorQuery::Ground),
     }
 }
 

@@ -10,55 +10,55 @@ use indexmap::IndexMap;
 use jsonc_parser::ast::{self, Value};
 use serde::Deserialize;
 
-use super::variant::variant;
 use crate::report::{Excerpt, Message, Path, Report, check_name, suggestion, unknown_name};
+use crate::variant::variant;
 use crate::{NamedMap, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
 /// One value of the file; or, after a problem, a silent stand-in for one.
-pub(super) struct Node<'a> {
+pub(crate) struct Node<'a> {
     report: &'a Report<'a>,
     path: Path,
     value: Option<&'a Value<'a>>,
 }
 
 impl<'a> Node<'a> {
-    pub(super) fn root(report: &'a Report<'a>, value: &'a Value<'a>) -> Self {
+    pub(crate) fn root(report: &'a Report<'a>, value: &'a Value<'a>) -> Self {
         Self { report, path: Path::default(), value: Some(value) }
     }
 
     /// Reports a problem of this value.
-    pub(super) fn problem(&self, message: impl Message) {
+    pub(crate) fn problem(&self, message: impl Message) {
         if self.value.is_some() {
             self.report.problem(&self.path, message);
         }
     }
 
-    pub(super) fn is_null(&self) -> bool {
+    pub(crate) fn is_null(&self) -> bool {
         matches!(self.value, Some(Value::NullKeyword(_)))
     }
 
-    pub(super) fn is_string(&self) -> bool {
+    pub(crate) fn is_string(&self) -> bool {
         matches!(self.value, Some(Value::StringLit(_)))
     }
 
-    pub(super) fn is_list(&self) -> bool {
+    pub(crate) fn is_list(&self) -> bool {
         matches!(self.value, Some(Value::Array(_)))
     }
 
-    pub(super) fn is(&self, text: &str) -> bool {
+    pub(crate) fn is(&self, text: &str) -> bool {
         matches!(self.value, Some(Value::StringLit(literal)) if literal.value == text)
     }
 
-    pub(super) fn bool(self) -> bool {
+    pub(crate) fn bool(self) -> bool {
         match self.value {
             Some(Value::BooleanLit(literal)) => literal.value,
             _ => self.wrong_type("true or false"),
         }
     }
 
-    pub(super) fn string(self) -> Option<&'a str> {
+    pub(crate) fn string(self) -> Option<&'a str> {
         match self.value {
             Some(Value::StringLit(literal)) => Some(&literal.value),
             _ => self.wrong_type("a string"),
@@ -66,7 +66,7 @@ impl<'a> Node<'a> {
     }
 
     /// A string that is shown to people and refers to things.
-    pub(super) fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         let (report, path) = (self.report, self.path.clone());
         let Some(name) = self.string() else {
             return String::new();
@@ -78,7 +78,7 @@ impl<'a> Node<'a> {
     }
 
     /// One name, or a list of names.
-    pub(super) fn names(self) -> Vec<String> {
+    pub(crate) fn names(self) -> Vec<String> {
         if self.is_list() {
             self.list(1..=limits::ENTRIES).into_iter().map(Node::name).collect()
         } else {
@@ -86,7 +86,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    pub(super) fn u64(self, range: RangeInclusive<u64>) -> u64 {
+    pub(crate) fn u64(self, range: RangeInclusive<u64>) -> u64 {
         let (min, max) = (*range.start(), *range.end());
         let Some(Value::NumberLit(literal)) = self.value else {
             self.wrong_type::<()>("a whole number");
@@ -105,12 +105,12 @@ impl<'a> Node<'a> {
         min
     }
 
-    pub(super) fn u32(self, range: RangeInclusive<u32>) -> u32 {
+    pub(crate) fn u32(self, range: RangeInclusive<u32>) -> u32 {
         let number = self.u64((*range.start()).into()..=(*range.end()).into());
         number.try_into().unwrap_or(*range.start())
     }
 
-    pub(super) fn number(self, range: RangeInclusive<f64>) -> f64 {
+    pub(crate) fn number(self, range: RangeInclusive<f64>) -> f64 {
         let (min, max) = (*range.start(), *range.end());
         let must =
             if min == max { format!("be {min}") } else { format!("be between {min} and {max}") };
@@ -118,7 +118,7 @@ impl<'a> Node<'a> {
     }
 
     /// A quantity > 0.
-    pub(super) fn positive(self) -> f64 {
+    pub(crate) fn positive(self) -> f64 {
         const MAX: f64 = limits::MAGNITUDE;
         let range = MAX.recip()..=MAX;
         self.number_that(&format!("be positive and at most {MAX}"), MAX, |x| range.contains(&x))
@@ -139,22 +139,22 @@ impl<'a> Node<'a> {
     }
 
     /// A quantity of either sign.
-    pub(super) fn quantity(self) -> f64 {
+    pub(crate) fn quantity(self) -> f64 {
         self.number(-limits::MAGNITUDE..=limits::MAGNITUDE)
     }
 
     /// A quantity >= 0.
-    pub(super) fn amount(self) -> f64 {
+    pub(crate) fn amount(self) -> f64 {
         self.number(0.0..=limits::MAGNITUDE)
     }
 
-    pub(super) fn probability(self) -> f64 {
+    pub(crate) fn probability(self) -> f64 {
         self.number(0.0..=1.0)
     }
 
     /// The variant of `T` that a string names. `unsupported`: names that the
     /// original simulator knows and this one does not.
-    pub(super) fn variant<T: Deserialize<'a>>(self, unsupported: &[&str]) -> Option<T> {
+    pub(crate) fn variant<T: Deserialize<'a>>(self, unsupported: &[&str]) -> Option<T> {
         let (report, path) = (self.report, self.path.clone());
         let name = self.string()?;
         variant(name)
@@ -165,14 +165,14 @@ impl<'a> Node<'a> {
     }
 
     /// A string in a notation of its own.
-    pub(super) fn parsed<T: FromStr<Err: ToString>>(self) -> Option<T> {
+    pub(crate) fn parsed<T: FromStr<Err: ToString>>(self) -> Option<T> {
         let (report, path) = (self.report, self.path.clone());
         let parsed = self.string()?.parse();
         parsed.map_err(|error: T::Err| report.problem(&path, error.to_string())).ok()
     }
 
     /// One of the given strings; for unions whose variants have parameters.
-    pub(super) fn one_of(
+    pub(crate) fn one_of(
         self,
         expected: &[&'static str],
         unsupported: &[&str],
@@ -187,7 +187,7 @@ impl<'a> Node<'a> {
     }
 
     /// The elements of a list of bounded length.
-    pub(super) fn list(self, lengths: RangeInclusive<usize>) -> Vec<Node<'a>> {
+    pub(crate) fn list(self, lengths: RangeInclusive<usize>) -> Vec<Node<'a>> {
         let Some(Value::Array(array)) = self.value else {
             return self.wrong_type("a list");
         };
@@ -203,7 +203,7 @@ impl<'a> Node<'a> {
     }
 
     /// A point or vector.
-    pub(super) fn pair(self) -> [f64; 2] {
+    pub(crate) fn pair(self) -> [f64; 2] {
         match <[Node<'a>; 2]>::try_from(self.list(2..=2)) {
             Ok(elements) => elements.map(Node::quantity),
             Err(_) => [0.0; 2],
@@ -212,14 +212,14 @@ impl<'a> Node<'a> {
 
     /// An object with known keys. Keys that `read` asks for are known; what is
     /// left over is reported.
-    pub(super) fn object<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
+    pub(crate) fn object<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
         let properties = self.properties();
         self.read_object(properties, read)
     }
 
     /// An object with known keys; or a string, which stands for an object with
     /// nothing but this `name`.
-    pub(super) fn object_or_name<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
+    pub(crate) fn object_or_name<T>(self, read: impl FnOnce(&mut Object<'a>) -> T) -> T {
         match self.value {
             Some(name @ Value::StringLit(_)) => {
                 self.read_object(Some(IndexMap::from([("name", name)])), read)
@@ -246,7 +246,7 @@ impl<'a> Node<'a> {
     }
 
     /// An object whose keys are names that the file chooses.
-    pub(super) fn map<T>(
+    pub(crate) fn map<T>(
         self,
         min_entries: usize,
         mut read: impl FnMut(&str, Node<'a>) -> T,
@@ -310,7 +310,7 @@ impl<'a> Node<'a> {
 }
 
 /// The properties of one object; or, after a problem, a silent stand-in.
-pub(super) struct Object<'a> {
+pub(crate) struct Object<'a> {
     report: &'a Report<'a>,
     path: Path,
     is_silent: bool,
@@ -320,13 +320,13 @@ pub(super) struct Object<'a> {
 }
 
 impl<'a> Object<'a> {
-    pub(super) fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
+    pub(crate) fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
         self.known.push(key);
         let value = self.properties.swap_remove(key)?;
         Some(Node { report: self.report, path: self.path.key(key), value: Some(value) })
     }
 
-    pub(super) fn required(&mut self, key: &'static str) -> Node<'a> {
+    pub(crate) fn required(&mut self, key: &'static str) -> Node<'a> {
         self.optional(key).unwrap_or_else(|| {
             self.problem(key, || format!("missing key `{key}`"));
             Node { report: self.report, path: self.path.key(key), value: None }
@@ -334,7 +334,7 @@ impl<'a> Object<'a> {
     }
 
     /// The value of an optional key, or its default.
-    pub(super) fn or<T>(
+    pub(crate) fn or<T>(
         &mut self,
         key: &'static str,
         default: T,
@@ -344,7 +344,7 @@ impl<'a> Object<'a> {
     }
 
     /// An optional object; a missing one is read as an empty one.
-    pub(super) fn inner<T>(
+    pub(crate) fn inner<T>(
         &mut self,
         key: &'static str,
         read: impl FnOnce(&mut Object<'a>) -> T,
@@ -362,7 +362,7 @@ impl<'a> Object<'a> {
     }
 
     /// Refuses keys by name that the original simulator knows.
-    pub(super) fn unsupported(&mut self, keys: &[&str]) {
+    pub(crate) fn unsupported(&mut self, keys: &[&str]) {
         for key in keys {
             if self.properties.swap_remove(*key).is_some() {
                 self.report.problem(&self.path.key(key), "not supported");
@@ -371,7 +371,7 @@ impl<'a> Object<'a> {
     }
 
     /// Accepts a key that has no effect here, with a warning that says why.
-    pub(super) fn ignored(&mut self, key: &'static str, why: &str) {
+    pub(crate) fn ignored(&mut self, key: &'static str, why: &str) {
         if self.optional(key).is_some() {
             self.report.warning(&self.path.key(key), format!("ignored: {why}"));
         }
@@ -379,12 +379,12 @@ impl<'a> Object<'a> {
 
     /// Accepts whatever keys are left, because what is known here depends on
     /// something unreadable.
-    pub(super) fn accept_rest(&mut self) {
+    pub(crate) fn accept_rest(&mut self) {
         self.properties.clear();
     }
 
     /// Reports a problem of a key, whether the file has it or not.
-    pub(super) fn problem(&self, key: &str, message: impl Message) {
+    pub(crate) fn problem(&self, key: &str, message: impl Message) {
         if !self.is_silent {
             self.report.problem(&self.path.key(key), message);
         }

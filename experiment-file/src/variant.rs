@@ -8,16 +8,16 @@ use serde::de::value::StrDeserializer;
 use serde::de::{self, IntoDeserializer as _};
 
 /// The variant of this name.
-pub(super) fn variant<'a, T: Deserialize<'a>>(name: &'a str) -> Result<T, UnknownVariant> {
+pub(crate) fn variant<'a, T: Deserialize<'a>>(name: &'a str) -> Result<T, UnknownVariant> {
     let deserializer: StrDeserializer<'a, UnknownVariant> = name.into_deserializer();
     T::deserialize(deserializer)
 }
 
 /// The name belongs to no variant.
 #[derive(Debug)]
-pub(super) struct UnknownVariant {
+pub(crate) struct UnknownVariant {
     /// The names of all variants.
-    pub(super) expected: &'static [&'static str],
+    pub(crate) expected: &'static [&'static str],
 }
 
 impl de::Error for UnknownVariant {

@@ -1,0 +1,77 @@
+//! The fitness functions that a file may name: one row each in
+//! [`fitness_functions!`] below, from which the reader, the schema and the checks
+//! follow. What they compute is `sim-core`'s `fitness`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ActuatorQuery;
+
+/// What an experiment must have for a fitness function to make sense of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Need {
+    /// The network drives this actuator.
+    OutputTo(ActuatorQuery),
+    /// There is a light in the world.
+    Light,
+    /// An episode is longer than so many steps, which do not count.
+    StepsBeyond(u32),
+}
+
+/// Steps at the start of an episode that `alignment` does not count.
+pub const ALIGNMENT_SETTLING_STEPS: u32 = 100;
+
+/// From a row per fitness function: its name in the file, and what it needs.
+macro_rules! fitness_functions {
+    ($(
+        $(#[doc = $doc:literal])*
+        $name:literal = $function:ident: [$($need:expr),*],
+    )*) => {
+        /// Fitness functions; see `fitness`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+        pub enum FitnessFunction {
+            $(
+                $(#[doc = $doc])*
+                #[serde(rename = $name)]
+                $function,
+            )*
+        }
+
+        impl FitnessFunction {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$function),*];
+
+            /// Its name in the file.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$function => $name,)*
+                }
+            }
+
+            /// What the experiment must have.
+            pub(crate) fn needs(self) -> &'static [Need] {
+                match self {
+                    $(Self::$function => &[$($need),*],)*
+                }
+            }
+        }
+    };
+}
+
+fitness_functions! {
+    /// Experiment A: one robot, and the same one, has its LED on.
+    "identify_leader" = IdentifyLeader: [Need::OutputTo(ActuatorQuery::Led)],
+    /// Experiment B: robots on the swarm's border have their LED on.
+    "identify_borderline" = IdentifyBorderline: [Need::OutputTo(ActuatorQuery::Led)],
+    /// Experiment C, Eq. 5.5.
+    "orientation_consensus" = OrientationConsensus: [Need::OutputTo(ActuatorQuery::Wheels)],
+    /// Experiment C as in the original simulator.
+    "alignment" = Alignment: [
+        Need::OutputTo(ActuatorQuery::Wheels),
+        Need::StepsBeyond(ALIGNMENT_SETTLING_STEPS)
+    ],
+    /// Experiment D: robots near the light.
+    "goto_light" = GotoLight: [Need::Light],
+    /// Robots near their centroid, but not on top of each other.
+    "grouping" = Grouping: [],
+}

@@ -1,0 +1,66 @@
+//! `light_sensor`: how bright lights of a colour are, per sector.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::SensorConfig;
+use crate::node::{Node, Object};
+use crate::{limits, schema};
+
+/// Light sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::property("noise_sigma", schema::amount("Its square is `noise_variance`."))
+)]
+pub struct LightSensorConfig {
+    /// Sectors; default 6.
+    #[schemars(range(min = 1, max = limits::SECTORS))]
+    pub n_sectors: u32,
+    /// Reach, cm; default 80. The light's own range bounds it too.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub range: f64,
+    /// Colour it sees; default "red".
+    pub color: String,
+    /// Decay per cm; default 0.05.
+    #[schemars(range(min = 0))]
+    pub decay_rho: f64,
+    /// Decay per radian; default 1.
+    #[schemars(range(min = 0))]
+    pub decay_phi: f64,
+    /// Variance of the Gaussian noise; default 0.1.
+    #[schemars(range(min = 0))]
+    pub noise_variance: f64,
+}
+
+impl Default for LightSensorConfig {
+    fn default() -> Self {
+        Self {
+            n_sectors: 6,
+            range: 80.0,
+            color: "red".to_owned(),
+            decay_rho: 0.05,
+            decay_phi: 1.0,
+            noise_variance: 0.1,
+        }
+    }
+}
+
+impl SensorConfig for LightSensorConfig {
+    fn read(o: &mut Object<'_>) -> Self {
+        let default = Self::default();
+        Self {
+            n_sectors: o.or("n_sectors", default.n_sectors, super::sectors),
+            range: o.or("range", default.range, Node::positive),
+            color: o.or("color", default.color, Node::name),
+            decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
+            decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
+            noise_variance: super::noise_variance(o, default.noise_variance),
+        }
+    }
+
+    fn n_sectors(&self) -> u32 {
+        self.n_sectors
+    }
+}
