@@ -1,10 +1,11 @@
-//! Honest champions.
+//! Champions, and their re-evaluation.
 //!
-//! The best of many noisy estimates is optimistic: it was chosen for its luck,
-//! too. So from time to time the champion so far, the best individual since, and
-//! the mean of the distribution (where an algorithm has one) are judged again, on
-//! held-out trials that nothing was selected by, and the champion is who does
-//! best there.
+//! The best of many noisy estimates is optimistic: the noise of its trials took
+//! part in choosing it. So at intervals three candidates are evaluated on held-out
+//! trials, which no selection has used: the champion so far, the best individual
+//! since the last re-evaluation, and the mean of the distribution (where an
+//! algorithm has one). The one with the largest mean fitness there becomes the
+//! champion.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,12 +16,13 @@ use super::{Genotype, mean, ranking::ranking};
 pub struct Champion {
     /// Generation after which it was found.
     pub generation: u64,
-    /// Where it comes from.
-    pub origin: Origin,
+    /// Where it comes from; checkpoints call it `origin`.
+    #[serde(rename = "origin")]
+    pub source: ChampionSource,
     /// Its genes.
     pub genotype: Genotype,
     /// Fitness in the trials of its generation, for which it was chosen; none
-    /// for a mean, which was not judged there.
+    /// for a mean, which was not evaluated there.
     pub trial_fitness: Vec<f64>,
     /// Fitness in trials that did not choose it; none before the first
     /// re-evaluation.
@@ -29,7 +31,7 @@ pub struct Champion {
 
 /// Where a champion comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Origin {
+pub enum ChampionSource {
     /// An individual of its generation, by index.
     Individual(u32),
     /// The mean of the distribution after its generation.
@@ -50,10 +52,10 @@ pub struct HeldOut {
     pub generation: u64,
 }
 
-/// Candidates to be judged on held-out trials.
+/// Candidates to be evaluated on held-out trials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reevaluation {
-    /// Generation whose held-out trials they meet.
+    /// Generation whose held-out trials evaluate them.
     pub generation: u64,
     /// The champion so far, if it has been re-evaluated before, comes first.
     pub candidates: Vec<Champion>,
@@ -102,7 +104,7 @@ mod tests {
     fn candidate(index: u32) -> Champion {
         Champion {
             generation: 9,
-            origin: Origin::Individual(index),
+            source: ChampionSource::Individual(index),
             genotype: vec![0.5],
             trial_fitness: vec![9.0],
             held_out: None,
@@ -115,9 +117,9 @@ mod tests {
     }
 
     #[test]
-    fn the_best_on_held_out_trials_wins_whatever_it_was_thought_to_be() {
+    fn the_best_on_held_out_trials_wins_whatever_its_fitness_before() {
         let winner = decide(&[vec![1.0, 2.0], vec![2.0, 4.0], vec![f64::NAN, 9.0]]).unwrap();
-        assert_eq!(winner.origin, Origin::Individual(1));
+        assert_eq!(winner.source, ChampionSource::Individual(1));
         let held_out = winner.held_out.unwrap();
         assert_eq!((held_out.mean, held_out.n_trials, held_out.generation), (3.0, 2, 9));
         // s = sqrt(2), n = 2
@@ -127,11 +129,11 @@ mod tests {
 
     #[test]
     fn of_equals_the_first_stays() {
-        assert_eq!(decide(&[vec![1.0], vec![1.0]]).unwrap().origin, Origin::Individual(0));
+        assert_eq!(decide(&[vec![1.0], vec![1.0]]).unwrap().source, ChampionSource::Individual(0));
     }
 
     #[test]
-    fn nobody_wins_without_a_finite_mean() {
+    fn without_a_finite_mean_there_is_no_new_champion() {
         assert_eq!(decide(&[vec![f64::NAN], vec![f64::INFINITY]]), None);
     }
 }

@@ -41,6 +41,15 @@ impl Digest {
         Self(hash.finalize().into())
     }
 
+    /// Link -1 of an evolution without an experiment file: of the text that
+    /// describes its setup.
+    pub(crate) fn of_text(setup: &str) -> Self {
+        let mut hash = Sha256::new();
+        hash.update("swarmevo setup digest 1\n");
+        hash.update(setup);
+        Self(hash.finalize().into())
+    }
+
     /// The link after this one.
     pub fn next(self, generation: u64, genotypes: &[Genotype], trial_fitness: &[Vec<f64>]) -> Self {
         let mut hash = Sha256::new();

@@ -1,31 +1,71 @@
-//! Evolution as ask/tell: which genotypes to judge next, and what their fitness
-//! teaches.
+//! Evolutionary algorithms as ask and tell, reproducible to the bit.
 //!
-//! [`Evolution`] does the bookkeeping that all algorithms share: statistics,
-//! champion, digest, the policy for fitness that is not finite. An algorithm
-//! only samples and updates.
+//! [`Evolution`] draws a generation of genotypes ([`ask`](Evolution::ask)), you
+//! compute their fitness, and it learns from that ([`tell`](Evolution::tell)):
 //!
-//! Between `tell` and `ask` all there is to know is the serialisable
-//! [`Evolution`] itself. `ask` is a pure function of it, so whoever restores a
-//! checkpoint asks the same genotypes again.
+//! ```
+//! use evolution::Setup;
+//!
+//! /// Largest where every gene is 0.3.
+//! fn sphere(genes: &[f64]) -> f64 {
+//!     -genes.iter().map(|gene| (gene - 0.3) * (gene - 0.3)).sum::<f64>()
+//! }
+//!
+//! let setup = Setup { population_size: 20, seed: 7, ..Setup::new("SNES", 10) };
+//! let mut evolution = setup.start()?;
+//! for _ in 0..200 {
+//!     let generation = evolution.ask();
+//!     // One number per trial; a function without noise needs one trial.
+//!     let fitness: Vec<Vec<f64>> =
+//!         generation.genotypes.iter().map(|genes| vec![sphere(genes)]).collect();
+//!     evolution.tell(generation, &fitness)?;
+//! }
+//! let champion = evolution.champion().expect("200 generations have a champion");
+//! assert!(champion.genotype.iter().all(|gene| (gene - 0.3).abs() < 1e-3));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Genes lie in \[0, 1\], larger fitness is better, and a fitness that is not
+//! finite ranks last. [`ALGORITHMS`] lists the algorithms with their parameters and
+//! limits; `docs/algorithms.md` has their formulas and sources.
+//!
+//! - [`Setup`] starts an evolution of one population for any function;
+//!   [`Evolution::new`] starts that of an experiment file, with several populations
+//!   if it has them (cooperative coevolution).
+//! - [`Evolution::ask`] is a pure function of the state, and the state serialises.
+//!   So an evolution that is restored from a checkpoint asks for the same genotypes
+//!   as the one that was stored.
+//! - Every random draw has an address (seed, generation, population), so results do
+//!   not depend on machine, threads or time. [`Evolution::digest`] is a hash of all
+//!   genotypes and fitness so far: equal digests mean equal runs, bit for bit.
+//! - The best of noisy evaluations is optimistic. [`Evolution::reevaluation`] names
+//!   candidates to evaluate again on held-out trials, and
+//!   [`Evolution::set_champion`] keeps the best of them.
+//!
+//! An algorithm samples and updates, no more; statistics, champion, digest and the
+//! rule for fitness that is not finite are shared.
 
 mod algorithms;
 mod champion;
 mod digest;
 mod ranking;
+mod setup;
 mod statistics;
 
 use std::{ops::Range, sync::Arc};
 
-use experiment_file::{ConfigError, ExperimentConfig, Problem};
+use experiment_file::ExperimentConfig;
 use numeric::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
-pub use champion::{Champion, HeldOut, Origin, Reevaluation};
+pub use algorithms::ALGORITHMS;
+pub use champion::{Champion, ChampionSource, HeldOut, Reevaluation};
 pub use digest::Digest;
+pub use experiment_file::AlgorithmParams;
+pub use setup::{Setup, SetupError};
 pub use statistics::Statistics;
 
-use algorithms::{Algorithm, Sample, Strategy as _, Unsuitable};
+use algorithms::{Algorithm, Sample, Strategy as _};
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
@@ -52,20 +92,20 @@ pub struct Evolution {
     champion_digest: Digest,
 }
 
-/// A generation to be judged.
+/// A generation whose fitness is to be computed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Asked {
+pub struct Generation {
     /// Index of the generation, from 0.
-    pub generation: u64,
-    /// Whole genotypes.
+    pub index: u64,
+    /// The genotypes of all individuals: of each, the segments of all populations.
     pub genotypes: Population,
-    /// Per population.
+    /// What each population's algorithm drew, in the order of the segments.
     samples: Vec<Sample>,
 }
 
-/// What became of a generation.
+/// The fitness of a generation in short.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GenerationRecord {
+pub struct GenerationSummary {
     /// Index of the generation, from 0.
     pub generation: u64,
     /// Over the individuals whose fitness is finite.
@@ -76,13 +116,14 @@ pub struct GenerationRecord {
     pub digest: Digest,
 }
 
-/// Why evolution cannot go on.
+/// Why a generation cannot be learnt from.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EvolutionError {
-    /// There is nothing to learn from.
+    /// No individual has a finite fitness. The fitness function or the bounds of
+    /// the genotype have to change.
     #[error(
         "no individual of generation {generation} has a finite fitness; \
-         the fitness function or the bounds of the genotype need a look"
+         check the fitness function and the bounds of the genotype"
     )]
     NoFiniteFitness {
         /// Index of the generation.
@@ -91,40 +132,40 @@ pub enum EvolutionError {
 }
 
 impl Evolution {
-    /// The start of an evolution. `segments`: the genes of each population, in
-    /// the order of `algorithm.populations`. Reports every population that its
-    /// algorithm cannot evolve. `simulation`: the fingerprint of what computes
-    /// fitness; it is part of the digest.
-    pub fn new(
-        config: &ExperimentConfig,
-        segments: &[Range<usize>],
-        simulation: &str,
-    ) -> Result<Self, ConfigError> {
-        let population_size = config.algorithm.population_size as usize;
-        let mut populations = Vec::new();
-        let mut problems = Vec::new();
-        for ((name, population), segment) in config.algorithm.populations.iter().zip(segments) {
-            let (params, d) = (&population.params, segment.len());
-            match Algorithm::new(config.algorithm.name, params, d, population_size) {
-                Ok(algorithm) => populations.push(algorithm),
-                Err(unsuitable) => problems.push(problem(name, &unsuitable)),
-            }
-        }
-        // What concerns the whole experiment would be said once per population.
-        problems.dedup();
-        if !problems.is_empty() {
-            return Err(ConfigError { problems });
-        }
-        Ok(Self {
-            seed: config.seed,
+    /// The start of an experiment's evolution. `segments`: the genes of each
+    /// population, in the order of `algorithm.populations`, none of them empty.
+    /// `simulation`: the fingerprint of what computes fitness; it is part of the
+    /// digest.
+    ///
+    /// # Panics
+    ///
+    /// If `config` names an algorithm that is not among [`ALGORITHMS`]. The reader
+    /// of experiment files refuses such a file.
+    pub fn new(config: &ExperimentConfig, segments: &[Range<usize>], simulation: &str) -> Self {
+        let algorithm = &config.algorithm;
+        let populations = algorithm.populations.values().zip(segments);
+        let populations = populations
+            .map(|(population, segment)| {
+                Algorithm::new(&algorithm.name, &population.params, segment.len())
+                    .expect("the reader knows the algorithm")
+            })
+            .collect();
+        let digest = Digest::of_config(config, simulation);
+        Self::of(config.seed, algorithm.population_size as usize, populations, digest)
+    }
+
+    /// The start of an evolution; `digest`: link -1 of the chain.
+    fn of(seed: u64, population_size: usize, populations: Vec<Algorithm>, digest: Digest) -> Self {
+        Self {
+            seed,
             population_size,
             n_generations: 0,
             populations,
             champion: None,
             challenger: None,
-            digest: Digest::of_config(config, simulation),
+            digest,
             champion_digest: Digest::default(),
-        })
+        }
     }
 
     /// Generations told so far.
@@ -150,7 +191,7 @@ impl Evolution {
     }
 
     /// Draws the next generation. Asking twice gives the same.
-    pub fn ask(&self) -> Asked {
+    pub fn ask(&self) -> Generation {
         let samples: Vec<Sample> = self
             .populations
             .iter()
@@ -169,35 +210,35 @@ impl Evolution {
             [only] => Arc::clone(&only.genotypes),
             _ => (0..self.population_size).map(whole).collect(),
         };
-        Asked { generation: self.n_generations, genotypes, samples }
+        Generation { index: self.n_generations, genotypes, samples }
     }
 
     /// Learns from a generation that [`ask`](Self::ask) drew.
     /// `trial_fitness[i][t]`: fitness of individual i in trial t.
     pub fn tell(
         &mut self,
-        asked: Asked,
+        generation: Generation,
         trial_fitness: &[Vec<f64>],
-    ) -> Result<GenerationRecord, EvolutionError> {
-        assert_eq!(asked.generation, self.n_generations, "generations are told in order");
-        assert_eq!(asked.genotypes.len(), trial_fitness.len(), "one fitness per individual");
-        let generation = asked.generation;
+    ) -> Result<GenerationSummary, EvolutionError> {
+        let Generation { index, genotypes, samples } = generation;
+        assert_eq!(index, self.n_generations, "generations are told in order");
+        assert_eq!(genotypes.len(), trial_fitness.len(), "one fitness per individual");
         let fitness: Vec<f64> = trial_fitness.iter().map(|trials| mean(trials)).collect();
         let ranking = ranking::ranking(&fitness);
         let best = ranking[0];
         if !fitness[best].is_finite() {
-            return Err(EvolutionError::NoFiniteFitness { generation });
+            return Err(EvolutionError::NoFiniteFitness { generation: index });
         }
 
-        for (population, sample) in self.populations.iter_mut().zip(&asked.samples) {
+        for (population, sample) in self.populations.iter_mut().zip(&samples) {
             population.learn(sample, &ranking, &fitness);
         }
         let best_before = self.challenger.as_ref().and_then(Champion::fitness);
         if best_before.is_none_or(|best_before| fitness[best] > best_before) {
             self.challenger = Some(Champion {
-                generation,
-                origin: Origin::Individual(best as u32),
-                genotype: asked.genotypes[best].clone(),
+                generation: index,
+                source: ChampionSource::Individual(best as u32),
+                genotype: genotypes[best].clone(),
                 trial_fitness: trial_fitness[best].clone(),
                 held_out: None,
             });
@@ -205,24 +246,25 @@ impl Evolution {
                 self.champion.clone_from(&self.challenger);
             }
         }
-        self.digest = self.digest.next(generation, &asked.genotypes, trial_fitness);
+        self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
-        Ok(GenerationRecord {
-            generation,
+        Ok(GenerationSummary {
+            generation: index,
             statistics: Statistics::of(&fitness),
             n_non_finite: fitness.iter().filter(|value| !value.is_finite()).count(),
             digest: self.digest,
         })
     }
 
-    /// Who is to be judged on held-out trials, after the latest generation.
+    /// The candidates to be evaluated on held-out trials, after the latest
+    /// generation; none before the first.
     pub fn reevaluation(&self) -> Option<Reevaluation> {
         let generation = self.n_generations.checked_sub(1)?;
         let incumbent = self.champion.clone().filter(|champion| champion.held_out.is_some());
         let means: Option<Vec<Genotype>> = self.populations.iter().map(Algorithm::mean).collect();
         let mean = means.map(|means| Champion {
             generation,
-            origin: Origin::Mean,
+            source: ChampionSource::Mean,
             genotype: means.concat(),
             trial_fitness: Vec::new(),
             held_out: None,
@@ -231,9 +273,10 @@ impl Evolution {
         Some(Reevaluation { generation, candidates })
     }
 
-    /// Makes the best of a [`reevaluation`](Self::reevaluation) the champion. If
-    /// none of them has a finite fitness, the champion stays.
-    pub fn crown(&mut self, reevaluation: &Reevaluation, trial_fitness: &[Vec<f64>]) {
+    /// Makes the best of a [`reevaluation`](Self::reevaluation) the champion, by
+    /// `trial_fitness[i][t]`, the fitness of candidate i in held-out trial t. If
+    /// none of them has a finite mean, the champion stays.
+    pub fn set_champion(&mut self, reevaluation: &Reevaluation, trial_fitness: &[Vec<f64>]) {
         if let Some(champion) = reevaluation.decide(trial_fitness) {
             self.champion = Some(champion);
         }
@@ -242,18 +285,6 @@ impl Evolution {
         self.champion_digest =
             self.champion_digest.next_champion(self.digest, genotypes, trial_fitness);
     }
-}
-
-/// Where in the configuration, and what.
-fn problem(population: &str, unsuitable: &Unsuitable) -> Problem {
-    let population = format!("algorithm.populations.{population}");
-    let path = match unsuitable {
-        Unsuitable::NoGenes => population,
-        Unsuitable::OnlyElite { .. } => format!("{population}.params.num_elite"),
-        Unsuitable::TooFewIndividuals => "algorithm.population_size".to_owned(),
-        Unsuitable::TooManyGenes { .. } => "algorithm.name".to_owned(),
-    };
-    Problem { path, line: None, message: unsuitable.to_string() }
 }
 
 /// Plain mean, summed in order.

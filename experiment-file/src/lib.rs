@@ -4,6 +4,7 @@
 //! problem of a file at once:
 //!
 //! ```
+//! use evolution::ALGORITHMS;
 //! use experiment_file::ExperimentConfig;
 //!
 //! let text = r#"{
@@ -33,13 +34,13 @@
 //!     }
 //!   }}
 //! }"#;
-//! let (config, warnings) = ExperimentConfig::from_json(text, "example")?;
+//! let (config, warnings) = ExperimentConfig::from_json(text, "example", ALGORITHMS)?;
 //! assert_eq!((config.name.as_str(), config.topology.ensembles["H"].n), ("example", 5));
 //! assert!(warnings.is_empty());
 //!
 //! // Two mistakes, two problems, each with its line and its path.
 //! let wrong = text.replace(r#""pre": "light""#, r#""pre": "night""#).replace(": 10", ": -10");
-//! let error = ExperimentConfig::from_json(&wrong, "example").unwrap_err();
+//! let error = ExperimentConfig::from_json(&wrong, "example", ALGORITHMS).unwrap_err();
 //! assert_eq!(
 //!     error.to_string(),
 //!     "line 5: topology.synapses.in.pre: no ensemble or stimulus is named `night`; \
@@ -63,6 +64,7 @@
 mod actuators;
 mod algorithm;
 mod check;
+mod description;
 mod fitness;
 pub mod limits;
 mod node;
@@ -83,6 +85,9 @@ use serde_json::json;
 
 pub use actuators::*;
 pub use algorithm::*;
+pub use description::{
+    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Parameter, ParameterValue,
+};
 pub use fitness::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
@@ -93,6 +98,7 @@ pub use sensors::*;
 pub use topology::*;
 pub use world::*;
 
+use read::Algorithms;
 use report::Report;
 
 /// Maps whose order carries meaning (order of inputs, of segments, of robots).
@@ -115,7 +121,7 @@ pub struct ExperimentConfig {
     pub seed: u64,
     /// The neural network's structure.
     pub topology: TopologyConfig,
-    /// What evolves, how, and how it is judged.
+    /// What evolves, how, and how its fitness is computed.
     pub algorithm: AlgorithmConfig,
     /// Arena, robots, lights, ground areas.
     pub world: WorldConfig,
@@ -124,15 +130,35 @@ pub struct ExperimentConfig {
 impl ExperimentConfig {
     /// Reads an experiment file. Returns the configuration and the warnings
     /// (keys that are accepted and ignored), or every problem of the file.
-    /// `default_name` names an experiment whose file gives no name.
-    pub fn from_json(text: &str, default_name: &str) -> Result<(Self, Vec<Problem>), ConfigError> {
+    /// `default_name` names an experiment whose file gives no name. `algorithms`
+    /// are those that the file may name: `evolution::ALGORITHMS`.
+    pub fn from_json(
+        text: &str,
+        default_name: &str,
+        algorithms: &'static [AlgorithmDescription],
+    ) -> Result<(Self, Vec<Problem>), ConfigError> {
+        Self::read(text, default_name, Algorithms::Described(algorithms))
+    }
+
+    /// Reads a canonical form, for programs that only simulate. It is checked like
+    /// any file, but for the algorithm's name and parameters: they are kept as they
+    /// are.
+    pub fn from_canonical_json(text: &str) -> Result<Self, ConfigError> {
+        Self::read(text, "", Algorithms::Unchecked).map(|(config, _)| config)
+    }
+
+    fn read(
+        text: &str,
+        default_name: &str,
+        algorithms: Algorithms,
+    ) -> Result<(Self, Vec<Problem>), ConfigError> {
         // RFC 8259 lets readers ignore a byte order mark, and some editors write one.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let root = read::parse(text)?;
         let report = Report::new(text, &root);
-        let config = read::read(&report, &root, default_name);
+        let config = read::read(&report, &root, default_name, algorithms);
         if report.is_complete() {
-            check::check(&config, &report);
+            check::check(&config, algorithms.find(&config.algorithm.name), &report);
         }
         let warnings = report.finish()?;
         Ok((config, warnings))

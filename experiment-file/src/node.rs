@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use crate::report::{Excerpt, Message, Path, Report, check_name, suggestion, unknown_name};
 use crate::variant::variant;
-use crate::{NamedMap, limits};
+use crate::{NamedMap, ParameterValue, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
@@ -150,6 +150,21 @@ impl<'a> Node<'a> {
 
     pub(crate) fn probability(self) -> f64 {
         self.number(0.0..=1.0)
+    }
+
+    /// A parameter of an algorithm that nothing is known of: a number or a name.
+    pub(crate) fn parameter(self) -> ParameterValue {
+        match self.value {
+            Some(Value::StringLit(_)) => ParameterValue::Name(self.name()),
+            Some(Value::NumberLit(literal)) => match literal.value.parse() {
+                Ok(whole) => ParameterValue::Whole(whole),
+                Err(_) => ParameterValue::Number(self.quantity()),
+            },
+            _ => {
+                self.wrong_type::<()>("a number or a name");
+                ParameterValue::Whole(0)
+            }
+        }
     }
 
     /// The variant of `T` that a string names. `unsupported`: names that the

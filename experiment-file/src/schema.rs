@@ -7,15 +7,21 @@
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
-use super::{
-    CmaEsParams, ExperimentConfig, GaParams, OpenAiEsParams, SnesParams, XnesParams, limits,
-};
+use super::description::describe_algorithms;
+use super::{AlgorithmDescription, ExperimentConfig, limits};
 
 /// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema,
 /// draft 2020-12). What it cannot express (names that resolve, sizes that agree,
-/// costs) only the reader checks.
-pub fn json_schema() -> Value {
-    schema_for!(ExperimentConfig).to_value()
+/// costs) only the reader checks. `algorithms` are those that a file may name.
+pub fn json_schema(algorithms: &[AlgorithmDescription]) -> Value {
+    let mut schema = schema_for!(ExperimentConfig).to_value();
+    describe_algorithms(&mut schema, algorithms);
+    schema
+}
+
+/// A place that the descriptions of the algorithms fill in.
+pub(super) fn filled_in(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({})
 }
 
 /// The keys in a list such as "a, b": attributes take no array.
@@ -112,30 +118,6 @@ pub(super) fn decodings(schema: &mut Schema) {
             }
             if let Value::Object(variant) = variant {
                 not_required(variant, "params");
-            }
-        }
-    }
-}
-
-/// The only encoding of genes.
-pub(super) fn encoded(schema: &mut Schema) {
-    add_property(schema, "encoding", json!({"const": "real"}));
-}
-
-/// An algorithm's parameters may stand in the population itself (section 4.3).
-pub(super) fn params_without_params(schema: &mut Schema) {
-    for params in [
-        schema_for!(GaParams),
-        schema_for!(SnesParams),
-        schema_for!(XnesParams),
-        schema_for!(CmaEsParams),
-        schema_for!(OpenAiEsParams),
-    ] {
-        let properties = params.get("properties").and_then(Value::as_object);
-        for (key, value) in properties.into_iter().flatten() {
-            // The first description is the genetic algorithm's, which uses them all.
-            if schema.pointer(&format!("/properties/{key}")).is_none() {
-                add_property(schema, key, value.clone());
             }
         }
     }

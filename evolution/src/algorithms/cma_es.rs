@@ -4,17 +4,18 @@
 //! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016,
 //! revised 2023); equation numbers are its own.
 
-use experiment_file::CmaEsParams;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, limits};
 use nalgebra::DVector;
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Sample, Strategy,
+    Described, Sample, Strategy,
     cumulation::{Cumulation, Rates, damping},
     draw_normals,
     linalg::{Eigen, Symmetric},
     mirror,
+    parameters::{MU_INIT, SIGMA_INIT},
 };
 
 /// A Gaussian with mean m and covariance sigma^2 C, of points x in all of R^d.
@@ -34,16 +35,28 @@ pub struct CmaEs {
 /// rounding.
 const EIGENVALUE_RATIO_MIN: f64 = 1e-14;
 
-impl CmaEs {
-    /// The first distribution over `d` genes, with C = I.
-    pub fn new(params: &CmaEsParams, d: usize) -> Self {
+impl Described for CmaEs {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "CMA-ES",
+        title: "Covariance matrix adaptation evolution strategy",
+        learns: "mean, step size, covariance",
+        state: "d²/2",
+        individuals_min: 2,
+        genes_max: Some(limits::GENES_OF_FULL_MATRIX),
+        parameters: &[MU_INIT, SIGMA_INIT],
+    };
+
+    /// C = I.
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
         Self {
-            mean: vec![params.mu_init; d],
+            mean: vec![params.number(&MU_INIT); d],
             covariance: Symmetric::identity(d),
-            cumulation: Cumulation::new(params.sigma_init, d),
+            cumulation: Cumulation::new(params.number(&SIGMA_INIT), d),
         }
     }
+}
 
+impl CmaEs {
     /// Eigenvectors of C and the square roots of its eigenvalues.
     fn root(&self) -> (Eigen, DVector<f64>) {
         let eigen = Eigen::of(&self.covariance.to_dense());

@@ -1,33 +1,81 @@
 //! The evolutionary algorithms, all behind one interface: draw a generation,
 //! learn from its fitness.
+//!
+//! An algorithm is one file, which implements [`Strategy`] and [`Described`], and
+//! one row of the registry at the end of the declarations below. Its names,
+//! parameters and limits in experiment files, in their JSON Schema and in
+//! `docs/algorithms.md` follow from its description.
 
 mod cma_es;
 mod cumulation;
 mod ga;
 mod linalg;
 mod openai_es;
+mod parameters;
 mod sep_cma_es;
 mod snes;
 mod xnes;
 
 use std::iter;
 
-use experiment_file::{AlgorithmName, AlgorithmParams};
+use experiment_file::{AlgorithmDescription, AlgorithmParams};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{Genotype, Population};
-use cma_es::CmaEs;
-use ga::Ga;
-use openai_es::OpenAiEs;
-use sep_cma_es::SepCmaEs;
-use snes::Snes;
-use xnes::Xnes;
+/// Declares the algorithms: the state of each, its description, its start.
+macro_rules! registry {
+    ($($(#[$doc:meta])* $module:ident::$name:ident,)*) => {
+        /// The algorithms, each with its state. A variant's name is part of the
+        /// format of checkpoints.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub enum Algorithm {
+            $($(#[$doc])* $name($module::$name),)*
+        }
 
-/// Genes that an algorithm with a d x d matrix may have. There, a generation of
-/// 100 individuals costs the coordinator half a second (CMA-ES) to one (xNES), and
-/// a checkpoint 10 to 20 MB; both grow fast, the time with the cube of d.
-pub const FULL_MATRIX_GENES_MAX: usize = 1000;
+        /// The descriptions of all algorithms, for the reader of experiment files.
+        pub static ALGORITHMS: &[AlgorithmDescription] =
+            &[$(<$module::$name as Described>::DESCRIPTION,)*];
+
+        impl Algorithm {
+            /// The algorithm of this name at its start; none if there is none.
+            /// `d`: genes of the population, at least 1.
+            pub fn new(name: &str, params: &AlgorithmParams, d: usize) -> Option<Self> {
+                $(if name == <$module::$name as Described>::DESCRIPTION.name {
+                    return Some(Self::$name(Described::start(params, d)));
+                })*
+                None
+            }
+
+            fn strategy(&self) -> &dyn Strategy {
+                match self {
+                    $(Self::$name(strategy) => strategy,)*
+                }
+            }
+
+            fn strategy_mut(&mut self) -> &mut dyn Strategy {
+                match self {
+                    $(Self::$name(strategy) => strategy,)*
+                }
+            }
+        }
+    };
+}
+
+registry! {
+    /// Genetic algorithm.
+    ga::Ga,
+    /// Separable natural evolution strategy.
+    snes::Snes,
+    /// Exponential natural evolution strategy.
+    xnes::Xnes,
+    /// Covariance matrix adaptation.
+    cma_es::CmaEs,
+    /// Covariance matrix adaptation with a diagonal matrix.
+    sep_cma_es::SepCmaEs,
+    /// OpenAI's evolution strategy.
+    openai_es::OpenAiEs,
+}
 
 /// What an algorithm draws for one generation.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,109 +118,21 @@ pub trait Strategy {
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]);
 }
 
-/// The algorithms, each with its state.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Algorithm {
-    /// Genetic algorithm.
-    Ga(Ga),
-    /// Separable natural evolution strategy.
-    Snes(Snes),
-    /// Exponential natural evolution strategy.
-    Xnes(Xnes),
-    /// Covariance matrix adaptation.
-    CmaEs(CmaEs),
-    /// Covariance matrix adaptation with a diagonal matrix.
-    SepCmaEs(SepCmaEs),
-    /// OpenAI's evolution strategy.
-    OpenAiEs(OpenAiEs),
-}
+/// What makes an algorithm known to experiment files.
+pub trait Described: Strategy {
+    /// Its name, parameters and limits.
+    const DESCRIPTION: AlgorithmDescription;
 
-/// Why an algorithm cannot evolve a population: a limit that depends on more
-/// than one key of the configuration.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Unsuitable {
-    /// The segment is empty.
-    #[error("the population has no genes: nothing that its `objects` name exists")]
-    NoGenes,
-    /// Nobody would be bred.
-    #[error("must be below population_size ({population_size}), is {n_elite}")]
-    OnlyElite {
-        /// `num_elite`.
-        n_elite: usize,
-        /// P.
-        population_size: usize,
-    },
-    /// There is nothing to compare.
-    #[error("this algorithm compares individuals: at least 2 are needed")]
-    TooFewIndividuals,
-    /// A matrix of this size costs too much.
-    #[error(
-        "a population of {d} genes is too large for this algorithm, whose cost grows with the cube \
-         of the genes (at most {FULL_MATRIX_GENES_MAX}); use \"sep-CMA-ES\" or \"SNES\""
-    )]
-    TooManyGenes {
-        /// Genes of the population.
-        d: usize,
-    },
+    /// Its state before the first generation, over `d` genes (at least 1).
+    /// `params` lie in the domains of the description.
+    fn start(params: &AlgorithmParams, d: usize) -> Self;
 }
 
 impl Algorithm {
-    /// An algorithm at its start. `d`: genes of the population.
-    pub fn new(
-        name: AlgorithmName,
-        params: &AlgorithmParams,
-        d: usize,
-        population_size: usize,
-    ) -> Result<Self, Unsuitable> {
-        if d == 0 {
-            return Err(Unsuitable::NoGenes);
-        }
-        let compares = matches!(params, AlgorithmParams::CmaEs(_) | AlgorithmParams::OpenAiEs(_));
-        if compares && population_size < 2 {
-            return Err(Unsuitable::TooFewIndividuals);
-        }
-        let has_full_matrix = matches!(name, AlgorithmName::Xnes | AlgorithmName::CmaEs);
-        if has_full_matrix && d > FULL_MATRIX_GENES_MAX {
-            return Err(Unsuitable::TooManyGenes { d });
-        }
-        Ok(match params {
-            AlgorithmParams::Ga(params) => Self::Ga(Ga::new(params, d, population_size)?),
-            AlgorithmParams::Snes(params) => Self::Snes(Snes::new(params, d)),
-            AlgorithmParams::Xnes(params) => Self::Xnes(Xnes::new(params, d)),
-            AlgorithmParams::CmaEs(params) if name == AlgorithmName::SepCmaEs => {
-                Self::SepCmaEs(SepCmaEs::new(params, d))
-            }
-            AlgorithmParams::CmaEs(params) => Self::CmaEs(CmaEs::new(params, d)),
-            AlgorithmParams::OpenAiEs(params) => Self::OpenAiEs(OpenAiEs::new(params, d)),
-        })
-    }
-
     /// The mean of its distribution as a genotype, if it has one.
     pub fn mean(&self) -> Option<Genotype> {
         let mean = self.strategy().mean()?;
         Some(mean.iter().map(|&gene| mirror(gene)).collect())
-    }
-
-    fn strategy(&self) -> &dyn Strategy {
-        match self {
-            Self::Ga(ga) => ga,
-            Self::Snes(snes) => snes,
-            Self::Xnes(xnes) => xnes,
-            Self::CmaEs(cma_es) => cma_es,
-            Self::SepCmaEs(sep_cma_es) => sep_cma_es,
-            Self::OpenAiEs(openai_es) => openai_es,
-        }
-    }
-
-    fn strategy_mut(&mut self) -> &mut dyn Strategy {
-        match self {
-            Self::Ga(ga) => ga,
-            Self::Snes(snes) => snes,
-            Self::Xnes(xnes) => xnes,
-            Self::CmaEs(cma_es) => cma_es,
-            Self::SepCmaEs(sep_cma_es) => sep_cma_es,
-            Self::OpenAiEs(openai_es) => openai_es,
-        }
     }
 }
 
@@ -203,8 +163,8 @@ fn mirror(x: f64) -> f64 {
     if x > 1.0 { 2.0 - x } else { x }
 }
 
-/// e^x, but finite: an update with a learning rate beyond reason must not make
-/// NaN of 0 * infinity.
+/// e^x, but at most [`f64::MAX`]: with a very large learning rate, the exponential
+/// would overflow to infinity, and 0 * infinity is NaN.
 fn finite_exp(x: f64) -> f64 {
     libm::exp(x).min(f64::MAX)
 }

@@ -5,11 +5,11 @@
 //! perturbations, centred ranks, and Adam (Kingma, Ba: arXiv 1412.6980,
 //! Algorithm 1) on the estimated gradient.
 
-use experiment_file::OpenAiEsParams;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, Strategy, draw_normals};
+use super::{Described, Sample, Strategy, draw_normals, parameters::MU_INIT};
 
 /// A Gaussian whose mean mu, kept in \[0, 1\], learns, and whose standard
 /// deviation sigma is the same for all genes and constant.
@@ -31,17 +31,40 @@ pub struct OpenAiEs {
 /// Adam's epsilon.
 const EPSILON: f64 = 1e-8;
 
-impl OpenAiEs {
-    /// The first distribution over `d` genes.
-    pub fn new(params: &OpenAiEsParams, d: usize) -> Self {
+/// A decay of 1 would never forget, and its correction divides by zero.
+const DECAY_MAX: f64 = 1.0 - f64::EPSILON;
+
+const SIGMA: Parameter =
+    Parameter::deviation("sigma", 0.1, "Standard deviation of the perturbations");
+const LEARNING_RATE: Parameter = Parameter::positive("learning_rate", 0.02, "Adam's step size");
+const BETA1: Parameter =
+    Parameter::between("beta1", [0.0, DECAY_MAX], 0.9, "Adam's decay of the first moment");
+const BETA2: Parameter =
+    Parameter::between("beta2", [0.0, DECAY_MAX], 0.999, "Adam's decay of the second moment");
+const WEIGHT_DECAY: Parameter =
+    Parameter::unit("weight_decay", 0.0, "L2 pull towards `mu_init` per generation");
+
+impl Described for OpenAiEs {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "openaiES",
+        title: "OpenAI's evolution strategy",
+        learns: "mean",
+        state: "3 d",
+        individuals_min: 2,
+        genes_max: None,
+        parameters: &[MU_INIT, SIGMA, LEARNING_RATE, BETA1, BETA2, WEIGHT_DECAY],
+    };
+
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
+        let mu_init = params.number(&MU_INIT);
         Self {
-            mu: vec![params.mu_init; d],
-            mu_init: params.mu_init,
-            sigma: params.sigma,
-            learning_rate: params.learning_rate,
-            beta1: params.beta1,
-            beta2: params.beta2,
-            weight_decay: params.weight_decay,
+            mu: vec![mu_init; d],
+            mu_init,
+            sigma: params.number(&SIGMA),
+            learning_rate: params.number(&LEARNING_RATE),
+            beta1: params.number(&BETA1),
+            beta2: params.number(&BETA2),
+            weight_decay: params.number(&WEIGHT_DECAY),
             first_moment: vec![0.0; d],
             second_moment: vec![0.0; d],
             n_updates: 0,

@@ -4,14 +4,15 @@
 //! Ros, Hansen: "A simple modification in CMA-ES achieving linear time and space
 //! complexity", PPSN X (2008).
 
-use experiment_file::CmaEsParams;
+use experiment_file::{AlgorithmDescription, AlgorithmParams};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Sample, Strategy,
+    Described, Sample, Strategy,
     cumulation::{Cumulation, Rates, damping},
     draw_normals, mirror,
+    parameters::{MU_INIT, SIGMA_INIT},
 };
 
 /// A Gaussian with mean m and covariance sigma^2 diag(C), of points in all of
@@ -24,13 +25,23 @@ pub struct SepCmaEs {
     cumulation: Cumulation,
 }
 
-impl SepCmaEs {
-    /// The first distribution over `d` genes, with C = I.
-    pub fn new(params: &CmaEsParams, d: usize) -> Self {
+impl Described for SepCmaEs {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "sep-CMA-ES",
+        title: "CMA-ES with a diagonal covariance",
+        learns: "mean, step size, variance per gene",
+        state: "4 d",
+        individuals_min: 2,
+        genes_max: None,
+        parameters: &[MU_INIT, SIGMA_INIT],
+    };
+
+    /// C = I.
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
         Self {
-            mean: vec![params.mu_init; d],
+            mean: vec![params.number(&MU_INIT); d],
             variances: vec![1.0; d],
-            cumulation: Cumulation::new(params.sigma_init, d),
+            cumulation: Cumulation::new(params.number(&SIGMA_INIT), d),
         }
     }
 }

@@ -4,11 +4,14 @@
 //! natural evolution strategies", GECCO 2011; Wierstra et al.: "Natural
 //! evolution strategies", JMLR 15 (2014); the thesis's Algorithm 3.
 
-use experiment_file::SnesParams;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, Strategy, draw_normals, finite_exp};
+use super::{
+    Described, Sample, Strategy, draw_normals, finite_exp,
+    parameters::{ETA_MU, MU_INIT, SIGMA_INIT},
+};
 use crate::ranking::utility_per_individual;
 
 /// A Gaussian with a diagonal covariance, per gene: mean mu and standard
@@ -21,15 +24,27 @@ pub struct Snes {
     eta_sigma: f64,
 }
 
-impl Snes {
-    /// The first distribution over `d` genes.
-    pub fn new(params: &SnesParams, d: usize) -> Self {
+const ETA_SIGMA: Parameter =
+    Parameter::computed("eta_sigma", "(3 + ln d)/(5 sqrt d)", "Learning rate of sigma");
+
+impl Described for Snes {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "SNES",
+        title: "Separable natural evolution strategy",
+        learns: "mean, deviation per gene",
+        state: "2 d",
+        individuals_min: 1,
+        genes_max: None,
+        parameters: &[ETA_MU, ETA_SIGMA, MU_INIT, SIGMA_INIT],
+    };
+
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
         let default_eta_sigma = (3.0 + libm::log(d as f64)) / (5.0 * (d as f64).sqrt());
         Self {
-            mu: vec![params.mu_init; d],
-            sigma: vec![params.sigma_init; d],
-            eta_mu: params.eta_mu,
-            eta_sigma: params.eta_sigma.unwrap_or(default_eta_sigma),
+            mu: vec![params.number(&MU_INIT); d],
+            sigma: vec![params.number(&SIGMA_INIT); d],
+            eta_mu: params.number(&ETA_MU),
+            eta_sigma: params.optional_number(&ETA_SIGMA).unwrap_or(default_eta_sigma),
         }
     }
 }

@@ -4,15 +4,16 @@
 //! evolution strategies", GECCO 2010; Wierstra et al.: "Natural evolution
 //! strategies", JMLR 15 (2014); the thesis's Algorithm 2.
 
-use experiment_file::XnesParams;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter, limits};
 use nalgebra::{DMatrix, DVector};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Sample, Strategy, draw_normals, finite_exp,
+    Described, Sample, Strategy, draw_normals, finite_exp,
     linalg::{Eigen, Symmetric, product},
     mirror,
+    parameters::{ETA_MU, MU_INIT, SIGMA_INIT},
 };
 use crate::ranking::utility_per_individual;
 
@@ -30,26 +31,43 @@ pub struct Xnes {
     eta_b: f64,
 }
 
-/// Largest entry of B. Nothing but learning rates beyond reason leads there; an
-/// update of B that would go further is left out, so that genes stay numbers.
+/// Largest entry of B. An update that would make an entry larger is left out, so
+/// that genes stay finite; this takes learning rates far above the defaults.
 const SHAPE_MAX: f64 = 1e100;
 
-impl Xnes {
-    /// The first distribution over `d` genes, with B = I.
-    pub fn new(params: &XnesParams, d: usize) -> Self {
+const ETA_SIGMA: Parameter =
+    Parameter::computed("eta_sigma", "(9 + 3 ln d)/(5 d sqrt d)", "Learning rate of sigma");
+const ETA_B: Parameter =
+    Parameter::computed("eta_B", "`eta_sigma`", "Learning rate of the shape B");
+
+impl Described for Xnes {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "xNES",
+        title: "Exponential natural evolution strategy",
+        learns: "mean, step size, shape",
+        state: "d²",
+        individuals_min: 1,
+        genes_max: Some(limits::GENES_OF_FULL_MATRIX),
+        parameters: &[ETA_MU, ETA_SIGMA, ETA_B, MU_INIT, SIGMA_INIT],
+    };
+
+    /// B = I.
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
         let size = d as f64;
         let default_eta = (9.0 + 3.0 * libm::log(size)) / (5.0 * size * size.sqrt());
-        let eta_sigma = params.eta_sigma.unwrap_or(default_eta);
+        let eta_sigma = params.optional_number(&ETA_SIGMA).unwrap_or(default_eta);
         Self {
-            mu: vec![params.mu_init; d],
-            sigma: params.sigma_init,
+            mu: vec![params.number(&MU_INIT); d],
+            sigma: params.number(&SIGMA_INIT),
             shape: DMatrix::<f64>::identity(d, d).as_slice().to_vec(),
-            eta_mu: params.eta_mu,
+            eta_mu: params.number(&ETA_MU),
             eta_sigma,
-            eta_b: params.eta_b.unwrap_or(eta_sigma),
+            eta_b: params.optional_number(&ETA_B).unwrap_or(eta_sigma),
         }
     }
+}
 
+impl Xnes {
     fn shape(&self) -> DMatrix<f64> {
         DMatrix::from_column_slice(self.mu.len(), self.mu.len(), &self.shape)
     }

@@ -2,14 +2,18 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmName, ExperimentConfig, ObjectConfig, RobotConfig, RobotController, TopologyConfig,
-    limits,
+    AlgorithmDescription, ExperimentConfig, ObjectConfig, RobotConfig, RobotController,
+    TopologyConfig, limits,
 };
 
-pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
+pub(super) fn check(
+    config: &ExperimentConfig,
+    algorithm: Option<&AlgorithmDescription>,
+    report: &Report<'_>,
+) {
     let network = NetworkSize::of(&config.topology);
     network_size(&network, report);
-    generation(config, &network, report);
+    generation(config, &network, algorithm, report);
     episode(config, &network, report);
 }
 
@@ -59,7 +63,12 @@ fn network_size(network: &NetworkSize, report: &Report<'_>) {
 }
 
 /// What the coordinator keeps of a generation.
-fn generation(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>) {
+fn generation(
+    config: &ExperimentConfig,
+    network: &NetworkSize,
+    description: Option<&AlgorithmDescription>,
+    report: &Report<'_>,
+) {
     let algorithm = Path::from(["algorithm"]);
     let topology = Path::from(["topology"]);
     let size_path = algorithm.key("population_size");
@@ -73,10 +82,9 @@ fn generation(config: &ExperimentConfig, network: &NetworkSize, report: &Report<
     let what = "possible genes per generation";
     let parts = [&topology];
     limit(size * n_genes, limits::GENES_PER_GENERATION, what, &size_path, &parts, report);
-    if matches!(config.algorithm.name, AlgorithmName::Xnes | AlgorithmName::CmaEs) {
+    if let Some(genes_max) = description.and_then(|description| description.genes_max) {
         let what = "possible genes for an algorithm with a full matrix";
-        let path = algorithm.key("name");
-        limit(n_genes, limits::GENES_OF_FULL_MATRIX, what, &path, &parts, report);
+        limit(n_genes, genes_max, what, &algorithm.key("name"), &parts, report);
     }
 }
 

@@ -2,13 +2,17 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmConfig, AlgorithmParams, ExperimentConfig, GenotypeQuery, NeuronParameter,
+    AlgorithmDescription, Domain, ExperimentConfig, GenotypeQuery, NeuronParameter, ParameterValue,
     PopulationConfig, limits,
 };
 
 use super::coverage::Coverage;
 
-pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
+pub(super) fn check(
+    config: &ExperimentConfig,
+    algorithm: Option<&AlgorithmDescription>,
+    report: &Report<'_>,
+) {
     let populations = &config.algorithm.populations;
     let populations_path = Path::from(["algorithm", "populations"]);
     let n_queries: usize = populations.values().map(|population| population.objects.len()).sum();
@@ -17,6 +21,13 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
         let message = || format!("has {n_queries} queries, the limit is {limit}");
         return report.conflict(&populations_path, &[], message);
     }
+    let population_size = config.algorithm.population_size;
+    let individuals_min = algorithm.map_or(1, |algorithm| algorithm.individuals_min);
+    if population_size < individuals_min {
+        let path = Path::from(["algorithm", "population_size"]);
+        let message = || format!("this algorithm needs at least {individuals_min} individuals");
+        report.conflict(&path, &[], message);
+    }
     let mut coverage = Coverage::new(&config.topology);
     for (name, population) in populations {
         let path = populations_path.key(name);
@@ -24,7 +35,9 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
             coverage.claim(query, name, &path.key("objects").index(i), report);
         }
         bounds(population, config.topology.dt, &path, report);
-        operators(&config.algorithm, population, &path, report);
+        if let Some(algorithm) = algorithm {
+            sizes(algorithm, population_size, population, &path, report);
+        }
     }
 }
 
@@ -58,26 +71,29 @@ fn bounds(population: &PopulationConfig, dt: f64, path: &Path, report: &Report<'
     }
 }
 
-fn operators(
-    algorithm: &AlgorithmConfig,
+/// Parameters that must be below the number of individuals.
+fn sizes(
+    algorithm: &AlgorithmDescription,
+    population_size: u32,
     population: &PopulationConfig,
     path: &Path,
     report: &Report<'_>,
 ) {
-    let size = algorithm.population_size;
     let size_path = Path::from(["algorithm", "population_size"]);
-    match &population.params {
-        AlgorithmParams::Ga(params) if params.num_elite >= size => {
-            let path = path.key("params").key("num_elite");
+    for parameter in algorithm.parameters {
+        let Some(value) = population.params.get(parameter) else {
+            continue;
+        };
+        if let (Domain::BelowPopulationSize, ParameterValue::Whole(number)) =
+            (parameter.domain, &value)
+            && !parameter.domain.contains(&value, population_size)
+        {
+            let key = parameter.key;
+            let path = path.key("params").key(key);
             let others = [&size_path, &Path::from(["algorithm", "name"])];
             report.conflict(&path, &others, || {
-                let num_elite = params.num_elite;
-                format!("`num_elite` {num_elite} leaves no room in a population of {size}")
+                format!("`{key}` {number} leaves no room in a population of {population_size}")
             });
         }
-        AlgorithmParams::CmaEs(_) | AlgorithmParams::OpenAiEs(_) if size < 2 => {
-            report.conflict(&size_path, &[], "this algorithm needs at least 2 individuals");
-        }
-        _ => {}
     }
 }

@@ -11,14 +11,20 @@ mod network;
 mod task;
 mod world;
 
-use super::ExperimentConfig;
 use super::report::Report;
+use super::{AlgorithmDescription, ExperimentConfig};
 
-/// Reports everything that does not fit together.
-pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
+/// Reports everything that does not fit together. `algorithm`: the description of
+/// the algorithm that the file names; none if it names none, or if it is not to be
+/// checked.
+pub(super) fn check(
+    config: &ExperimentConfig,
+    algorithm: Option<&AlgorithmDescription>,
+    report: &Report<'_>,
+) {
     network::check(&config.topology, report);
-    genotype::check(config, report);
+    genotype::check(config, algorithm, report);
     world::check(config, report);
     task::check(config, report);
-    budget::check(config, report);
+    budget::check(config, algorithm, report);
 }

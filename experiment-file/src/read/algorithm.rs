@@ -1,13 +1,23 @@
 //! Reads `algorithm`.
 
+use super::Algorithms;
 use super::node::{Node, Object};
-use super::population::population;
-use crate::{AlgorithmConfig, AlgorithmName, FitnessFunction, limits};
+use super::population::{ParamsReader, population};
+use crate::{AlgorithmConfig, FitnessFunction, limits};
 
-pub(super) fn algorithm(o: &mut Object<'_>) -> AlgorithmConfig {
-    let name = o.required("name").variant(&[]);
+pub(super) fn algorithm(o: &mut Object<'_>, algorithms: Algorithms) -> AlgorithmConfig {
+    let name = o.required("name");
+    let (name, params) = match algorithms {
+        Algorithms::Unchecked => (name.name(), ParamsReader::Unchecked),
+        Algorithms::Described(known) => {
+            let names: Vec<&str> = known.iter().map(|algorithm| algorithm.name).collect();
+            let name = name.one_of(&names, &[]).unwrap_or_default();
+            let params = algorithms.find(name).map_or(ParamsReader::Skip, ParamsReader::Of);
+            (name.to_owned(), params)
+        }
+    };
     AlgorithmConfig {
-        name: name.unwrap_or(AlgorithmName::Ga),
+        name,
         evolvable_object: o.required("evolvable_object").name(),
         population_size: o.required("population_size").u32(1..=limits::POPULATION),
         generations: o.required("generations").u64(1..=limits::GENERATIONS),
@@ -22,6 +32,6 @@ pub(super) fn algorithm(o: &mut Object<'_>) -> AlgorithmConfig {
         champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
         populations: o
             .required("populations")
-            .map(1, |_, node| node.object(|o| population(o, name))),
+            .map(1, |_, node| node.object(|o| population(o, params))),
     }
 }

@@ -14,8 +14,17 @@ pub(super) use parse::parse;
 use crate::node::{self, Node, Object};
 use jsonc_parser::ast::Value;
 
-use super::ExperimentConfig;
 use super::report::{Report, check_name};
+use super::{AlgorithmDescription, ExperimentConfig};
+
+/// The algorithms that a file may name.
+#[derive(Clone, Copy)]
+pub(super) enum Algorithms {
+    /// These.
+    Described(&'static [AlgorithmDescription]),
+    /// Any: the file is a canonical form whose algorithm was checked before.
+    Unchecked,
+}
 
 /// The experiment of a syntax tree. What is unreadable is reported, and a
 /// placeholder stands in its place.
@@ -23,13 +32,15 @@ pub(super) fn read<'a>(
     report: &'a Report<'a>,
     root: &'a Value<'a>,
     default_name: &str,
+    algorithms: Algorithms,
 ) -> ExperimentConfig {
-    let mut config = Node::root(report, root).object(|o| experiment(o, default_name));
+    let read = |o: &mut Object<'_>| experiment(o, default_name, algorithms);
+    let mut config = Node::root(report, root).object(read);
     config.sort_decoding();
     config
 }
 
-fn experiment(o: &mut Object<'_>, default_name: &str) -> ExperimentConfig {
+fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) -> ExperimentConfig {
     // Tells an editor where the schema is.
     o.optional("$schema").map(Node::string);
     let name = o.optional("name").map(Node::name);
@@ -46,13 +57,23 @@ fn experiment(o: &mut Object<'_>, default_name: &str) -> ExperimentConfig {
         }),
         seed: o.or("seed", 0, |node| node.u64(0..=u64::MAX)),
         topology: o.required("topology").object(topology::topology),
-        algorithm: o.required("algorithm").object(algorithm::algorithm),
+        algorithm: o.required("algorithm").object(|o| algorithm::algorithm(o, algorithms)),
         world: o.required("world").object(world::world),
     };
     for key in ["num_processes", "render"] {
         o.ignored(key, "it concerns the original simulator's processes and window");
     }
     config
+}
+
+impl Algorithms {
+    /// The description of the algorithm of this name, if it is to be checked.
+    pub(super) fn find(self, name: &str) -> Option<&'static AlgorithmDescription> {
+        match self {
+            Self::Described(algorithms) => AlgorithmDescription::find(algorithms, name),
+            Self::Unchecked => None,
+        }
+    }
 }
 
 impl ExperimentConfig {

@@ -1,6 +1,6 @@
 //! Crossover: two parents make two children.
 
-use experiment_file::{CrossoverOperator, GaParams};
+use experiment_file::{AlgorithmParams, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -32,15 +32,26 @@ const N_CUTS: usize = 3;
 /// children to their parents.
 const SBX_INDEX: f64 = 0.5;
 
+/// Chooses among the variants of [`Crossover`], in their order.
+pub const OPERATOR: Parameter = Parameter::one_of(
+    "crossover_operator",
+    &["blxalpha", "uniform", "onepoint", "multipoint", "simulated_binary"],
+    &["combination", "pcx"],
+    "How two parents yield two children",
+);
+/// How far BLX-alpha reaches beyond the parents.
+pub const ALPHA: Parameter = Parameter::amount("alpha", 0.5, "BLX-alpha's alpha");
+
 impl Crossover {
     /// As configured.
-    pub fn new(params: &GaParams) -> Self {
-        match params.crossover_operator {
-            CrossoverOperator::BlxAlpha => Self::BlxAlpha { alpha: params.alpha },
-            CrossoverOperator::Uniform => Self::Uniform,
-            CrossoverOperator::OnePoint => Self::OnePoint,
-            CrossoverOperator::MultiPoint => Self::MultiPoint,
-            CrossoverOperator::SimulatedBinary => Self::SimulatedBinary,
+    pub fn new(params: &AlgorithmParams) -> Self {
+        match params.name(&OPERATOR).as_str() {
+            "blxalpha" => Self::BlxAlpha { alpha: params.number(&ALPHA) },
+            "uniform" => Self::Uniform,
+            "onepoint" => Self::OnePoint,
+            "multipoint" => Self::MultiPoint,
+            "simulated_binary" => Self::SimulatedBinary,
+            other => unreachable!("`{other}` is none of the names in the domain"),
         }
     }
 
@@ -247,8 +258,8 @@ mod tests {
         // P(beta) = (n + 1)/2 * beta^n up to 1, (n + 1)/2 / beta^(n + 2) beyond.
         let exponent = SBX_INDEX + 1.0;
         let cdf = |beta: f64| {
-            let tail = beta.powf(-exponent) / 2.0;
-            if beta <= 1.0 { beta.powf(exponent) / 2.0 } else { 1.0 - tail }
+            let tail = libm::pow(beta, -exponent) / 2.0;
+            if beta <= 1.0 { libm::pow(beta, exponent) / 2.0 } else { 1.0 - tail }
         };
         let statistic = ks_statistic(betas, cdf);
         assert!(statistic < 1.95, "{statistic}");

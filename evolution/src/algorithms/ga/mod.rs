@@ -8,11 +8,11 @@ mod crossover;
 mod mutation;
 mod selection;
 
-use experiment_file::{GaParams, MatingOperator};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, Strategy, Unsuitable};
+use super::{Described, Sample, Strategy};
 use crate::Genotype;
 use crossover::Crossover;
 use mutation::Mutation;
@@ -35,28 +35,54 @@ pub struct Ga {
     fitness: Vec<f64>,
 }
 
-impl Ga {
-    /// The start over `d` genes. There must be room for children beside the elite.
-    pub fn new(params: &GaParams, d: usize, population_size: usize) -> Result<Self, Unsuitable> {
-        let n_elite = params.num_elite as usize;
-        if n_elite >= population_size {
-            return Err(Unsuitable::OnlyElite { n_elite, population_size });
-        }
-        // The only operator there is: pairs are neighbours of a shuffled list.
-        let MatingOperator::Random = params.mating_operator;
-        Ok(Self {
+/// Pairs are neighbours of a shuffled list; there is no other way yet.
+const MATING_OPERATOR: Parameter =
+    Parameter::one_of("mating_operator", &["random"], &[], "How parents are paired");
+const CROSSOVER_PROB: Parameter =
+    Parameter::unit("crossover_prob", 0.9, "Probability that a pair is crossed");
+const MUTATION_PROB: Parameter =
+    Parameter::unit("mutation_prob", 0.05, "Probability that a gene mutates");
+const NUM_ELITE: Parameter =
+    Parameter::below_population_size("num_elite", 3, "Individuals that survive unchanged");
+
+impl Described for Ga {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "GA",
+        title: "Genetic algorithm",
+        learns: "population",
+        state: "P d",
+        individuals_min: 1,
+        genes_max: None,
+        parameters: &[
+            selection::OPERATOR,
+            selection::TOURNAMENT_SIZE,
+            MATING_OPERATOR,
+            crossover::OPERATOR,
+            crossover::ALPHA,
+            CROSSOVER_PROB,
+            mutation::OPERATOR,
+            MUTATION_PROB,
+            mutation::SIGMA,
+            NUM_ELITE,
+        ],
+    };
+
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
+        Self {
             d,
-            n_elite,
+            n_elite: params.whole(&NUM_ELITE) as usize,
             selection: Selection::new(params),
             crossover: Crossover::new(params),
-            crossover_prob: params.crossover_prob,
+            crossover_prob: params.number(&CROSSOVER_PROB),
             mutation: Mutation::new(params),
-            mutation_prob: params.mutation_prob,
+            mutation_prob: params.number(&MUTATION_PROB),
             ranked: Vec::new(),
             fitness: Vec::new(),
-        })
+        }
     }
+}
 
+impl Ga {
     /// The elite, then children. Each phase draws for all individuals before the
     /// next one begins.
     fn breed(&self, population_size: usize, rng: &mut Stream) -> Vec<Genotype> {

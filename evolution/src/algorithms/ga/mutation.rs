@@ -1,6 +1,6 @@
 //! Mutation: genes change at random.
 
-use experiment_file::{GaParams, MutationOperator};
+use experiment_file::{AlgorithmParams, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +16,27 @@ pub enum Mutation {
     Uniform,
 }
 
+/// Chooses among the variants of [`Mutation`], in their order.
+pub const OPERATOR: Parameter = Parameter::one_of(
+    "mutation_operator",
+    &["gaussian", "uniform"],
+    &["bitflip", "categorical"],
+    "How a gene mutates",
+);
+/// Its default is sqrt(0.3), Table 3.4 of the thesis.
+pub const SIGMA: Parameter = Parameter::amount(
+    "mutation_sigma",
+    0.547_722_557_505_166_1,
+    "Standard deviation of Gaussian mutation",
+);
+
 impl Mutation {
     /// As configured.
-    pub fn new(params: &GaParams) -> Self {
-        match params.mutation_operator {
-            MutationOperator::Gaussian => Self::Gaussian { sigma: params.mutation_sigma },
-            MutationOperator::Uniform => Self::Uniform,
+    pub fn new(params: &AlgorithmParams) -> Self {
+        match params.name(&OPERATOR).as_str() {
+            "gaussian" => Self::Gaussian { sigma: params.number(&SIGMA) },
+            "uniform" => Self::Uniform,
+            other => unreachable!("`{other}` is none of the names in the domain"),
         }
     }
 

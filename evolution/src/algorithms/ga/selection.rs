@@ -1,6 +1,6 @@
 //! Selection: whose genes get a chance.
 
-use experiment_file::{GaParams, SelectionOperator};
+use experiment_file::{AlgorithmParams, Parameter, limits};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -29,17 +29,31 @@ const LINEAR_PRESSURE: f64 = 1.5;
 /// to 1; each further rank has 1 - this of the one before.
 const NONLINEAR_BEST: f64 = 0.1;
 
+/// Chooses among the variants of [`Selection`], in their order.
+pub const OPERATOR: Parameter = Parameter::one_of(
+    "selection_operator",
+    &["tournament", "roulette", "lin_rank", "nonlin_rank", "stochastic_universal"],
+    &[],
+    "How parents are chosen",
+);
+/// Contestants of a tournament, K.
+pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
+    "tournament_size",
+    [1, limits::POPULATION],
+    3,
+    "Contestants of a tournament, drawn with replacement",
+);
+
 impl Selection {
     /// As configured.
-    pub fn new(params: &GaParams) -> Self {
-        match params.selection_operator {
-            SelectionOperator::Tournament => {
-                Self::Tournament { size: params.tournament_size as usize }
-            }
-            SelectionOperator::Roulette => Self::Roulette,
-            SelectionOperator::LinRank => Self::LinearRank,
-            SelectionOperator::NonlinRank => Self::NonlinearRank,
-            SelectionOperator::StochasticUniversal => Self::StochasticUniversal,
+    pub fn new(params: &AlgorithmParams) -> Self {
+        match params.name(&OPERATOR).as_str() {
+            "tournament" => Self::Tournament { size: params.whole(&TOURNAMENT_SIZE) as usize },
+            "roulette" => Self::Roulette,
+            "lin_rank" => Self::LinearRank,
+            "nonlin_rank" => Self::NonlinearRank,
+            "stochastic_universal" => Self::StochasticUniversal,
+            other => unreachable!("`{other}` is none of the names in the domain"),
         }
     }
 
@@ -166,7 +180,7 @@ mod tests {
     #[test]
     fn a_tournament_of_k_selects_by_the_kth_power_of_rank() {
         for size in [1, 2, 3, 5] {
-            let not_better = |rank: usize| ((N - rank) as f64 / N as f64).powi(size as i32);
+            let not_better = |rank: usize| libm::pow((N - rank) as f64 / N as f64, size as f64);
             let shares = shares(Selection::Tournament { size }, &fitness());
             assert_close(&shares, |rank| not_better(rank) - not_better(rank + 1));
         }
@@ -185,8 +199,8 @@ mod tests {
 
     #[test]
     fn nonlinear_rank_falls_geometrically() {
-        let sum: f64 = (0..N).map(|rank| 0.9_f64.powi(rank as i32)).sum();
-        let expected = |rank: usize| 0.9_f64.powi(rank as i32) / sum;
+        let sum: f64 = (0..N).map(|rank| libm::pow(0.9, rank as f64)).sum();
+        let expected = |rank: usize| libm::pow(0.9, rank as f64) / sum;
         assert_close(&shares(Selection::NonlinearRank, &fitness()), expected);
     }
 

@@ -1,31 +1,24 @@
 //! The operators' statistics and rules.
 
-use experiment_file::{CrossoverOperator, MutationOperator, SelectionOperator};
 use numeric::random::Purpose;
 
 use super::*;
 use crate::{Population, ranking::ranking};
 
-const PARAMS: GaParams = GaParams {
-    selection_operator: SelectionOperator::Tournament,
-    tournament_size: 3,
-    mating_operator: MatingOperator::Random,
-    crossover_operator: CrossoverOperator::BlxAlpha,
-    alpha: 0.5,
-    crossover_prob: 0.9,
-    mutation_operator: MutationOperator::Gaussian,
-    mutation_prob: 0.05,
-    mutation_sigma: 0.5,
-    num_elite: 3,
-};
+/// Parameters that differ from the defaults by these numbers, and a smaller
+/// mutation.
+fn params(numbers: &[(&str, f64)]) -> AlgorithmParams {
+    let params = AlgorithmParams::default().with("mutation_sigma", 0.5);
+    numbers.iter().fold(params, |params, &(key, value)| params.with(key, value))
+}
 
 fn rng(generation: u64) -> Stream {
     Stream::new(9, generation, 0, Purpose::Evolution, 0)
 }
 
 /// A generation of `n` whose fitness is that of its index, and the next one.
-fn two_generations(params: &GaParams, n: usize) -> (Population, Population) {
-    let mut ga = Ga::new(params, 4, n).unwrap();
+fn two_generations(params: &AlgorithmParams, n: usize) -> (Population, Population) {
+    let mut ga = Ga::start(params, 4);
     let first = ga.sample(n, &mut rng(0));
     let fitness: Vec<f64> = (0..n).map(|i| i as f64).collect();
     ga.learn(&first, &ranking(&fitness), &fitness);
@@ -34,7 +27,7 @@ fn two_generations(params: &GaParams, n: usize) -> (Population, Population) {
 
 #[test]
 fn the_first_generation_is_uniform() {
-    let ga = Ga::new(&PARAMS, 100, 100).unwrap();
+    let ga = Ga::start(&params(&[]), 100);
     let genes = ga.sample(100, &mut rng(0)).genotypes.concat();
     assert!(genes.iter().all(|gene| (0.0..1.0).contains(gene)));
     let mean = genes.iter().sum::<f64>() / 1e4;
@@ -44,7 +37,7 @@ fn the_first_generation_is_uniform() {
 
 #[test]
 fn the_elite_survives_unchanged_and_in_order() {
-    let params = GaParams { mutation_prob: 1.0, ..PARAMS };
+    let params = params(&[("mutation_prob", 1.0)]);
     let (first, second) = two_generations(&params, 20);
     assert_eq!(second[..3], [first[19].clone(), first[18].clone(), first[17].clone()]);
     assert_eq!(second.len(), 20);
@@ -54,7 +47,7 @@ fn the_elite_survives_unchanged_and_in_order() {
 #[test]
 fn without_crossover_and_mutation_children_are_selected_parents() {
     for n in [20, 21] {
-        let params = GaParams { crossover_prob: 0.0, mutation_prob: 0.0, ..PARAMS };
+        let params = params(&[("crossover_prob", 0.0), ("mutation_prob", 0.0)]);
         let (first, second) = two_generations(&params, n);
         assert!(second.iter().all(|child| first.contains(child)));
         let of_worst_third = second.iter().filter(|child| first[..n / 3].contains(child)).count();
@@ -64,14 +57,15 @@ fn without_crossover_and_mutation_children_are_selected_parents() {
 
 #[test]
 fn whoever_does_not_cross_still_mutates() {
-    let params = GaParams { crossover_prob: 0.0, mutation_prob: 1.0, ..PARAMS };
+    let params = params(&[("crossover_prob", 0.0), ("mutation_prob", 1.0)]);
     let (first, second) = two_generations(&params, 21);
     assert!(second[3..].iter().all(|child| !first.contains(child)));
 }
 
 #[test]
 fn an_odd_parent_out_passes() {
-    let params = GaParams { crossover_prob: 1.0, mutation_prob: 0.0, num_elite: 2, ..PARAMS };
+    let params =
+        params(&[("crossover_prob", 1.0), ("mutation_prob", 0.0)]).with("num_elite", 2_u32);
     let (first, second) = two_generations(&params, 21);
     let unchanged = second[2..].iter().filter(|child| first.contains(child)).count();
     // Whoever was paired with itself is unchanged, too.
@@ -81,9 +75,10 @@ fn an_odd_parent_out_passes() {
 
 #[test]
 fn crossover_happens_with_its_probability() {
-    let params = GaParams { crossover_prob: 0.7, mutation_prob: 0.0, num_elite: 0, ..PARAMS };
+    let params =
+        params(&[("crossover_prob", 0.7), ("mutation_prob", 0.0)]).with("num_elite", 0_u32);
     let n = 20_000;
-    let mut ga = Ga::new(&params, 1, n).unwrap();
+    let mut ga = Ga::start(&params, 1);
     let first = ga.sample(n, &mut rng(0));
     let fitness = vec![0.0; n];
     ga.learn(&first, &ranking(&fitness), &fitness);
@@ -99,7 +94,7 @@ fn crossover_happens_with_its_probability() {
 
 #[test]
 fn children_are_clipped_to_the_unit_cube() {
-    let params = GaParams { mutation_prob: 1.0, mutation_sigma: 10.0, ..PARAMS };
+    let params = params(&[("mutation_prob", 1.0), ("mutation_sigma", 10.0)]);
     let (_, second) = two_generations(&params, 100);
     let genes = second.concat();
     assert!(genes.iter().all(|gene| (0.0..=1.0).contains(gene)));
@@ -108,8 +103,8 @@ fn children_are_clipped_to_the_unit_cube() {
 
 #[test]
 fn whoever_has_no_finite_fitness_is_neither_elite_nor_parent() {
-    let params = GaParams { crossover_prob: 0.0, mutation_prob: 0.0, ..PARAMS };
-    let mut ga = Ga::new(&params, 2, 6).unwrap();
+    let params = params(&[("crossover_prob", 0.0), ("mutation_prob", 0.0)]);
+    let mut ga = Ga::start(&params, 2);
     let first = ga.sample(6, &mut rng(0));
     let fitness = [f64::NAN, 1.0, f64::INFINITY, 2.0, f64::NEG_INFINITY, f64::NAN];
     ga.learn(&first, &ranking(&fitness), &fitness);
@@ -121,14 +116,8 @@ fn whoever_has_no_finite_fitness_is_neither_elite_nor_parent() {
 }
 
 #[test]
-fn an_elite_that_leaves_no_room_is_refused() {
-    for (num_elite, population_size) in [(3, 3), (4, 3), (1, 1)] {
-        let params = GaParams { num_elite, ..PARAMS };
-        let error = Ga::new(&params, 2, population_size).unwrap_err();
-        let n_elite = num_elite as usize;
-        assert_eq!(error, Unsuitable::OnlyElite { n_elite, population_size });
-    }
-    assert!(Ga::new(&GaParams { num_elite: 0, ..PARAMS }, 2, 1).is_ok());
+fn the_default_deviation_of_mutation_is_the_root_of_three_tenths() {
+    assert_eq!(AlgorithmParams::default().number(&mutation::SIGMA), 0.3_f64.sqrt());
 }
 
 #[test]

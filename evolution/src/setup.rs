@@ -1,0 +1,160 @@
+//! An evolution without an experiment file: any function of genes in \[0, 1\] can
+//! be maximised.
+
+use std::fmt;
+
+use experiment_file::{AlgorithmDescription, AlgorithmParams};
+
+use super::{ALGORITHMS, Algorithm, Digest, Evolution};
+
+/// What to evolve, and by which algorithm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// Name of the algorithm, as in experiment files.
+    pub algorithm: String,
+    /// Its parameters; those that are absent have their defaults.
+    pub params: AlgorithmParams,
+    /// Genes of a genotype, at least 1.
+    pub n_genes: usize,
+    /// Genotypes per generation.
+    pub population_size: u32,
+    /// Seed of all random draws.
+    pub seed: u64,
+}
+
+/// Everything that is wrong with a [`Setup`], one sentence each; never empty. The
+/// caller has to change the setup.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct SetupError {
+    /// What is wrong, and what would be right.
+    pub problems: Vec<String>,
+}
+
+impl Setup {
+    /// `n_genes` genes, evolved by the algorithm of this name with its default
+    /// parameters: 20 individuals per generation, seed 0.
+    pub fn new(algorithm: &str, n_genes: usize) -> Self {
+        Self {
+            algorithm: algorithm.to_owned(),
+            params: AlgorithmParams::default(),
+            n_genes,
+            population_size: 20,
+            seed: 0,
+        }
+    }
+
+    /// The evolution before its first generation.
+    pub fn start(&self) -> Result<Evolution, SetupError> {
+        let problems = self.problems();
+        if !problems.is_empty() {
+            return Err(SetupError { problems });
+        }
+        let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes);
+        let population = algorithm.expect("the algorithm is known");
+        let size = self.population_size as usize;
+        Ok(Evolution::of(self.seed, size, vec![population], Digest::of_text(&self.text())))
+    }
+
+    /// The same rules as the reader's of experiment files, from the same
+    /// descriptions.
+    fn problems(&self) -> Vec<String> {
+        let Some(algorithm) = AlgorithmDescription::find(ALGORITHMS, &self.algorithm) else {
+            let known: Vec<&str> = ALGORITHMS.iter().map(|algorithm| algorithm.name).collect();
+            let name = &self.algorithm;
+            return vec![format!("no algorithm is named `{name}`; known: {}", known.join(", "))];
+        };
+        let mut problems = Vec::new();
+        let (d, size) = (self.n_genes, self.population_size);
+        if d == 0 {
+            problems.push("a genotype needs at least 1 gene".to_owned());
+        }
+        if let Some(max) = algorithm.genes_max.filter(|&max| d as u64 > max) {
+            problems.push(format!("{} takes at most {max} genes, not {d}", algorithm.name));
+        }
+        let min = algorithm.individuals_min;
+        if size < min {
+            let name = algorithm.name;
+            problems.push(format!("{name} needs at least {min} individuals, not {size}"));
+        }
+        for parameter in algorithm.parameters {
+            let value = self.params.get(parameter);
+            if let Some(value) = value.filter(|value| !parameter.domain.contains(value, size)) {
+                let (key, domain) = (parameter.key, parameter.domain);
+                problems.push(format!("`{key}` must be {domain}, is {value}"));
+            }
+        }
+        for (key, _) in self.params.iter().filter(|(key, _)| !algorithm.has(key)) {
+            problems.push(format!("{} has no parameter `{key}`", algorithm.name));
+        }
+        problems
+    }
+
+    /// All of it as text, for the digest.
+    fn text(&self) -> String {
+        let Self { algorithm, params, n_genes, population_size, seed } = self;
+        let mut text = format!("{algorithm}\n{n_genes}\n{population_size}\n{seed}\n");
+        for (key, value) in params.iter() {
+            text += &format!("{key} {value}\n");
+        }
+        text
+    }
+}
+
+impl fmt::Display for SetupError {
+    /// One problem per line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.problems.join("\n"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problems(setup: &Setup) -> Vec<String> {
+        setup.start().unwrap_err().problems
+    }
+
+    #[test]
+    fn every_algorithm_starts_with_its_defaults() {
+        for algorithm in ALGORITHMS {
+            let evolution = Setup::new(algorithm.name, 3).start().unwrap();
+            assert_eq!(evolution.ask().genotypes.len(), 20, "{}", algorithm.name);
+        }
+    }
+
+    #[test]
+    fn a_setup_is_refused_with_everything_that_is_wrong() {
+        let params = AlgorithmParams::default().with("sigma_init", 2.0).with("eta_mu", 1.0);
+        let setup = Setup { params, population_size: 1, ..Setup::new("CMA-ES", 1001) };
+        let expected = [
+            "CMA-ES takes at most 1000 genes, not 1001",
+            "CMA-ES needs at least 2 individuals, not 1",
+            "`sigma_init` must be between 0.000000001 and 1, is 2",
+            "CMA-ES has no parameter `eta_mu`",
+        ];
+        assert_eq!(problems(&setup), expected);
+        assert_eq!(problems(&Setup::new("SNES", 0)), ["a genotype needs at least 1 gene"]);
+        let expected = "no algorithm is named `PSO`; known: GA, SNES, ";
+        assert!(problems(&Setup::new("PSO", 1))[0].starts_with(expected));
+    }
+
+    #[test]
+    fn an_elite_leaves_room_for_children() {
+        let params = AlgorithmParams::default().with("num_elite", 4_u32);
+        let setup = Setup { params, population_size: 4, ..Setup::new("GA", 2) };
+        let expected = "`num_elite` must be a whole number below the population size, is 4";
+        assert_eq!(problems(&setup), [expected]);
+        assert!(Setup { population_size: 5, ..setup }.start().is_ok());
+    }
+
+    #[test]
+    fn what_a_setup_says_enters_the_digest() {
+        let digest = |setup: Setup| setup.start().unwrap().digest();
+        let base = || Setup::new("SNES", 2);
+        let eta = AlgorithmParams::default().with("eta_mu", 0.5);
+        assert_eq!(digest(base()), digest(base()));
+        assert_ne!(digest(base()), digest(Setup { seed: 1, ..base() }));
+        assert_ne!(digest(base()), digest(Setup { params: eta, ..base() }));
+    }
+}
