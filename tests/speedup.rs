@@ -21,7 +21,8 @@ const N_TIMED_GENERATIONS: u64 = 6;
 fn main() {
     let text = fs::read_to_string(workspace_file("configs/leader_selection_snes.json"))
         .expect("shipped with the project");
-    let (config, _) = ExperimentConfig::from_json(&text, "A").expect("a shipped file is right");
+    let (config, _) = ExperimentConfig::from_json(&text, "A", evolution::ALGORITHMS)
+        .expect("a shipped file is right");
     let coordinator = CoordinatorProcess::start();
     let workers = WorkerProcess::start_many(&coordinator, 2);
 

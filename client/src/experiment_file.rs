@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use evolution::Evolution;
+use evolution::ALGORITHMS;
 use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
 use sim_core::Simulation;
 use swarm_proto::v1::SubmitExperimentRequest;
@@ -37,7 +37,8 @@ pub struct Overrides {
 pub struct Compiled {
     pub config: ExperimentConfig,
     pub experiment: Simulation,
-    /// What the file says and nobody heeds, and what keeps its default.
+    /// Keys of the file without effect, and parameters of the network that keep
+    /// their defaults.
     pub warnings: Vec<Problem>,
 }
 
@@ -68,20 +69,11 @@ impl ExperimentFile {
         Ok(Self { path: path.into(), text })
     }
 
-    /// Makes sure, as the coordinator will, that the experiment can be evolved.
-    pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
-        let compiled = self.compile(overrides)?;
-        Evolution::new(
-            &compiled.config,
-            compiled.experiment.population_segments(),
-            sim_core::FINGERPRINT,
-        )?;
-        Ok(compiled)
-    }
-
-    /// Makes the experiment ready to be simulated.
+    /// Checks the experiment as the coordinator will, and makes it ready to be
+    /// simulated.
     pub fn compile(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
-        let (config, mut warnings) = ExperimentConfig::from_json(&self.text, &self.default_name())?;
+        let (config, mut warnings) =
+            ExperimentConfig::from_json(&self.text, &self.default_name(), ALGORITHMS)?;
         let config = overrides.apply(config)?;
         let experiment = Simulation::compile(&config)?;
         warnings.extend(experiment.uncovered_parameters().iter().cloned().map(unlocated));
@@ -135,7 +127,7 @@ impl Overrides {
         algorithm.generations = self.generations.unwrap_or(algorithm.generations);
         algorithm.evaluation_steps = self.steps.unwrap_or(algorithm.evaluation_steps);
         algorithm.num_evaluations = self.trials.unwrap_or(algorithm.num_evaluations);
-        match ExperimentConfig::from_json(&config.to_canonical_json(), &config.name) {
+        match ExperimentConfig::from_json(&config.to_canonical_json(), &config.name, ALGORITHMS) {
             Ok((config, _)) => Ok(config),
             Err(mut error) => {
                 // Lines of the canonical form mean nothing to anybody.
@@ -218,7 +210,7 @@ pub mod tests {
             steps: Some(3),
             trials: Some(4),
         };
-        let config = file.check(&overrides).unwrap().config;
+        let config = file.compile(&overrides).unwrap().config;
         let algorithm = config.algorithm;
         assert_eq!((config.seed, algorithm.generations), (u64::MAX, 2));
         assert_eq!((algorithm.evaluation_steps, algorithm.num_evaluations), (3, 4));
@@ -229,7 +221,7 @@ pub mod tests {
         let file = ExperimentFile::read(&quickstart()).unwrap();
         let overrides =
             Overrides { steps: Some(1 + limits::STEPS), trials: Some(0), ..Overrides::default() };
-        let error = file.check(&overrides).unwrap_err();
+        let error = file.compile(&overrides).unwrap_err();
         let expected = ["algorithm.evaluation_steps", "algorithm.num_evaluations"];
         assert_eq!(error.problems.iter().map(|p| &*p.path).collect::<Vec<_>>(), expected);
         assert!(error.problems.iter().all(|problem| problem.line.is_none()));

@@ -11,7 +11,7 @@ use crate::{
     priority::Priority,
     store::{self, ExperimentState, Generation, NewExperiment, StoreError},
 };
-use evolution::{Digest, Evolution};
+use evolution::{ALGORITHMS, Digest, Evolution};
 
 /// What a client submits.
 #[derive(Debug, Clone, Default)]
@@ -37,8 +37,8 @@ pub struct Checked {
     pub new: NewExperiment,
     /// Before its first generation.
     pub evolution: Evolution,
-    /// What the file says and nobody heeds, and what keeps its default; one
-    /// line each.
+    /// Keys of the file without effect, and parameters of the network that keep
+    /// their defaults; one line each.
     pub warnings: Vec<String>,
 }
 
@@ -65,17 +65,18 @@ impl Submission {
     /// Checks everything about a submission; it can run if this succeeds.
     pub fn check(self) -> Result<Checked, ConfigError> {
         let (mut config, warnings) =
-            ExperimentConfig::from_json(&self.config_json, &self.default_name)?;
+            ExperimentConfig::from_json(&self.config_json, &self.default_name, ALGORITHMS)?;
         if self.seed.is_some() || self.generations.is_some() {
             config.seed = self.seed.unwrap_or(config.seed);
             config.algorithm.generations = self.generations.unwrap_or(config.algorithm.generations);
             // The file's limits hold for what replaces parts of it, too.
             let name = config.name.clone();
-            (config, _) = ExperimentConfig::from_json(&config.to_canonical_json(), &name)?;
+            (config, _) =
+                ExperimentConfig::from_json(&config.to_canonical_json(), &name, ALGORITHMS)?;
         }
         let experiment = sim_core::Simulation::compile(&config)?;
         let evolution =
-            Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)?;
+            Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT);
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         warnings.extend(experiment.uncovered_parameters().iter().cloned());
         let new = NewExperiment {
@@ -110,7 +111,7 @@ impl Runnable {
         let corrupt = |what: &str, error: &dyn std::fmt::Display| {
             StoreError::Corrupt(format!("{what} of experiment {id}: {error}"))
         };
-        let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "")
+        let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
             .map_err(|error| corrupt("configuration", &error))?;
         let evolution =
             serde_json::from_str(checkpoint).map_err(|error| corrupt("checkpoint", &error))?;

@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [config, champion, steps @ ..] = &args[..] else {
         return Err("usage: draw_episode EXPERIMENT CHAMPION STEP...".into());
     };
-    let (config, _warnings) = ExperimentConfig::from_json(&fs::read_to_string(config)?, "episode")?;
+    let text = fs::read_to_string(config)?;
+    let (config, _warnings) = ExperimentConfig::from_json(&text, "episode", evolution::ALGORITHMS)?;
     let champion: serde_json::Value = serde_json::from_str(&fs::read_to_string(champion)?)?;
     let genotype: Vec<f64> = serde_json::from_value(champion["genotype"].clone())?;
     let simulation = Simulation::compile(&config)?;

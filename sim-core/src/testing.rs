@@ -24,7 +24,7 @@ pub(crate) fn experiment_d() -> ExperimentConfig {
 }
 
 fn read(text: &str) -> ExperimentConfig {
-    ExperimentConfig::from_json(text, "test").unwrap().0
+    ExperimentConfig::from_json(text, "test", evolution::ALGORITHMS).unwrap().0
 }
 
 /// The first robots of a configuration.

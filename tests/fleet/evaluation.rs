@@ -67,7 +67,9 @@ impl Subject {
 }
 
 fn compiled(config_json: &str) -> sim_core::Simulation {
-    let (config, _) = experiment_file::ExperimentConfig::from_json(config_json, "").unwrap();
+    let (config, _) =
+        experiment_file::ExperimentConfig::from_json(config_json, "", evolution::ALGORITHMS)
+            .unwrap();
     sim_core::Simulation::compile(&config).unwrap()
 }
 

@@ -53,7 +53,8 @@ impl Run {
     /// The experiment file, with the run's seed.
     fn config(&self) -> ExperimentConfig {
         let text = fs::read_to_string(self.config_path()).unwrap();
-        let (mut config, _) = ExperimentConfig::from_json(&text, "").unwrap();
+        let (mut config, _) =
+            ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap();
         config.seed = self.champion["seed"].as_u64().unwrap();
         config
     }

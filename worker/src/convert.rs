@@ -56,7 +56,7 @@ fn compile(config_json: &str, isa: Isa) -> Result<Computable, String> {
 }
 
 fn computable(config_json: &str, isa: Isa) -> Result<Computable, ConfigError> {
-    let (config, _warnings) = ExperimentConfig::from_json(config_json, "")?;
+    let config = ExperimentConfig::from_canonical_json(config_json)?;
     let experiment = Simulation::compile(&config)?.with_isa(isa);
     let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
     Ok(Computable {

@@ -56,7 +56,8 @@ fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Simulation), Err
         return Ok((compiled.config, compiled.experiment));
     }
     let (config, _warnings) =
-        ExperimentConfig::from_json(DEFAULT, "default").expect("a shipped file is right");
+        ExperimentConfig::from_json(DEFAULT, "default", evolution::ALGORITHMS)
+            .expect("a shipped file is right");
     let experiment = Simulation::compile(&config).expect("a shipped file is right");
     Ok((config, experiment))
 }

@@ -40,7 +40,8 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         // A signal ends these at once: there is nothing to put in order.
         Command::Validate { files } => return validate::validate(&files, &mut progress),
         Command::Schema => {
-            return progress.print(&json::document(&experiment_file::json_schema()));
+            return progress
+                .print(&json::document(&experiment_file::json_schema(evolution::ALGORITHMS)));
         }
         Command::Simulate(simulation) => {
             return simulate::simulate(settings, &simulation, &mut progress).await;

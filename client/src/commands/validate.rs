@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use experiment_file::{AlgorithmName, ConfigError, Problem};
+use experiment_file::{ConfigError, Problem};
 use serde::Serialize;
 
 use crate::{
@@ -58,7 +58,7 @@ struct Report {
 struct Summary {
     name: String,
     seed: u64,
-    algorithm: AlgorithmName,
+    algorithm: String,
     population_size: u32,
     generations: u64,
     trials: u32,
@@ -70,7 +70,7 @@ struct Summary {
 impl Report {
     fn of(path: &Path) -> Self {
         let file = path.to_string_lossy().into_owned();
-        match ExperimentFile::read(path).and_then(|file| file.check(&Overrides::default())) {
+        match ExperimentFile::read(path).and_then(|file| file.compile(&Overrides::default())) {
             Ok(compiled) => {
                 let summary = Some(Summary::of(&compiled));
                 Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary }
@@ -88,7 +88,7 @@ impl Summary {
         Self {
             name: config.name.clone(),
             seed: config.seed,
-            algorithm: config.algorithm.name,
+            algorithm: config.algorithm.name.clone(),
             population_size: config.algorithm.population_size,
             generations: config.algorithm.generations,
             trials: config.algorithm.num_evaluations,
@@ -101,15 +101,10 @@ impl Summary {
 
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let algorithm = serde_json::to_value(self.algorithm).unwrap_or_default();
         write!(
             f,
             "{}, {}, {} robots, {} genes, {} generations",
-            self.name,
-            algorithm.as_str().unwrap_or_default(),
-            self.robots,
-            self.genotype_len,
-            self.generations,
+            self.name, self.algorithm, self.robots, self.genotype_len, self.generations,
         )
     }
 }

@@ -30,11 +30,11 @@ pub struct Alone {
 
 /// Runs an experiment without engine and network.
 pub fn measure(file: &str) -> Alone {
-    let (config, _) = ExperimentConfig::from_json(file, "").expect("the file is right");
+    let (config, _) =
+        ExperimentConfig::from_json(file, "", evolution::ALGORITHMS).expect("the file is right");
     let experiment = sim_core::Simulation::compile(&config).expect("the file is right");
     let mut evolution =
-        Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT)
-            .expect("the file is right");
+        Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT);
     let directory = TempDir::new().expect("a temporary directory");
     let mut store = Store::open(directory.path()).expect("a new database");
     let new = NewExperiment {

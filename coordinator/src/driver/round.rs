@@ -7,13 +7,13 @@ use experiment_file::ExperimentConfig;
 use sim_core::held_out;
 
 use crate::{engine::JudgedGeneration, store::Generation};
-use evolution::{Asked, Champion, Evolution, EvolutionError, Origin, Population, Reevaluation};
+use evolution::{Champion, ChampionSource, Evolution, EvolutionError, Population, Reevaluation};
 
 /// What the fleet judges at once.
 #[derive(Debug)]
 pub enum Round {
     /// The next generation.
-    Generation(Arc<Evolution>, Asked),
+    Generation(Arc<Evolution>, evolution::Generation),
     /// Candidates on held-out trials, after a generation that has been learnt
     /// from and is not committed yet.
     Reevaluation(Box<Learnt>, Reevaluation),
@@ -66,7 +66,7 @@ impl Round {
     /// The generation, or the address of the held-out trials.
     pub fn address(&self) -> u64 {
         match self {
-            Self::Generation(_, asked) => asked.generation,
+            Self::Generation(_, asked) => asked.index,
             Self::Reevaluation(_, reevaluation) => held_out(reevaluation.generation),
         }
     }
@@ -109,7 +109,7 @@ impl Round {
             }
             Self::Reevaluation(mut learnt, candidates) => {
                 let mut crowned = learnt.evolution.clone();
-                crowned.crown(&candidates, &judged.trial_fitness);
+                crowned.set_champion(&candidates, &judged.trial_fitness);
                 learnt.notices.extend(crowned.champion().map(describe));
                 if learnt.is_scheduled(config) {
                     learnt.evolution = crowned.clone();
@@ -151,7 +151,7 @@ impl Learnt {
 fn learn(
     config: &ExperimentConfig,
     mut evolution: Evolution,
-    asked: Asked,
+    asked: evolution::Generation,
     judged: &JudgedGeneration,
 ) -> Result<Learnt, EvolutionError> {
     let record = evolution.tell(asked, &judged.trial_fitness)?;
@@ -191,8 +191,8 @@ fn describe(champion: &Champion) -> String {
         None => "without finite fitness on held-out trials".to_owned(),
     };
     let generation = champion.generation;
-    match (champion.origin, champion.fitness()) {
-        (Origin::Individual(individual), Some(fitness)) => format!(
+    match (champion.source, champion.fitness()) {
+        (ChampionSource::Individual(individual), Some(fitness)) => format!(
             "champion: {held_out} ({fitness:.6} when chosen), \
              individual {individual} of generation {generation}"
         ),

@@ -102,7 +102,7 @@ impl Checked {
                 format!("trial_count is {trial_count}, not within 1..={}", limits::TRIALS);
             return Err(Status::invalid_argument(message));
         }
-        let config = ExperimentConfig::from_json(&config_json, "");
+        let config = ExperimentConfig::from_json(&config_json, "", evolution::ALGORITHMS);
         let compiled = config.and_then(|(config, _)| {
             let experiment = Simulation::compile(&config)?;
             Ok((config, experiment))

@@ -39,7 +39,7 @@ use crate::{
     store::{self, ExperimentState, NewExperiment, Store, StoreError},
     submission::{Checked, Runnable, Submission},
 };
-use evolution::{Evolution, Origin};
+use evolution::{ALGORITHMS, ChampionSource, Evolution};
 
 use super::{convert, explain, history, shutting_down, store_status};
 
@@ -256,9 +256,9 @@ impl ExperimentService for Experiments {
         Ok(Response::new(GetChampionResponse {
             experiment_id: id.0,
             generation: champion.generation,
-            individual: match champion.origin {
-                Origin::Individual(individual) => Some(individual),
-                Origin::Mean => None,
+            individual: match champion.source {
+                ChampionSource::Individual(individual) => Some(individual),
+                ChampionSource::Mean => None,
             },
             fitness: champion.fitness(),
             held_out: champion.held_out.map(convert::held_out),
@@ -419,7 +419,7 @@ fn resume(
 }
 
 fn differs_in_generations_only(config_json: &str, config: &ExperimentConfig) -> bool {
-    ExperimentConfig::from_json(config_json, "").is_ok_and(|(mut other, _)| {
+    ExperimentConfig::from_json(config_json, "", ALGORITHMS).is_ok_and(|(mut other, _)| {
         other.algorithm.generations = config.algorithm.generations;
         other == *config
     })
@@ -486,8 +486,8 @@ pub(super) fn problems(error: &ConfigError) -> String {
 }
 
 fn network_json(config_json: &str, genotype: &[f64]) -> Result<String, String> {
-    let (config, _) =
-        ExperimentConfig::from_json(config_json, "").map_err(|error| error.to_string())?;
+    let (config, _) = ExperimentConfig::from_json(config_json, "", ALGORITHMS)
+        .map_err(|error| error.to_string())?;
     let experiment = sim_core::Simulation::compile(&config).map_err(|error| error.to_string())?;
     let network = experiment.network_json(genotype).map_err(|error| error.to_string())?;
     Ok(network.to_string())

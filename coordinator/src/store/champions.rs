@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use crate::ids::ExperimentId;
-use evolution::{Champion, HeldOut, Origin};
+use evolution::{Champion, ChampionSource, HeldOut};
 
 use super::StoreError;
 
@@ -13,9 +13,9 @@ pub fn put(
     id: ExperimentId,
     champion: &Champion,
 ) -> rusqlite::Result<()> {
-    let individual = match champion.origin {
-        Origin::Individual(individual) => Some(individual),
-        Origin::Mean => None,
+    let individual = match champion.source {
+        ChampionSource::Individual(individual) => Some(individual),
+        ChampionSource::Mean => None,
     };
     transaction.execute(
         "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
@@ -55,7 +55,7 @@ pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<Champion>
             };
             let champion = Champion {
                 generation: row.get(0)?,
-                origin: individual.map_or(Origin::Mean, Origin::Individual),
+                source: individual.map_or(ChampionSource::Mean, ChampionSource::Individual),
                 genotype: Vec::new(),
                 trial_fitness: Vec::new(),
                 held_out,

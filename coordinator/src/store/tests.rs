@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::submission::{Submission, checkpoint_json};
-use evolution::{Champion, Evolution, HeldOut, Origin, Statistics};
+use evolution::{Champion, ChampionSource, Evolution, HeldOut, Statistics};
 
 use super::*;
 
@@ -39,7 +39,7 @@ fn generation(generation: u64) -> Generation {
 fn commit(store: &mut Store, id: ExperimentId, number: u64, completed: Option<&str>) -> Result<()> {
     let champion = Champion {
         generation: number,
-        origin: Origin::Individual(3),
+        source: ChampionSource::Individual(3),
         genotype: vec![0.1, 1.0 / 3.0],
         trial_fitness: vec![0.5, 0.75],
         held_out: None,
@@ -94,7 +94,7 @@ fn a_champion_keeps_its_origin_and_its_held_out_fitness() {
     let held_out = HeldOut { mean: 0.1 + 0.2, ci95: 1.0 / 3.0, n_trials: 50, generation: 4 };
     let champion = Champion {
         generation: 3,
-        origin: Origin::Mean,
+        source: ChampionSource::Mean,
         genotype: vec![1.0 / 3.0],
         trial_fitness: Vec::new(),
         held_out: Some(held_out),

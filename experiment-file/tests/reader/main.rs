@@ -10,7 +10,10 @@ mod schema;
 mod shipped;
 mod values;
 
-use experiment_file::{ConfigError, ExperimentConfig, Problem};
+use evolution::ALGORITHMS;
+use experiment_file::{
+    AlgorithmDescription, AlgorithmParams, ConfigError, ExperimentConfig, Problem,
+};
 
 /// A small experiment that uses a bit of everything; lines count from 1.
 const BASE: &str = r#"{
@@ -90,7 +93,7 @@ fn edited(from: &str, to: &str) -> String {
 }
 
 fn read(text: &str) -> Result<(ExperimentConfig, Vec<Problem>), ConfigError> {
-    ExperimentConfig::from_json(text, "default")
+    ExperimentConfig::from_json(text, "default", ALGORITHMS)
 }
 
 /// The configuration of a text that must be right, without warnings.
@@ -110,4 +113,16 @@ fn refuse(text: &str) -> String {
         Ok(_) => panic!("accepted\n{text}"),
         Err(error) => error.to_string(),
     }
+}
+
+/// The parameters of an algorithm as the reader fills them in.
+fn defaults(algorithm: &str) -> AlgorithmParams {
+    let description = AlgorithmDescription::find(ALGORITHMS, algorithm).unwrap();
+    let mut params = AlgorithmParams::default();
+    for parameter in description.parameters {
+        if let Some(value) = parameter.default.value() {
+            params.set(parameter.key, value);
+        }
+    }
+    params
 }

@@ -1,6 +1,7 @@
 //! What a wrong file hears: every problem, where it is, what would be right.
 
 use super::{BASE, edited, refuse};
+use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 
 /// [`BASE`] with several passages replaced.
@@ -205,7 +206,7 @@ fn a_query_with_two_meanings_is_ambiguous() {
 #[test]
 fn a_file_without_a_name_needs_a_default_that_is_one() {
     let text = edited(r#""name": "base","#, "");
-    let error = ExperimentConfig::from_json(&text, "").unwrap_err();
+    let error = ExperimentConfig::from_json(&text, "", ALGORITHMS).unwrap_err();
     assert_eq!(
         error.to_string(),
         "line 1: `name` is missing, and the default does not serve: a name must not be empty"

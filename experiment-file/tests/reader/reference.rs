@@ -3,8 +3,8 @@
 
 use std::io::Write as _;
 
-use super::read;
-use experiment_file::{AlgorithmParams, ExperimentConfig, FitnessFunction, GaParams, SnesParams};
+use super::{defaults, read};
+use experiment_file::{ExperimentConfig, FitnessFunction};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/reference/");
 
@@ -30,7 +30,7 @@ fn experiment_a_is_accepted_unchanged() {
     assert_eq!(config.name, "chk_experimentA_SNES_ctrnn");
     assert_eq!(config.algorithm.fitness_function, FitnessFunction::IdentifyLeader);
     let population = &config.algorithm.populations["p4"];
-    assert_eq!(population.params, AlgorithmParams::Snes(SnesParams::default()));
+    assert_eq!(population.params, defaults("SNES"));
     assert_eq!(config.topology.synapses.len(), 15);
 }
 
@@ -44,5 +44,5 @@ fn experiment_d_is_accepted_unchanged() {
     assert_eq!(warnings, ignored);
     assert_eq!(config.algorithm.fitness_function, FitnessFunction::GotoLight);
     let population = &config.algorithm.populations["p1"];
-    assert_eq!(population.params, AlgorithmParams::Ga(GaParams::default()));
+    assert_eq!(population.params, defaults("GA"));
 }

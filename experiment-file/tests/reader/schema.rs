@@ -6,10 +6,11 @@ use serde_json::{Value, json};
 use super::generator::{Dice, damage, experiment};
 use super::shipped::shipped;
 use super::{BASE, edited, read};
+use evolution::ALGORITHMS;
 use experiment_file::json_schema;
 
 fn validator() -> Validator {
-    jsonschema::draft202012::new(&json_schema()).unwrap()
+    jsonschema::draft202012::new(&json_schema(ALGORITHMS)).unwrap()
 }
 
 fn problems(validator: &Validator, file: &Value) -> Vec<String> {
@@ -90,7 +91,7 @@ fn what_the_reader_accepts_fits_the_schema() {
 
 #[test]
 fn the_schema_carries_descriptions_and_defaults() {
-    let schema = json_schema();
+    let schema = json_schema(ALGORITHMS);
     let receiver = &schema["$defs"]["WirelessReceiverConfig"]["properties"]["n_sectors"];
     assert_eq!(receiver["default"], json!(4));
     assert_eq!(receiver["description"], json!("Sectors; default 4."));

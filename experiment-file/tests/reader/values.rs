@@ -1,10 +1,10 @@
 //! What a right file means: defaults, alternatives, the canonical form.
 
-use super::{BASE, accept, edited, read};
+use super::{BASE, accept, defaults, edited, read};
+use evolution::ALGORITHMS;
 use experiment_file::{
-    Activation, AlgorithmName, AlgorithmParams, GaParams, Initializer, LightController,
-    LightSourceConfig, NeuronParams, ObjectConfig, RobotController, SnesParams,
-    UncontrollableRotationConfig, json_schema,
+    Activation, Initializer, LightController, LightSourceConfig, NeuronParams, ObjectConfig,
+    RobotController, UncontrollableRotationConfig, json_schema,
 };
 
 #[test]
@@ -44,7 +44,7 @@ fn one_bound_serves_all_queries() {
 #[test]
 fn operators_stand_in_params_or_in_the_population() {
     let config = accept(BASE);
-    let expected = AlgorithmParams::Ga(GaParams { num_elite: 2, ..GaParams::default() });
+    let expected = defaults("GA").with("num_elite", 2_u32);
     assert_eq!(config.algorithm.populations["neurons"].params, expected);
 }
 
@@ -162,9 +162,9 @@ fn what_steers_the_original_alone_is_ignored_with_a_warning_each() {
         "line 46: algorithm.populations.neurons.num_elite: ignored: only the genetic algorithm \
          has it"
     );
-    assert_eq!(config.algorithm.name, AlgorithmName::Snes);
+    assert_eq!(config.algorithm.name, "SNES");
     let params = &config.algorithm.populations["neurons"].params;
-    assert_eq!(*params, AlgorithmParams::Snes(SnesParams::default()));
+    assert_eq!(*params, defaults("SNES"));
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn a_file_may_name_its_schema() {
     let text = edited(name, r#""$schema": "experiment.schema.json", "name": "base","#);
     assert_eq!(accept(&text), accept(BASE));
     let file: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert!(jsonschema::is_valid(&json_schema(), &file));
+    assert!(jsonschema::is_valid(&json_schema(ALGORITHMS), &file));
 }
 
 #[test]

@@ -229,7 +229,7 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
 
 fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> AlgorithmConfig {
     AlgorithmConfig {
-        name: AlgorithmName::Snes,
+        name: "SNES".into(),
         evolvable_object: "robotA".into(),
         population_size: 100,
         generations: 1000,
@@ -250,12 +250,7 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
                 ],
                 max_vals: vec![3.0, 1.5, 0.75, 5.0],
                 min_vals: vec![-3.0, -1.5, -1.0, 0.05],
-                params: AlgorithmParams::Snes(SnesParams {
-                    eta_mu: 1.0,
-                    eta_sigma: None,
-                    mu_init: 0.5,
-                    sigma_init: 0.2,
-                }),
+                params: AlgorithmParams::default(),
             },
         )]),
     }

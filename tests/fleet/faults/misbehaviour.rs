@@ -76,7 +76,8 @@ impl Intruder {
 }
 
 fn compile(spec: &ExperimentSpec) -> sim_core::Simulation {
-    let (config, _) = ExperimentConfig::from_json(&spec.config_json, "").unwrap();
+    let (config, _) =
+        ExperimentConfig::from_json(&spec.config_json, "", evolution::ALGORITHMS).unwrap();
     sim_core::Simulation::compile(&config).unwrap()
 }
 

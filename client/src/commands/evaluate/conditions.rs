@@ -222,7 +222,7 @@ fn to_json(config: &ExperimentConfig) -> Json {
 }
 
 fn read(whose: &str, file: &Json) -> Result<ExperimentConfig, Error> {
-    match ExperimentConfig::from_json(&json::line(file), "") {
+    match ExperimentConfig::from_json(&json::line(file), "", evolution::ALGORITHMS) {
         Ok((config, _)) => Ok(config),
         Err(error) => Err(Error::Input(format!("{whose}: {}", problems(&error)))),
     }

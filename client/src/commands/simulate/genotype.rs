@@ -87,7 +87,7 @@ mod tests {
         let file = ExperimentFile::read(&shipped("leader_selection_ga")).unwrap();
         let compiled = file.compile(&Overrides { seed: Some(7), ..Overrides::default() }).unwrap();
         let segments = compiled.experiment.population_segments();
-        let evolution = Evolution::new(&compiled.config, segments, sim_core::FINGERPRINT).unwrap();
+        let evolution = Evolution::new(&compiled.config, segments, sim_core::FINGERPRINT);
         assert_eq!(random(&compiled), evolution.ask().genotypes[0][..]);
     }
 

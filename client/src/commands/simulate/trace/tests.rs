@@ -13,7 +13,7 @@ fn config(objects: &str) -> ExperimentConfig {
     let text = text
         .replace("\"evaluation_steps\": 100", "\"evaluation_steps\": 30")
         .replace("\"objects\": {", &format!("\"objects\": {{ {objects}"));
-    ExperimentConfig::from_json(&text, "").unwrap().0
+    ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap().0
 }
 
 /// Heading and rows of the first trial, and what they were made from.
