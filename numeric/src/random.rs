@@ -44,8 +44,9 @@ pub enum Purpose {
     /// Stochastic decoding; stream = robot, per step one draw per stochastic
     /// output neuron (threshold) or output (softmax), in the order of outputs.
     Decoding = 6,
-    /// Sensor noise; stream = robot, one normal per sector and step, light
-    /// sensor first.
+    /// Sensor noise; stream = robot + 2^32 k, one normal per value of the reading
+    /// and step. k is 0 for the light sensor and, after it, the distance sensor,
+    /// and another number for each other kind of sensor.
     SensorNoise = 7,
     /// Movement of lights; stream = light.
     LightMovement = 8,

@@ -31,6 +31,7 @@ mod leadership;
 mod lights;
 mod neighbours;
 mod network;
+mod objects;
 mod perturbations;
 mod problems;
 mod record;

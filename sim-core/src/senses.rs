@@ -1,38 +1,45 @@
 //! What robots perceive: the readings that stimuli are made of.
 
 use crate::communication::Mode;
-use crate::neighbours::Neighbours;
-use crate::sensors::Viewpoint;
+use crate::perturbations::Perturbations;
+use crate::sensors::{Noise, NoiseStream, Surroundings};
 use crate::swarm::Swarm;
-use crate::torus::{Torus, Vec2};
+use crate::torus::Vec2;
 use crate::world::RobotGroup;
 use experiment_file::SensorQuery;
 use numeric::random::Stream;
 
-/// Readings of the robots of one group in one trial, beside those of the radio;
-/// empty without the sensor.
+/// Readings of the robots of one group in one trial, beside those of the radio.
 #[derive(Debug, Clone)]
 pub(crate) struct Senses {
-    /// `[robot][sector]`
-    light: Vec<f64>,
-    /// `[robot][sector]`
-    distance: Vec<f64>,
-    /// `[robot]`
-    ground: Vec<f64>,
-    n_robots: usize,
+    /// As [`RobotGroup::sensors`].
+    sensors: Vec<SensorState>,
+    /// Where noise comes from.
+    noise: Vec<NoiseSource>,
 }
 
-/// What there is to sense beside frames.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Surroundings<'a> {
-    /// The plane.
-    pub torus: &'a Torus,
-    /// Who is near whom.
-    pub neighbours: &'a Neighbours,
-    /// Positions of all lights.
-    pub lights: &'a [Vec2],
-    /// Centres of all ground areas.
-    pub areas: &'a [Vec2],
+/// The noise of one sensor of a group, or of several that share their streams.
+#[derive(Debug, Clone)]
+struct NoiseSource {
+    key: NoiseStream,
+    /// Per robot of the group.
+    streams: Vec<Stream>,
+    /// How many sensors draw from them.
+    n_sensors: usize,
+}
+
+/// What a mounted sensor has in one trial.
+#[derive(Debug, Clone)]
+struct SensorState {
+    query: SensorQuery,
+    /// Values of a robot's reading.
+    reading_len: usize,
+    /// `[robot][value]`
+    readings: Vec<f64>,
+    /// Per robot, whether its controller gets the reading: it is not inhibited.
+    is_wanted: Vec<bool>,
+    /// Place of its noise in [`Senses::noise`]; none without noise.
+    noise: Option<usize>,
 }
 
 /// A reading of one robot.
@@ -58,16 +65,39 @@ impl Reading<'_> {
 }
 
 impl Senses {
-    /// Nothing perceived yet.
-    pub fn new(group: &RobotGroup) -> Self {
-        let n = group.robots.len();
-        let zeros = |n_values: Option<usize>| vec![0.0; n * n_values.unwrap_or(0)];
-        Self {
-            light: zeros(group.light_sensor.as_ref().map(|sensor| sensor.n_sectors)),
-            distance: zeros(group.distance_sensor.as_ref().map(|sensor| sensor.n_sectors)),
-            ground: zeros(group.ground_sensor.as_ref().map(|_| 1)),
-            n_robots: n,
+    /// Nothing perceived yet. `stream` gives a stream of noise by its number.
+    pub fn new(
+        group: &RobotGroup,
+        perturbations: &Perturbations,
+        stream: impl Fn(u64) -> Stream,
+    ) -> Self {
+        let n_robots = group.robots.len();
+        let mut sensors = Vec::new();
+        let mut noise: Vec<NoiseSource> = Vec::new();
+        for mounted in &group.sensors {
+            let Noise { deviation, stream: key } = mounted.sensor.noise();
+            let source = (deviation > 0.0).then(|| {
+                let known = noise.iter().position(|source| source.key == key);
+                known.unwrap_or_else(|| {
+                    let streams = group.robots.clone().map(|robot| stream(key.number(robot)));
+                    noise.push(NoiseSource { key, streams: streams.collect(), n_sensors: 0 });
+                    noise.len() - 1
+                })
+            });
+            if let Some(source) = source {
+                noise[source].n_sensors += 1;
+            }
+            let reading_len = mounted.sensor.reading_len();
+            let is_wanted = |robot| !perturbations.inhibits(robot, mounted.query);
+            sensors.push(SensorState {
+                query: mounted.query,
+                reading_len,
+                readings: vec![0.0; n_robots * reading_len],
+                is_wanted: (0..n_robots).map(is_wanted).collect(),
+                noise: source,
+            });
         }
+        Self { sensors, noise }
     }
 
     /// A reading of robot `robot`, the group's number `index`.
@@ -81,10 +111,6 @@ impl Senses {
         let received = swarm.received[robot].as_ref();
         let vector = |direction: Option<Vec2>| {
             Reading::Vector(direction.map_or([0.0; 2], |direction| [direction.x, direction.y]))
-        };
-        let of_robot = |readings: &'a [f64]| {
-            let n = readings.len() / self.n_robots;
-            Reading::Slice(&readings[index * n..(index + 1) * n])
         };
         match query {
             SensorQuery::ReceiverMessage => {
@@ -100,43 +126,66 @@ impl Senses {
             SensorQuery::ReceiverState => {
                 Reading::Scalar([f64::from(swarm.modes[robot] == Mode::Send)])
             }
-            SensorQuery::Light => of_robot(&self.light),
-            SensorQuery::Distance => of_robot(&self.distance),
-            SensorQuery::Ground => of_robot(&self.ground),
+            query => {
+                let sensor = self.sensors.iter().find(|sensor| sensor.query == query);
+                Reading::Slice(sensor.map_or(&[], |sensor| {
+                    &sensor.readings[index * sensor.reading_len..][..sensor.reading_len]
+                }))
+            }
         }
     }
 
-    /// Senses with every robot of the group. Noise comes from each robot's own
-    /// stream, the light sensor's first.
-    pub fn update(
-        &mut self,
-        group: &RobotGroup,
-        swarm: &Swarm,
-        surroundings: Surroundings<'_>,
-        noise: &mut [Stream],
-    ) {
-        let Surroundings { torus, neighbours, lights, areas } = surroundings;
-        for (index, robot) in group.robots.clone().enumerate() {
-            let position = swarm.positions[robot];
-            let from = Viewpoint { torus, position, heading: swarm.headings[robot] };
-            let noise = &mut noise[robot];
-            if let Some(sensor) = &group.light_sensor {
-                let readings = &mut self.light[index * sensor.n_sectors..][..sensor.n_sectors];
-                if swarm.photosensitive[robot] {
-                    sensor.sense(from, lights, noise, readings);
-                } else if group.distance_sensor.is_some() {
-                    // Nobody looks at the readings, but the other sensor's noise
-                    // comes after theirs.
-                    sensor.skip(noise);
+    /// Senses with every robot of the group, sensor by sensor in the order in which
+    /// they are mounted.
+    pub fn update(&mut self, group: &RobotGroup, swarm: &Swarm, surroundings: &Surroundings<'_>) {
+        for (mounted, state) in group.sensors.iter().zip(&mut self.sensors) {
+            let SensorState { reading_len, readings, is_wanted, .. } = state;
+            let robots = group.robots.clone();
+            mounted.sensor.sense_group(robots, is_wanted, swarm, surroundings, readings);
+            if let Some(source) = state.noise {
+                let NoiseSource { streams, n_sensors, .. } = &mut self.noise[source];
+                let deviation = mounted.sensor.noise().deviation;
+                for ((reading, is_wanted), stream) in
+                    readings.chunks_exact_mut(*reading_len).zip(is_wanted).zip(streams)
+                {
+                    if *is_wanted {
+                        add_noise(reading, deviation, stream);
+                    } else if *n_sensors > 1 {
+                        // Nobody gets the reading, but the next noise in the stream is
+                        // another sensor's.
+                        stream.skip(*reading_len);
+                    }
                 }
             }
-            if let Some(sensor) = &group.distance_sensor {
-                let readings = &mut self.distance[index * sensor.n_sectors..][..sensor.n_sectors];
-                sensor.sense(neighbours.of(robot), from.heading, noise, readings);
-            }
-            if let Some(sensor) = &group.ground_sensor {
-                self.ground[index] = sensor.sense(torus, position, areas);
+            let range = mounted.sensor.value_range();
+            for value in readings.iter_mut() {
+                *value = value.clamp(*range.start(), *range.end());
             }
         }
+    }
+}
+
+/// Adds Gaussian noise to each value of a reading, one draw each.
+fn add_noise(reading: &mut [f64], deviation: f64, stream: &mut Stream) {
+    for value in reading {
+        *value += deviation * stream.normal();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use numeric::random::Purpose;
+
+    #[test]
+    fn noise_has_its_deviation_and_one_draw_per_value() {
+        let mut stream = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
+        let mut expected = stream.clone();
+        let mut reading = [0.5, 0.9, 0.1, 0.0];
+        add_noise(&mut reading, 0.4, &mut stream);
+        for (value, clean) in reading.into_iter().zip([0.5, 0.9, 0.1, 0.0]) {
+            assert_eq!(value, clean + 0.4 * expected.normal());
+        }
+        assert_eq!(stream.uniform(), expected.uniform());
     }
 }

@@ -9,13 +9,15 @@ use crate::fitness::{self, Fitness, Moment};
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
+use crate::objects::{Site, StaticObjects};
 use crate::perturbations::Perturbations;
 use crate::record::{Metrics, StepRecord};
-use crate::senses::{Senses, Surroundings};
+use crate::senses::Senses;
+use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
-use crate::world::{Fixtures, Site, World};
+use crate::world::World;
 use experiment_file::SensorQuery;
 use numeric::Isa;
 use numeric::random::{Purpose, Stream};
@@ -38,8 +40,6 @@ pub(crate) struct Trial<'a> {
     groups: Vec<Group>,
     /// Stochastic decoding, per robot.
     decoding: Vec<Stream>,
-    /// Noise of sensors, per robot.
-    noise: Vec<Stream>,
     fitness: Box<dyn Fitness>,
     fitness_sum: f64,
     n_judged_steps: u32,
@@ -63,7 +63,11 @@ struct Address {
 
 impl Address {
     fn stream(self, purpose: Purpose, number: usize) -> Stream {
-        Stream::new(self.seed, self.generation, self.trial.into(), purpose, number as u64)
+        self.numbered_stream(purpose, number as u64)
+    }
+
+    fn numbered_stream(self, purpose: Purpose, number: u64) -> Stream {
+        Stream::new(self.seed, self.generation, self.trial.into(), purpose, number)
     }
 
     /// One stream for each of `n` robots, or lights.
@@ -87,13 +91,13 @@ impl Address {
     }
 
     /// Draws the positions of lights or ground areas.
-    fn place_fixtures(
+    fn place_static_objects(
         self,
-        fixtures: &[Fixtures],
+        objects: &[StaticObjects],
         torus: &Torus,
     ) -> Result<Vec<Vec2>, EvaluateError> {
         let mut positions = Vec::new();
-        for Fixtures { site, .. } in fixtures {
+        for StaticObjects { site, .. } in objects {
             let mut stream = self.stream(Purpose::Positions, site.object);
             positions.extend(self.place(site, torus, &mut stream)?);
         }
@@ -118,18 +122,16 @@ impl<'a> Trial<'a> {
             positions.extend(address.place(&group.site, &world.torus, &mut stream)?);
             let mut orientations = address.stream(Purpose::Orientations, group.site.object);
             headings.extend(group.headings.draw(&mut orientations));
-            groups.push(Group {
-                senses: Senses::new(group),
-                perturbations: Perturbations::new(
-                    &group.perturbations,
-                    group.robots.len(),
-                    |number| address.stream(Purpose::Perturbation, number),
-                ),
-                positions: stream,
-            });
+            let perturbations =
+                Perturbations::new(&group.perturbations, group.robots.len(), |number| {
+                    address.stream(Purpose::Perturbation, number)
+                });
+            let noise = |number| address.numbered_stream(Purpose::SensorNoise, number);
+            let senses = Senses::new(group, &perturbations, noise);
+            groups.push(Group { senses, perturbations, positions: stream });
         }
-        let lights = address.place_fixtures(&world.lights, &world.torus)?;
-        let areas = address.place_fixtures(&world.areas, &world.torus)?;
+        let lights = address.place_static_objects(&world.lights, &world.torus)?;
+        let areas = address.place_static_objects(&world.areas, &world.torus)?;
         let controllers = world.lights.iter().zip(&world.light_controllers);
         let controllers = controllers
             .flat_map(|(lights, controller)| lights.members.clone().map(move |_| controller));
@@ -142,7 +144,7 @@ impl<'a> Trial<'a> {
         let mut swarm = Swarm::new(positions, headings, world.message_len);
         for (group, state) in world.groups.iter().zip(&groups) {
             for (index, robot) in group.robots.clone().enumerate() {
-                swarm.photosensitive[robot] = group.light_sensor.is_some()
+                swarm.photosensitive[robot] = group.has_sensor(SensorQuery::Light)
                     && !state.perturbations.inhibits(index, SensorQuery::Light);
             }
         }
@@ -163,7 +165,6 @@ impl<'a> Trial<'a> {
             areas,
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
-            noise: address.streams(Purpose::SensorNoise, n_robots),
             fitness: fitness::new(simulation.fitness, world),
             fitness_sum: 0.0,
             n_judged_steps: 0,
@@ -201,7 +202,7 @@ impl<'a> Trial<'a> {
                 lights: &self.lights,
                 areas: &self.areas,
             };
-            state.senses.update(group, &self.swarm, surroundings, &mut self.noise);
+            state.senses.update(group, &self.swarm, &surroundings);
         }
         Ok(())
     }

@@ -6,12 +6,13 @@ use crate::communication::{Antenna, Quantiser, Receiver};
 use crate::drive::Drive;
 use crate::initializers::{Headings, Positions};
 use crate::network::Network;
+use crate::objects::{Site, StaticObjects};
 use crate::problems::Problems;
-use crate::sensors::{Decay, DistanceSensor, GroundSensor, LightSensor};
+use crate::sensors::{self, Decay, MountedSensor};
 use crate::torus::Torus;
 use experiment_file::{
     GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig, PerturbationsConfig,
-    RobotConfig, RobotController, SensorQuery, SensorsConfig, WorldConfig,
+    RobotConfig, RobotController, SensorQuery, WorldConfig,
 };
 
 /// Communication range of robots without radio, cm.
@@ -27,38 +28,15 @@ pub(crate) struct World {
     /// Antennas per robot.
     pub antennas: Vec<Antenna>,
     /// Lights, object by object.
-    pub lights: Vec<Fixtures>,
+    pub lights: Vec<StaticObjects>,
     /// How the lights of each object move.
     pub light_controllers: Vec<LightController>,
     /// Ground areas, object by object.
-    pub areas: Vec<Fixtures>,
+    pub areas: Vec<StaticObjects>,
     /// Components of a message; 0 without radio.
     pub message_len: usize,
-    /// Index in `groups` of the robots that evolve and are judged.
+    /// Index in `groups` of the robots that evolve and are evaluated.
     pub evolvable: usize,
-}
-
-/// What an object's instances have in common.
-#[derive(Debug, Clone)]
-pub(crate) struct Site {
-    /// Name of the object.
-    pub name: String,
-    /// Index of the object.
-    pub object: usize,
-    /// Where its instances start.
-    pub positions: Positions,
-}
-
-/// The lights, or the ground areas, of one object.
-#[derive(Debug, Clone)]
-pub(crate) struct Fixtures {
-    /// Where they come from.
-    pub site: Site,
-    /// Their numbers among all lights, or all ground areas.
-    pub members: Range<usize>,
-    /// Reach or radius, cm.
-    range: f64,
-    color: String,
 }
 
 /// The robots of one object.
@@ -74,12 +52,8 @@ pub(crate) struct RobotGroup {
     pub controller: RobotController,
     /// What their controller gets, and in which of its inputs.
     pub stimuli: Vec<(SensorQuery, Range<usize>)>,
-    /// Sensors beside the radio.
-    pub light_sensor: Option<LightSensor>,
-    /// Sensors beside the radio.
-    pub distance_sensor: Option<DistanceSensor>,
-    /// Sensors beside the radio.
-    pub ground_sensor: Option<GroundSensor>,
+    /// Sensors beside the radio, in the order in which they draw noise.
+    pub sensors: Vec<MountedSensor>,
     /// Wheels.
     pub drive: Option<Drive>,
     /// What quantises their messages.
@@ -88,9 +62,16 @@ pub(crate) struct RobotGroup {
     pub perturbations: PerturbationsConfig,
 }
 
+impl RobotGroup {
+    /// Whether the robots have a sensor, beside the radio, that gives the reading.
+    pub fn has_sensor(&self, query: SensorQuery) -> bool {
+        self.sensors.iter().any(|mounted| mounted.query == query)
+    }
+}
+
 impl World {
-    /// Compiles the objects, of which `evolvable_object` names the robots that are
-    /// judged; none if there are no such robots.
+    /// Compiles the objects, of which `evolvable_object` names the robots that
+    /// are evaluated; none if there are no such robots.
     pub fn compile(
         config: &WorldConfig,
         evolvable_object: &str,
@@ -146,14 +127,14 @@ impl World {
         self.areas.last().map_or(0, |areas| areas.members.end)
     }
 
-    /// The robots that evolve and are judged.
-    pub fn judged(&self) -> Range<usize> {
+    /// The robots that evolve and are evaluated.
+    pub fn evaluated(&self) -> Range<usize> {
         self.groups[self.evolvable].robots.clone()
     }
 
-    /// Distance within which two of the judged robots hear each other, cm.
+    /// Distance within which two of the evaluated robots hear each other, cm.
     pub fn communication_range(&self) -> f64 {
-        let antenna = self.judged().next().map(|robot| self.antennas[robot]).unwrap_or_default();
+        let antenna = self.evaluated().next().map(|robot| self.antennas[robot]).unwrap_or_default();
         match (antenna.emits_within, antenna.receiver) {
             (Some(reach), Some(receiver)) => receiver.range.min(reach),
             _ => DEFAULT_RANGE,
@@ -163,9 +144,9 @@ impl World {
     /// Distance beyond which no robot senses another one, cm.
     pub fn sensing_range(&self) -> f64 {
         let receivers = self.antennas.iter().filter_map(|antenna| antenna.receiver);
-        let sensors = self.groups.iter().filter_map(|group| group.distance_sensor.as_ref());
+        let sensors = self.groups.iter().flat_map(|group| &group.sensors);
         let ranges = receivers.map(|receiver| receiver.range);
-        ranges.chain(sensors.map(|sensor| sensor.range)).fold(0.0, f64::max)
+        ranges.chain(sensors.map(|mounted| mounted.sensor.robots_within())).fold(0.0, f64::max)
     }
 
     fn add_lights(
@@ -177,10 +158,10 @@ impl World {
     ) {
         let n = config.num_instances as usize;
         let positions = Positions::new(&config.initializers.positions, n);
-        let Some(site) = site(index, name, positions, problems) else { return };
+        let Some(site) = Site::new(index, name, positions, problems) else { return };
         let members = self.n_lights()..self.n_lights() + n;
         let (range, color) = (config.params.range, config.params.color.clone());
-        self.lights.push(Fixtures { site, members, range, color });
+        self.lights.push(StaticObjects { site, members, range, color });
         self.light_controllers.push(config.controller.clone());
     }
 
@@ -193,10 +174,10 @@ impl World {
     ) {
         let n = config.num_instances as usize;
         let positions = Positions::new(&config.initializers.positions, n);
-        let Some(site) = site(index, name, positions, problems) else { return };
+        let Some(site) = Site::new(index, name, positions, problems) else { return };
         let members = self.n_areas()..self.n_areas() + n;
         let (range, color) = (config.params.range, config.params.color.clone());
-        self.areas.push(Fixtures { site, members, range, color });
+        self.areas.push(StaticObjects { site, members, range, color });
     }
 
     fn add_robots(
@@ -209,7 +190,7 @@ impl World {
     ) {
         let n = config.num_instances as usize;
         let positions = Positions::new(&config.initializers.positions, n);
-        let site = site(index, name, positions, problems);
+        let site = Site::new(index, name, positions, problems);
         let headings = Headings::new(&config.initializers.orientations, n)
             .map_err(|message| {
                 problems.add(format!("world.objects.{name}.initializers.orientations"), message);
@@ -224,16 +205,14 @@ impl World {
         {
             self.message_len = len as usize;
         }
-        let sensors = &config.sensors;
-        let light_sensor = self.light_sensor(sensors);
         let stimuli = match config.controller {
             RobotController::NeuralController => {
                 let stimuli = network.stimuli.values();
                 stimuli.map(|stimulus| (stimulus.sensor, stimulus.inputs.clone())).collect()
             }
             RobotController::BraitenbergLightFollower => {
-                let n_sectors = light_sensor.as_ref().map_or(0, |sensor| sensor.n_sectors);
-                vec![(SensorQuery::Light, 0..n_sectors)]
+                let n_sectors = config.sensors.reading_len(SensorQuery::Light).unwrap_or(0);
+                vec![(SensorQuery::Light, 0..n_sectors as usize)]
             }
         };
         let group = RobotGroup {
@@ -242,16 +221,7 @@ impl World {
             robots: self.n_robots()..self.n_robots() + n,
             controller: config.controller,
             stimuli,
-            light_sensor,
-            distance_sensor: sensors.distance_sensor.as_ref().map(|sensor| DistanceSensor {
-                n_sectors: sensor.n_sectors as usize,
-                range: sensor.range,
-                decay: Decay { rho: sensor.decay_rho, phi: sensor.decay_phi },
-                noise_deviation: sensor.noise_variance.sqrt(),
-            }),
-            ground_sensor: sensors.ground_sensor.as_ref().map(|sensor| GroundSensor {
-                areas: of_color(&self.areas, &sensor.color).collect(),
-            }),
+            sensors: sensors::mount(&config.sensors, &self.lights, &self.areas),
             drive: config.actuators.wheel_actuator.as_ref().map(|wheels| Drive {
                 max_speed: wheels.max_speed,
                 axle_length: wheels.axle_length,
@@ -265,38 +235,6 @@ impl World {
         self.antennas.extend(group.robots.clone().map(|_| antenna(config)));
         self.groups.push(group);
     }
-
-    fn light_sensor(&self, sensors: &SensorsConfig) -> Option<LightSensor> {
-        let sensor = sensors.light_sensor.as_ref()?;
-        let lights = of_color(&self.lights, &sensor.color);
-        Some(LightSensor {
-            n_sectors: sensor.n_sectors as usize,
-            decay: Decay { rho: sensor.decay_rho, phi: sensor.decay_phi },
-            noise_deviation: sensor.noise_variance.sqrt(),
-            lights: lights.map(|(light, range)| (light, range.min(sensor.range))).collect(),
-        })
-    }
-}
-
-fn site(
-    index: usize,
-    name: &str,
-    positions: Result<Positions, String>,
-    problems: &mut Problems,
-) -> Option<Site> {
-    match positions {
-        Ok(positions) => Some(Site { name: name.to_owned(), object: index, positions }),
-        Err(message) => {
-            problems.add(format!("world.objects.{name}.initializers.positions"), message);
-            None
-        }
-    }
-}
-
-/// Numbers and ranges of the fixtures of a colour.
-fn of_color(fixtures: &[Fixtures], color: &str) -> impl Iterator<Item = (usize, f64)> {
-    let fixtures = fixtures.iter().filter(move |fixtures| fixtures.color == color);
-    fixtures.flat_map(|fixtures| fixtures.members.clone().map(|member| (member, fixtures.range)))
 }
 
 fn antenna(robot: &RobotConfig) -> Antenna {

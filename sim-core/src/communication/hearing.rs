@@ -40,7 +40,7 @@ pub(crate) struct Heard {
     /// How far off the sector's direction it is, radians.
     phi: f64,
     /// Logarithm of its strength.
-    loudness: f64,
+    log_strength: f64,
 }
 
 /// The strongest emitter in every sector of every robot. Every emitter puts a
@@ -109,10 +109,10 @@ impl Hearing {
                 }
                 let bearing = wrap_angle(emitter.bearing - headings[robot]);
                 let mut hear_in = |sector: usize, phi: f64| {
-                    let loudness = receiver.decay.loudness(emitter.rho, phi);
+                    let log_strength = receiver.decay.log_strength(emitter.rho, phi);
                     let strongest = &mut sectors[sector];
-                    if strongest.is_none_or(|heard| loudness > heard.loudness) {
-                        *strongest = Some(Heard { emitter, phi, loudness });
+                    if strongest.is_none_or(|heard| log_strength > heard.log_strength) {
+                        *strongest = Some(Heard { emitter, phi, log_strength });
                     }
                 };
                 let nearest = (bearing * sectors_per_radian + 0.5) as usize;
@@ -236,7 +236,7 @@ mod tests {
     fn robots_at_one_point_hear_each_other_ahead() {
         let hearing = hearing(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
         assert_eq!(emitters(&hearing, 0), [Some(1), None, None, None]);
-        assert_eq!(hearing.of(0)[0].unwrap().loudness, 0.0);
+        assert_eq!(hearing.of(0)[0].unwrap().log_strength, 0.0);
     }
 
     #[test]

@@ -39,16 +39,16 @@ pub(crate) struct Moment<'a> {
 impl<'a> Moment<'a> {
     /// This step of a trial.
     pub fn new(world: &'a World, swarm: &'a Swarm, lights: &'a [Vec2], step: u32) -> Self {
-        let judged = world.judged();
+        let evaluated = world.evaluated();
         Self {
             torus: &world.torus,
             step,
             moved: swarm.moved,
-            positions: &swarm.positions[judged.clone()],
-            headings: &swarm.headings[judged.clone()],
-            wheels: &swarm.wheels[judged.clone()],
-            leds: &swarm.leds[judged.clone()],
-            photosensitive: &swarm.photosensitive[judged],
+            positions: &swarm.positions[evaluated.clone()],
+            headings: &swarm.headings[evaluated.clone()],
+            wheels: &swarm.wheels[evaluated.clone()],
+            leds: &swarm.leds[evaluated.clone()],
+            photosensitive: &swarm.photosensitive[evaluated],
             lights,
         }
     }

@@ -1,38 +1,51 @@
 //! Distance sensor: per sector the nearness of the nearest robot.
 
-use super::{Decay, perturb, take_sectors};
-use crate::neighbours::Neighbour;
+use super::{Decay, Noise, NoiseStream, Sensor, Surroundings, Viewpoint, take_sectors};
 use crate::torus::wrap_angle;
-use numeric::random::Stream;
+use experiment_file::DistanceSensorConfig;
 
-/// A distance sensor.
+/// A distance sensor. Readings per sector, in \[0, 1\].
 #[derive(Debug, Clone)]
 pub(crate) struct DistanceSensor {
-    /// Sectors, n.
-    pub n_sectors: usize,
+    n_sectors: usize,
     /// Reach, cm.
-    pub range: f64,
-    /// Fading.
-    pub decay: Decay,
-    /// Standard deviation of the noise.
-    pub noise_deviation: f64,
+    range: f64,
+    decay: Decay,
+    noise_deviation: f64,
 }
 
 impl DistanceSensor {
-    /// Readings per sector, in \[0, 1\], of a robot with this heading.
-    pub fn sense(
-        &self,
-        neighbours: &[Neighbour],
-        heading: f64,
-        noise: &mut Stream,
-        readings: &mut [f64],
-    ) {
-        readings.fill(0.0);
-        for neighbour in neighbours.iter().filter(|neighbour| neighbour.rho <= self.range) {
-            let bearing = wrap_angle(neighbour.bearing - heading);
-            take_sectors(neighbour.rho, bearing, self.decay, readings, f64::max);
+    /// As configured.
+    pub fn new(config: &DistanceSensorConfig) -> Self {
+        Self {
+            n_sectors: config.n_sectors as usize,
+            range: config.range,
+            decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
+            noise_deviation: config.noise_variance.sqrt(),
         }
-        perturb(readings, self.noise_deviation, noise);
+    }
+}
+
+impl Sensor for DistanceSensor {
+    fn reading_len(&self) -> usize {
+        self.n_sectors
+    }
+
+    fn noise(&self) -> Noise {
+        Noise { deviation: self.noise_deviation, stream: NoiseStream::LIGHT_AND_DISTANCE }
+    }
+
+    fn robots_within(&self) -> f64 {
+        self.range
+    }
+
+    fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
+        reading.fill(0.0);
+        let neighbours = surroundings.neighbours.of(from.robot).iter();
+        for neighbour in neighbours.filter(|neighbour| neighbour.rho <= self.range) {
+            let bearing = wrap_angle(neighbour.bearing - from.heading);
+            take_sectors(neighbour.rho, bearing, self.decay, reading, f64::max);
+        }
     }
 }
 
@@ -43,7 +56,6 @@ mod tests {
     use super::*;
     use crate::neighbours::Neighbours;
     use crate::torus::{Torus, Vec2};
-    use numeric::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 
@@ -60,8 +72,10 @@ mod tests {
         let mut neighbours = Neighbours::new(100.0, robots.len());
         neighbours.update(&TORUS, &robots);
         let mut readings = vec![7.0; 4];
-        let mut noise = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        sensor.sense(neighbours.of(1), 0.0, &mut noise, &mut readings);
+        let from = Viewpoint { robot: 1, position: own, heading: 0.0 };
+        let neighbours = &neighbours;
+        let surroundings = Surroundings { torus: &TORUS, neighbours, lights: &[], areas: &[] };
+        sensor.sense(from, &surroundings, &mut readings);
         readings
     }
 

@@ -1,42 +1,52 @@
 //! Light sensor: per sector the sum over the lights of its colour.
 
-use super::{Decay, Viewpoint, perturb};
-use crate::torus::Vec2;
-use numeric::random::Stream;
+use super::{Decay, Noise, NoiseStream, Sensor, Surroundings, Viewpoint, take_sectors};
+use crate::objects::StaticObjects;
+use crate::torus::wrap_angle;
+use experiment_file::LightSensorConfig;
 
-/// A light sensor and the lights that it can see.
+/// A light sensor and the lights that it can see. Readings per sector, in
+/// \[0, 1\].
 #[derive(Debug, Clone)]
 pub(crate) struct LightSensor {
-    /// Sectors, n.
-    pub n_sectors: usize,
-    /// Fading.
-    pub decay: Decay,
-    /// Standard deviation of the noise.
-    pub noise_deviation: f64,
+    n_sectors: usize,
+    decay: Decay,
+    noise_deviation: f64,
     /// Lights of its colour, each with the distance within which it is seen, cm.
-    pub lights: Vec<(usize, f64)>,
+    lights: Vec<(usize, f64)>,
 }
 
 impl LightSensor {
-    /// Readings per sector, in \[0, 1\]; `lights` are the positions of all lights.
-    pub fn sense(
-        &self,
-        from: Viewpoint<'_>,
-        lights: &[Vec2],
-        noise: &mut Stream,
-        readings: &mut [f64],
-    ) {
-        readings.fill(0.0);
-        for &(light, reach) in &self.lights {
-            from.view(lights[light], reach, self.decay, readings, |sum, strength| sum + strength);
+    /// As configured, for those of `lights` that have its colour.
+    pub fn new(config: &LightSensorConfig, lights: &[StaticObjects]) -> Self {
+        let lights = StaticObjects::of_color(lights, &config.color);
+        Self {
+            n_sectors: config.n_sectors as usize,
+            decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
+            noise_deviation: config.noise_variance.sqrt(),
+            lights: lights.map(|(light, range)| (light, range.min(config.range))).collect(),
         }
-        perturb(readings, self.noise_deviation, noise);
+    }
+}
+
+impl Sensor for LightSensor {
+    fn reading_len(&self) -> usize {
+        self.n_sectors
     }
 
-    /// Passes over the noise of one step.
-    pub fn skip(&self, noise: &mut Stream) {
-        if self.noise_deviation > 0.0 {
-            noise.skip(self.n_sectors);
+    fn noise(&self) -> Noise {
+        Noise { deviation: self.noise_deviation, stream: NoiseStream::LIGHT_AND_DISTANCE }
+    }
+
+    fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
+        reading.fill(0.0);
+        for &(light, reach) in &self.lights {
+            let away = surroundings.torus.displacement(from.position, surroundings.lights[light]);
+            let rho = away.norm();
+            if rho <= reach {
+                let bearing = wrap_angle(away.angle() - from.heading);
+                take_sectors(rho, bearing, self.decay, reading, |sum, strength| sum + strength);
+            }
         }
     }
 }
@@ -46,8 +56,8 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use super::*;
-    use crate::torus::Torus;
-    use numeric::random::Purpose;
+    use crate::neighbours::Neighbours;
+    use crate::torus::{Torus, Vec2};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 
@@ -58,10 +68,11 @@ mod tests {
             noise_deviation: 0.0,
             lights: (0..lights.len()).map(|light| (light, reach)).collect(),
         };
-        let from = Viewpoint { torus: &TORUS, position: Vec2::new(5.0, 5.0), heading };
+        let from = Viewpoint { robot: 0, position: Vec2::new(5.0, 5.0), heading };
+        let neighbours = &Neighbours::new(0.0, 1);
+        let surroundings = Surroundings { torus: &TORUS, neighbours, lights, areas: &[] };
         let mut readings = vec![7.0; 4];
-        let mut noise = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        sensor.sense(from, lights, &mut noise, &mut readings);
+        sensor.sense(from, &surroundings, &mut readings);
         readings
     }
 
@@ -81,11 +92,11 @@ mod tests {
     }
 
     #[test]
-    fn lights_add_up_and_readings_are_clipped() {
+    fn lights_add_up() {
         let near = Vec2::new(6.0, 5.0);
         let far = Vec2::new(45.0, 5.0);
         let both = sense(&[near, far], 80.0, 0.0);
-        assert_eq!(both[0], 1.0);
+        assert_near(&both[..1], &[libm::exp(-0.05) + libm::exp(-2.0)]);
         let behind = libm::exp(-0.05 - PI) + libm::exp(-2.0 - PI);
         assert_near(&both[2..3], &[behind]);
     }

@@ -1,16 +1,149 @@
 //! Sensors beside the wireless receiver (section 3.2.2 of the thesis). Sector j of
 //! n points to heading + j * 2 pi / n.
+//!
+//! A kind of sensor implements [`Sensor`] in a file of its own and is mounted by
+//! [`mount`].
 
 mod distance;
 mod ground;
 mod light;
 
-pub(crate) use distance::DistanceSensor;
-pub(crate) use ground::GroundSensor;
-pub(crate) use light::LightSensor;
+use std::fmt::Debug;
+use std::ops::{Range, RangeInclusive};
+use std::sync::Arc;
 
-use crate::torus::{Torus, Vec2, angular_difference, sector_angle, wrap_angle};
-use numeric::random::Stream;
+use distance::DistanceSensor;
+use ground::GroundSensor;
+use light::LightSensor;
+
+use crate::neighbours::Neighbours;
+use crate::objects::StaticObjects;
+use crate::swarm::Swarm;
+use crate::torus::{Torus, Vec2, angular_difference, sector_angle};
+use experiment_file::{SensorQuery, SensorsConfig};
+
+/// A kind of sensor with its parameters, as mounted on the robots of a group.
+pub(crate) trait Sensor: Debug + Send + Sync {
+    /// Number of values of a reading.
+    fn reading_len(&self) -> usize;
+
+    /// Range to which the values of a reading are clipped, after noise.
+    fn value_range(&self) -> RangeInclusive<f64> {
+        0.0..=1.0
+    }
+
+    /// Noise of each value.
+    fn noise(&self) -> Noise;
+
+    /// Distance beyond which it senses no other robot, cm; 0: it senses none.
+    fn robots_within(&self) -> f64 {
+        0.0
+    }
+
+    /// Fills in the reading of one robot, without noise.
+    fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]);
+
+    /// Fills in the readings of a group, `[robot][value]`, without noise; those of
+    /// robots whose reading nobody wants are left as they are. It is one virtual
+    /// call per group and step, in which `sense` is none; not to be overridden.
+    fn sense_group(
+        &self,
+        robots: Range<usize>,
+        is_wanted: &[bool],
+        swarm: &Swarm,
+        surroundings: &Surroundings<'_>,
+        readings: &mut [f64],
+    ) {
+        let readings = readings.chunks_exact_mut(self.reading_len());
+        for ((robot, reading), _) in
+            robots.zip(readings).zip(is_wanted).filter(|(_, is_wanted)| **is_wanted)
+        {
+            let (position, heading) = (swarm.positions[robot], swarm.headings[robot]);
+            self.sense(Viewpoint { robot, position, heading }, surroundings, reading);
+        }
+    }
+}
+
+/// Gaussian noise on each value of a reading, one draw each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Noise {
+    /// Standard deviation, in the values' unit; 0: nothing is drawn.
+    pub deviation: f64,
+    /// Which of a robot's streams it is drawn from.
+    pub stream: NoiseStream,
+}
+
+impl Noise {
+    /// No noise.
+    pub const NONE: Self = Self { deviation: 0.0, stream: NoiseStream::LIGHT_AND_DISTANCE };
+}
+
+/// One of the streams that the noise of a robot's sensors is drawn from. Every
+/// kind of sensor has its own, so that no reading depends on which other sensors
+/// are mounted. The numbers are part of the format of a run: never reuse one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct NoiseStream(u32);
+
+impl NoiseStream {
+    /// Of the light sensor and, after it, the distance sensor. They share one, in
+    /// this order, because they did so in the first version of the format: with
+    /// streams of their own they would draw other noise, and every run of them would
+    /// be another one.
+    pub const LIGHT_AND_DISTANCE: Self = Self(0);
+
+    /// The stream's number, at [`Purpose::SensorNoise`](numeric::random::Purpose),
+    /// for a robot.
+    pub fn number(self, robot: usize) -> u64 {
+        // Robots are far fewer.
+        u64::from(self.0) << 32 | robot as u64
+    }
+}
+
+/// A sensor of a group of robots, and the reading that it gives.
+#[derive(Debug, Clone)]
+pub(crate) struct MountedSensor {
+    /// The name that stimuli have for the reading.
+    pub query: SensorQuery,
+    /// The sensor.
+    pub sensor: Arc<dyn Sensor>,
+}
+
+/// The sensors of a group of robots. Those that share a stream of noise draw from
+/// it in this order.
+pub(crate) fn mount(
+    config: &SensorsConfig,
+    lights: &[StaticObjects],
+    areas: &[StaticObjects],
+) -> Vec<MountedSensor> {
+    // What frames a receiver takes is the radio's business.
+    let SensorsConfig { wireless_receiver: _, light_sensor, distance_sensor, ground_sensor } =
+        config;
+    let mut mounted = Vec::new();
+    let mut mount = |query, sensor: Arc<dyn Sensor>| mounted.push(MountedSensor { query, sensor });
+    if let Some(config) = light_sensor {
+        mount(SensorQuery::Light, Arc::new(LightSensor::new(config, lights)));
+    }
+    if let Some(config) = distance_sensor {
+        mount(SensorQuery::Distance, Arc::new(DistanceSensor::new(config)));
+    }
+    if let Some(config) = ground_sensor {
+        mount(SensorQuery::Ground, Arc::new(GroundSensor::new(config, areas)));
+    }
+    mounted
+}
+
+/// What there is to sense beside frames.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surroundings<'a> {
+    /// The plane.
+    pub torus: &'a Torus,
+    /// Who is near whom, within the largest [`Sensor::robots_within`] at least.
+    pub neighbours: &'a Neighbours,
+    /// Positions of all lights.
+    pub lights: &'a [Vec2],
+    /// Centres of all ground areas.
+    pub areas: &'a [Vec2],
+}
 
 /// How what a robot perceives fades with distance and angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,44 +157,24 @@ pub(crate) struct Decay {
 impl Decay {
     /// Strength, in (0, 1\], at distance `rho` and angle `phi` off the sector.
     pub fn strength(&self, rho: f64, phi: f64) -> f64 {
-        libm::exp(self.loudness(rho, phi))
+        libm::exp(self.log_strength(rho, phi))
     }
 
     /// Logarithm of the strength.
-    pub fn loudness(&self, rho: f64, phi: f64) -> f64 {
+    pub fn log_strength(&self, rho: f64, phi: f64) -> f64 {
         -self.rho * rho - self.phi * phi
     }
 }
 
-/// The pose of a sensing robot.
+/// A sensing robot.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Viewpoint<'a> {
-    /// The plane.
-    pub torus: &'a Torus,
-    /// Where the robot is.
+pub(crate) struct Viewpoint {
+    /// Its number.
+    pub robot: usize,
+    /// Where it is, cm.
     pub position: Vec2,
     /// Where it looks, in \[0, 2 pi).
     pub heading: f64,
-}
-
-impl Viewpoint<'_> {
-    /// Hands each sector's strength of something at `target` to `take`, if it is
-    /// within `reach`.
-    fn view(
-        &self,
-        target: Vec2,
-        reach: f64,
-        decay: Decay,
-        readings: &mut [f64],
-        take: impl Fn(f64, f64) -> f64,
-    ) {
-        let away = self.torus.displacement(self.position, target);
-        let rho = away.norm();
-        if rho <= reach {
-            let bearing = wrap_angle(away.angle() - self.heading);
-            take_sectors(rho, bearing, decay, readings, take);
-        }
-    }
 }
 
 /// Hands each sector's strength of something at distance `rho` and in direction
@@ -77,43 +190,5 @@ fn take_sectors(
     for (sector, reading) in readings.iter_mut().enumerate() {
         let phi = angular_difference(bearing, sector_angle(sector, n_sectors));
         *reading = take(*reading, decay.strength(rho, phi));
-    }
-}
-
-/// Adds Gaussian noise to each reading, one draw each, and clips to \[0, 1\];
-/// without noise nothing is drawn.
-fn perturb(readings: &mut [f64], noise_deviation: f64, noise: &mut Stream) {
-    for reading in readings {
-        if noise_deviation > 0.0 {
-            *reading += noise_deviation * noise.normal();
-        }
-        *reading = reading.clamp(0.0, 1.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use numeric::random::Purpose;
-
-    #[test]
-    fn noise_has_its_variance_and_readings_stay_in_range() {
-        let mut noise = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        let mut expected = noise.clone();
-        let mut readings = [0.5, 0.9, 0.1, 0.0];
-        perturb(&mut readings, 0.4, &mut noise);
-        for (reading, clean) in readings.into_iter().zip([0.5, 0.9, 0.1, 0.0]) {
-            assert_eq!(reading, (clean + 0.4 * expected.normal()).clamp(0.0, 1.0));
-        }
-    }
-
-    #[test]
-    fn without_noise_nothing_is_drawn() {
-        let mut noise = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        let untouched = noise.clone().uniform();
-        let mut readings = [0.5, 1.7];
-        perturb(&mut readings, 0.0, &mut noise);
-        assert_eq!(readings, [0.5, 1.0]);
-        assert_eq!(noise.uniform(), untouched);
     }
 }
