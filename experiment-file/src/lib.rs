@@ -67,6 +67,7 @@ mod check;
 mod description;
 mod fitness;
 pub mod limits;
+mod neuron;
 mod node;
 mod problem;
 mod query;
@@ -89,6 +90,7 @@ pub use description::{
     AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Parameter, ParameterValue,
 };
 pub use fitness::*;
+pub use neuron::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
 pub use report::suggestion;

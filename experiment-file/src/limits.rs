@@ -5,6 +5,8 @@
 //! hours with a single episode. The bounds lie far above the experiments that
 //! this simulator exists for (10 to 50 robots, 24 neurons, about 450 genes).
 
+use std::ops::RangeInclusive;
+
 /// Bytes of an experiment file.
 pub const FILE_BYTES: usize = 1 << 20;
 /// Lists and objects within each other.
@@ -21,6 +23,10 @@ pub const QUERIES: usize = 1_024;
 /// product of a few of them overflows. Quantities that must be positive are at
 /// least its reciprocal.
 pub const MAGNITUDE: f64 = 1e9;
+/// Range of a quantity > 0.
+pub const POSITIVE: RangeInclusive<f64> = 1.0 / MAGNITUDE..=MAGNITUDE;
+/// Range of a quantity of either sign.
+pub const QUANTITY: RangeInclusive<f64> = -MAGNITUDE..=MAGNITUDE;
 
 /// Individuals per generation.
 pub const POPULATION: u32 = 100_000;

@@ -10,6 +10,7 @@ use indexmap::IndexMap;
 use jsonc_parser::ast::{self, Value};
 use serde::Deserialize;
 
+use crate::limits::{POSITIVE, QUANTITY};
 use crate::report::{Excerpt, Message, Path, Report, check_name, suggestion, unknown_name};
 use crate::variant::variant;
 use crate::{NamedMap, ParameterValue, limits};
@@ -110,37 +111,39 @@ impl<'a> Node<'a> {
         number.try_into().unwrap_or(*range.start())
     }
 
+    /// A number of a range; `POSITIVE` is worded as what it stands for.
     pub(crate) fn number(self, range: RangeInclusive<f64>) -> f64 {
         let (min, max) = (*range.start(), *range.end());
-        let must =
-            if min == max { format!("be {min}") } else { format!("be between {min} and {max}") };
-        self.number_that(&must, min, |x| range.contains(&x))
-    }
-
-    /// A quantity > 0.
-    pub(crate) fn positive(self) -> f64 {
-        const MAX: f64 = limits::MAGNITUDE;
-        let range = MAX.recip()..=MAX;
-        self.number_that(&format!("be positive and at most {MAX}"), MAX, |x| range.contains(&x))
-    }
-
-    fn number_that(self, must: &str, placeholder: f64, is_right: impl Fn(f64) -> bool) -> f64 {
+        let is_positive = range == POSITIVE;
+        let placeholder = if is_positive { max } else { min };
         let Some(Value::NumberLit(literal)) = self.value else {
             self.wrong_type::<()>("a number");
             return placeholder;
         };
         match literal.value.parse::<f64>() {
-            Ok(number) if is_right(number) => number,
+            Ok(number) if range.contains(&number) => number,
             _ => {
+                let must = if is_positive {
+                    format!("be positive and at most {max}")
+                } else if min == max {
+                    format!("be {min}")
+                } else {
+                    format!("be between {min} and {max}")
+                };
                 self.problem(|| format!("must {must}, is {}", Excerpt(literal.value)));
                 placeholder
             }
         }
     }
 
+    /// A quantity > 0.
+    pub(crate) fn positive(self) -> f64 {
+        self.number(POSITIVE)
+    }
+
     /// A quantity of either sign.
     pub(crate) fn quantity(self) -> f64 {
-        self.number(-limits::MAGNITUDE..=limits::MAGNITUDE)
+        self.number(QUANTITY)
     }
 
     /// A quantity >= 0.

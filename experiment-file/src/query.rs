@@ -7,13 +7,16 @@ use std::str::FromStr;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
+use super::neuron::evolvable_parameters;
+
 /// Names a part of the network's parameters (Table 4.1).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum GenotypeQuery {
     /// `synapses:weights:...`
     Weights(SynapseSelector),
-    /// `neurons:PARAMETER:...`
-    Neurons(NeuronParameter, EnsembleSelector),
+    /// `neurons:PARAMETER:...`: the name of a parameter that evolves in some
+    /// [`NeuronModel`](crate::NeuronModel).
+    Neurons(&'static str, EnsembleSelector),
 }
 
 /// The last part of `synapses:weights:...`. Kinds refer to the *presynaptic*
@@ -31,17 +34,6 @@ pub enum SynapseSelector {
     /// From the ensemble (or stimulus) of this name, or in the synapse group of
     /// this name.
     Named(String),
-}
-
-/// The middle part of `neurons:...:...`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NeuronParameter {
-    /// beta
-    Bias,
-    /// tau, decoded on a logarithmic scale: 2 * 10^x.
-    Tau,
-    /// g
-    Gain,
 }
 
 /// The last part of `neurons:...:...`.
@@ -76,17 +68,6 @@ impl EnsembleSelector {
     }
 }
 
-impl fmt::Display for NeuronParameter {
-    /// As it stands in a query.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Bias => "bias",
-            Self::Tau => "tau",
-            Self::Gain => "gain",
-        })
-    }
-}
-
 impl fmt::Display for GenotypeQuery {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -106,15 +87,26 @@ pub enum ParseQueryError {
     Unsupported(String),
     /// It has another form.
     #[error(
-        "expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `bias`, `tau` or `gain`"
+        "expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with {}",
+        parameter_names()
     )]
     Malformed,
+}
+
+/// Such as "`a`, `b` or `c`".
+fn parameter_names() -> String {
+    let quoted: Vec<String> =
+        evolvable_parameters().iter().map(|p| format!("`{}`", p.name)).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => quoted.concat(),
+    }
 }
 
 impl FromStr for GenotypeQuery {
     type Err = ParseQueryError;
 
-    /// Table 4.1; `gains` is another name of `gain`, as in section 4.3.
+    /// Table 4.1, with the parameters of all neuron models.
     fn from_str(text: &str) -> Result<Self, ParseQueryError> {
         let mut parts = text.splitn(3, ':');
         let mut next = || parts.next().filter(|part| !part.is_empty());
@@ -131,13 +123,15 @@ impl FromStr for GenotypeQuery {
                     name => SynapseSelector::Named(name.to_owned()),
                 }));
             }
-            ("neurons", "bias") => NeuronParameter::Bias,
-            ("neurons", "tau") => NeuronParameter::Tau,
-            ("neurons", "gain" | "gains") => NeuronParameter::Gain,
             ("synapses", "delays")
             | ("neurons", "decoding")
             | ("encoders" | "encoding" | "decoders" | "decoding", "weights") => {
                 return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
+            }
+            ("neurons", name) => {
+                let known = evolvable_parameters();
+                let named = known.iter().find(|p| p.name == name || p.aliases.contains(&name));
+                named.ok_or(ParseQueryError::Malformed)?.name
             }
             _ => return Err(ParseQueryError::Malformed),
         };
@@ -163,10 +157,13 @@ impl JsonSchema for GenotypeQuery {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let parameters = evolvable_parameters();
+        let names = parameters.iter().flat_map(|p| [&p.name].into_iter().chain(p.aliases)).copied();
+        let names = names.collect::<Vec<_>>().join("|");
         json_schema!({
             "description": "Names a part of the network's parameters (Table 4.1).",
             "type": "string",
-            "pattern": "^(synapses:weights|neurons:(bias|tau|gains?)):.+$",
+            "pattern": format!("^(synapses:weights|neurons:({names})):.+$"),
         })
     }
 }

@@ -8,7 +8,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use super::description::describe_algorithms;
-use super::{AlgorithmDescription, ExperimentConfig, limits};
+use super::{AlgorithmDescription, ExperimentConfig, NeuronModel, limits};
 
 /// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema,
 /// draft 2020-12). What it cannot express (names that resolve, sizes that agree,
@@ -160,16 +160,11 @@ pub(super) fn amount(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "description": description})
 }
 
-/// The names of the only neuron model.
-pub(super) fn neuron_model() -> Value {
-    json!({"enum": ["rate_model", "ctrnn"]})
-}
-
-/// The same in the form of Appendix A.
+/// The neuron model in the form of Appendix A.
 pub(super) fn neurons() -> Value {
     json!({
         "type": "object",
-        "properties": {"model": neuron_model()},
+        "properties": {"model": {"enum": NeuronModel::names()}},
         "required": ["model"],
         "additionalProperties": false,
     })

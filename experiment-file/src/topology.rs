@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{NamedMap, SensorQuery, limits, schema};
+use super::{NamedMap, NeuronModel, SensorQuery, limits, neuron, schema};
 
 /// Of [`TopologyConfig::dt`].
 pub(super) const DEFAULT_DT: f64 = 0.1;
@@ -13,13 +13,12 @@ pub(super) const DEFAULT_TIME_SCALE: u32 = 20;
 /// Of [`TopologyConfig::seed`].
 pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
 
-/// Structure of the CTRNN; its trainable values come from the genotype.
+/// Structure of the network; its trainable values come from the genotype.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("dt, time_scale, seed"),
+    transform = schema::optional("dt, time_scale, seed, neuron_model"),
     transform = schema::property("encoding", schema::encoding()),
-    transform = schema::property("neuron_model", schema::neuron_model()),
     transform = schema::property("neurons", schema::neurons()),
     transform = schema::property("synapse_model", json!({"const": "static_synapse"})),
     transform = schema::ignored("synapse_params")
@@ -34,6 +33,9 @@ pub struct TopologyConfig {
     /// Seed of the random connections (and of fixed weights); default 821.
     #[schemars(extend("default" = DEFAULT_CONNECTION_SEED))]
     pub seed: u64,
+    /// How the neurons work; default `rate_model`.
+    #[serde(skip_serializing_if = "NeuronModel::is_default")]
+    pub neuron_model: NeuronModel,
     /// Inputs, in the order in which they are stacked.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub stimuli: NamedMap<StimulusConfig>,
@@ -69,10 +71,14 @@ pub struct EnsembleConfig {
     /// Number of neurons.
     #[schemars(range(min = 1, max = limits::NEURONS))]
     pub n: u32,
-    /// Activation function F; default sigmoid.
-    pub activation: Activation,
-    /// Values for parameters that no query of the genotype covers.
-    pub params: NeuronParams,
+    /// Activation function F; default sigmoid. None for a neuron model without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Activation")]
+    pub activation: Option<Activation>,
+    /// Values for parameters that no query of the genotype covers: all parameters of
+    /// the neuron model, by name.
+    #[schemars(schema_with = "neuron::params_schema")]
+    pub params: NamedMap<f64>,
 }
 
 /// Activation function of an ensemble.
@@ -84,30 +90,6 @@ pub enum Activation {
     Sigmoid,
     /// Hyperbolic tangent, range (-1, 1).
     Tanh,
-}
-
-/// Neuron parameters outside the genotype.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    default,
-    deny_unknown_fields,
-    transform = schema::property("activation", json!({"$ref": "#/$defs/Activation"}))
-)]
-pub struct NeuronParams {
-    /// Time constant, seconds; default 2, which is 2 * 10^0 on Table 3.3's
-    /// scale.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub tau: f64,
-    /// Gain g; default 1.
-    pub gain: f64,
-    /// Bias beta; default 0.
-    pub bias: f64,
-}
-
-impl Default for NeuronParams {
-    fn default() -> Self {
-        Self { tau: 2.0, gain: 1.0, bias: 0.0 }
-    }
 }
 
 /// Connects an ensemble to an actuator.

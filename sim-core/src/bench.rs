@@ -6,14 +6,14 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use crate::lanes::Lanes;
-use crate::network::ctrnn::Ctrnn;
+use crate::network::dynamics::NetworkState;
 use crate::simulation::{EvaluateError, Simulation};
 use numeric::Isa;
 
 /// The network of a genotype, at work without robots.
 #[derive(Debug)]
 pub struct NetworkLoad {
-    ctrnn: Ctrnn,
+    state: NetworkState,
     stimuli: Lanes,
 }
 
@@ -33,12 +33,13 @@ impl NetworkLoad {
                 stimuli.set(input, lane, ((lane + 3 * input) % 11) as f32 / 11.0);
             }
         }
-        Ok(Self { ctrnn: Ctrnn::new(simulation.isa, network, &phenotype, n_lanes), stimuli })
+        let state = NetworkState::new(simulation.isa, network, &phenotype, n_lanes);
+        Ok(Self { state, stimuli })
     }
 
     /// One environment step.
     pub fn step(&mut self) {
-        self.ctrnn.step(black_box(&self.stimuli));
+        self.state.step(black_box(&self.stimuli));
     }
 }
 

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use indexmap::IndexMap;
+
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use experiment_file::{
-    EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter, SynapseSelector,
-    TopologyConfig,
+    EnsembleSelector, ExperimentConfig, GeneScale, GenotypeQuery, SynapseSelector, TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -23,28 +24,34 @@ pub(crate) struct Codec {
     uncovered: Vec<String>,
 }
 
-/// One gene: `parameter` = gene * span + low.
+/// One gene: the parameter's value is that of gene * span + low on its scale.
 #[derive(Debug, Clone, Copy)]
 struct Gene {
     parameter: Parameter,
     low: f64,
     span: f64,
+    scale: GeneScale,
 }
 
 /// A value of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Parameter {
-    /// Of a synapse.
+    /// The weight of the synapse of this number.
     Weight(usize),
-    /// Of a neuron.
-    Neuron(NeuronParameter, usize),
+    /// A parameter of the neuron of this number.
+    Neuron {
+        /// Index among the neuron model's parameters.
+        parameter: usize,
+        /// Number of the neuron.
+        neuron: usize,
+    },
 }
 
 impl Codec {
     /// Resolves the queries of all populations, in their order; notes populations
     /// without genes.
     pub fn compile(config: &ExperimentConfig, network: &Network, problems: &mut Problems) -> Self {
-        let mut coverage = Coverage::new(network);
+        let mut coverage = ParameterCoverage::new(network);
         let mut genes = Vec::new();
         let mut segments = Vec::new();
         for (name, population) in &config.algorithm.populations {
@@ -52,9 +59,10 @@ impl Codec {
             let bounds = population.min_vals.iter().zip(&population.max_vals);
             for (query, (&low, &high)) in population.objects.iter().zip(bounds) {
                 let span = high - low;
-                for parameter in select(query, network) {
+                let (parameters, scale) = select(query, network);
+                for parameter in parameters {
                     *coverage.of(parameter) = true;
-                    genes.push(Gene { parameter, low, span });
+                    genes.push(Gene { parameter, low, span, scale });
                 }
             }
             if genes.len() == first {
@@ -88,13 +96,11 @@ impl Codec {
     pub fn decode(&self, genotype: &[f64]) -> Phenotype {
         let mut phenotype = self.defaults.clone();
         for (gene, x) in self.genes.iter().zip(genotype) {
-            let value = x * gene.span + gene.low;
+            let value = gene.scale.value(x * gene.span + gene.low);
             match gene.parameter {
                 Parameter::Weight(synapse) => phenotype.weights[synapse] = value,
-                Parameter::Neuron(NeuronParameter::Bias, neuron) => phenotype.bias[neuron] = value,
-                Parameter::Neuron(NeuronParameter::Gain, neuron) => phenotype.gain[neuron] = value,
-                Parameter::Neuron(NeuronParameter::Tau, neuron) => {
-                    phenotype.tau[neuron] = tau(value);
+                Parameter::Neuron { parameter, neuron } => {
+                    phenotype.neurons[parameter][neuron] = value;
                 }
             }
         }
@@ -102,23 +108,24 @@ impl Codec {
     }
 }
 
-/// Time constants are decoded on a logarithmic scale.
-fn tau(exponent: f64) -> f64 {
-    2.0 * libm::pow(10.0, exponent)
-}
-
-/// The parameters that a query covers, in genotype order.
-fn select(query: &GenotypeQuery, network: &Network) -> Vec<Parameter> {
+/// The parameters that a query covers, in genotype order, and the scale of its genes.
+fn select(query: &GenotypeQuery, network: &Network) -> (Vec<Parameter>, GeneScale) {
     match query {
-        GenotypeQuery::Weights(selector) => select_weights(selector, network),
-        GenotypeQuery::Neurons(parameter, selector) => {
+        GenotypeQuery::Weights(selector) => (select_weights(selector, network), GeneScale::Linear),
+        GenotypeQuery::Neurons(name, selector) => {
+            let mut parameters = network.model.spec().parameters.iter().enumerate();
+            let named = parameters.find(|(_, parameter)| parameter.name == *name);
+            let Some((parameter, scale)) = named.and_then(|(i, p)| Some((i, p.gene?))) else {
+                return (Vec::new(), GeneScale::Linear);
+            };
             let neurons = match selector {
                 EnsembleSelector::All => 0..network.n_neurons(),
                 EnsembleSelector::Named(name) => {
                     network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
                 }
             };
-            neurons.map(|neuron| Parameter::Neuron(*parameter, neuron)).collect()
+            let parameters = neurons.map(|neuron| Parameter::Neuron { parameter, neuron });
+            (parameters.collect(), scale)
         }
     }
 }
@@ -157,7 +164,7 @@ fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Paramete
 fn defaults(
     config: &TopologyConfig,
     network: &Network,
-    coverage: &Coverage,
+    coverage: &ParameterCoverage,
     problems: &mut Problems,
 ) -> Phenotype {
     let mut weights = vec![0.0; network.synapses.len()];
@@ -167,49 +174,39 @@ fn defaults(
             weights[synapse] = -1.0 + 2.0 * stream.uniform();
         }
     }
-    let mut phenotype = Phenotype { weights, tau: vec![], gain: vec![], bias: vec![] };
-    for (name, ensemble) in &network.ensembles {
-        let params = ensemble.defaults;
-        // Euler steps beyond twice the time constant diverge.
-        if network.dt > 2.0 * params.tau
-            && coverage.tau[ensemble.neurons.clone()].iter().any(|covered| !covered)
-        {
-            let message = format!("{} s is less than half of topology.dt: unstable", params.tau);
-            problems.add(format!("topology.ensembles.{name}.params.tau"), message);
+    let mut neurons = IndexMap::new();
+    for (parameter, covered) in network.model.spec().parameters.iter().zip(&coverage.neurons) {
+        let mut values = Vec::with_capacity(network.n_neurons());
+        for (name, ensemble) in &network.ensembles {
+            let value = ensemble.default_of(parameter);
+            let is_used = !covered[ensemble.neurons.clone()].iter().all(|&covered| covered);
+            // Euler steps beyond twice the time constant diverge.
+            if parameter.is_time_constant && network.dt > 2.0 * value && is_used {
+                let message = format!("{value} s is less than half of topology.dt: unstable");
+                let path = format!("topology.ensembles.{name}.params.{}", parameter.name);
+                problems.add(path, message);
+            }
+            values.extend(ensemble.neurons.clone().map(|_| value));
         }
-        for _ in ensemble.neurons.clone() {
-            phenotype.tau.push(params.tau);
-            phenotype.gain.push(params.gain);
-            phenotype.bias.push(params.bias);
-        }
+        neurons.insert(parameter.name, values);
     }
-    phenotype
+    Phenotype { weights, neurons }
 }
 
 /// Which values the genotype covers.
-struct Coverage {
+struct ParameterCoverage {
+    /// By number of the synapse.
     weights: Vec<bool>,
-    bias: Vec<bool>,
-    tau: Vec<bool>,
-    gain: Vec<bool>,
+    /// By index of the parameter and number of the neuron.
+    neurons: Vec<Vec<bool>>,
 }
 
-impl Coverage {
+impl ParameterCoverage {
     fn new(network: &Network) -> Self {
-        let neurons = vec![false; network.n_neurons()];
+        let n_parameters = network.model.spec().parameters.len();
         Self {
             weights: vec![false; network.synapses.len()],
-            bias: neurons.clone(),
-            tau: neurons.clone(),
-            gain: neurons,
-        }
-    }
-
-    fn neurons(&self, parameter: NeuronParameter) -> &[bool] {
-        match parameter {
-            NeuronParameter::Bias => &self.bias,
-            NeuronParameter::Tau => &self.tau,
-            NeuronParameter::Gain => &self.gain,
+            neurons: vec![vec![false; network.n_neurons()]; n_parameters],
         }
     }
 
@@ -217,9 +214,7 @@ impl Coverage {
     fn of(&mut self, parameter: Parameter) -> &mut bool {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
-            Parameter::Neuron(NeuronParameter::Bias, neuron) => &mut self.bias[neuron],
-            Parameter::Neuron(NeuronParameter::Tau, neuron) => &mut self.tau[neuron],
-            Parameter::Neuron(NeuronParameter::Gain, neuron) => &mut self.gain[neuron],
+            Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],
         }
     }
 
@@ -232,16 +227,12 @@ impl Coverage {
                 lines.push(format!("synapses:weights:{name}: {n} weights stay random"));
             }
         }
-        for parameter in [NeuronParameter::Bias, NeuronParameter::Tau, NeuronParameter::Gain] {
+        let parameters = network.model.spec().parameters.iter().zip(&self.neurons);
+        for (parameter, covered) in parameters.filter(|(parameter, _)| parameter.gene.is_some()) {
             for (name, ensemble) in &network.ensembles {
-                let (label, value) = match parameter {
-                    NeuronParameter::Bias => ("bias", ensemble.defaults.bias),
-                    NeuronParameter::Tau => ("tau", ensemble.defaults.tau),
-                    NeuronParameter::Gain => ("gain", ensemble.defaults.gain),
-                };
-                if self.neurons(parameter)[ensemble.neurons.clone()].iter().any(|covered| !covered)
-                {
-                    lines.push(format!("neurons:{label}:{name} stays {value}"));
+                if covered[ensemble.neurons.clone()].iter().any(|covered| !covered) {
+                    let value = ensemble.default_of(parameter);
+                    lines.push(format!("neurons:{}:{name} stays {value}", parameter.name));
                 }
             }
         }
@@ -290,11 +281,11 @@ mod tests {
         let gene = |gene: &Gene| {
             let value = match gene.parameter {
                 Parameter::Weight(synapse) => phenotype.weights[synapse],
-                Parameter::Neuron(NeuronParameter::Bias, neuron) => phenotype.bias[neuron],
-                Parameter::Neuron(NeuronParameter::Gain, neuron) => phenotype.gain[neuron],
-                Parameter::Neuron(NeuronParameter::Tau, neuron) => {
-                    libm::log10(phenotype.tau[neuron] / 2.0)
-                }
+                Parameter::Neuron { parameter, neuron } => phenotype.neurons[parameter][neuron],
+            };
+            let value = match gene.scale {
+                GeneScale::Linear => value,
+                GeneScale::PowerOfTen { factor } => libm::log10(value / factor),
             };
             (value - gene.low) / gene.span
         };
@@ -311,9 +302,9 @@ mod tests {
                 prop_assert!((gene - back).abs() < 1e-12);
             }
             prop_assert!(phenotype.weights.iter().all(|w| (-3.0..=3.0).contains(w)));
-            prop_assert!(phenotype.tau.iter().all(|tau| (0.2..=11.25).contains(tau)));
-            prop_assert!(phenotype.gain.iter().all(|gain| (0.05..=5.0).contains(gain)));
-            prop_assert!(phenotype.bias.iter().all(|bias| (-1.5..=1.5).contains(bias)));
+            for (name, range) in [("tau", 0.2..=11.25), ("gain", 0.05..=5.0), ("bias", -1.5..=1.5)] {
+                prop_assert!(phenotype.neurons[name].iter().all(|value| range.contains(value)));
+            }
         }
     }
 
@@ -327,9 +318,9 @@ mod tests {
         genes[n_weights + 24] = 4.0 / 7.0;
         let phenotype = codec.decode(&genes);
         assert_eq!(phenotype.weights[..2], [3.0, 0.0]);
-        assert_eq!(phenotype.bias[..2], [-1.5, 0.0]);
-        assert!((phenotype.tau[0] - 2.0).abs() < 1e-12, "2 * 10^0");
-        assert!((phenotype.gain[0] - 2.525).abs() < 1e-12);
+        assert_eq!(phenotype.neurons["bias"][..2], [-1.5, 0.0]);
+        assert!((phenotype.neurons["tau"][0] - 2.0).abs() < 1e-12, "2 * 10^0");
+        assert!((phenotype.neurons["gain"][0] - 2.525).abs() < 1e-12);
     }
 
     #[test]
@@ -354,7 +345,7 @@ mod tests {
         );
         let bias = |name: &str| {
             let ensemble = EnsembleSelector::Named(name.into());
-            GenotypeQuery::Neurons(NeuronParameter::Bias, ensemble)
+            GenotypeQuery::Neurons("bias", ensemble)
         };
         assert_eq!(n_genes(bias("OUT_COMM")), 2);
         for query in [named("H3"), bias("H3"), bias("I1")] {
@@ -373,10 +364,10 @@ mod tests {
         empty.algorithm.populations[0] = experiment_a().algorithm.populations[0].clone();
         assert!(compile(&empty).2.check().is_ok(), "other synapses exist");
         let mut fast = with_queries(&[named("I1-H1")]);
-        fast.topology.ensembles[0].params.tau = 0.04;
+        fast.topology.ensembles[0].params["tau"] = 0.04;
         assert!(compile(&fast).2.check().is_err());
         let mut covered = experiment_a();
-        covered.topology.ensembles[0].params.tau = 0.04;
+        covered.topology.ensembles[0].params["tau"] = 0.04;
         assert!(compile(&covered).2.check().is_ok());
     }
 

@@ -7,7 +7,7 @@ mod suite;
 
 use experiment_file::{
     AlgorithmConfig, AlgorithmDescription, AlgorithmParams, Domain, FitnessFunction, NamedMap,
-    PopulationConfig, TopologyConfig, WorldConfig,
+    NeuronModel, PopulationConfig, TopologyConfig, WorldConfig,
 };
 
 use super::*;
@@ -173,6 +173,7 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
             dt: 0.1,
             time_scale: 20,
             seed: 821,
+            neuron_model: NeuronModel::Rate,
             stimuli: NamedMap::new(),
             ensembles: NamedMap::new(),
             outputs: NamedMap::new(),

@@ -20,6 +20,12 @@ pub(super) fn check(
 struct NetworkSize {
     n_inputs: u64,
     n_neurons: u64,
+    /// Numbers that a worker keeps for the neurons of one robot.
+    n_states: u64,
+    /// Parameters of all neurons that can evolve.
+    n_neuron_genes: u64,
+    /// Operations of all neurons in a substep.
+    n_neuron_operations: u64,
     /// If every possible one exists.
     n_synapses: u64,
 }
@@ -33,9 +39,14 @@ impl NetworkSize {
         };
         let size_of_all = |names: &[String]| names.iter().map(size).sum::<u64>();
         let groups = topology.synapses.values();
+        let model = topology.neuron_model.spec();
+        let n_neurons = topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum();
         Self {
             n_inputs: topology.stimuli.values().map(|stimulus| u64::from(stimulus.n)).sum(),
-            n_neurons: topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum(),
+            n_neurons,
+            n_states: n_neurons * model.states_per_neuron,
+            n_neuron_genes: n_neurons * model.evolvable().count() as u64,
+            n_neuron_operations: n_neurons * model.operations_per_neuron,
             n_synapses: groups
                 .map(|group| size_of_all(&group.pre) * size_of_all(&group.post))
                 .sum(),
@@ -55,7 +66,7 @@ fn network_size(network: &NetworkSize, report: &Report<'_>) {
     let topology = Path::from(["topology"]);
     let [stimuli, ensembles, synapses] =
         ["stimuli", "ensembles", "synapses"].map(|key| topology.key(key));
-    let &NetworkSize { n_inputs, n_neurons, n_synapses } = network;
+    let &NetworkSize { n_inputs, n_neurons, n_synapses, .. } = network;
     limit(n_inputs, limits::INPUTS.into(), "inputs", &stimuli, &[], report);
     limit(n_neurons, limits::NEURONS.into(), "neurons", &ensembles, &[], report);
     let parts = [&stimuli, &ensembles];
@@ -78,7 +89,7 @@ fn generation(
     let parts = [&algorithm.key("num_evaluations")];
     limit(n_trials, limits::TRIALS_PER_GENERATION, what, &size_path, &parts, report);
 
-    let n_genes = network.n_synapses + 3 * network.n_neurons;
+    let n_genes = network.n_synapses + network.n_neuron_genes;
     let what = "possible genes per generation";
     let parts = [&topology];
     limit(size * n_genes, limits::GENES_PER_GENERATION, what, &size_path, &parts, report);
@@ -102,7 +113,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     limit(n_robots, limits::ROBOTS.into(), "robots", &path, &[], report);
     limit(n_fixtures, limits::FIXTURES.into(), "lights and ground areas", &path, &[], report);
 
-    let states = n_robots * (network.n_inputs + network.n_neurons);
+    let states = n_robots * (network.n_inputs + network.n_states);
     let what = "inputs and neurons of all robots";
     limit(states, limits::NETWORK_STATES, what, &path, &[&topology], report);
 
@@ -112,7 +123,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
 
     let n_sensed = n_robots + n_fixtures;
     let of_robot = |robot: &RobotConfig| {
-        let substep = network.n_synapses + network.n_neurons;
+        let substep = network.n_synapses + network.n_neuron_operations;
         let think = match robot.controller {
             RobotController::NeuralController => substep * u64::from(config.topology.time_scale),
             RobotController::BraitenbergLightFollower => 0,

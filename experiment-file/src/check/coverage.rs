@@ -3,13 +3,10 @@
 use std::fmt;
 
 use crate::report::{Path, Report, suggestion};
-use crate::{
-    EnsembleSelector, GenotypeQuery, NeuronParameter, SynapseGroupConfig, SynapseSelector,
-    TopologyConfig,
-};
+use crate::{EnsembleSelector, GenotypeQuery, SynapseGroupConfig, SynapseSelector, TopologyConfig};
 
 /// The evolvable parts of a network and who claimed them.
-pub(super) struct Coverage<'a> {
+pub(super) struct ParameterCoverage<'a> {
     topology: &'a TopologyConfig,
     parts: Vec<Part<'a>>,
 }
@@ -26,7 +23,7 @@ enum PartKind<'a> {
     /// The weights of a group's synapses from one of its names.
     Weights { group: &'a str, pre: &'a str, source: Source },
     /// A parameter of an ensemble's neurons.
-    Neurons { parameter: NeuronParameter, ensemble: &'a str },
+    Neurons { parameter: &'static str, ensemble: &'a str },
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -36,7 +33,7 @@ enum Source {
     Motor,
 }
 
-impl<'a> Coverage<'a> {
+impl<'a> ParameterCoverage<'a> {
     pub(super) fn new(topology: &'a TopologyConfig) -> Self {
         let source = |name: &str| {
             if topology.stimuli.contains_key(name) {
@@ -54,8 +51,8 @@ impl<'a> Coverage<'a> {
             pre.map(move |pre| PartKind::Weights { group, pre, source: source(pre) })
         });
         let neurons = topology.ensembles.keys().flat_map(|ensemble| {
-            [NeuronParameter::Bias, NeuronParameter::Tau, NeuronParameter::Gain]
-                .map(|parameter| PartKind::Neurons { parameter, ensemble })
+            let parameters = topology.neuron_model.spec().evolvable();
+            parameters.map(move |p| PartKind::Neurons { parameter: p.name, ensemble })
         });
         let parts = weights.chain(neurons).map(|kind| Part { kind, owner: None }).collect();
         Self { topology, parts }
@@ -77,7 +74,7 @@ impl<'a> Coverage<'a> {
             return report.conflict(path, &others, || self.explain(query));
         }
         let others = match query {
-            GenotypeQuery::Neurons(..) => vec![ensembles],
+            GenotypeQuery::Neurons(..) => vec![ensembles, part("neuron_model"), part("neurons")],
             GenotypeQuery::Weights(_) => vec![stimuli, part("synapses"), part("outputs")],
         };
         let others: Vec<&Path> = others.iter().collect();

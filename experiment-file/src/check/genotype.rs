@@ -2,11 +2,11 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    AlgorithmDescription, Domain, ExperimentConfig, GenotypeQuery, NeuronParameter, ParameterValue,
-    PopulationConfig, limits,
+    AlgorithmDescription, Domain, ExperimentConfig, GenotypeQuery, ParameterValue,
+    PopulationConfig, TopologyConfig, limits,
 };
 
-use super::coverage::Coverage;
+use super::coverage::ParameterCoverage;
 
 pub(super) fn check(
     config: &ExperimentConfig,
@@ -28,20 +28,29 @@ pub(super) fn check(
         let message = || format!("this algorithm needs at least {individuals_min} individuals");
         report.conflict(&path, &[], message);
     }
-    let mut coverage = Coverage::new(&config.topology);
+    let mut coverage = ParameterCoverage::new(&config.topology);
     for (name, population) in populations {
         let path = populations_path.key(name);
         for (i, query) in population.objects.iter().enumerate() {
             coverage.claim(query, name, &path.key("objects").index(i), report);
         }
-        bounds(population, config.topology.dt, &path, report);
+        bounds(population, &config.topology, &path, report);
         if let Some(algorithm) = algorithm {
             sizes(algorithm, population_size, population, &path, report);
         }
     }
 }
 
-fn bounds(population: &PopulationConfig, dt: f64, path: &Path, report: &Report<'_>) {
+/// Bounds are in order, and the values that they stand for are within the range of
+/// what they bound.
+fn bounds(
+    population: &PopulationConfig,
+    topology: &TopologyConfig,
+    path: &Path,
+    report: &Report<'_>,
+) {
+    let [model, neurons, dt] =
+        ["neuron_model", "neurons", "dt"].map(|key| Path::from(["topology", key]));
     let bounds = population.min_vals.iter().zip(&population.max_vals);
     for (i, (query, (&min, &max))) in population.objects.iter().zip(bounds).enumerate() {
         let query_path = path.key("objects").index(i);
@@ -52,21 +61,25 @@ fn bounds(population: &PopulationConfig, dt: f64, path: &Path, report: &Report<'
                 format!("the maximum {max} of `{query}` is not above its minimum {min}")
             });
         }
-        if !matches!(query, GenotypeQuery::Neurons(NeuronParameter::Tau, _)) {
-            continue;
-        }
-        // The bounds of tau are exponents.
-        let (shortest, longest) = (2.0 * libm::exp10(min), 2.0 * libm::exp10(max));
-        if shortest < dt / 2.0 {
-            let dt_path = Path::from(["topology", "dt"]);
-            report.conflict(&min_path, &[&dt_path, &query_path], || {
-                format!("tau = 2 * 10^{min} s is below dt / 2: the network would be unstable")
+        let GenotypeQuery::Neurons(name, _) = query else { continue };
+        let Some(parameter) = topology.neuron_model.spec().parameter(name) else { continue };
+        let Some(scale) = parameter.gene else { continue };
+        let shown = |bound: f64| parameter.with_unit(format!("{name} = {}", scale.formula(bound)));
+        let (lowest, highest) = (scale.value(min), scale.value(max));
+        let (low, high) = (*parameter.range.start(), *parameter.range.end());
+        if parameter.is_time_constant && lowest < topology.dt / 2.0 {
+            report.conflict(&min_path, &[&dt, &model, &neurons, &query_path], || {
+                format!("{} is below dt / 2: the network would be unstable", shown(min))
+            });
+        } else if lowest < low {
+            report.conflict(&min_path, &[&model, &neurons, &query_path], || {
+                format!("{} is below the limit of {}", shown(min), parameter.with_unit(low))
             });
         }
-        if longest > limits::MAGNITUDE {
-            let limit = limits::MAGNITUDE;
-            let message = || format!("tau = 2 * 10^{max} s is above the limit of {limit} s");
-            report.conflict(&max_path, &[&query_path], message);
+        if highest > high {
+            report.conflict(&max_path, &[&model, &neurons, &query_path], || {
+                format!("{} is above the limit of {}", shown(max), parameter.with_unit(high))
+            });
         }
     }
 }

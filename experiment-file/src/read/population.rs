@@ -3,8 +3,8 @@
 use super::node::{Node, Object};
 use crate::algorithm::GENETIC_KEYS;
 use crate::{
-    AlgorithmDescription, AlgorithmParams, Domain, EnsembleSelector, GenotypeQuery,
-    NeuronParameter, ParameterValue, PopulationConfig, limits,
+    AlgorithmDescription, AlgorithmParams, Domain, GenotypeQuery, ParameterValue, PopulationConfig,
+    SynapseSelector, limits,
 };
 
 /// How the parameters of a population are read.
@@ -38,7 +38,7 @@ pub(super) fn population(o: &mut Object<'_>, params: ParamsReader) -> Population
 }
 
 fn query(node: Node<'_>) -> GenotypeQuery {
-    node.parsed().unwrap_or(GenotypeQuery::Neurons(NeuronParameter::Bias, EnsembleSelector::All))
+    node.parsed().unwrap_or(GenotypeQuery::Weights(SynapseSelector::All))
 }
 
 /// One bound per query; a single one serves all.

@@ -5,12 +5,12 @@ use crate::report::suggestion;
 use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
 use crate::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
 use crate::{
-    Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronParams,
-    OutputConfig, SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits,
+    Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronModel, OutputConfig,
+    SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits, neuron,
 };
 
 pub(super) fn topology(o: &mut Object<'_>) -> TopologyConfig {
-    neuron_model(o);
+    let model = neuron_model(o);
     let stimuli = o.required("stimuli").map(1, |_, node| node.object(stimulus));
     if let Some(node) = o.optional("encoding") {
         node.map(0, |name, node| encoding(name, node, &stimuli));
@@ -19,28 +19,32 @@ pub(super) fn topology(o: &mut Object<'_>) -> TopologyConfig {
         dt: o.or("dt", DEFAULT_DT, Node::positive),
         time_scale: o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE)),
         seed: o.or("seed", DEFAULT_CONNECTION_SEED, |node| node.u64(0..=u64::MAX)),
+        neuron_model: model.unwrap_or_default(),
         stimuli,
-        ensembles: o.required("ensembles").map(1, |_, node| node.object(ensemble)),
+        ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
         outputs: o.required("outputs").map(1, |_, node| node.object(output)),
         synapses: o.required("synapses").map(1, |_, node| node.object(synapse_group)),
         decoding: o.required("decoding").map(1, |_, node| node.object(decoding)),
     }
 }
 
-/// There is one model, so it need not be named.
-fn neuron_model(o: &mut Object<'_>) {
-    const KNOWN: [&str; 2] = ["rate_model", "ctrnn"];
-    const SPIKING: [&str; 5] = ["adex", "izhikevich", "lif", "exp_lif", "morris_lecar"];
-    if let Some(model) = o.optional("neuron_model") {
-        model.one_of(&KNOWN, &SPIKING);
-    }
-    if let Some(neurons) = o.optional("neurons") {
-        neurons.object(|o| o.required("model").one_of(&KNOWN, &SPIKING));
+/// The model, which a file may name in two places; none if it is unreadable.
+fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
+    let named = |node: Node<'_>| {
+        node.one_of(&NeuronModel::names(), &neuron::UNSUPPORTED).and_then(NeuronModel::named)
+    };
+    let outer = o.optional("neuron_model").map(named);
+    let inner = o.optional("neurons").map(|node| node.object(|o| named(o.required("model"))));
+    if let (Some(Some(outer)), Some(Some(inner))) = (outer, inner)
+        && outer != inner
+    {
+        o.problem("neuron_model", "`neurons` has another one");
     }
     if let Some(model) = o.optional("synapse_model") {
         model.one_of(&["static_synapse"], &["dynamic_synapse"]);
     }
     o.ignored("synapse_params", "static synapses have no parameters");
+    outer.or(inner).unwrap_or(Some(NeuronModel::default()))
 }
 
 fn stimulus(o: &mut Object<'_>) -> StimulusConfig {
@@ -64,27 +68,34 @@ fn encoding(name: &str, node: Node<'_>, stimuli: &NamedMap<StimulusConfig>) {
     });
 }
 
-fn ensemble(o: &mut Object<'_>) -> EnsembleConfig {
+/// `model`: none if it is unreadable; then nobody can tell which parameters are
+/// right.
+fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
+    let n = o.required("n").u32(1..=limits::NEURONS);
+    let Some(spec) = model.map(NeuronModel::spec) else {
+        for key in ["activation", "params"] {
+            o.optional(key);
+        }
+        return EnsembleConfig { n, activation: None, params: NamedMap::new() };
+    };
     let activation = |o: &mut Object<'_>| -> Option<Activation> {
+        spec.activation?;
         o.optional("activation").and_then(|node| node.variant(&[]))
     };
-    let default = NeuronParams::default();
-    let n = o.required("n").u32(1..=limits::NEURONS);
     let outer = activation(o);
     let (params, inner) = o.inner("params", |o| {
-        let params = NeuronParams {
-            tau: o.or("tau", default.tau, Node::positive),
-            gain: o.or("gain", default.gain, Node::quantity),
-            bias: o.or("bias", default.bias, Node::quantity),
-        };
-        (params, activation(o))
+        let parameters = spec.parameters.iter().map(|parameter| {
+            let read = |node: Node<'_>| node.number(parameter.range.clone());
+            (parameter.name.to_owned(), o.or(parameter.name, parameter.default, read))
+        });
+        (parameters.collect(), activation(o))
     });
     if let (Some(outer), Some(inner)) = (outer, inner)
         && outer != inner
     {
         o.problem("activation", "`params` has another one");
     }
-    EnsembleConfig { n, activation: outer.or(inner).unwrap_or(Activation::Sigmoid), params }
+    EnsembleConfig { n, activation: outer.or(inner).or(spec.activation), params }
 }
 
 fn output(o: &mut Object<'_>) -> OutputConfig {

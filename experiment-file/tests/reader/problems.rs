@@ -164,7 +164,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neurons:tau:H""#, r#""neurons:tau:HH""#,
      "line 45: algorithm.populations.neurons.objects[1]: no ensemble is named `HH`; did you mean `H`?"),
     (r#""neurons:tau:H""#, r#""neurons:tau""#,
-     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `bias`, `tau` or `gain`"),
+     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `tau`, `gain` or `bias`"),
     (r#""neurons:tau:H""#, r#""neurons:bias:H""#,
      "line 45: algorithm.populations.neurons.objects[1]: covers the bias of ensemble `H` a second time, after `neurons:bias:all` of population `neurons`"),
     (r#""neurons:tau:H""#, r#""synapses:weights:in""#,

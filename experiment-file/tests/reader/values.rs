@@ -3,7 +3,7 @@
 use super::{BASE, accept, defaults, edited, read};
 use evolution::ALGORITHMS;
 use experiment_file::{
-    Activation, Initializer, LightController, LightSourceConfig, NeuronParams, ObjectConfig,
+    Activation, Initializer, LightController, LightSourceConfig, NeuronModel, ObjectConfig,
     RobotController, UncontrollableRotationConfig, json_schema,
 };
 
@@ -13,8 +13,8 @@ fn what_a_file_omits_has_its_documented_default() {
     assert_eq!((config.seed, config.topology.seed), (0, 821));
     assert_eq!((config.topology.dt, config.topology.time_scale), (0.1, 20));
     assert_eq!((config.world.height, config.world.width), (1000.0, 1000.0));
-    assert_eq!(config.topology.ensembles["H"].activation, Activation::Sigmoid);
-    assert_eq!(config.topology.ensembles["H"].params, NeuronParams::default());
+    assert_eq!(config.topology.ensembles["H"].activation, Some(Activation::Sigmoid));
+    assert_eq!(config.topology.ensembles["H"].params, NeuronModel::Rate.default_params());
     assert!(config.topology.synapses["out"].trainable);
     let (_, bots) = config.robots().next().unwrap();
     let receiver = bots.sensors.wireless_receiver.as_ref().unwrap();

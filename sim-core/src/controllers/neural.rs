@@ -2,8 +2,8 @@
 
 use super::{Action, Controller};
 use crate::lanes::Lanes;
-use crate::network::ctrnn::Ctrnn;
 use crate::network::decoding::Output;
+use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use numeric::Isa;
 use numeric::random::Stream;
@@ -11,7 +11,7 @@ use numeric::random::Stream;
 /// One network, its state in every lane, and the decoding of its outputs.
 #[derive(Debug)]
 pub(crate) struct NeuralController<'a> {
-    ctrnn: Ctrnn,
+    state: NetworkState,
     outputs: &'a [Output],
     /// Scratch of decoders.
     weights: Vec<f64>,
@@ -20,19 +20,19 @@ pub(crate) struct NeuralController<'a> {
 impl<'a> NeuralController<'a> {
     /// At rest in every lane.
     pub fn new(isa: Isa, network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
-        let ctrnn = Ctrnn::new(isa, network, phenotype, n_lanes);
-        Self { ctrnn, outputs: &network.outputs, weights: Vec::new() }
+        let state = NetworkState::new(isa, network, phenotype, n_lanes);
+        Self { state, outputs: &network.outputs, weights: Vec::new() }
     }
 }
 
 impl Controller for NeuralController<'_> {
     fn perceive(&mut self, stimuli: &Lanes) {
-        self.ctrnn.step(stimuli);
+        self.state.step(stimuli);
     }
 
     fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>) {
         for output in self.outputs {
-            output.decode(self.ctrnn.activity(), lane, stream, &mut self.weights, action);
+            output.decode(self.state.activity(), lane, stream, &mut self.weights, action);
         }
     }
 }

@@ -1,13 +1,14 @@
 //! A network with its values, for people and other programs to read.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::connections::Source;
 use super::{Network, Phenotype};
 
 impl Network {
     /// Stimuli, neurons and synapses with their values. Inputs and neurons are
-    /// numbered each from 0 in the order of the experiment file.
+    /// numbered each from 0 in the order of the experiment file. A neuron has a key
+    /// for every parameter of the neuron model.
     pub fn to_json(&self, phenotype: &Phenotype) -> Value {
         let stimuli = self.stimuli.iter().map(|(name, stimulus)| {
             json!({
@@ -19,13 +20,15 @@ impl Network {
         });
         let neurons = self.ensembles.iter().flat_map(|(name, ensemble)| {
             ensemble.neurons.clone().map(move |neuron| {
-                json!({
-                    "ensemble": name,
-                    "activation": ensemble.activation,
-                    "tau": phenotype.tau[neuron],
-                    "gain": phenotype.gain[neuron],
-                    "bias": phenotype.bias[neuron],
-                })
+                let parameters = phenotype.neurons.iter();
+                let mut keys: Map<String, Value> = parameters
+                    .map(|(&name, values)| (name.into(), values[neuron].into()))
+                    .collect();
+                keys.insert("ensemble".into(), json!(name));
+                if let Some(activation) = ensemble.activation {
+                    keys.insert("activation".into(), json!(activation));
+                }
+                Value::Object(keys)
             })
         });
         let synapses = self.groups.iter().flat_map(|(name, group)| {
@@ -54,6 +57,7 @@ impl Network {
         json!({
             "dt": self.dt,
             "time_scale": self.n_substeps,
+            "neuron_model": self.model,
             "stimuli": stimuli.collect::<Vec<_>>(),
             "neurons": neurons.collect::<Vec<_>>(),
             "synapses": synapses.collect::<Vec<_>>(),

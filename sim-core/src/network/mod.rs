@@ -1,9 +1,11 @@
 //! The neural network's structure: what is the same for all genotypes.
 
 pub(crate) mod connections;
-pub(crate) mod ctrnn;
+mod ctrnn;
 pub(crate) mod decoding;
+pub(crate) mod dynamics;
 mod json;
+mod phenotype;
 
 use std::ops::Range;
 
@@ -12,7 +14,10 @@ use indexmap::IndexMap;
 use crate::problems::Problems;
 use connections::{Synapse, SynapseGroup};
 use decoding::Output;
-use experiment_file::{Activation, NeuronParams, SensorQuery, TopologyConfig};
+use experiment_file::{
+    Activation, NamedMap, NeuronModel, NeuronParameter, SensorQuery, TopologyConfig,
+};
+pub(crate) use phenotype::Phenotype;
 
 /// Structure of a network.
 #[derive(Debug, Clone)]
@@ -21,6 +26,8 @@ pub(crate) struct Network {
     pub dt: f64,
     /// Substeps per environment step.
     pub n_substeps: u32,
+    /// How its neurons work.
+    pub model: NeuronModel,
     /// Inputs by name, in the order of their rows.
     pub stimuli: IndexMap<String, Stimulus>,
     /// Neurons by name of their ensemble, in their order.
@@ -47,25 +54,19 @@ pub(crate) struct Stimulus {
 pub(crate) struct Ensemble {
     /// Its neurons.
     pub neurons: Range<usize>,
-    /// Activation function F.
-    pub activation: Activation,
-    /// Values of what the genotype does not cover.
-    pub defaults: NeuronParams,
+    /// Activation function F; none if the neuron model has none.
+    pub activation: Option<Activation>,
+    /// Values of the model's parameters that the genotype does not cover, by name.
+    pub defaults: NamedMap<f64>,
     /// Whether an output reads it.
     pub motor: bool,
 }
 
-/// What a genotype decides: one value per synapse, or per neuron.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Phenotype {
-    /// Per synapse.
-    pub weights: Vec<f64>,
-    /// Time constants tau per neuron, seconds.
-    pub tau: Vec<f64>,
-    /// Gains g per neuron.
-    pub gain: Vec<f64>,
-    /// Biases beta per neuron.
-    pub bias: Vec<f64>,
+impl Ensemble {
+    /// Value of a parameter that the genotype does not cover.
+    pub fn default_of(&self, parameter: &NeuronParameter) -> f64 {
+        self.defaults.get(parameter.name).copied().unwrap_or(parameter.default)
+    }
 }
 
 impl Network {
@@ -86,7 +87,7 @@ impl Network {
             let ensemble = Ensemble {
                 neurons,
                 activation: ensemble.activation,
-                defaults: ensemble.params,
+                defaults: ensemble.params.clone(),
                 motor,
             };
             (name.clone(), ensemble)
@@ -97,6 +98,7 @@ impl Network {
         Self {
             dt: config.dt,
             n_substeps: config.time_scale,
+            model: config.neuron_model,
             stimuli,
             ensembles,
             groups,

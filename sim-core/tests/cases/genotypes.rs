@@ -1,15 +1,13 @@
 //! What a genotype means: queries, segments, connections, defaults.
 
 use experiment_file::{
-    EnsembleSelector, ExperimentConfig, FitnessFunction, GenotypeQuery, NeuronParameter,
-    NeuronParams, SynapseGroupConfig, SynapseSelector,
+    EnsembleSelector, ExperimentConfig, FitnessFunction, GenotypeQuery, NamedMap,
+    SynapseGroupConfig, SynapseSelector,
 };
 use sim_core::Simulation;
 
 use crate::configs::{experiment_a, experiment_c, experiment_d};
 use crate::{assert_agreement, random_genotype, reference, spread};
-
-use NeuronParameter::{Bias, Gain, Tau};
 
 fn weights(of: &str) -> GenotypeQuery {
     GenotypeQuery::Weights(match of {
@@ -21,12 +19,17 @@ fn weights(of: &str) -> GenotypeQuery {
     })
 }
 
-fn neurons(parameter: NeuronParameter, of: &str) -> GenotypeQuery {
+fn neurons(parameter: &'static str, of: &str) -> GenotypeQuery {
     let selector = match of {
         "all" => EnsembleSelector::All,
         name => EnsembleSelector::Named(name.into()),
     };
     GenotypeQuery::Neurons(parameter, selector)
+}
+
+/// What an ensemble's `params` say.
+fn params(tau: f64, gain: f64, bias: f64) -> NamedMap<f64> {
+    [("tau", tau), ("gain", gain), ("bias", bias)].map(|(name, x)| (name.to_owned(), x)).into()
 }
 
 /// Replaces the populations: their queries with lower and upper bounds.
@@ -89,9 +92,9 @@ fn queries_cover_what_they_name() {
         (weights("OUT_COMM"), 26),
         (weights("I3"), 20),
         (weights("OUT_LED-H1"), 10),
-        (neurons(Bias, "all"), 24),
-        (neurons(Tau, "OUT_COMM"), 2),
-        (neurons(Gain, "H2"), 10),
+        (neurons("bias", "all"), 24),
+        (neurons("tau", "OUT_COMM"), 2),
+        (neurons("gain", "H2"), 10),
     ] {
         set_populations(&mut config, &[&[(query.clone(), -1.0, 0.0)]]);
         assert_eq!(genotype_len(&config), expected, "{query}");
@@ -105,9 +108,9 @@ fn every_population_has_its_segment() {
     set_populations(
         &mut config,
         &[
-            &[(weights("sensory"), -3.0, 3.0), (neurons(Bias, "all"), -1.0, 1.0)],
-            &[(neurons(Tau, "H1"), -1.0, 0.0)],
-            &[(weights("motor"), -3.0, 3.0), (neurons(Gain, "OUT_LED"), 0.0, 1.0)],
+            &[(weights("sensory"), -3.0, 3.0), (neurons("bias", "all"), -1.0, 1.0)],
+            &[(neurons("tau", "H1"), -1.0, 0.0)],
+            &[(weights("motor"), -3.0, 3.0), (neurons("gain", "OUT_LED"), 0.0, 1.0)],
         ],
     );
     let simulation = Simulation::compile(&config).expect("the configuration is valid");
@@ -123,11 +126,11 @@ fn decoded_networks_agree() {
     set_populations(
         &mut reordered,
         &[
-            &[(neurons(Gain, "H2"), 0.5, 2.0), (weights("motor"), -1.0, 2.0)],
+            &[(neurons("gain", "H2"), 0.5, 2.0), (weights("motor"), -1.0, 2.0)],
             &[
-                (neurons(Tau, "all"), -0.9, 0.5),
+                (neurons("tau", "all"), -0.9, 0.5),
                 (weights("sensory"), -2.0, 2.0),
-                (neurons(Bias, "OUT_LED"), -3.0, 0.0),
+                (neurons("bias", "OUT_LED"), -3.0, 0.0),
                 (weights("H1-OUT_LED"), -5.0, 5.0),
                 (weights("H2"), -3.0, 1.0),
             ],
@@ -149,15 +152,15 @@ fn decoded_networks_agree() {
     };
     topology.synapses.insert("mixed".into(), group(&["H2", "I1", "H1"], &["H2", "H1"], true));
     topology.synapses.insert("motors".into(), group(&["OUT_COMM"], &["OUT_ST", "OUT_LED"], false));
-    topology.ensembles["H1"].params = NeuronParams { tau: 0.5, gain: 2.0, bias: -0.3 };
-    topology.ensembles["OUT_ST"].params = NeuronParams { tau: 0.3, gain: 4.0, bias: 0.2 };
+    topology.ensembles["H1"].params = params(0.5, 2.0, -0.3);
+    topology.ensembles["OUT_ST"].params = params(0.3, 4.0, 0.2);
     set_populations(
         &mut partly_fixed,
         &[&[
             (weights("H1"), -3.0, 3.0),
             (weights("I2"), -3.0, 3.0),
-            (neurons(Bias, "OUT_LED"), -2.0, 1.0),
-            (neurons(Gain, "H2"), 0.1, 5.0),
+            (neurons("bias", "OUT_LED"), -2.0, 1.0),
+            (neurons("gain", "H2"), 0.1, 5.0),
         ]],
     );
 

@@ -104,7 +104,7 @@ fn messages_without_quantisation_agree() {
 fn messages_outside_the_lattice_agree() {
     let mut config = judged_by_every_led();
     config.algorithm.evaluation_steps = 100;
-    config.topology.ensembles["OUT_COMM"].activation = Activation::Tanh;
+    config.topology.ensembles["OUT_COMM"].activation = Some(Activation::Tanh);
     // So warm that a message left at -1 would choose other symbols than one at 0.
     transmitter_mut(&mut config).beta = 5.0;
     let episodes = assert_lively_agreement(&config);

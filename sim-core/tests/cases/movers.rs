@@ -76,7 +76,7 @@ fn motion_agrees_for_every_kind_of_drive() {
         config.algorithm.fitness_function = FitnessFunction::Grouping;
         config.algorithm.evaluation_steps = 60;
         config.topology.decoding["outB"] = decoding;
-        config.topology.ensembles["OUT_MOT"].activation = activation;
+        config.topology.ensembles["OUT_MOT"].activation = Some(activation);
         let swarm = swarm_mut(&mut config);
         swarm.num_instances = 5;
         swarm.perturbations.stimuli_inhibition.clear();

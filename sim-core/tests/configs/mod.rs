@@ -165,8 +165,11 @@ struct Motor {
 
 /// Figures 5.1, 5.3 and 5.4 with Tables 5.1 and 5.2.
 fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfig {
-    let ensemble =
-        |n, activation| EnsembleConfig { n, activation, params: NeuronParams::default() };
+    let ensemble = |n, activation| EnsembleConfig {
+        n,
+        activation: Some(activation),
+        params: NeuronModel::Rate.default_params(),
+    };
     let output = |ensemble: &str, actuator| OutputConfig { ensemble: ensemble.into(), actuator };
     let mut groups: Vec<(&str, &str, f64)> =
         stimuli.iter().map(|&(name, ..)| (name, "H1", 1.0)).collect();
@@ -191,6 +194,7 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
         dt: 0.1,
         time_scale: 20,
         seed: 821,
+        neuron_model: NeuronModel::Rate,
         stimuli: stimuli
             .iter()
             .map(|&(name, n, sensor)| (name.to_owned(), StimulusConfig { n, sensor }))
@@ -244,9 +248,9 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
             PopulationConfig {
                 objects: vec![
                     GenotypeQuery::Weights(SynapseSelector::All),
-                    GenotypeQuery::Neurons(NeuronParameter::Bias, EnsembleSelector::All),
-                    GenotypeQuery::Neurons(NeuronParameter::Tau, EnsembleSelector::All),
-                    GenotypeQuery::Neurons(NeuronParameter::Gain, EnsembleSelector::All),
+                    GenotypeQuery::Neurons("bias", EnsembleSelector::All),
+                    GenotypeQuery::Neurons("tau", EnsembleSelector::All),
+                    GenotypeQuery::Neurons("gain", EnsembleSelector::All),
                 ],
                 max_vals: vec![3.0, 1.5, 0.75, 5.0],
                 min_vals: vec![-3.0, -1.5, -1.0, 0.05],

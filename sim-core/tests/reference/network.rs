@@ -4,8 +4,7 @@
 use std::ops::Range;
 
 use experiment_file::{
-    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, NeuronParameter,
-    SynapseSelector, TopologyConfig,
+    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, SynapseSelector, TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -15,7 +14,7 @@ pub enum Gene {
     /// Weight of the synapse of this number.
     Weight(usize),
     /// Parameter of the neuron of this number.
-    Neuron(NeuronParameter, usize),
+    Neuron(&'static str, usize),
 }
 
 /// A gene with its bounds.
@@ -135,7 +134,7 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
                             neurons_of(topology, name).expect("the query names an ensemble")
                         }
                     };
-                    neurons.map(|neuron| Gene::Neuron(*parameter, neuron)).collect()
+                    neurons.map(|neuron| Gene::Neuron(parameter, neuron)).collect()
                 }
             };
             genes.extend(covered.into_iter().map(|gene| BoundedGene { gene, min, max }));
@@ -186,10 +185,10 @@ impl Network {
         let mut activation = Vec::new();
         for ensemble in topology.ensembles.values() {
             for _ in 0..ensemble.n {
-                tau.push(ensemble.params.tau);
-                gain.push(ensemble.params.gain);
-                bias.push(ensemble.params.bias);
-                activation.push(ensemble.activation);
+                tau.push(ensemble.params["tau"]);
+                gain.push(ensemble.params["gain"]);
+                bias.push(ensemble.params["bias"]);
+                activation.push(ensemble.activation.expect("rate neurons have one"));
             }
         }
         let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
@@ -197,11 +196,10 @@ impl Network {
             let value = x * (max - min) + min;
             match *gene {
                 Gene::Weight(synapse) => weights[synapse] = Some(value),
-                Gene::Neuron(NeuronParameter::Bias, neuron) => bias[neuron] = value,
-                Gene::Neuron(NeuronParameter::Gain, neuron) => gain[neuron] = value,
-                Gene::Neuron(NeuronParameter::Tau, neuron) => {
-                    tau[neuron] = 2.0 * 10f64.powf(value);
-                }
+                Gene::Neuron("bias", neuron) => bias[neuron] = value,
+                Gene::Neuron("gain", neuron) => gain[neuron] = value,
+                Gene::Neuron("tau", neuron) => tau[neuron] = 2.0 * 10f64.powf(value),
+                Gene::Neuron(other, _) => panic!("{other} is no parameter of a CTRNN"),
             }
         }
 

@@ -21,6 +21,7 @@ mod kernel;
 mod squash;
 
 use super::connections::Source;
+use super::dynamics::Dynamics;
 use super::{Network, Phenotype};
 use crate::lanes::Lanes;
 use experiment_file::Activation;
@@ -38,8 +39,6 @@ pub(crate) struct Ctrnn {
     chunks: Vec<Chunk>,
     /// The kernel's row of each neuron.
     rows: Vec<usize>,
-    /// u, `[neuron][lane]`.
-    activity: Lanes,
 }
 
 impl Ctrnn {
@@ -54,30 +53,23 @@ impl Ctrnn {
             Chunk::new(&kernel, first * isa.vector_len(), width, isa)
         });
         let chunks = chunks.collect();
-        let activity = Lanes::new(rows.len(), n_lanes);
-        let mut network = Self { isa, kernel, chunks, rows, activity };
-        network.show_activity();
-        network
+        Self { isa, kernel, chunks, rows }
     }
+}
 
-    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
-    pub fn step(&mut self, stimuli: &Lanes) {
+impl Dynamics for Ctrnn {
+    fn step(&mut self, stimuli: &Lanes) {
         for chunk in &mut self.chunks {
             chunk.advance(&self.kernel, stimuli, self.isa);
         }
-        self.show_activity();
     }
 
-    /// u, `[neuron][lane]`.
-    pub fn activity(&self) -> &Lanes {
-        &self.activity
-    }
-
-    fn show_activity(&mut self) {
+    /// u
+    fn write_activity(&self, activity: &mut Lanes) {
         for chunk in &self.chunks {
             for (neuron, &row) in self.rows.iter().enumerate() {
                 let lanes = chunk.activity(row);
-                self.activity.row_mut(neuron)[chunk.first_lane()..][..lanes.len()]
+                activity.row_mut(neuron)[chunk.first_lane()..][..lanes.len()]
                     .copy_from_slice(lanes);
             }
         }
@@ -99,17 +91,18 @@ fn compile(network: &Network, phenotype: &Phenotype) -> (Kernel, Vec<usize>) {
     for (synapse, weight) in network.synapses.iter().zip(&phenotype.weights) {
         incoming[synapse.post].push((synapse.pre, *weight));
     }
+    let [tau, gain, bias] = ["tau", "gain", "bias"].map(|name| &phenotype.neurons[name]);
     let mut kernel = Kernel::new(network.n_substeps);
     for (activation, members) in pairs {
         let mut pair = Pair { activation, ..Pair::default() };
         let first = (kernel.recurrent.len(), kernel.afferent.len());
         for (half, neuron) in members.into_iter().enumerate() {
             let Some(neuron) = neuron else { continue };
-            let rate = network.dt / phenotype.tau[neuron];
-            let scale = squash::scale(activation) * phenotype.gain[neuron];
-            pair.start[half] = (scale * phenotype.bias[neuron]) as f32;
+            let rate = network.dt / tau[neuron];
+            let scale = squash::scale(activation) * gain[neuron];
+            pair.start[half] = (scale * bias[neuron]) as f32;
             pair.retention[half] = (1.0 - rate) as f32;
-            pair.drive[half] = (rate * scale * phenotype.bias[neuron]) as f32;
+            pair.drive[half] = (rate * scale * bias[neuron]) as f32;
             for &(pre, weight) in &incoming[neuron] {
                 let weight = (rate * scale * weight) as f32;
                 let (couplings, first, pre) = match pre {
@@ -139,15 +132,17 @@ fn pair_up(network: &Network) -> Vec<(Activation, [Option<usize>; 2])> {
     let mut pairs = Vec::new();
     let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];
     for ensemble in network.ensembles.values() {
+        // The reader gives every ensemble of rate neurons one.
+        let function = ensemble.activation.unwrap_or_default();
         let mut neurons = ensemble.neurons.clone();
         while let Some(first) = neurons.next() {
             let second = neurons.next();
             if second.is_some() {
-                pairs.push((ensemble.activation, [Some(first), second]));
+                pairs.push((function, [Some(first), second]));
                 continue;
             }
             for (activation, single) in &mut left_over {
-                if *activation == ensemble.activation {
+                if *activation == function {
                     match single.take() {
                         None => *single = Some(first),
                         Some(other) => pairs.push((*activation, [Some(other), Some(first)])),

@@ -1,6 +1,7 @@
 //! The network against its equations, and against itself on other processors.
 
 use super::*;
+use crate::network::dynamics::NetworkState;
 use crate::problems::Problems;
 use crate::testing::experiment_a;
 use experiment_file::ExperimentConfig;
@@ -11,8 +12,8 @@ fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut 
         let mut u = Vec::new();
         for ensemble in network.ensembles.values() {
             u.extend(ensemble.neurons.clone().map(|i| {
-                let x = phenotype.gain[i] * (v[i] + phenotype.bias[i]);
-                match ensemble.activation {
+                let x = phenotype.neurons["gain"][i] * (v[i] + phenotype.neurons["bias"][i]);
+                match ensemble.activation.unwrap() {
                     Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
                     Activation::Tanh => libm::tanh(x),
                 }
@@ -31,7 +32,7 @@ fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut 
                 };
         }
         for i in 0..v.len() {
-            v[i] += network.dt / phenotype.tau[i] * (drive[i] - v[i]);
+            v[i] += network.dt / phenotype.neurons["tau"][i] * (drive[i] - v[i]);
         }
     }
     activities(v)
@@ -51,7 +52,7 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
 /// `tanh`, and an odd number of neurons.
 fn networks() -> [(Network, Phenotype); 3] {
     let mut tanh = experiment_a();
-    tanh.topology.ensembles["H2"].activation = Activation::Tanh;
+    tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);
     let mut odd = tanh.clone();
     odd.topology.ensembles["H1"].n = 7;
     odd.topology.ensembles["H2"].n = 9;
@@ -81,26 +82,26 @@ fn bits(
     lanes: std::ops::Range<usize>,
     lane: usize,
 ) -> Vec<u32> {
-    let mut ctrnn = Ctrnn::new(isa, network, phenotype, lanes.len());
+    let mut state = NetworkState::new(isa, network, phenotype, lanes.len());
     for step in 0..3 {
-        ctrnn.step(&stimuli(step, lanes.clone()));
+        state.step(&stimuli(step, lanes.clone()));
     }
-    ctrnn.activity().column(lane - lanes.start).map(f32::to_bits).collect()
+    state.activity().column(lane - lanes.start).map(f32::to_bits).collect()
 }
 
 #[test]
 fn every_lane_follows_the_equation() {
     for (network, phenotype) in networks() {
         let n_lanes = 11;
-        let mut ctrnn = Ctrnn::new(Isa::best(), &network, &phenotype, n_lanes);
+        let mut state = NetworkState::new(Isa::best(), &network, &phenotype, n_lanes);
         let mut v = vec![vec![0.0; network.n_neurons()]; n_lanes];
         for step in 0..5 {
-            ctrnn.step(&stimuli(step, 0..n_lanes));
+            state.step(&stimuli(step, 0..n_lanes));
             for (lane, v) in v.iter_mut().enumerate() {
                 let phi: Vec<f64> = (0..5).map(|input| stimulus(step, lane, input)).collect();
                 let u = reference(&network, &phenotype, &phi, v);
                 for (neuron, u) in u.into_iter().enumerate() {
-                    let difference = (f64::from(ctrnn.activity().get(neuron, lane)) - u).abs();
+                    let difference = (f64::from(state.activity().get(neuron, lane)) - u).abs();
                     assert!(difference < 1e-5, "step {step}, lane {lane}: {difference}");
                 }
             }

@@ -1,0 +1,219 @@
+//! Neuron models: which there are, and what an experiment file says of each.
+//!
+//! A model has its parameters, queries and costs in a [`NeuronModelSpec`]. The
+//! reader, the JSON Schema, the queries of the genotype, the budget and the canonical
+//! form all follow from it, and so does what `sim-core` decodes genes into. To add a
+//! model: a file beside `rate`, a variant of [`NeuronModel`] here, and in `sim-core`
+//! the model's dynamics.
+
+mod rate;
+
+use std::borrow::Cow;
+use std::fmt;
+use std::ops::RangeInclusive;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value, json};
+
+use super::{Activation, NamedMap};
+
+/// How the neurons of a network work: one model for all of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum NeuronModel {
+    /// Continuous-time recurrent neural network of rate neurons (CTRNN).
+    #[default]
+    Rate,
+}
+
+/// Models of the original simulator that this one does not know.
+pub(super) const UNSUPPORTED: [&str; 5] = ["adex", "izhikevich", "lif", "exp_lif", "morris_lecar"];
+
+/// What an experiment file can say of the neurons of a model, and what they cost.
+#[derive(Debug)]
+pub struct NeuronModelSpec {
+    /// Its names in files; the canonical form uses the first.
+    pub names: &'static [&'static str],
+    /// The parameters of a neuron, in the order of the canonical form.
+    pub parameters: &'static [NeuronParameter],
+    /// The activation function of an ensemble that names none; none for a model
+    /// whose neurons have no activation function.
+    pub activation: Option<Activation>,
+    /// Numbers that a worker keeps for a neuron of one robot, for the budget.
+    pub states_per_neuron: u64,
+    /// Operations of a neuron in a network substep, for the budget; a synapse has 1.
+    pub operations_per_neuron: u64,
+}
+
+/// A parameter of a model's neurons.
+#[derive(Debug)]
+pub struct NeuronParameter {
+    /// Its name in `params` and in queries.
+    pub name: &'static str,
+    /// Other names in queries.
+    pub aliases: &'static [&'static str],
+    /// One sentence for the schema, with its unit and its default.
+    pub description: &'static str,
+    /// Its unit, empty if it has none.
+    pub unit: &'static str,
+    /// Its value where neither the file nor a gene gives one.
+    pub default: f64,
+    /// Values that a neuron can have, from a file or from a gene.
+    pub range: RangeInclusive<f64>,
+    /// What a gene's bounds mean; none if the parameter cannot evolve.
+    pub gene: Option<GeneScale>,
+    /// Whether an Euler step longer than twice its value makes the network diverge.
+    pub is_time_constant: bool,
+}
+
+/// From a number between a query's `min_vals` and `max_vals` to a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GeneScale {
+    /// The number itself.
+    Linear,
+    /// `factor` * 10^number.
+    PowerOfTen {
+        /// The value for 0.
+        factor: f64,
+    },
+}
+
+impl NeuronModel {
+    /// Every model.
+    pub const ALL: [Self; 1] = [Self::Rate];
+
+    /// What files say of it, and what it costs.
+    pub fn spec(self) -> &'static NeuronModelSpec {
+        match self {
+            Self::Rate => &rate::SPEC,
+        }
+    }
+
+    /// The name in the canonical form.
+    pub fn name(self) -> &'static str {
+        self.spec().names[0]
+    }
+
+    /// The `params` of an ensemble that sets none: every parameter with its default.
+    pub fn default_params(self) -> NamedMap<f64> {
+        let parameters = self.spec().parameters.iter();
+        parameters.map(|parameter| (parameter.name.to_owned(), parameter.default)).collect()
+    }
+
+    /// The names of all models.
+    pub(super) fn names() -> Vec<&'static str> {
+        Self::ALL.iter().flat_map(|model| model.spec().names).copied().collect()
+    }
+
+    /// The model of a name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|model| model.spec().names.contains(&name))
+    }
+
+    /// Whether the canonical form leaves it out: files that name no model mean this
+    /// one, and canonical forms from before there was a choice stay what they are.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl NeuronModelSpec {
+    /// The parameter of this name.
+    pub fn parameter(&self, name: &str) -> Option<&NeuronParameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// The parameters that a query can name.
+    pub fn evolvable(&self) -> impl Iterator<Item = &NeuronParameter> {
+        self.parameters.iter().filter(|parameter| parameter.gene.is_some())
+    }
+}
+
+/// Every parameter that a query can name, of all models; a name that several models
+/// use, once.
+pub(super) fn evolvable_parameters() -> Vec<&'static NeuronParameter> {
+    let mut found: Vec<&NeuronParameter> = Vec::new();
+    for parameter in NeuronModel::ALL.iter().flat_map(|model| model.spec().evolvable()) {
+        if found.iter().all(|other| other.name != parameter.name) {
+            found.push(parameter);
+        }
+    }
+    found
+}
+
+impl GeneScale {
+    /// The value that a number stands for.
+    pub fn value(self, number: f64) -> f64 {
+        match self {
+            Self::Linear => number,
+            Self::PowerOfTen { factor } => factor * libm::pow(10.0, number),
+        }
+    }
+
+    /// How the value comes from the number, for people to read.
+    pub(super) fn formula(self, number: f64) -> String {
+        match self {
+            Self::Linear => number.to_string(),
+            Self::PowerOfTen { factor } => format!("{factor} * 10^{number}"),
+        }
+    }
+}
+
+impl Serialize for NeuronModel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl JsonSchema for NeuronModel {
+    fn schema_name() -> Cow<'static, str> {
+        "NeuronModel".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "How the neurons of the network work.",
+            "enum": Self::names(),
+        })
+    }
+}
+
+/// Schema of an ensemble's `params`: those of one of the models.
+pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
+    let activation = generator.subschema_for::<Activation>();
+    let of_model = |model: NeuronModel| {
+        let spec = model.spec();
+        let parameters = spec.parameters.iter();
+        let mut properties: Map<String, Value> =
+            parameters.map(|parameter| (parameter.name.to_owned(), parameter.schema())).collect();
+        if spec.activation.is_some() {
+            properties.insert("activation".to_owned(), activation.clone().to_value());
+        }
+        json_schema!({"type": "object", "properties": properties, "additionalProperties": false})
+    };
+    match NeuronModel::ALL.as_slice() {
+        [only] => of_model(*only),
+        several => {
+            json_schema!({"anyOf": several.iter().copied().map(of_model).collect::<Vec<_>>()})
+        }
+    }
+}
+
+impl NeuronParameter {
+    /// A value with its unit.
+    pub(super) fn with_unit(&self, value: impl fmt::Display) -> String {
+        if self.unit.is_empty() { value.to_string() } else { format!("{value} {}", self.unit) }
+    }
+
+    fn schema(&self) -> Value {
+        let (min, max) = (self.range.start(), self.range.end());
+        json!({
+            "description": self.description,
+            "type": "number",
+            "minimum": min,
+            "maximum": max,
+            "default": self.default,
+        })
+    }
+}
