@@ -1,8 +1,9 @@
 //! Random streams addressed by what they are for.
 //!
 //! A stream is ChaCha8 whose 256-bit key *is* its address, four little-endian
-//! 64-bit words `[seed, generation, trial, purpose]`, and whose 64-bit stream
-//! number is the robot. Streams of different addresses are independent, no
+//! 64-bit words `[seed, trial set, trial, purpose]`, and whose 64-bit stream
+//! number is the robot. A trial set ([`TrialSet`]) is the word g for generation g,
+//! g | 2^63 for its held-out trials, and 2^62 for evaluations. Streams of different addresses are independent, no
 //! stream depends on who draws from it or when, and any other program with a
 //! ChaCha8 can reproduce every number of a run.
 //!
@@ -18,6 +19,8 @@
 //!   countable; and its logarithm comes from `libm`, where the crates for
 //!   distributions would use the platform's as soon as any dependency asks for
 //!   their `std` feature.
+
+use std::fmt;
 
 use pulp::{Simd, WithSimd};
 use rand::{Rng as _, SeedableRng as _};
@@ -58,15 +61,89 @@ pub enum Purpose {
     Evolution = 11,
 }
 
+/// Which worlds and which noise trials meet: trial t of one set is another world
+/// than trial t of any other set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TrialSet {
+    /// The trials that generation g of an evolution is selected by, g from 0.
+    Generation(u64),
+    /// The held-out trials that belong to generation g: worlds and noise that
+    /// evolution never meets, for an honest look at what it found.
+    HeldOut(u64),
+    /// The trials of evaluations: the same for every run, neither of a generation
+    /// nor held out by one.
+    Evaluation,
+}
+
+impl TrialSet {
+    /// The generation that the trials belong to; none for evaluations.
+    pub const fn generation(self) -> Option<u64> {
+        match self {
+            Self::Generation(generation) | Self::HeldOut(generation) => Some(generation),
+            Self::Evaluation => None,
+        }
+    }
+
+    /// The kind of trials in one word, for logs: `selection`, `held-out` or
+    /// `evaluation`.
+    pub const fn kind(self) -> &'static str {
+        match self {
+            Self::Generation(_) => "selection",
+            Self::HeldOut(_) => "held-out",
+            Self::Evaluation => "evaluation",
+        }
+    }
+
+    /// The second word of a stream's address. The numbers are part of the format of
+    /// a run.
+    const fn word(self) -> u64 {
+        match self {
+            Self::Generation(generation) => {
+                debug_assert!(generation < EVALUATION_BIT, "no run has so many generations");
+                generation
+            }
+            Self::HeldOut(generation) => generation | HELD_OUT_BIT,
+            Self::Evaluation => EVALUATION_BIT,
+        }
+    }
+}
+
+const EVALUATION_BIT: u64 = 1 << 62;
+const HELD_OUT_BIT: u64 = 1 << 63;
+
+/// The trials of a generation.
+impl From<u64> for TrialSet {
+    fn from(generation: u64) -> Self {
+        Self::Generation(generation)
+    }
+}
+
+impl fmt::Display for TrialSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Generation(generation) => write!(f, "generation {generation}"),
+            Self::HeldOut(generation) => write!(f, "held-out trials of generation {generation}"),
+            Self::Evaluation => f.write_str("evaluation"),
+        }
+    }
+}
+
 /// A random stream; see the module's text for its address and its values.
 #[derive(Debug, Clone)]
 pub struct Stream(ChaCha8Rng);
 
 impl Stream {
-    /// The stream of this address, at its beginning.
-    pub fn new(seed: u64, generation: u64, trial: u64, purpose: Purpose, stream: u64) -> Self {
+    /// The stream of this address, at its beginning. `trial_set`: a [`TrialSet`], or
+    /// the number of a generation.
+    pub fn new(
+        seed: u64,
+        trial_set: impl Into<TrialSet>,
+        trial: u64,
+        purpose: Purpose,
+        stream: u64,
+    ) -> Self {
         let mut key = [0; 32];
-        let words = [seed, generation, trial, purpose as u64];
+        let words = [seed, trial_set.into().word(), trial, purpose as u64];
         for (bytes, word) in key.chunks_exact_mut(8).zip(words) {
             bytes.copy_from_slice(&word.to_le_bytes());
         }
@@ -316,6 +393,20 @@ mod tests {
         first.sort_unstable();
         first.dedup();
         assert_eq!(first.len(), 6);
+    }
+
+    /// Part of the format of a run, as the numbers of purposes are.
+    #[test]
+    fn trial_sets_have_their_words() {
+        for (trial_set, word) in [
+            (TrialSet::Generation(0), 0),
+            (TrialSet::Generation(39), 39),
+            (TrialSet::HeldOut(0), 9_223_372_036_854_775_808),
+            (TrialSet::HeldOut(39), 9_223_372_036_854_775_847),
+            (TrialSet::Evaluation, 4_611_686_018_427_387_904),
+        ] {
+            assert_eq!(trial_set.word(), word, "{trial_set}");
+        }
     }
 
     #[test]

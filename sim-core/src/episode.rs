@@ -12,6 +12,7 @@ use crate::record::{EpisodeSummary, StepRecord};
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::Trial;
 use experiment_file::RobotController;
+use numeric::random::TrialSet;
 
 /// Lanes that are simulated side by side: enough to share the weights, few enough
 /// to stay in the cache.
@@ -22,13 +23,13 @@ const MAX_LANES: usize = 256;
 pub(crate) fn run(
     simulation: &Simulation,
     phenotype: &Phenotype,
-    generation: u64,
+    trial_set: TrialSet,
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>, EvaluateError> {
     let mut fitness = Vec::with_capacity(trials.len());
     for trials in side_by_side(simulation, trials) {
-        let mut episodes = Episodes::new(simulation, phenotype, generation, trials)?;
+        let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials)?;
         for step in 0..simulation.n_steps {
             if !keep_going() {
                 return Ok(None);
@@ -45,7 +46,7 @@ pub(crate) fn run(
 pub(crate) fn measure(
     simulation: &Simulation,
     phenotype: &Phenotype,
-    generation: u64,
+    trial_set: TrialSet,
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>, EvaluateError> {
@@ -56,7 +57,7 @@ pub(crate) fn measure(
         let first = values.len();
         values.resize(first + trials.len() * n_values, f64::NAN);
         let rows = &mut values[first..];
-        let mut episodes = Episodes::new(simulation, phenotype, generation, trials)?;
+        let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials)?;
         for step in 0..simulation.n_steps {
             if !keep_going() {
                 return Ok(None);
@@ -91,11 +92,11 @@ fn side_by_side(simulation: &Simulation, trials: Range<u32>) -> impl Iterator<It
 pub(crate) fn watch(
     simulation: &Simulation,
     phenotype: &Phenotype,
-    generation: u64,
+    trial_set: TrialSet,
     trial: u32,
     observe: &mut dyn FnMut(StepRecord),
 ) -> Result<EpisodeSummary, EvaluateError> {
-    let mut episodes = Episodes::new(simulation, phenotype, generation, trial..trial + 1)?;
+    let mut episodes = Episodes::new(simulation, phenotype, trial_set, trial..trial + 1)?;
     let mut sums: IndexMap<&'static str, (f64, u32)> = IndexMap::new();
     for step in 0..simulation.n_steps {
         episodes.step(step, |trial, brains, fitness| {
@@ -126,10 +127,10 @@ impl<'a> Episodes<'a> {
     fn new(
         simulation: &'a Simulation,
         phenotype: &Phenotype,
-        generation: u64,
+        trial_set: TrialSet,
         trials: Range<u32>,
     ) -> Result<Self, EvaluateError> {
-        let trials = trials.map(|trial| Trial::new(simulation, generation, trial));
+        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
         let groups = 0..simulation.world.groups.len();
         let brain = |group| Brain::new(simulation, group, phenotype, trials.len());

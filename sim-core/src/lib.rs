@@ -1,5 +1,5 @@
 //! The simulation of swarms of robots, as a pure function:
-//! (experiment, genotype, trial addresses) -> fitness of each trial.
+//! (experiment, genotype, trial set, trials) -> fitness of each trial.
 //!
 //! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
 //! same inputs give the same bits on every machine.
@@ -32,6 +32,7 @@ mod lights;
 mod neighbours;
 mod network;
 mod objects;
+mod output;
 mod perturbations;
 mod problems;
 mod record;
@@ -46,21 +47,11 @@ mod trial;
 mod world;
 
 pub use communication::Mode;
-pub use numeric::{Isa, UnknownIsa};
+pub use numeric::{Isa, UnknownIsa, random::TrialSet};
+pub use output::Output;
 pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};
 pub use torus::Vec2;
-
-/// The address of the held-out trials that belong to a generation: worlds and
-/// noise that evolution never meets, for an honest look at what it found.
-pub const fn held_out(generation: u64) -> u64 {
-    // Generations of a run stay far below.
-    generation | 1 << 63
-}
-
-/// The address of the trials on which evaluations judge a genotype: the same for
-/// every run, neither a generation of it nor held out by one.
-pub const EVALUATION: u64 = 1 << 62;
 
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work

@@ -13,12 +13,12 @@ use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 use crate::world::World;
 use experiment_file::{ConfigError, ExperimentConfig, FitnessFunction, limits};
-use numeric::Isa;
+use numeric::{Isa, random::TrialSet};
 
 /// Trials whose start is tried out when an experiment is compiled.
 const N_TRIED_TRIALS: u32 = 8;
 
-/// A compiled experiment: (genotype, generation, trials) -> fitness.
+/// A compiled experiment: (genotype, trial set, trials) -> fitness.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     pub(crate) isa: Isa,
@@ -60,15 +60,15 @@ pub enum EvaluateError {
     /// cannot hold. Every genotype meets it in this trial.
     #[error(
         "world.objects.{object}.initializers.positions: no place for number {index} \
-         in generation {generation}, trial {trial}"
+         in {trial_set}, trial {trial}"
     )]
     Unplaceable {
         /// Name of the object.
         object: String,
         /// Index of the instance without a place.
         index: usize,
-        /// Generation of the trial.
-        generation: u64,
+        /// The set that the trial is of.
+        trial_set: TrialSet,
         /// The trial.
         trial: u32,
     },
@@ -99,7 +99,7 @@ impl Simulation {
         let mut problems = Problems::default();
         for trial in 0..simulation.n_trials.min(N_TRIED_TRIALS) {
             if let Err(EvaluateError::Unplaceable { object, index, .. }) =
-                Trial::new(&simulation, 0, trial)
+                Trial::new(&simulation, TrialSet::Generation(0), trial)
             {
                 let path = format!("world.objects.{object}.initializers.positions");
                 problems.add(path, format!("no place for number {index} in trial {trial}"));
@@ -135,17 +135,17 @@ impl Simulation {
 
     /// Simulates one episode per trial and returns their fitness, in order.
     ///
-    /// `genotype`: d genes in \[0, 1\]; `generation`: whose worlds and noise, or
-    /// [`held_out`](crate::held_out) ones; `trials`: a non-empty part of
-    /// 0..[`limits::TRIALS`]. The fitness of a trial does not depend on which
+    /// `genotype`: d genes in \[0, 1\]; `trial_set`: which worlds and noise, the
+    /// number of a generation for those of that generation; `trials`: a non-empty
+    /// part of 0..[`limits::TRIALS`]. The fitness of a trial does not depend on which
     /// other trials are asked for.
     pub fn evaluate(
         &self,
         genotype: &[f64],
-        generation: u64,
+        trial_set: impl Into<TrialSet>,
         trials: Range<u32>,
     ) -> Result<Vec<f64>, EvaluateError> {
-        let fitness = self.evaluate_while(genotype, generation, trials, &|| true)?;
+        let fitness = self.evaluate_while(genotype, trial_set, trials, &|| true)?;
         Ok(fitness.expect("nothing stopped it"))
     }
 
@@ -154,13 +154,13 @@ impl Simulation {
     pub fn evaluate_while(
         &self,
         genotype: &[f64],
-        generation: u64,
+        trial_set: impl Into<TrialSet>,
         trials: Range<u32>,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
-        episode::run(self, &phenotype, generation, trials, keep_going)
+        episode::run(self, &phenotype, trial_set.into(), trials, keep_going)
     }
 
     /// Names of the measures of the task, in their order; see [`Metrics`].
@@ -185,13 +185,13 @@ impl Simulation {
     pub fn measure_while(
         &self,
         genotype: &[f64],
-        generation: u64,
+        trial_set: impl Into<TrialSet>,
         trials: Range<u32>,
         keep_going: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
-        episode::measure(self, &phenotype, generation, trials, keep_going)
+        episode::measure(self, &phenotype, trial_set.into(), trials, keep_going)
     }
 
     /// Simulates the episode of one trial and shows each of its steps to
@@ -200,13 +200,13 @@ impl Simulation {
     pub fn simulate(
         &self,
         genotype: &[f64],
-        generation: u64,
+        trial_set: impl Into<TrialSet>,
         trial: u32,
         observe: &mut dyn FnMut(StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&(trial..trial.saturating_add(1)))?;
-        episode::watch(self, &phenotype, generation, trial, observe)
+        episode::watch(self, &phenotype, trial_set.into(), trial, observe)
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with
@@ -245,7 +245,6 @@ impl Simulation {
 mod tests {
     use super::*;
     use crate::testing::{experiment_a, genotype, robot};
-    use crate::{EVALUATION, held_out};
     use experiment_file::{GenotypeQuery, SynapseSelector};
 
     #[test]
@@ -261,16 +260,16 @@ mod tests {
     fn measuring_changes_no_fitness_and_gives_what_watching_shows() {
         let simulation = Simulation::compile(&experiment_a()).unwrap();
         let genotype = genotype(simulation.genotype_len(), 2);
-        let generation = EVALUATION;
+        let trial_set = TrialSet::Evaluation;
         let n_values = simulation.values_per_trial();
         assert_eq!(n_values, 1 + 300 * 2);
         let measure = |trials| {
-            let measured = simulation.measure_while(&genotype, generation, trials, &|| true);
+            let measured = simulation.measure_while(&genotype, trial_set, trials, &|| true);
             measured.unwrap().unwrap()
         };
         // More than are simulated at once.
         let together = measure(0..40);
-        let fitness = simulation.evaluate(&genotype, generation, 0..40).unwrap();
+        let fitness = simulation.evaluate(&genotype, trial_set, 0..40).unwrap();
         assert_eq!(together.len(), 40 * n_values);
         for (trial, row) in together.chunks_exact(n_values).enumerate() {
             assert_eq!(row[0].to_bits(), fitness[trial].to_bits());
@@ -278,30 +277,26 @@ mod tests {
         assert_eq!(measure(31..33), together[31 * n_values..33 * n_values]);
         let mut watched = Vec::new();
         let observe = &mut |step: StepRecord| watched.extend(step.metrics.into_values());
-        simulation.simulate(&genotype, generation, 31, observe).unwrap();
+        simulation.simulate(&genotype, trial_set, 31, observe).unwrap();
         assert_eq!(watched, together[31 * n_values + 1..32 * n_values]);
-        let stopped = simulation.measure_while(&genotype, generation, 0..1, &|| false);
+        let stopped = simulation.measure_while(&genotype, trial_set, 0..1, &|| false);
         assert_eq!(stopped, Ok(None));
     }
 
     #[test]
     fn trials_of_evaluations_are_those_of_no_generation() {
-        for generation in [0, 1, limits::GENERATIONS] {
-            assert_ne!(generation, EVALUATION);
-            assert_ne!(held_out(generation), EVALUATION);
-        }
         let simulation = Simulation::compile(&experiment_a()).unwrap();
         let genotype = genotype(simulation.genotype_len(), 2);
-        let start = |generation| {
+        let start = |trial_set: TrialSet| {
             let mut positions = Vec::new();
             let observe = &mut |step: StepRecord| {
                 positions.extend(step.robots.iter().map(|robot| robot.position));
             };
-            simulation.simulate(&genotype, generation, 0, observe).unwrap();
+            simulation.simulate(&genotype, trial_set, 0, observe).unwrap();
             positions
         };
-        assert_ne!(start(EVALUATION), start(0));
-        assert_ne!(start(EVALUATION), start(held_out(0)));
+        assert_ne!(start(TrialSet::Evaluation), start(TrialSet::Generation(0)));
+        assert_ne!(start(TrialSet::Evaluation), start(TrialSet::HeldOut(0)));
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::torus::{Torus, Vec2};
 use crate::world::World;
 use experiment_file::SensorQuery;
 use numeric::Isa;
-use numeric::random::{Purpose, Stream};
+use numeric::random::{Purpose, Stream, TrialSet};
 
 /// Steps at the start of an episode in which every robot sends.
 const N_FIRST_STEPS_SENDING: u32 = 10;
@@ -57,7 +57,7 @@ struct Group {
 #[derive(Debug, Clone, Copy)]
 struct Address {
     seed: u64,
-    generation: u64,
+    trial_set: TrialSet,
     trial: u32,
 }
 
@@ -67,7 +67,7 @@ impl Address {
     }
 
     fn numbered_stream(self, purpose: Purpose, number: u64) -> Stream {
-        Stream::new(self.seed, self.generation, self.trial.into(), purpose, number)
+        Stream::new(self.seed, self.trial_set, self.trial.into(), purpose, number)
     }
 
     /// One stream for each of `n` robots, or lights.
@@ -85,7 +85,7 @@ impl Address {
         site.positions.draw(torus, stream).map_err(|unplaceable| EvaluateError::Unplaceable {
             object: site.name.clone(),
             index: unplaceable.index,
-            generation: self.generation,
+            trial_set: self.trial_set,
             trial: self.trial,
         })
     }
@@ -109,11 +109,11 @@ impl<'a> Trial<'a> {
     /// The trial before its first step.
     pub fn new(
         simulation: &'a Simulation,
-        generation: u64,
+        trial_set: TrialSet,
         trial: u32,
     ) -> Result<Self, EvaluateError> {
         let world = &simulation.world;
-        let address = Address { seed: simulation.seed, generation, trial };
+        let address = Address { seed: simulation.seed, trial_set, trial };
         let mut positions = Vec::with_capacity(world.n_robots());
         let mut headings = Vec::with_capacity(world.n_robots());
         let mut groups = Vec::with_capacity(world.groups.len());
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn a_frame_crosses_a_line_one_hop_per_step_and_dies_at_max_hops() {
         let simulation = Simulation::compile(&line(14)).unwrap();
-        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
         let mut modes = [Mode::Relay; 14];
         modes[0] = Mode::Send;
         step(&mut trial, &modes, [1.0, 0.0]);
@@ -368,7 +368,7 @@ mod tests {
     #[test]
     fn nothing_is_heard_in_the_first_step_and_everyone_sends_in_the_first_ten() {
         let simulation = Simulation::compile(&line(2)).unwrap();
-        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
         for step in 0..12 {
             trial.sense(step).unwrap();
             // On the air: the frames of step - 1.
@@ -382,7 +382,7 @@ mod tests {
     #[test]
     fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
         let simulation = Simulation::compile(&line(2)).unwrap();
-        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
         let read = |trial: &Trial<'_>, query| {
             trial.groups[0].senses.reading(query, &trial.swarm, 0, 0).values().to_vec()
         };
@@ -407,7 +407,7 @@ mod tests {
     #[test]
     fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
         let simulation = Simulation::compile(&line(3)).unwrap();
-        let mut trial = Trial::new(&simulation, 0, 0).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
         step(&mut trial, &[Mode::Send; 3], [0.0; 2]);
         let mut from_right = 0;
         for _ in 0..2000 {

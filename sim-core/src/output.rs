@@ -1,0 +1,12 @@
+//! What is computed of a trial.
+
+/// What somebody wants to know of each trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Output {
+    /// One number per trial: its fitness. See
+    /// [`Simulation::evaluate`](crate::Simulation::evaluate).
+    Fitness,
+    /// The fitness of a trial, and then step by step every measure of the task. See
+    /// [`Simulation::measure_while`](crate::Simulation::measure_while).
+    Measures,
+}
