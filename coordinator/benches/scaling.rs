@@ -9,13 +9,14 @@ mod simulated_fleet;
 use std::time::{Duration, Instant};
 
 use coordinator::{
-    engine::{Command, Engine, EngineConfig, Introduction, ItemResult},
-    ids::ExperimentId,
+    engine::{Batch, Command, Engine, EngineConfig, Introduction, ItemResult},
+    ids::{ExperimentId, JobId},
     priority::Priority,
 };
+use sim_core::TrialSet;
 use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 
-const EXPERIMENT: ExperimentId = ExperimentId(1);
+const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
 const LEASE: Duration = Duration::from_secs(10);
 const N_TRIALS: u32 = 5;
 /// The first one teaches the engine how long things take.
@@ -99,7 +100,7 @@ fn efficiency(config: EngineConfig, population_size: usize, n_workers: usize, st
             fleet.stall(id, Duration::from_secs(30));
         }
         let n_judged = generation as usize + 1;
-        let is_done = |fleet: &SimulatedFleet| fleet.judged.len() == n_judged;
+        let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_judged;
         assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
     }
     let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;
@@ -116,25 +117,26 @@ fn throughput() -> f64 {
         let version = String::new();
         engine.on_worker_joined(started, Introduction { name, version, n_slots: 1, process: None });
     }
-    engine.on_experiment_started(EXPERIMENT, "spec".into(), Priority::default());
+    engine.on_job_started(EXPERIMENT, "spec".into(), Priority::default());
     let genotypes = population(100_000);
     let started = Instant::now();
     let mut now = started;
-    engine.on_generation_asked(now, EXPERIMENT, 0, genotypes, 1);
+    let batch = Batch::fitness(TrialSet::Generation(0), genotypes, 1);
+    engine.on_batch_requested(now, EXPERIMENT, batch);
     let mut n_items = 0;
     loop {
         match engine.poll_command() {
-            Some(Command::SendItems { worker, items, .. }) => {
-                n_items += items.len();
+            Some(Command::SendAssignments { worker, assignments, .. }) => {
+                n_items += assignments.len();
                 now += Duration::from_micros(10);
                 let compute_time = Duration::from_millis(100);
-                for item in items {
-                    let outcome = Ok(vec![fitness(&item.genotype, 0)]);
-                    let result = ItemResult { id: item.id, outcome, compute_time };
+                for assignment in assignments {
+                    let outcome = Ok(vec![fitness(&assignment.genotype, 0)]);
+                    let result = ItemResult { id: assignment.id, outcome, compute_time };
                     engine.on_results(now, worker, vec![result]);
                 }
             }
-            Some(Command::FinishGeneration { .. }) => break,
+            Some(Command::FinishBatch { .. }) => break,
             Some(_) => {}
             None => unreachable!("the generation is not finished"),
         }

@@ -8,48 +8,68 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ExperimentId(pub u64);
 
+/// An evaluation, which nothing is stored of; numbered from 1 by the driver since
+/// the coordinator's start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EvaluationId(pub u64);
+
+/// What the engine schedules. Experiments come before evaluations in its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum JobId {
+    /// An experiment of the store.
+    Experiment(ExperimentId),
+    /// An evaluation of one genotype.
+    Evaluation(EvaluationId),
+}
+
+impl JobId {
+    /// The experiment, if it is one.
+    pub const fn experiment(self) -> Option<ExperimentId> {
+        match self {
+            Self::Experiment(id) => Some(id),
+            Self::Evaluation(_) => None,
+        }
+    }
+}
+
+impl From<ExperimentId> for JobId {
+    fn from(id: ExperimentId) -> Self {
+        Self::Experiment(id)
+    }
+}
+
+impl From<EvaluationId> for JobId {
+    fn from(id: EvaluationId) -> Self {
+        Self::Evaluation(id)
+    }
+}
+
 /// A worker's connection; a worker that reconnects gets another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerId(pub u64);
 
-/// One assignment of work to one worker; an item that is assigned again gets
-/// another.
+/// An item given to a worker; an item that is given to another worker, or again,
+/// gets another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ItemId(pub u64);
+pub struct AssignmentId(pub u64);
 
-/// Where the numbers of evaluations begin: no store gets there.
-const EVALUATIONS: u64 = 1 << 63;
-
-impl ExperimentId {
-    /// An evaluation, which is no experiment of the store; numbered from 1 by the
-    /// driver.
-    pub fn evaluation(number: u64) -> Self {
-        Self(EVALUATIONS | number)
-    }
-
-    /// Whether it is an evaluation.
-    pub fn is_evaluation(self) -> bool {
-        self.0 & EVALUATIONS != 0
-    }
-}
-
-impl fmt::Display for ExperimentId {
+impl fmt::Display for JobId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_evaluation() {
-            return write!(f, "evaluation {}", self.0 & !EVALUATIONS);
+        match self {
+            Self::Experiment(id) => write!(f, "experiment {id}"),
+            Self::Evaluation(id) => write!(f, "evaluation {id}"),
         }
-        self.0.fmt(f)
     }
 }
 
-impl fmt::Display for WorkerId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
+macro_rules! display_number {
+    ($($id:ty),*) => {
+        $(impl fmt::Display for $id {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.fmt(f)
+            }
+        })*
+    };
 }
 
-impl fmt::Display for ItemId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
+display_number!(ExperimentId, EvaluationId, WorkerId, AssignmentId);

@@ -110,7 +110,7 @@ impl Source {
         let mut scrape = Scrape::default();
         let version = env!("CARGO_PKG_VERSION");
         scrape.put(&BUILD, &[version, sim_core::FINGERPRINT], 1.0);
-        let tally = fleet.tally;
+        let counters = fleet.counters;
         for (state, n_workers) in [
             ("available", fleet.n_workers_available),
             ("draining", fleet.n_workers_draining),
@@ -122,15 +122,15 @@ impl Source {
             (&SLOTS, fleet.n_slots as f64),
             (&SLOT_TIME, fleet.slot_time_s),
             (&BUSY_TIME, fleet.busy_time_s),
-            (&WORKERS_JOINED, tally.n_workers_joined as f64),
-            (&WORKERS_LEFT, tally.n_workers_left as f64),
-            (&WORKERS_LOST, tally.n_workers_lost as f64),
-            (&ITEMS_ASSIGNED, tally.n_items_assigned as f64),
-            (&ITEMS_COMPUTED, tally.n_items_computed as f64),
-            (&ITEMS_FAILED, tally.n_items_failed as f64),
-            (&ITEMS_REQUEUED, tally.n_items_requeued as f64),
-            (&ITEMS_RECALLED, tally.n_items_recalled as f64),
-            (&EPISODES, tally.n_episodes as f64),
+            (&WORKERS_JOINED, counters.n_workers_joined as f64),
+            (&WORKERS_LEFT, counters.n_workers_left as f64),
+            (&WORKERS_LOST, counters.n_workers_lost as f64),
+            (&ITEMS_ASSIGNED, counters.n_items_assigned as f64),
+            (&ITEMS_COMPUTED, counters.n_items_computed as f64),
+            (&ITEMS_FAILED, counters.n_items_failed as f64),
+            (&ITEMS_REQUEUED, counters.n_items_requeued as f64),
+            (&ITEMS_RECALLED, counters.n_items_recalled as f64),
+            (&EPISODES, counters.n_episodes as f64),
             (&STORE_AVAILABLE, if self.store.trouble().is_none() { 1.0 } else { 0.0 }),
         ] {
             scrape.put(metric, &[], value);

@@ -6,12 +6,15 @@ mod simulated_fleet;
 
 use std::time::Duration;
 
-use coordinator::{engine::EngineConfig, ids::ExperimentId};
+use coordinator::{
+    engine::EngineConfig,
+    ids::{ExperimentId, JobId},
+};
 use proptest::prelude::*;
 use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 
 const LEASE: Duration = Duration::from_secs(10);
-const EXPERIMENT: ExperimentId = ExperimentId(1);
+const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
 const SECOND: Duration = Duration::from_secs(1);
 const HOUR: Duration = Duration::from_secs(3600);
 
@@ -31,18 +34,18 @@ fn auditing_fleet(audit_fraction: f64) -> SimulatedFleet {
     SimulatedFleet::new(MODEL, EngineConfig { audit_fraction, ..EngineConfig::new(LEASE) })
 }
 
-fn is_judged(fleet: &SimulatedFleet) -> bool {
-    !fleet.judged.is_empty()
+fn is_finished(fleet: &SimulatedFleet) -> bool {
+    !fleet.evaluated.is_empty()
 }
 
 #[track_caller]
 fn assert_right(fleet: &SimulatedFleet, n_individuals: usize, n_trials: u32) {
-    let (_, judged) = fleet.judged.last().expect("a judged generation");
+    let (_, evaluated) = fleet.evaluated.last().expect("an evaluated batch");
     let expected: Vec<Vec<f64>> = population(n_individuals)
         .iter()
         .map(|genotype| (0..n_trials).map(|trial| fitness(genotype, trial)).collect())
         .collect();
-    assert_eq!(judged.trial_fitness, expected);
+    assert_eq!(evaluated.values, expected);
 }
 
 /// The time of one generation.
@@ -54,10 +57,10 @@ fn generation_time(config: EngineConfig, speeds: &[f64], n_individuals: usize) -
     fleet.submit(EXPERIMENT, 100);
     for generation in 0..3 {
         fleet.ask(EXPERIMENT, generation, n_individuals, 5);
-        assert!(fleet.run_until(HOUR, |fleet| fleet.judged.len() as u64 > generation));
+        assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() as u64 > generation));
         assert_right(&fleet, n_individuals, 5);
     }
-    fleet.judged[2].1.duration
+    fleet.evaluated[2].1.duration
 }
 
 #[test]
@@ -70,7 +73,7 @@ fn ten_thousand_workers_come_and_go_and_a_hundred_thousand_individuals_are_judge
     fleet.submit(EXPERIMENT, 100);
     fleet.ask(EXPERIMENT, 0, 100_000, 1);
     let mut n_replaced = 0;
-    while fleet.judged.is_empty() {
+    while fleet.evaluated.is_empty() {
         fleet.run_for(SECOND);
         fleet.engine.sanity_check();
         let ids = fleet.worker_ids();
@@ -119,7 +122,7 @@ fn a_stalled_worker_holds_nobody_up() {
     fleet.ask(EXPERIMENT, 0, 100, 5);
     fleet.run_for(2 * SECOND);
     fleet.stall(ids[3], HOUR);
-    assert!(fleet.run_until(60 * SECOND, is_judged));
+    assert!(fleet.run_until(60 * SECOND, is_finished));
     assert_right(&fleet, 100, 5);
     assert!(fleet.now() < 12 * SECOND, "{:?}", fleet.now());
 }
@@ -133,9 +136,9 @@ fn short_items_keep_slots_busy_over_a_slow_network() {
     fleet.submit(EXPERIMENT, 100);
     for generation in 0..2 {
         fleet.ask(EXPERIMENT, generation, 4000, 1);
-        assert!(fleet.run_until(HOUR, |fleet| fleet.judged.len() as u64 > generation));
+        assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() as u64 > generation));
     }
-    let idle = fleet.judged[1].1.idle_share;
+    let idle = fleet.evaluated[1].1.idle_share;
     assert!(idle < 0.05, "{idle}");
     let status = &fleet.status()[0];
     assert!(status.idle_share < 0.2 && status.results_per_s > 1000.0, "{status:?}");
@@ -143,7 +146,7 @@ fn short_items_keep_slots_busy_over_a_slow_network() {
 
 #[test]
 fn experiments_share_the_fleet_by_priority() {
-    let (low, high) = (ExperimentId(1), ExperimentId(2));
+    let (low, high) = (JobId::Experiment(ExperimentId(1)), JobId::Experiment(ExperimentId(2)));
     let mut fleet =
         SimulatedFleet::new(FleetModel { checks: false, ..MODEL }, EngineConfig::new(LEASE));
     for _ in 0..10 {
@@ -154,8 +157,8 @@ fn experiments_share_the_fleet_by_priority() {
         // Items of different lengths: it is time that is shared.
         if id == low { fleet.ask(id, 0, 6000, 1) } else { fleet.ask(id, 0, 3000, 4) }
     }
-    assert!(fleet.run_until(HOUR, is_judged));
-    assert_eq!(fleet.judged[0].0, high);
+    assert!(fleet.run_until(HOUR, is_finished));
+    assert_eq!(fleet.evaluated[0].0, high);
     // 3000 items of 0.44 s with three quarters of ten workers.
     let expected = 3000.0 * 0.44 / 7.5;
     let taken = fleet.now().as_secs_f64();
@@ -164,22 +167,22 @@ fn experiments_share_the_fleet_by_priority() {
 
 #[test]
 fn workers_serve_another_experiment_while_one_is_at_its_barrier() {
-    let (a, b) = (ExperimentId(1), ExperimentId(2));
+    let (a, b) = (JobId::Experiment(ExperimentId(1)), JobId::Experiment(ExperimentId(2)));
     let mut fleet = fleet();
     fleet.join(1, 1.0);
     fleet.submit(a, 1000);
     fleet.submit(b, 1);
     fleet.ask(a, 0, 2, 1);
     fleet.ask(b, 0, 10, 1);
-    assert!(fleet.run_until(HOUR, is_judged));
-    assert_eq!(fleet.judged[0].0, a);
+    assert!(fleet.run_until(HOUR, is_finished));
+    assert_eq!(fleet.evaluated[0].0, a);
     let before = fleet.n_items_sent;
     fleet.run_for(SECOND);
     assert!(fleet.n_items_sent > before);
     // Nobody saves up turns while it has nothing to do.
     fleet.ask(a, 1, 2, 1);
-    assert!(fleet.run_until(SECOND, |fleet| fleet.judged.len() == 2));
-    assert_eq!(fleet.judged[1].0, a);
+    assert!(fleet.run_until(SECOND, |fleet| fleet.evaluated.len() == 2));
+    assert_eq!(fleet.evaluated[1].0, a);
 }
 
 #[test]
@@ -192,12 +195,12 @@ fn a_paused_experiment_gives_its_workers_up_and_goes_on_where_it_was() {
     fleet.ask(EXPERIMENT, 0, 40, 5);
     fleet.run_for(SECOND);
     let n_sent = fleet.n_items_sent;
-    fleet.tell(|engine, now| engine.on_experiment_paused(now, EXPERIMENT));
+    fleet.tell(|engine, now| engine.on_job_paused(now, EXPERIMENT));
     assert!(fleet.status().iter().all(|worker| worker.n_in_flight == 0));
     fleet.run_for(HOUR);
     assert_eq!(fleet.n_items_sent, n_sent);
-    fleet.tell(|engine, now| engine.on_experiment_resumed(now, EXPERIMENT));
-    assert!(fleet.run_until(HOUR, is_judged));
+    fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
+    assert!(fleet.run_until(HOUR, is_finished));
     assert_right(&fleet, 40, 5);
 }
 
@@ -207,9 +210,9 @@ fn audits_find_a_faulty_worker_and_pause_the_experiment() {
     let ids: Vec<_> = (0..5).map(|_| fleet.join(1, 1.0)).collect();
     fleet.submit(EXPERIMENT, 100);
     fleet.ask(EXPERIMENT, 0, 50, 2);
-    assert!(fleet.run_until(HOUR, is_judged));
-    let judged = &fleet.judged[0].1;
-    assert!(judged.n_audited >= 5 && judged.n_unaudited == 0, "{judged:?}");
+    assert!(fleet.run_until(HOUR, is_finished));
+    let evaluated = &fleet.evaluated[0].1;
+    assert!(evaluated.n_audited >= 5 && evaluated.n_unaudited == 0, "{evaluated:?}");
     assert_right(&fleet, 50, 2);
 
     fleet.corrupt(ids[2]);
@@ -217,13 +220,13 @@ fn audits_find_a_faulty_worker_and_pause_the_experiment() {
     assert!(fleet.run_until(HOUR, |fleet| !fleet.paused.is_empty()));
     let reason = fleet.paused[0].1.clone();
     assert!(reason.contains("\"worker-3\""), "{reason}");
-    assert_eq!(fleet.judged.len(), 1, "nothing doubtful is handed on");
+    assert_eq!(fleet.evaluated.len(), 1, "nothing doubtful is handed on");
     let distrusted = fleet.status().into_iter().filter(|worker| worker.distrusted.is_some());
     assert_eq!(distrusted.count(), 2);
     fleet.run_for(HOUR);
 
-    fleet.tell(|engine, now| engine.on_experiment_resumed(now, EXPERIMENT));
-    assert!(fleet.run_until(HOUR, |fleet| fleet.judged.len() == 2));
+    fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
+    assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() == 2));
     assert_right(&fleet, 50, 2);
 }
 
@@ -233,15 +236,15 @@ fn audits_are_waived_when_there_is_no_second_worker() {
     fleet.join(1, 1.0);
     fleet.submit(EXPERIMENT, 100);
     fleet.ask(EXPERIMENT, 0, 5, 1);
-    assert!(fleet.run_until(HOUR, is_judged));
-    assert_eq!(fleet.judged[0].1.n_unaudited, 5);
+    assert!(fleet.run_until(HOUR, is_finished));
+    assert_eq!(fleet.evaluated[0].1.n_unaudited, 5);
     // A second one that leaves in the middle of it.
     let second = fleet.join(1, 0.01);
     fleet.ask(EXPERIMENT, 1, 5, 1);
     fleet.run_for(5 * SECOND);
-    assert_eq!(fleet.judged.len(), 1, "it is waited for");
+    assert_eq!(fleet.evaluated.len(), 1, "it is waited for");
     fleet.kill(second);
-    assert!(fleet.run_until(HOUR, |fleet| fleet.judged.len() == 2));
+    assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() == 2));
     assert_right(&fleet, 5, 1);
 }
 
@@ -256,7 +259,7 @@ fn flapping_streams_are_not_blamed_on_the_work() {
         let id = fleet.worker_ids()[0];
         fleet.flap(id);
     }
-    assert!(fleet.run_until(HOUR, is_judged));
+    assert!(fleet.run_until(HOUR, is_finished));
     assert!(fleet.failed.is_empty(), "{:?}", fleet.failed);
     assert_right(&fleet, 3, 1);
 }
@@ -272,7 +275,7 @@ fn work_that_takes_down_one_process_after_the_other_fails_its_experiment_after_a
     }
     fleet.join(1, 1.0);
     fleet.run_for(LEASE / 2);
-    assert!(fleet.failed.is_empty() && fleet.judged.is_empty(), "it is held back");
+    assert!(fleet.failed.is_empty() && fleet.evaluated.is_empty(), "it is held back");
     fleet.run_for(LEASE);
     assert!(fleet.failed[0].1.contains("individual 0 of generation 0"), "{:?}", fleet.failed);
 }
@@ -286,7 +289,7 @@ fn the_engine_is_a_function_of_its_events() {
         }
         fleet.submit(EXPERIMENT, 100);
         fleet.ask(EXPERIMENT, 0, 100, 5);
-        assert!(fleet.run_until(HOUR, is_judged));
+        assert!(fleet.run_until(HOUR, is_finished));
         (fleet.now(), fleet.n_items_sent, fleet.n_items_dropped)
     };
     assert_eq!(history(), history());
@@ -346,8 +349,8 @@ proptest! {
                 Happening::Silence(i) => if let Some(id) = pick(i) { fleet.silence(id) },
                 Happening::Drain(i) => if let Some(id) = pick(i) { fleet.drain(id) },
                 Happening::PauseAndResume => {
-                    fleet.tell(|engine, now| engine.on_experiment_paused(now, EXPERIMENT));
-                    fleet.tell(|engine, now| engine.on_experiment_resumed(now, EXPERIMENT));
+                    fleet.tell(|engine, now| engine.on_job_paused(now, EXPERIMENT));
+                    fleet.tell(|engine, now| engine.on_job_resumed(now, EXPERIMENT));
                 }
                 Happening::Wait => fleet.run_for(SECOND / 3),
             }
@@ -356,11 +359,11 @@ proptest! {
             }
         }
         fleet.join(2, 1.0);
-        let is_over = |fleet: &SimulatedFleet| is_judged(fleet) || !fleet.failed.is_empty();
+        let is_over = |fleet: &SimulatedFleet| is_finished(fleet) || !fleet.failed.is_empty();
         prop_assert!(fleet.run_until(HOUR, is_over));
         if fleet.failed.is_empty() {
             assert_right(&fleet, n_individuals, n_trials);
-            prop_assert_eq!(fleet.judged.len(), 1);
+            prop_assert_eq!(fleet.evaluated.len(), 1);
         }
         prop_assert!(fleet.paused.is_empty());
     }

@@ -102,13 +102,16 @@ impl Stage {
                 let received =
                     tokio::time::timeout(Duration::from_millis(20), inbox.message()).await;
                 let Ok(received) = received else { continue };
-                let Some(work_response::Message::Batch(batch)) = received.unwrap().unwrap().message
+                let Some(work_response::Message::Assignments(batch)) =
+                    received.unwrap().unwrap().message
                 else {
                     continue;
                 };
-                for item in batch.items {
-                    let values = vec![item.genotype[0]; item.trial_count as usize];
-                    worker.result(item.item_id, Outcome::Fitness(TrialFitness { values })).await;
+                for assignment in batch.assignments {
+                    let values = vec![assignment.genotype[0]; assignment.trial_count as usize];
+                    worker
+                        .result(assignment.assignment_id, Outcome::Fitness(TrialFitness { values }))
+                        .await;
                 }
             }
         };
@@ -148,8 +151,8 @@ impl RawWorker {
         self.send(WorkRequest { message: Some(message) }.encode_to_vec()).await;
     }
 
-    async fn result(&self, item_id: u64, outcome: Outcome) {
-        let result = ItemResult { item_id, outcome: Some(outcome), compute_us: 1 };
+    async fn result(&self, assignment_id: u64, outcome: Outcome) {
+        let result = ItemResult { assignment_id, outcome: Some(outcome), compute_us: 1 };
         self.say(work_request::Message::Results(ItemResults { results: vec![result] })).await;
     }
 
@@ -259,9 +262,11 @@ fn message() -> impl Strategy<Value = work_request::Message> {
         1 => any::<String>().prop_map(|message| Some(Outcome::Failure(ItemFailure { message }))),
         1 => Just(None),
     ];
-    let item_id = prop_oneof![4 => 1..16_u64, 1 => any::<u64>()];
-    let result = (item_id, outcome, any::<u64>())
-        .prop_map(|(item_id, outcome, compute_us)| ItemResult { item_id, outcome, compute_us });
+    let assignment_id = prop_oneof![4 => 1..16_u64, 1 => any::<u64>()];
+    let result =
+        (assignment_id, outcome, any::<u64>()).prop_map(|(assignment_id, outcome, compute_us)| {
+            ItemResult { assignment_id, outcome, compute_us }
+        });
     prop_oneof![
         8 => vec(result, 0..30)
             .prop_map(|results| work_request::Message::Results(ItemResults { results })),
@@ -378,10 +383,12 @@ async fn fitness_that_overflows_or_is_not_a_number_is_ranked_last_and_survived()
         let received = tokio::time::timeout(Duration::from_millis(20), inbox.message()).await;
         let Ok(received) = received else { continue };
         let message = received.unwrap().unwrap().message.unwrap();
-        let work_response::Message::Batch(batch) = message else { continue };
-        for item in batch.items {
-            let values = values.next().unwrap()[..item.trial_count as usize].to_vec();
-            worker.result(item.item_id, Outcome::Fitness(TrialFitness { values })).await;
+        let work_response::Message::Assignments(batch) = message else { continue };
+        for assignment in batch.assignments {
+            let values = values.next().unwrap()[..assignment.trial_count as usize].to_vec();
+            worker
+                .result(assignment.assignment_id, Outcome::Fitness(TrialFitness { values }))
+                .await;
         }
     }
     assert_eq!(stage.experiment(id).await.state(), ExperimentState::Completed);

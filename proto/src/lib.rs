@@ -7,8 +7,9 @@ pub mod v1 {
     tonic::include_proto!("swarm.v1");
 }
 
-/// Version of the worker protocol. Coordinator and worker must agree.
-pub const PROTOCOL_VERSION: u32 = 3;
+/// Version of the worker protocol, as `worker.proto` says. Coordinator and worker must
+/// agree.
+pub const PROTOCOL_VERSION: u32 = v1::ProtocolVersion::Current as u32;
 
 /// Most items per slot that a worker is given before it has answered any.
 pub const ITEMS_PER_SLOT_MAX: usize = 16;

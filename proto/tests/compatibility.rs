@@ -1,5 +1,9 @@
 //! What clients were promised stays: the protocol only grows.
 //!
+//! `worker.proto` may change with its version: workers come from the same release as
+//! their coordinator. What stays of it is the [`HANDSHAKE`], by which workers of
+//! another version are refused with the reason.
+//!
 //! `swarm.v1.binpb` is the descriptor of what was promised. After additions, let
 //! them be promised, too, with
 //!
@@ -87,9 +91,40 @@ fn add_service(facts: &mut BTreeSet<String>, scope: &str, service: &ServiceDescr
     }
 }
 
+/// What of `worker.proto` holds for all its versions: beginnings of facts.
+const HANDSHAKE: [&str; 5] = [
+    "service swarm.v1.WorkerService",
+    "method swarm.v1.WorkerService/Work ",
+    "field swarm.v1.WorkRequest.hello ",
+    "field swarm.v1.Hello.protocol_version ",
+    "field swarm.v1.Hello.sim_core_fingerprint ",
+];
+
+/// The version that a `worker.proto` describes; none before it said so.
+fn worker_version(set: &FileDescriptorSet) -> Option<i32> {
+    let mut enums = set.file.iter().flat_map(|file| &file.enum_type);
+    let version = enums.find(|it| it.name() == "ProtocolVersion")?;
+    let mut values = version.value.iter();
+    Some(values.find(|it| it.name() == "PROTOCOL_VERSION_CURRENT")?.number())
+}
+
+/// The files of a set with this name, or without it.
+fn files(set: &FileDescriptorSet, is_in: impl Fn(&str) -> bool) -> FileDescriptorSet {
+    let file = set.file.iter().filter(|file| is_in(file.name())).cloned().collect();
+    FileDescriptorSet { file }
+}
+
 /// What the first promises and the second does not keep.
 fn broken(promised: &FileDescriptorSet, present: &FileDescriptorSet) -> Vec<String> {
-    facts(promised).difference(&facts(present)).cloned().collect()
+    let is_workers = |name: &str| name.ends_with("/worker.proto");
+    let facts_of = |set| (facts(&files(set, |it| !is_workers(it))), facts(&files(set, is_workers)));
+    let (promised_to_clients, mut promised_to_workers) = facts_of(promised);
+    let (for_clients, for_workers) = facts_of(present);
+    if worker_version(present) > worker_version(promised) {
+        promised_to_workers.retain(|fact| HANDSHAKE.iter().any(|it| fact.starts_with(it)));
+    }
+    let lost_by_clients = promised_to_clients.difference(&for_clients);
+    lost_by_clients.chain(promised_to_workers.difference(&for_workers)).cloned().collect()
 }
 
 #[test]
@@ -102,7 +137,8 @@ fn the_protocol_keeps_its_promises() {
     let broken = broken(&promised(), &present());
     assert!(
         broken.is_empty(),
-        "clients rely on what is gone or has changed; add something new beside it: {broken:#?}"
+        "others rely on what is gone or has changed; add something new beside it, or, in \
+         worker.proto, raise PROTOCOL_VERSION_CURRENT: {broken:#?}"
     );
 }
 
@@ -193,4 +229,32 @@ fn additions_break_nothing() {
         service(set, "FleetService").method.push(method);
     });
     assert_eq!(broken, Vec::<String>::new());
+}
+
+fn raise_worker_version(set: &mut FileDescriptorSet) {
+    let mut enums = set.file.iter_mut().flat_map(|file| &mut file.enum_type);
+    let version = enums.find(|it| it.name() == "ProtocolVersion").unwrap();
+    let current = version.value.iter_mut().find(|it| it.name() == "PROTOCOL_VERSION_CURRENT");
+    *current.unwrap().number.as_mut().unwrap() += 1;
+}
+
+#[test]
+fn what_workers_are_told_changes_with_its_version_and_the_handshake_never() {
+    let change = |set: &mut FileDescriptorSet| message(set, "Assignment").field.clear();
+    assert!(!broken_by(change).is_empty(), "without another version");
+    let with_version = broken_by(|set| {
+        change(set);
+        raise_worker_version(set);
+    });
+    assert_eq!(with_version, Vec::<String>::new());
+    let of_the_handshake = broken_by(|set| {
+        raise_worker_version(set);
+        message(set, "Hello").field[0].number = Some(77);
+    });
+    assert_eq!(of_the_handshake.len(), 1, "{of_the_handshake:?}");
+    let of_clients = broken_by(|set| {
+        raise_worker_version(set);
+        message(set, "Notice").field.clear();
+    });
+    assert_eq!(of_clients.len(), 1, "{of_clients:?}");
 }

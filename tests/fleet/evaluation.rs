@@ -283,16 +283,17 @@ async fn answers_of_the_wrong_size_are_refused_and_others_compute() {
         Answer::Fitness(TrialFitness { values: vec![0.5; 3] }),
     ] {
         let mut worker = HandWorker::connect(&url, hello()).await.unwrap();
-        let batch = worker.receive_batch().await.unwrap();
-        assert_eq!(batch.generation, sim_core::EVALUATION);
-        worker.answer(batch.items[0].item_id, wrong).await;
+        let batch = worker.receive_assignments().await.unwrap();
+        assert_eq!(batch.output(), swarm_proto::v1::Output::Measures);
+        worker.answer(batch.assignments[0].assignment_id, wrong).await;
         let end = worker.receive_end().await;
         assert!(end.message().contains("values for"), "{end}");
     }
     let _worker = WorkerProcess::start(&coordinator, "good");
     let trials = asking.await.unwrap();
     let experiment = compiled(&request.config_json);
-    let fitness = experiment.evaluate(&request.genotype, sim_core::EVALUATION, 0..3).unwrap();
+    let fitness =
+        experiment.evaluate(&request.genotype, sim_core::TrialSet::Evaluation, 0..3).unwrap();
     assert_eq!(trials.iter().map(|trial| trial.fitness).collect::<Vec<_>>(), fitness);
     assert!(trials.iter().all(|trial| trial.values.len() == n_values - 1));
 }
@@ -304,11 +305,11 @@ async fn the_work_of_a_client_that_goes_away_is_dropped() {
     let mut answers = client.evaluate(Subject::new().request()).await.unwrap().into_inner();
     answers.message().await.unwrap();
     let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
-    let batch = worker.receive_batch().await.unwrap();
+    let batch = worker.receive_assignments().await.unwrap();
     drop(answers);
     loop {
-        if let work_response::Message::EndExperiment(end) = worker.receive().await.unwrap() {
-            assert_eq!(end.experiment_id, batch.experiment_id);
+        if let work_response::Message::EndJob(end) = worker.receive().await.unwrap() {
+            assert_eq!(end.job, batch.job);
             break;
         }
     }

@@ -214,14 +214,14 @@ async fn an_item_that_fails_everywhere_fails_its_experiment_by_name() {
     loop {
         let batch = tokio::select! {
             batch = worker.receive() => match batch.unwrap() {
-                work_response::Message::Batch(batch) => batch,
-                work_response::Message::EndExperiment(_) => break,
+                work_response::Message::Assignments(batch) => batch,
+                work_response::Message::EndJob(_) => break,
                 _ => continue,
             },
         };
-        for item in batch.items {
+        for assignment in batch.assignments {
             let failure = ItemFailure { message: "the wheels\ncame off".to_owned() };
-            worker.answer(item.item_id, Outcome::Failure(failure)).await;
+            worker.answer(assignment.assignment_id, Outcome::Failure(failure)).await;
         }
     }
     let outcome = coordinator.swarmctl(&["watch", &id.to_string()]);
@@ -237,8 +237,8 @@ async fn a_worker_that_returns_the_wrong_number_of_values_is_dropped() {
     let coordinator = CoordinatorProcess::start();
     coordinator.submit(&Experiment::small(1).path());
     let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
-    let batch = worker.receive_batch().await.unwrap();
-    worker.answer_fitness(batch.items[0].item_id, vec![1.0; 99]).await;
+    let batch = worker.receive_assignments().await.unwrap();
+    worker.answer_fitness(batch.assignments[0].assignment_id, vec![1.0; 99]).await;
     let status = loop {
         match worker.receive().await {
             Ok(_) => {}
@@ -254,7 +254,7 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
     let coordinator = CoordinatorProcess::start_with(&["--lease", "1"]);
     coordinator.submit(&Experiment::small(1).path());
     let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
-    worker.receive_batch().await.unwrap();
+    worker.receive_assignments().await.unwrap();
     let lost = coordinator.process.wait_for("loss", |line| line["message"] == "worker lost");
     assert_eq!(lost["reason"], "silent for 1 s");
     assert_eq!(lost["items_requeued"], 2);
@@ -270,10 +270,10 @@ async fn workers_that_differ_pause_the_experiment_and_are_named() {
         let mut worker = HandWorker::connect(&coordinator.url(), hello).await.unwrap();
         tokio::spawn(async move {
             while let Ok(message) = worker.receive().await {
-                let work_response::Message::Batch(batch) = message else { continue };
-                for item in batch.items {
-                    let values = vec![value; item.trial_count as usize];
-                    worker.answer_fitness(item.item_id, values).await;
+                let work_response::Message::Assignments(batch) = message else { continue };
+                for assignment in batch.assignments {
+                    let values = vec![value; assignment.trial_count as usize];
+                    worker.answer_fitness(assignment.assignment_id, values).await;
                 }
             }
         });

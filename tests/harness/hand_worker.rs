@@ -3,8 +3,8 @@
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
-        Hello, ItemBatch, ItemResult, ItemResults, TrialFitness, WorkRequest, WorkResponse,
-        item_result::Outcome, work_request, work_response,
+        Assignments, Hello, ItemResult, ItemResults, JobId, TrialFitness, TrialSet, WorkRequest,
+        WorkResponse, item_result::Outcome, job_id::Job, trial_set, work_request, work_response,
         worker_service_client::WorkerServiceClient,
     },
 };
@@ -20,6 +20,26 @@ pub fn hello() -> Hello {
         name: "by hand".to_owned(),
         slots: 1,
         ..Hello::default()
+    }
+}
+
+/// The number of an experiment. Panics if the job is none.
+pub fn experiment_of(job: Option<JobId>) -> u64 {
+    match job.and_then(|job| job.job) {
+        Some(Job::Experiment(id)) => id,
+        other => panic!("no experiment: {other:?}"),
+    }
+}
+
+/// The experiment, and the generation of it, that assignments are of. Panics if they
+/// are of neither an experiment nor the trials by which a generation is selected.
+pub fn generation_of(assignments: &Assignments) -> (u64, u64) {
+    let set = assignments.trial_set.and_then(|TrialSet { trial_set }| trial_set);
+    match set {
+        Some(trial_set::TrialSet::Generation(generation)) => {
+            (experiment_of(assignments.job), generation)
+        }
+        other => panic!("no generation: {other:?}"),
     }
 }
 
@@ -49,11 +69,11 @@ impl HandWorker {
         Ok(response.message.expect("known kind"))
     }
 
-    /// The next items.
-    pub async fn receive_batch(&mut self) -> Result<ItemBatch, Status> {
+    /// The next assignments.
+    pub async fn receive_assignments(&mut self) -> Result<Assignments, Status> {
         loop {
-            if let work_response::Message::Batch(batch) = self.receive().await? {
-                return Ok(batch);
+            if let work_response::Message::Assignments(assignments) = self.receive().await? {
+                return Ok(assignments);
             }
         }
     }
@@ -81,14 +101,14 @@ impl HandWorker {
         while let Ok(Some(_)) = inbox.message().await {}
     }
 
-    /// Answers an item.
-    pub async fn answer(&self, item_id: u64, outcome: Outcome) {
-        let result = ItemResult { item_id, outcome: Some(outcome), compute_us: 1 };
+    /// Answers an assignment.
+    pub async fn answer(&self, assignment_id: u64, outcome: Outcome) {
+        let result = ItemResult { assignment_id, outcome: Some(outcome), compute_us: 1 };
         self.say(work_request::Message::Results(ItemResults { results: vec![result] })).await;
     }
 
-    /// Answers an item with fitness.
-    pub async fn answer_fitness(&self, item_id: u64, values: Vec<f64>) {
-        self.answer(item_id, Outcome::Fitness(TrialFitness { values })).await;
+    /// Answers an assignment with fitness.
+    pub async fn answer_fitness(&self, assignment_id: u64, values: Vec<f64>) {
+        self.answer(assignment_id, Outcome::Fitness(TrialFitness { values })).await;
     }
 }

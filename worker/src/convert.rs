@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use experiment_file::{ConfigError, ExperimentConfig};
-use sim_core::{EVALUATION, Isa, Simulation};
+use experiment_file::{ConfigError, ExperimentConfig, limits};
+use sim_core::{Isa, Output, Simulation, TrialSet};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},
@@ -13,29 +13,27 @@ use swarm_proto::{
 use crate::{
     WorkerConfig,
     activity::Activity,
-    pool::{Evaluator, Item, Outcome},
+    assignment::{Assignment, ItemResult, JobId},
+    pool::Evaluator,
 };
 
 /// Numbers in one message of several results: 4 MiB.
 const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 
-/// Makes a specification computable. It is compiled by the slot that computes
-/// its first item, once; what is wrong with it is the failure of each item.
+/// Makes a specification computable. It is compiled once, by the slot that computes
+/// its first assignment; a specification that does not compile fails each of them.
 /// `activity`: where robots' steps are counted.
 pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) -> Evaluator {
     let compiled = OnceLock::new();
-    Arc::new(move |item: &Item, keep_going: &dyn Fn() -> bool| {
-        let Computable { experiment, robot_steps }: &Computable =
+    Arc::new(move |assignment: &Assignment, keep_going: &dyn Fn() -> bool| {
+        let Computable { simulation, robot_steps }: &Computable =
             compiled.get_or_init(|| compile(&config_json, isa)).as_ref().map_err(String::clone)?;
-        let Item { genotype, generation, trials, .. } = item;
-        let computed = match *generation {
-            EVALUATION => {
-                experiment.measure_while(genotype, EVALUATION, trials.clone(), keep_going)
-            }
-            generation => {
-                experiment.evaluate_while(genotype, generation, trials.clone(), keep_going)
-            }
+        let Assignment { genotype, trial_set, trials, output, .. } = assignment;
+        let compute = match output {
+            Output::Fitness => Simulation::evaluate_while,
+            Output::Measures => Simulation::measure_while,
         };
+        let computed = compute(simulation, genotype, *trial_set, trials.clone(), keep_going);
         let computed = computed.map_err(|error| error.to_string())?;
         let n_episodes = computed.as_ref().map_or(0, |_| trials.len()) as u64;
         activity.add_robot_steps(n_episodes * robot_steps);
@@ -45,7 +43,7 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) 
 
 /// A compiled specification.
 struct Computable {
-    experiment: Simulation,
+    simulation: Simulation,
     /// Environment steps of an episode, summed over robots.
     robot_steps: u64,
 }
@@ -57,40 +55,87 @@ fn compile(config_json: &str, isa: Isa) -> Result<Computable, String> {
 
 fn computable(config_json: &str, isa: Isa) -> Result<Computable, ConfigError> {
     let config = ExperimentConfig::from_canonical_json(config_json)?;
-    let experiment = Simulation::compile(&config)?.with_isa(isa);
+    let simulation = Simulation::compile(&config)?.with_isa(isa);
     let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
     Ok(Computable {
-        experiment,
+        simulation,
         robot_steps: n_robots * u64::from(config.algorithm.evaluation_steps),
     })
 }
 
-/// Reads an item, or fails it: the coordinator is not trusted to be right.
-pub(crate) fn item(
-    experiment_id: u64,
-    generation: u64,
-    item: v1::Item,
-) -> Result<Item, v1::ItemResult> {
-    let v1::Item { item_id, first_trial, trial_count, genotype } = item;
-    let Some(end) = first_trial.checked_add(trial_count) else {
-        let message = format!("{trial_count} trials from {first_trial} on are too many");
-        return Err(failure(item_id, message));
-    };
-    Ok(Item { id: item_id, experiment_id, generation, trials: first_trial..end, genotype })
+/// What assignments have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Common {
+    pub(crate) job: JobId,
+    trial_set: TrialSet,
+    output: Output,
 }
 
-pub(crate) fn result(outcome: Outcome) -> v1::ItemResult {
-    let compute_us = u64::try_from(outcome.duration.as_micros()).unwrap_or(u64::MAX);
-    match outcome.fitness {
+/// Reads a job's id; none if it is of a kind that this version does not know.
+pub(crate) fn job(job: Option<v1::JobId>) -> Option<JobId> {
+    Some(match job?.job? {
+        v1::job_id::Job::Experiment(id) => JobId::Experiment(id),
+        v1::job_id::Job::Evaluation(id) => JobId::Evaluation(id),
+    })
+}
+
+/// Reads what assignments have in common, or says what is wrong with it.
+pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
+    let job = job(assignments.job).ok_or("the assignment names no job")?;
+    let trial_set = assignments.trial_set.and_then(|set| set.trial_set);
+    let trial_set = match trial_set.ok_or("the assignment names no trial set")? {
+        v1::trial_set::TrialSet::Generation(generation) => {
+            TrialSet::Generation(checked_generation(generation)?)
+        }
+        v1::trial_set::TrialSet::HeldOut(generation) => {
+            TrialSet::HeldOut(checked_generation(generation)?)
+        }
+        v1::trial_set::TrialSet::Evaluation(_) => TrialSet::Evaluation,
+    };
+    let output = match assignments.output() {
+        v1::Output::Fitness => Output::Fitness,
+        v1::Output::Measures => Output::Measures,
+        v1::Output::Unspecified => return Err("the assignment names no output".into()),
+    };
+    Ok(Common { job, trial_set, output })
+}
+
+fn checked_generation(generation: u64) -> Result<u64, String> {
+    if generation > limits::GENERATIONS {
+        return Err(format!("there is no generation {generation}"));
+    }
+    Ok(generation)
+}
+
+/// Reads an assignment, or fails it: the coordinator is not trusted to be right.
+pub(crate) fn assignment(
+    common: &Common,
+    assignment: v1::Assignment,
+) -> Result<Assignment, v1::ItemResult> {
+    let v1::Assignment { assignment_id: id, first_trial, trial_count, genotype } = assignment;
+    let Some(end) = first_trial.checked_add(trial_count) else {
+        let message = format!("{trial_count} trials from {first_trial} on are too many");
+        return Err(failure(id, message));
+    };
+    let &Common { job, trial_set, output } = common;
+    Ok(Assignment { id, job, trial_set, output, trials: first_trial..end, genotype })
+}
+
+pub(crate) fn result(result: ItemResult) -> v1::ItemResult {
+    let ItemResult { assignment_id, output, outcome, duration } = result;
+    let compute_us = u64::try_from(duration.as_micros()).unwrap_or(u64::MAX);
+    match outcome {
         Ok(values) => v1::ItemResult {
-            item_id: outcome.item_id,
-            outcome: Some(match outcome.generation {
-                EVALUATION => v1::item_result::Outcome::Measures(v1::TrialMeasures { values }),
-                _ => v1::item_result::Outcome::Fitness(v1::TrialFitness { values }),
+            assignment_id,
+            outcome: Some(match output {
+                Output::Fitness => v1::item_result::Outcome::Fitness(v1::TrialFitness { values }),
+                Output::Measures => {
+                    v1::item_result::Outcome::Measures(v1::TrialMeasures { values })
+                }
             }),
             compute_us,
         },
-        Err(message) => v1::ItemResult { compute_us, ..failure(outcome.item_id, message) },
+        Err(message) => v1::ItemResult { compute_us, ..failure(assignment_id, message) },
     }
 }
 
@@ -109,10 +154,10 @@ pub(crate) fn next_message(ready: &mut Vec<v1::ItemResult>) -> v1::WorkRequest {
     results(ready.drain(..n).collect())
 }
 
-/// An item that was not computed.
-pub(crate) fn failure(item_id: u64, message: String) -> v1::ItemResult {
+/// The result of an assignment that was not computed.
+pub(crate) fn failure(assignment_id: u64, message: String) -> v1::ItemResult {
     let outcome = v1::item_result::Outcome::Failure(v1::ItemFailure { message });
-    v1::ItemResult { item_id, outcome: Some(outcome), compute_us: 0 }
+    v1::ItemResult { assignment_id, outcome: Some(outcome), compute_us: 0 }
 }
 
 pub(crate) fn hello(config: &WorkerConfig, process_id: u64) -> v1::WorkRequest {

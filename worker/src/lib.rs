@@ -4,6 +4,7 @@
 //! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
 
 mod activity;
+mod assignment;
 mod backoff;
 mod convert;
 pub mod metrics;

@@ -1,58 +1,39 @@
-//! The threads that compute: one item per slot at a time, apart from the threads
+//! The threads that compute: one assignment per slot at a time, apart from the threads
 //! that talk to the network.
 
 use std::{
     any::Any,
     collections::VecDeque,
     fmt, io, mem,
-    ops::Range,
     panic::{self, AssertUnwindSafe},
     sync::{
         Arc, Condvar, Mutex, MutexGuard,
         atomic::{AtomicBool, Ordering::Relaxed},
     },
     thread,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 
-use crate::activity::{Activity, Made};
+use crate::{
+    activity::{Activity, Made},
+    assignment::{Assignment, ItemResult},
+};
 
-/// One genotype and the trials to run it on.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Item {
-    pub(crate) id: u64,
-    pub(crate) experiment_id: u64,
-    pub(crate) generation: u64,
-    pub(crate) trials: Range<u32>,
-    pub(crate) genotype: Vec<f64>,
-}
-
-/// Computes the fitness of an item, one per trial, or measures its trials, or says
-/// why it cannot. Asks now and then whether to go on; none if it was stopped.
+/// Computes the numbers of an assignment, or says why it cannot. Asks now and then
+/// whether to go on; none if it was told not to.
 pub(crate) type Evaluator =
-    Arc<dyn Fn(&Item, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
+    Arc<dyn Fn(&Assignment, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
 
-/// What became of an item.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Outcome {
-    pub(crate) item_id: u64,
-    /// Whose trials they are.
-    pub(crate) generation: u64,
-    /// One number per trial, or what is measured of each.
-    pub(crate) fitness: Result<Vec<f64>, String>,
-    pub(crate) duration: Duration,
-}
-
-/// An item on its way through the pool.
-pub(crate) struct Task {
-    pub(crate) item: Item,
+/// An assignment on its way through the pool.
+pub(crate) struct Queued {
+    pub(crate) assignment: Assignment,
     pub(crate) evaluator: Evaluator,
-    /// Where the outcome goes; if nobody listens there any more, nowhere. Once
-    /// all tasks of a channel are done or dropped, the channel ends.
-    pub(crate) reply: mpsc::Sender<Outcome>,
+    /// Where the result goes; if nobody listens there any more, nowhere. Once
+    /// all assignments of a channel are done or dropped, the channel ends.
+    pub(crate) reply: mpsc::Sender<ItemResult>,
 }
 
 /// A fixed number of threads that share a bounded queue. Dropping the pool drops
@@ -72,28 +53,28 @@ struct Shared {
 
 #[derive(Default)]
 struct Queue {
-    tasks: VecDeque<Task>,
+    waiting: VecDeque<Queued>,
     /// What the slots are computing.
     running: Vec<Arc<Running>>,
     closed: bool,
 }
 
-/// An item in a slot.
+/// An assignment in a slot.
 struct Running {
-    item: Item,
-    /// Nobody wants its outcome any more.
+    assignment: Assignment,
+    /// Whether its result is not wanted any more.
     cancelled: AtomicBool,
 }
 
 impl fmt::Debug for Queue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let items: Vec<u64> = self.tasks.iter().map(|task| task.item.id).collect();
-        f.debug_struct("Queue").field("items", &items).field("closed", &self.closed).finish()
+        let ids: Vec<u64> = self.waiting.iter().map(|queued| queued.assignment.id).collect();
+        f.debug_struct("Queue").field("assignments", &ids).field("closed", &self.closed).finish()
     }
 }
 
 impl Pool {
-    /// Starts `slots` threads; the queue holds as many tasks as the coordinator may
+    /// Starts `slots` threads; the queue holds as many assignments as the coordinator may
     /// send ahead. `activity`: where they are counted.
     pub(crate) fn start(slots: usize, activity: Arc<Activity>) -> io::Result<Self> {
         let (queue, changed) = (Mutex::default(), Condvar::new());
@@ -107,41 +88,41 @@ impl Pool {
         Ok(pool)
     }
 
-    /// Number of tasks that the queue holds.
+    /// Number of assignments that the queue holds.
     pub(crate) fn capacity(&self) -> usize {
         self.capacity
     }
 
-    /// Queues a task, or gives it back if the queue is full.
-    pub(crate) fn submit(&self, task: Task) -> Result<(), Task> {
+    /// Queues an assignment, or gives it back if the queue is full.
+    pub(crate) fn submit(&self, queued: Queued) -> Result<(), Queued> {
         let mut queue = self.shared.lock();
-        if queue.tasks.len() >= self.capacity {
-            return Err(task);
+        if queue.waiting.len() >= self.capacity {
+            return Err(queued);
         }
-        queue.tasks.push_back(task);
+        queue.waiting.push_back(queued);
         self.shared.report(&queue);
         self.shared.changed.notify_one();
         Ok(())
     }
 
-    /// Drops all tasks that wait, and returns their number. What is being computed
+    /// Drops all assignments that wait, and returns their number. What is being computed
     /// goes on.
     pub(crate) fn drop_queued(&self) -> usize {
         let mut queue = self.shared.lock();
-        let dropped = mem::take(&mut queue.tasks);
+        let dropped = mem::take(&mut queue.waiting);
         self.shared.report(&queue);
         dropped.len()
     }
 
-    /// Drops the tasks that match, whether they wait or are being computed, and
-    /// returns their number. They have no outcome.
-    pub(crate) fn cancel(&self, matches: impl Fn(&Item) -> bool) -> usize {
+    /// Drops the assignments that match, whether they wait or are being computed, and
+    /// returns their number. They have no result.
+    pub(crate) fn cancel(&self, matches: impl Fn(&Assignment) -> bool) -> usize {
         let mut queue = self.shared.lock();
-        let n_before = queue.tasks.len();
-        queue.tasks.retain(|task| !matches(&task.item));
+        let n_before = queue.waiting.len();
+        queue.waiting.retain(|queued| !matches(&queued.assignment));
         self.shared.report(&queue);
-        let n_dropped = n_before - queue.tasks.len();
-        let running = queue.running.iter().filter(|running| matches(&running.item));
+        let n_dropped = n_before - queue.waiting.len();
+        let running = queue.running.iter().filter(|running| matches(&running.assignment));
         n_dropped + running.inspect(|running| running.cancelled.store(true, Relaxed)).count()
     }
 }
@@ -150,7 +131,7 @@ impl Drop for Pool {
     fn drop(&mut self) {
         let mut queue = self.shared.lock();
         queue.closed = true;
-        queue.tasks.clear();
+        queue.waiting.clear();
         self.shared.report(&queue);
         self.shared.changed.notify_all();
     }
@@ -163,60 +144,63 @@ impl Shared {
 
     /// The queue has changed.
     fn report(&self, queue: &Queue) {
-        self.activity.on_queue(queue.tasks.len(), queue.running.len());
+        self.activity.on_queue(queue.waiting.len(), queue.running.len());
     }
 
     /// A slot's life.
     fn work(&self) {
-        while let Some((running, evaluator, reply)) = self.next_task() {
-            let outcome = compute(&running, &evaluator, &self.activity);
+        while let Some((running, evaluator, reply)) = self.next() {
+            let result = compute(&running, &evaluator, &self.activity);
             let mut queue = self.lock();
             queue.running.retain(|other| !Arc::ptr_eq(other, &running));
             self.report(&queue);
             drop(queue);
-            if let Some(outcome) = outcome {
-                // An error means that the stream of this item is gone, and with it
-                // the use of the outcome.
-                let _ = reply.blocking_send(outcome);
+            if let Some(result) = result {
+                // An error means that the stream of this assignment is gone: nobody
+                // wants the result.
+                let _ = reply.blocking_send(result);
             }
         }
     }
 
-    /// Waits for a task; none once the pool is closed.
-    fn next_task(&self) -> Option<(Arc<Running>, Evaluator, mpsc::Sender<Outcome>)> {
+    /// Waits for an assignment; none once the pool is closed.
+    fn next(&self) -> Option<(Arc<Running>, Evaluator, mpsc::Sender<ItemResult>)> {
         let mut queue = self
             .changed
-            .wait_while(self.lock(), |queue| queue.tasks.is_empty() && !queue.closed)
+            .wait_while(self.lock(), |queue| queue.waiting.is_empty() && !queue.closed)
             .expect("nothing panics while it holds the queue");
-        let Task { item, evaluator, reply } = queue.tasks.pop_front()?;
-        let running = Arc::new(Running { item, cancelled: AtomicBool::new(false) });
+        let Queued { assignment, evaluator, reply } = queue.waiting.pop_front()?;
+        let running = Arc::new(Running { assignment, cancelled: AtomicBool::new(false) });
         queue.running.push(Arc::clone(&running));
         self.report(&queue);
         Some((running, evaluator, reply))
     }
 }
 
-/// Computes one item; no outcome if it is cancelled meanwhile. A panic is the
-/// item's failure, not the worker's.
-#[expect(clippy::disallowed_methods, reason = "reports how long an item took; decides nothing")]
+/// Computes one assignment; no result if it is cancelled meanwhile. A panic is the
+/// assignment's failure, not the worker's.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "reports how long an assignment took; decides nothing"
+)]
 fn compute(
-    Running { item, cancelled }: &Running,
+    Running { assignment, cancelled }: &Running,
     evaluator: &Evaluator,
     activity: &Activity,
-) -> Option<Outcome> {
+) -> Option<ItemResult> {
     let started = Instant::now();
     let keep_going = || !cancelled.load(Relaxed);
-    let fitness = panic::catch_unwind(AssertUnwindSafe(|| evaluator(item, &keep_going)))
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| evaluator(assignment, &keep_going)))
         .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))));
     let duration = started.elapsed();
-    let made = match &fitness {
-        Ok(Some(_)) => Made::Fitness { n_episodes: item.trials.len() as u64 },
+    let made = match &outcome {
+        Ok(Some(_)) => Made::Fitness { n_episodes: assignment.trials.len() as u64 },
         Ok(None) => Made::Nothing,
         Err(_) => Made::Failure,
     };
     activity.on_item(made, duration);
-    let &Item { id: item_id, generation, .. } = item;
-    Some(Outcome { item_id, generation, fitness: fitness.transpose()?, duration })
+    let &Assignment { id: assignment_id, output, .. } = assignment;
+    Some(ItemResult { assignment_id, output, outcome: outcome.transpose()?, duration })
 }
 
 fn panic_message(payload: &(dyn Any + Send)) -> &str {
@@ -231,25 +215,40 @@ fn panic_message(payload: &(dyn Any + Send)) -> &str {
 mod tests {
     use std::sync::mpsc as std_mpsc;
 
+    use sim_core::{Output, TrialSet};
+
     use super::*;
+    use crate::assignment::JobId;
+    use std::time::Duration;
 
-    fn item(id: u64) -> Item {
-        Item { id, experiment_id: id % 2, generation: 0, trials: 0..1, genotype: vec![id as f64] }
+    fn assignment(id: u64) -> Assignment {
+        Assignment {
+            id,
+            job: JobId::Experiment(id % 2),
+            trial_set: TrialSet::Generation(0),
+            output: Output::Fitness,
+            trials: 0..1,
+            genotype: vec![id as f64],
+        }
     }
 
-    fn task(id: u64, evaluator: &Evaluator, reply: &mpsc::Sender<Outcome>) -> Task {
-        Task { item: item(id), evaluator: Arc::clone(evaluator), reply: reply.clone() }
+    fn queued(id: u64, evaluator: &Evaluator, reply: &mpsc::Sender<ItemResult>) -> Queued {
+        Queued {
+            assignment: assignment(id),
+            evaluator: Arc::clone(evaluator),
+            reply: reply.clone(),
+        }
     }
 
-    fn submit(pool: &Pool, task: Task) {
-        assert!(pool.submit(task).is_ok(), "the queue has room");
+    fn submit(pool: &Pool, queued: Queued) {
+        assert!(pool.submit(queued).is_ok(), "the queue has room");
     }
 
-    /// All outcomes of a channel that ends, by item.
-    fn collect(mut outcomes: mpsc::Receiver<Outcome>) -> Vec<(u64, Result<Vec<f64>, String>)> {
+    /// All results of a channel that ends, by item.
+    fn collect(mut results: mpsc::Receiver<ItemResult>) -> Vec<(u64, Result<Vec<f64>, String>)> {
         let mut all = Vec::new();
-        while let Some(outcome) = outcomes.blocking_recv() {
-            all.push((outcome.item_id, outcome.fitness));
+        while let Some(result) = results.blocking_recv() {
+            all.push((result.assignment_id, result.outcome));
         }
         all.sort_by_key(|(id, _)| *id);
         all
@@ -261,10 +260,10 @@ mod tests {
         let (started, starts) = std_mpsc::channel();
         let (permit, permits) = std_mpsc::channel();
         let permits = Mutex::new(permits);
-        let evaluator: Evaluator = Arc::new(move |item, keep_going| {
-            started.send(item.id).map_err(|error| error.to_string())?;
+        let evaluator: Evaluator = Arc::new(move |assignment, keep_going| {
+            started.send(assignment.id).map_err(|error| error.to_string())?;
             permits.lock().unwrap().recv().map_err(|error| error.to_string())?;
-            Ok(keep_going().then(|| item.genotype.clone()))
+            Ok(keep_going().then(|| assignment.genotype.clone()))
         });
         (evaluator, starts, permit)
     }
@@ -272,30 +271,30 @@ mod tests {
     #[test]
     fn every_item_gets_its_own_outcome() {
         let pool = Pool::start(4, Arc::default()).unwrap();
-        let (reply, outcomes) = mpsc::channel(8);
-        let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
+        let (reply, results) = mpsc::channel(8);
+        let evaluator: Evaluator = Arc::new(|assignment, _| Ok(Some(assignment.genotype.clone())));
         for id in 0..8 {
-            submit(&pool, task(id, &evaluator, &reply));
+            submit(&pool, queued(id, &evaluator, &reply));
         }
         drop(reply);
         let expected: Vec<_> = (0..8).map(|id| (id, Ok(vec![id as f64]))).collect();
-        assert_eq!(collect(outcomes), expected);
+        assert_eq!(collect(results), expected);
     }
 
     #[test]
     fn a_panic_fails_its_item_and_spares_the_slot() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let (reply, outcomes) = mpsc::channel(4);
-        let evaluator: Evaluator = Arc::new(|item, _| match item.id {
+        let (reply, results) = mpsc::channel(4);
+        let evaluator: Evaluator = Arc::new(|assignment, _| match assignment.id {
             0 => panic!("no such robot"),
-            1 => panic!("robot {}", item.id),
+            1 => panic!("robot {}", assignment.id),
             _ => Ok(Some(vec![])),
         });
-        submit(&pool, task(0, &evaluator, &reply));
-        submit(&pool, task(1, &evaluator, &reply));
-        let mut received = outcomes;
+        submit(&pool, queued(0, &evaluator, &reply));
+        submit(&pool, queued(1, &evaluator, &reply));
+        let mut received = results;
         assert!(received.blocking_recv().is_some());
-        submit(&pool, task(2, &evaluator, &reply));
+        submit(&pool, queued(2, &evaluator, &reply));
         drop(reply);
         let rest = collect(received);
         assert_eq!(rest, [(1, Err("panicked: robot 1".into())), (2, Ok(vec![]))]);
@@ -304,55 +303,59 @@ mod tests {
     #[test]
     fn dropping_what_is_queued_lets_what_is_running_finish() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let (reply, outcomes) = mpsc::channel(4);
+        let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
-        submit(&pool, task(0, &evaluator, &reply));
+        submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
-        submit(&pool, task(1, &evaluator, &reply));
-        submit(&pool, task(2, &evaluator, &reply));
+        submit(&pool, queued(1, &evaluator, &reply));
+        submit(&pool, queued(2, &evaluator, &reply));
         assert_eq!(pool.drop_queued(), 2);
         permit.send(()).unwrap();
         drop(reply);
-        assert_eq!(collect(outcomes), [(0, Ok(vec![0.0]))]);
+        assert_eq!(collect(results), [(0, Ok(vec![0.0]))]);
     }
 
     #[test]
     fn cancelling_stops_what_is_running_and_drops_what_waits() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let (reply, outcomes) = mpsc::channel(4);
+        let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
-        submit(&pool, task(0, &evaluator, &reply));
+        submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
         for id in 1..=3 {
-            submit(&pool, task(id, &evaluator, &reply));
+            submit(&pool, queued(id, &evaluator, &reply));
         }
-        assert_eq!(pool.cancel(|item| item.experiment_id == 0), 2, "one runs, one waits");
+        assert_eq!(
+            pool.cancel(|assignment| assignment.job == JobId::Experiment(0)),
+            2,
+            "one runs, one waits"
+        );
         for _ in 0..3 {
             permit.send(()).unwrap();
         }
         drop(reply);
-        assert_eq!(collect(outcomes), [(1, Ok(vec![1.0])), (3, Ok(vec![3.0]))]);
+        assert_eq!(collect(results), [(1, Ok(vec![1.0])), (3, Ok(vec![3.0]))]);
     }
 
     #[test]
     fn what_becomes_of_items_is_counted() {
         let activity = Arc::new(Activity::default());
         let pool = Pool::start(1, Arc::clone(&activity)).unwrap();
-        let (reply, outcomes) = mpsc::channel(4);
+        let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
-        submit(&pool, task(0, &evaluator, &reply));
+        submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
-        submit(&pool, task(1, &evaluator, &reply));
-        submit(&pool, task(2, &evaluator, &reply));
+        submit(&pool, queued(1, &evaluator, &reply));
+        submit(&pool, queued(2, &evaluator, &reply));
         let figures = activity.figures();
         assert_eq!((figures.n_slots_busy, figures.n_items_queued), (1, 2));
-        pool.cancel(|item| item.experiment_id == 0);
+        pool.cancel(|assignment| assignment.job == JobId::Experiment(0));
         let failing: Evaluator = Arc::new(|_, _| Err("no such robot".into()));
-        submit(&pool, task(3, &failing, &reply));
+        submit(&pool, queued(3, &failing, &reply));
         permit.send(()).unwrap();
         permit.send(()).unwrap();
         drop(reply);
-        assert_eq!(collect(outcomes).len(), 2);
+        assert_eq!(collect(results).len(), 2);
         let figures = activity.figures();
         assert_eq!(figures.n_items_computed, 1);
         assert_eq!(figures.n_items_failed, 1);
@@ -363,48 +366,48 @@ mod tests {
     }
 
     #[test]
-    fn a_full_queue_gives_the_task_back() {
+    fn a_full_queue_gives_the_assignment_back() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let (reply, _outcomes) = mpsc::channel(4);
+        let (reply, _results) = mpsc::channel(4);
         let (evaluator, starts, _permit) = gated();
-        submit(&pool, task(0, &evaluator, &reply));
+        submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
         for id in 1..=pool.capacity() as u64 {
-            submit(&pool, task(id, &evaluator, &reply));
+            submit(&pool, queued(id, &evaluator, &reply));
         }
         assert_eq!(
-            pool.submit(task(99, &evaluator, &reply)).map_err(|task| task.item),
-            Err(item(99))
+            pool.submit(queued(99, &evaluator, &reply)).map_err(|queued| queued.assignment),
+            Err(assignment(99))
         );
     }
 
     #[test]
     fn a_dropped_pool_finishes_what_is_running_and_nothing_else() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let (reply, outcomes) = mpsc::channel(4);
+        let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
-        submit(&pool, task(0, &evaluator, &reply));
+        submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
-        submit(&pool, task(1, &evaluator, &reply));
+        submit(&pool, queued(1, &evaluator, &reply));
         drop(pool);
         permit.send(()).unwrap();
         drop(reply);
-        assert_eq!(collect(outcomes), [(0, Ok(vec![0.0]))]);
+        assert_eq!(collect(results), [(0, Ok(vec![0.0]))]);
     }
 
     #[test]
-    fn outcomes_that_nobody_waits_for_do_not_block_a_slot() {
+    fn results_that_nobody_waits_for_do_not_block_a_slot() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let evaluator: Evaluator = Arc::new(|item, _| Ok(Some(item.genotype.clone())));
+        let evaluator: Evaluator = Arc::new(|assignment, _| Ok(Some(assignment.genotype.clone())));
         let (gone, receiver) = mpsc::channel(1);
         drop(receiver);
-        submit(&pool, task(0, &evaluator, &gone));
-        submit(&pool, task(1, &evaluator, &gone));
-        let (reply, outcomes) = mpsc::channel(1);
-        while pool.submit(task(2, &evaluator, &reply)).is_err() {
+        submit(&pool, queued(0, &evaluator, &gone));
+        submit(&pool, queued(1, &evaluator, &gone));
+        let (reply, results) = mpsc::channel(1);
+        while pool.submit(queued(2, &evaluator, &reply)).is_err() {
             thread::yield_now();
         }
         drop(reply);
-        assert_eq!(collect(outcomes), [(2, Ok(vec![2.0]))]);
+        assert_eq!(collect(results), [(2, Ok(vec![2.0]))]);
     }
 }

@@ -26,8 +26,10 @@ use tonic::{
 use tracing::{debug, info};
 
 use crate::{
-    WorkerConfig, convert,
-    pool::{Evaluator, Outcome, Pool, Task},
+    WorkerConfig,
+    assignment::{ItemResult, JobId},
+    convert,
+    pool::{Evaluator, Pool, Queued},
 };
 
 /// Messages that wait for the network.
@@ -123,8 +125,8 @@ impl Session {
         evaluator: &(dyn Fn(String) -> Evaluator + Sync),
     ) -> Ended {
         let Self { welcome, mut inbound, outbound } = self;
-        let (reply, mut outcomes) = mpsc::channel(pool.capacity());
-        let mut desk = Desk {
+        let (reply, mut results) = mpsc::channel(pool.capacity());
+        let mut state = SessionState {
             pool,
             evaluator,
             evaluators: BTreeMap::new(),
@@ -138,13 +140,13 @@ impl Session {
         let mut computed = Vec::new();
         let mut all_computed = false;
 
-        while !(all_computed && desk.ready.is_empty()) {
+        while !(all_computed && state.ready.is_empty()) {
             // Results that the network does not take stop the intake of more.
-            let has_room = desk.ready.len() < RESULTS_PER_MESSAGE_MAX;
+            let has_room = state.ready.len() < RESULTS_PER_MESSAGE_MAX;
             tokio::select! {
                 biased;
-                () = shutdown.cancelled(), if !desk.is_draining() => {
-                    desk.drain();
+                () = shutdown.cancelled(), if !state.is_draining() => {
+                    state.drain();
                     if outbound.send(convert::draining()).await.is_err() {
                         return Ended::Lost { reason: STOPPED_READING.into(), worked };
                     }
@@ -157,7 +159,7 @@ impl Session {
                 message = inbound.message(), if has_room => match message {
                     Ok(Some(WorkResponse { message: Some(message) })) => {
                         worked = true;
-                        desk.on_message(message);
+                        state.on_message(message);
                     }
                     // A kind of message from the future.
                     Ok(Some(WorkResponse { message: None })) => {}
@@ -167,14 +169,14 @@ impl Session {
                     }
                     Err(status) => return Ended::Lost { reason: describe(&status), worked },
                 },
-                n = outcomes.recv_many(&mut computed, RESULTS_PER_MESSAGE_MAX),
+                n = results.recv_many(&mut computed, RESULTS_PER_MESSAGE_MAX),
                     if has_room && !all_computed =>
                 {
                     all_computed = n == 0;
-                    desk.ready.extend(computed.drain(..).map(convert::result));
+                    state.ready.extend(computed.drain(..).map(convert::result));
                 }
-                permit = outbound.reserve(), if !desk.ready.is_empty() => match permit {
-                    Ok(permit) => permit.send(convert::next_message(&mut desk.ready)),
+                permit = outbound.reserve(), if !state.ready.is_empty() => match permit {
+                    Ok(permit) => permit.send(convert::next_message(&mut state.ready)),
                     Err(_) => return Ended::Lost { reason: STOPPED_READING.into(), worked },
                 },
             }
@@ -194,17 +196,18 @@ impl Session {
 const STOPPED_READING: &str = "the coordinator stopped reading";
 
 /// What a session knows: specifications, and results to be sent.
-struct Desk<'a> {
+struct SessionState<'a> {
     pool: &'a Pool,
     evaluator: &'a (dyn Fn(String) -> Evaluator + Sync),
-    /// By experiment.
-    evaluators: BTreeMap<u64, Evaluator>,
-    /// Where slots put outcomes; none once no more items are taken.
-    reply: Option<mpsc::Sender<Outcome>>,
+    /// The jobs whose specification has come, and not their end.
+    evaluators: BTreeMap<JobId, Evaluator>,
+    /// Where slots put results; none once no more assignments are taken.
+    reply: Option<mpsc::Sender<ItemResult>>,
+    /// Results that wait for the network.
     ready: Vec<v1::ItemResult>,
 }
 
-impl Desk<'_> {
+impl SessionState<'_> {
     fn is_draining(&self) -> bool {
         self.reply.is_none()
     }
@@ -217,40 +220,47 @@ impl Desk<'_> {
 
     fn on_message(&mut self, message: Message) {
         match message {
-            Message::Spec(v1::ExperimentSpec { experiment_id, config_json }) => {
-                self.evaluators.insert(experiment_id, (self.evaluator)(config_json));
+            Message::Spec(v1::JobSpec { job, config_json }) => {
+                if let Some(job) = convert::job(job) {
+                    self.evaluators.insert(job, (self.evaluator)(config_json));
+                }
             }
-            Message::Batch(batch) => self.on_batch(batch),
-            Message::EndExperiment(v1::EndExperiment { experiment_id }) => {
-                self.evaluators.remove(&experiment_id);
-                let dropped = self.pool.cancel(|item| item.experiment_id == experiment_id);
-                debug!(experiment_id, dropped, "experiment ended");
+            Message::Assignments(assignments) => self.on_assignments(assignments),
+            Message::EndJob(v1::EndJob { job }) => {
+                let Some(job) = convert::job(job) else { return };
+                self.evaluators.remove(&job);
+                let dropped = self.pool.cancel(|assignment| assignment.job == job);
+                debug!(%job, dropped, "job ended");
             }
-            Message::DropItems(v1::DropItems { item_ids }) => {
-                let item_ids = BTreeSet::from_iter(item_ids);
-                let dropped = self.pool.cancel(|item| item_ids.contains(&item.id));
-                debug!(dropped, "items dropped");
+            Message::DropAssignments(v1::DropAssignments { assignment_ids }) => {
+                let ids = BTreeSet::from_iter(assignment_ids);
+                let dropped = self.pool.cancel(|assignment| ids.contains(&assignment.id));
+                debug!(dropped, "assignments dropped");
             }
             Message::Welcome(_) => debug!("ignored a second welcome"),
         }
     }
 
-    /// Queues items; those that cannot be are failed. While draining they are
-    /// dropped: the coordinator had not yet heard of it.
-    fn on_batch(&mut self, batch: v1::ItemBatch) {
+    /// Queues assignments, and fails those that cannot be queued. While the worker
+    /// drains they are dropped: the coordinator had not yet heard of it.
+    fn on_assignments(&mut self, assignments: v1::Assignments) {
         let Some(reply) = &self.reply else { return };
-        let v1::ItemBatch { experiment_id, generation, items } = batch;
-        let evaluator = self.evaluators.get(&experiment_id);
-        for item in items {
-            let item_id = item.item_id;
-            let queued = convert::item(experiment_id, generation, item).and_then(|item| {
-                let evaluator = evaluator.map(Arc::clone).ok_or_else(|| {
-                    let message = format!("no specification of experiment {experiment_id} came");
-                    convert::failure(item_id, message)
-                })?;
-                self.pool.submit(Task { item, evaluator, reply: reply.clone() }).map_err(|_| {
-                    let message = format!("more than {} items are queued", self.pool.capacity());
-                    convert::failure(item_id, message)
+        let common = convert::common(&assignments).and_then(|common| {
+            let evaluator = self.evaluators.get(&common.job);
+            let evaluator =
+                evaluator.ok_or_else(|| format!("no specification of {} came", common.job));
+            Ok((common, Arc::clone(evaluator?)))
+        });
+        for assignment in assignments.assignments {
+            let id = assignment.assignment_id;
+            let queued = common.as_ref().map_err(|message| convert::failure(id, message.clone()));
+            let queued = queued.and_then(|(common, evaluator)| {
+                let assignment = convert::assignment(common, assignment)?;
+                let (evaluator, reply) = (Arc::clone(evaluator), reply.clone());
+                self.pool.submit(Queued { assignment, evaluator, reply }).map_err(|_| {
+                    let message =
+                        format!("more than {} assignments are queued", self.pool.capacity());
+                    convert::failure(id, message)
                 })
             });
             self.ready.extend(queued.err());

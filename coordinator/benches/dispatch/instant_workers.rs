@@ -125,20 +125,25 @@ async fn work(url: &str, name: String, n_slots: u32, diary: &Diary) -> anyhow::R
     let mut inbound = client.work(ReceiverStream::new(requests)).await?.into_inner();
     while let Some(WorkResponse { message }) = inbound.message().await? {
         let received = now();
-        let Some(work_response::Message::Batch(batch)) = message else { continue };
-        let results = batch.items.iter().map(answer).collect();
+        let Some(work_response::Message::Assignments(batch)) = message else { continue };
+        let results = batch.assignments.iter().map(answer).collect();
         let results = work_request::Message::Results(ItemResults { results });
         outbox.send(WorkRequest { message: Some(results) }).await?;
-        diary.note(batch.generation, received);
+        let Some(v1::trial_set::TrialSet::Generation(generation)) =
+            batch.trial_set.and_then(|set| set.trial_set)
+        else {
+            continue;
+        };
+        diary.note(generation, received);
     }
     bail!("the stream ended")
 }
 
 /// Any fitness will do, as long as it depends on the genotype alone.
-fn answer(item: &v1::Item) -> ItemResult {
-    let values = vec![item.genotype[0]; item.trial_count as usize];
+fn answer(assignment: &v1::Assignment) -> ItemResult {
+    let values = vec![assignment.genotype[0]; assignment.trial_count as usize];
     let outcome = Some(Outcome::Fitness(TrialFitness { values }));
-    ItemResult { item_id: item.item_id, outcome, compute_us: 0 }
+    ItemResult { assignment_id: assignment.assignment_id, outcome, compute_us: 0 }
 }
 
 #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]

@@ -11,7 +11,7 @@ use tracing::info;
 
 use crate::{
     clock,
-    engine::JudgedGeneration,
+    engine::EvaluatedBatch,
     failpoint,
     ids::ExperimentId,
     shared_store::{Retry, SharedStore, Written},
@@ -54,9 +54,9 @@ pub async fn conclude(
     run: RunId,
     config: Arc<ExperimentConfig>,
     round: Round,
-    judged: JudgedGeneration,
+    evaluated: EvaluatedBatch,
 ) -> Advanced {
-    let concluding = task::spawn_blocking(move || round.conclude(&config, &judged));
+    let concluding = task::spawn_blocking(move || round.conclude(&config, &evaluated));
     let step = match concluding.await {
         Ok(Ok(next)) => Step::Concluded(next),
         Ok(Err(error)) => Step::Failed(error.to_string()),

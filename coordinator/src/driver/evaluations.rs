@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 use tracing::{debug, info};
 
-use crate::{clock, ids::ExperimentId, priority::Priority};
+use crate::{clock, engine::Batch, ids::EvaluationId, priority::Priority};
 use evolution::Genotype;
 
 use super::Driver;
@@ -36,16 +36,17 @@ impl Driver {
     pub(super) fn evaluate(&mut self, evaluation: Evaluation) {
         let Evaluation { spec, genotype, n_trials, n_values, priority, reply } = evaluation;
         self.n_evaluations += 1;
-        let id = ExperimentId::evaluation(self.n_evaluations);
-        debug!(experiment = %id, trials = n_trials, "evaluation starts");
+        let id = EvaluationId(self.n_evaluations);
+        debug!(evaluation = %id, trials = n_trials, "evaluation starts");
         self.evaluations.insert(id, reply);
-        self.engine.on_experiment_started(id, spec, priority);
-        self.engine.on_evaluation_asked(clock::now(), id, genotype, n_trials, n_values);
+        self.engine.on_job_started(id.into(), spec, priority);
+        let batch = Batch::measures(genotype, n_trials, n_values);
+        self.engine.on_batch_requested(clock::now(), id.into(), batch);
     }
 
     /// Tells who waits how an evaluation has ended.
-    pub(super) fn finish_evaluation(&mut self, id: ExperimentId, result: Result<Vec<f64>, String>) {
-        self.engine.on_experiment_ended(clock::now(), id);
+    pub(super) fn finish_evaluation(&mut self, id: EvaluationId, result: Result<Vec<f64>, String>) {
+        self.engine.on_job_ended(clock::now(), id.into());
         if let Some(reply) = self.evaluations.remove(&id) {
             // Whoever has gone meanwhile does not want to know.
             let _ = reply.send(result);
@@ -56,8 +57,8 @@ impl Driver {
     pub(super) fn drop_abandoned_evaluations(&mut self) {
         let abandoned = self.evaluations.extract_if(.., |_, reply| reply.is_closed());
         for (id, _) in abandoned.collect::<Vec<_>>() {
-            info!(experiment = %id, "evaluation dropped: its client has gone");
-            self.engine.on_experiment_ended(clock::now(), id);
+            info!(evaluation = %id, "evaluation dropped: its client has gone");
+            self.engine.on_job_ended(clock::now(), id.into());
         }
     }
 }

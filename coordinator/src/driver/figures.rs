@@ -2,7 +2,7 @@
 
 use crate::{
     clock,
-    engine::{FleetFigures, WorkFigures},
+    engine::{FleetStats, JobStats},
     ids::ExperimentId,
     store::Generation,
 };
@@ -13,7 +13,7 @@ use super::Driver;
 #[derive(Debug, Default)]
 pub struct Figures {
     /// Who computes.
-    pub fleet: FleetFigures,
+    pub fleet: FleetStats,
     /// What is computed: every unfinished experiment that this program can compute.
     pub experiments: Vec<ExperimentFigures>,
 }
@@ -30,7 +30,7 @@ pub struct ExperimentFigures {
     /// The latest generation that is on disk.
     pub latest: Option<Generation>,
     /// Its work.
-    pub work: WorkFigures,
+    pub work: JobStats,
 }
 
 impl Driver {
@@ -41,11 +41,8 @@ impl Driver {
             name: running.config.name.clone(),
             generations_wanted: running.config.algorithm.generations,
             latest: running.latest.clone(),
-            work: self.engine.work_figures(id),
+            work: self.engine.job_stats(id.into()),
         });
-        Figures {
-            fleet: self.engine.fleet_figures(clock::now()),
-            experiments: experiments.collect(),
-        }
+        Figures { fleet: self.engine.fleet_stats(clock::now()), experiments: experiments.collect() }
     }
 }

@@ -14,6 +14,7 @@ mod round;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use experiment_file::ExperimentConfig;
+use sim_core::{Output, TrialSet};
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinSet,
@@ -25,11 +26,11 @@ use tracing::{debug, error, info, warn};
 use crate::{
     clock,
     engine::{
-        Activity, Command, Engine, EngineConfig, Introduction, Item, ItemResult, JudgedGeneration,
-        WorkerStatus,
+        Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
+        JobActivity, WorkerStatus,
     },
     failpoint,
-    ids::{ExperimentId, ItemId, WorkerId},
+    ids::{AssignmentId, EvaluationId, ExperimentId, JobId, WorkerId},
     metrics::Instruments,
     priority::Priority,
     shared_store::SharedStore,
@@ -89,7 +90,7 @@ pub enum Event {
     /// A client wants a genotype evaluated.
     EvaluationRequested(Box<Evaluation>),
     /// A client wonders what becomes of an experiment.
-    ActivityRequested(ExperimentId, oneshot::Sender<Activity>),
+    ActivityRequested(ExperimentId, oneshot::Sender<JobActivity>),
     /// Somebody scrapes metrics.
     FiguresRequested(oneshot::Sender<Figures>),
 }
@@ -132,14 +133,23 @@ pub struct WorkerLink {
 pub enum ToWorker {
     /// It is welcome under this id.
     Welcome(WorkerId),
-    /// An experiment's specification.
-    Spec(ExperimentId, Arc<str>),
-    /// Items of a generation.
-    Items(ExperimentId, u64, Vec<Item>),
-    /// Results that are not wanted any more.
-    DropItems(Vec<ItemId>),
-    /// An experiment is over, or paused.
-    End(ExperimentId),
+    /// A job's specification.
+    Spec(JobId, Arc<str>),
+    /// Items of a job's batch.
+    Assignments {
+        /// The job whose batch it is.
+        job: JobId,
+        /// Which worlds and noise the trials meet.
+        trial_set: TrialSet,
+        /// What is returned for a trial.
+        output: Output,
+        /// At least one.
+        assignments: Vec<Assignment>,
+    },
+    /// Assignments whose results are not wanted any more.
+    Drop(Vec<AssignmentId>),
+    /// A job is over, or paused.
+    End(JobId),
     /// It is dropped; why.
     Dropped(String),
 }
@@ -164,7 +174,7 @@ pub struct Driver {
     experiments: BTreeMap<ExperimentId, Running>,
     n_started: u64,
     /// Who waits for which evaluation.
-    evaluations: BTreeMap<ExperimentId, Reply>,
+    evaluations: BTreeMap<EvaluationId, Reply>,
     n_evaluations: u64,
     /// Judged rounds whose conclusions are being drawn and stored.
     advancing: JoinSet<Advanced>,
@@ -314,7 +324,9 @@ impl Driver {
             }
             // If the client is gone it need not be told.
             Event::WorkersRequested(reply) => drop(reply.send(self.engine.worker_status(now))),
-            Event::ActivityRequested(id, reply) => drop(reply.send(self.engine.activity(now, id))),
+            Event::ActivityRequested(id, reply) => {
+                drop(reply.send(self.engine.activity(now, id.into())));
+            }
             Event::FiguresRequested(reply) => drop(reply.send(self.figures())),
         }
     }
@@ -324,13 +336,13 @@ impl Driver {
         let generations = runnable.config.algorithm.generations;
         info!(
             experiment = %id, name = runnable.config.name, seed = runnable.config.seed,
-            generation = runnable.round.address(), generations,
+            generation = runnable.round.trial_set().generation(), generations,
             "experiment starts"
         );
-        self.engine.on_experiment_started(id, runnable.spec, runnable.priority);
+        self.engine.on_job_started(id.into(), runnable.spec, runnable.priority);
         if runnable.is_paused {
             info!(experiment = %id, "experiment is paused");
-            self.engine.on_experiment_paused(clock::now(), id);
+            self.engine.on_job_paused(clock::now(), id.into());
         }
         self.n_started += 1;
         let running =
@@ -343,60 +355,62 @@ impl Driver {
     fn judge(&mut self, id: ExperimentId, round: Round) {
         let Some(running) = self.experiments.get_mut(&id) else { return };
         let n_trials = round.n_trials(&running.config);
-        let (address, genotypes) = (round.address(), round.genotypes());
+        let batch = Batch::fitness(round.trial_set(), round.genotypes(), n_trials);
         running.round = Some(round);
-        self.engine.on_generation_asked(clock::now(), id, address, genotypes, n_trials);
+        self.engine.on_batch_requested(clock::now(), id.into(), batch);
     }
 
     fn carry_out(&mut self, command: Command) {
         match command {
-            Command::SendSpec { worker, experiment, spec } => {
-                self.send(worker, ToWorker::Spec(experiment, spec));
-            }
-            Command::SendItems { worker, experiment, generation, items } => {
-                debug!(%worker, %experiment, generation, items = items.len(), "items assigned");
-                let item_len = size_of_val(items[0].genotype.as_slice()).max(1);
-                for items in items.chunks((BATCH_LEN / item_len).max(1)) {
-                    self.send(worker, ToWorker::Items(experiment, generation, items.to_vec()));
+            Command::SendSpec { worker, job, spec } => self.send(worker, ToWorker::Spec(job, spec)),
+            Command::SendAssignments { worker, job, trial_set, output, assignments } => {
+                debug!(
+                    %worker, %job, generation = trial_set.generation(), trials = trial_set.kind(),
+                    items = assignments.len(), "items assigned"
+                );
+                let genotype_len = size_of_val(assignments[0].genotype.as_slice()).max(1);
+                for assignments in assignments.chunks((BATCH_LEN / genotype_len).max(1)) {
+                    let assignments = assignments.to_vec();
+                    let message = ToWorker::Assignments { job, trial_set, output, assignments };
+                    self.send(worker, message);
                 }
             }
-            Command::SendDrop { worker, items } => self.send(worker, ToWorker::DropItems(items)),
-            Command::SendEnd { worker, experiment } => {
-                self.send(worker, ToWorker::End(experiment));
+            Command::SendDrop { worker, assignments } => {
+                self.send(worker, ToWorker::Drop(assignments));
             }
+            Command::SendEnd { worker, job } => self.send(worker, ToWorker::End(job)),
             Command::Disconnect { worker, reason, n_items_requeued } => {
                 self.send(worker, ToWorker::Dropped(reason.clone()));
                 self.forget_worker(worker, &reason, n_items_requeued);
             }
-            Command::FinishGeneration { experiment, mut judged } if experiment.is_evaluation() => {
-                self.finish_evaluation(experiment, Ok(judged.trial_fitness.swap_remove(0)));
+            Command::FinishBatch { job: JobId::Evaluation(id), mut evaluated } => {
+                self.finish_evaluation(id, Ok(evaluated.values.swap_remove(0)));
             }
-            Command::FailExperiment { experiment, reason }
-            | Command::PauseExperiment { experiment, reason }
-                if experiment.is_evaluation() =>
-            {
-                error!(%experiment, reason, "evaluation failed");
-                self.finish_evaluation(experiment, Err(reason));
+            Command::FailJob { job: JobId::Evaluation(id), reason }
+            | Command::PauseJob { job: JobId::Evaluation(id), reason } => {
+                error!(evaluation = %id, reason, "evaluation failed");
+                self.finish_evaluation(id, Err(reason));
             }
-            Command::FinishGeneration { experiment, judged } => {
+            Command::FinishBatch { job: JobId::Experiment(experiment), evaluated } => {
                 let Some(running) = self.experiments.get_mut(&experiment) else { return };
                 let Some(round) = running.round.take() else { return };
-                let JudgedGeneration { generation, n_audited, n_unaudited, .. } = judged;
-                debug!(%experiment, generation, n_audited, "generation judged");
+                let EvaluatedBatch { trial_set, n_audited, n_unaudited, .. } = evaluated;
+                let (generation, trials) = (trial_set.generation(), trial_set.kind());
+                debug!(%experiment, generation, trials, n_audited, "batch evaluated");
                 if n_unaudited > 0 {
                     warn!(
-                        %experiment, generation, n_audited, n_unaudited,
+                        %experiment, generation, trials, n_audited, n_unaudited,
                         "there was no second worker to audit results"
                     );
                 }
                 let run = RunId { id: experiment, incarnation: running.incarnation };
                 let config = Arc::clone(&running.config);
-                self.advancing.spawn(advance::conclude(run, config, round, judged));
+                self.advancing.spawn(advance::conclude(run, config, round, evaluated));
             }
-            Command::FailExperiment { experiment, reason } => {
+            Command::FailJob { job: JobId::Experiment(experiment), reason } => {
                 self.end(experiment, ExperimentState::Failed, reason);
             }
-            Command::PauseExperiment { experiment, reason } => {
+            Command::PauseJob { job: JobId::Experiment(experiment), reason } => {
                 error!(%experiment, reason, "experiment paused");
                 let paused = Change::State(ExperimentState::Paused, reason.clone());
                 for change in [Change::Notice(reason), paused] {
@@ -432,7 +446,7 @@ impl Driver {
                     self.end(id, state, reason);
                 } else {
                     self.experiments.remove(&id);
-                    self.engine.on_experiment_ended(clock::now(), id);
+                    self.engine.on_job_ended(clock::now(), id.into());
                 }
             }
             Step::Failed(reason) => self.end(id, ExperimentState::Failed, reason),

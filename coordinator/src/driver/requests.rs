@@ -30,17 +30,17 @@ impl Driver {
             }
             Request::Pause(reason) => {
                 info!(experiment = %id, reason, "experiment paused");
-                self.engine.on_experiment_paused(clock::now(), id);
+                self.engine.on_job_paused(clock::now(), id.into());
                 Change::State(ExperimentState::Paused, reason)
             }
             Request::Resume => {
                 info!(experiment = %id, "experiment resumed");
-                self.engine.on_experiment_resumed(clock::now(), id);
+                self.engine.on_job_resumed(clock::now(), id.into());
                 Change::State(ExperimentState::Running, String::new())
             }
             Request::SetPriority(priority) => {
                 info!(experiment = %id, priority = priority.weight(), "experiment reprioritised");
-                self.engine.on_priority_set(id, priority);
+                self.engine.on_priority_set(id.into(), priority);
                 Change::Priority(priority)
             }
         };
@@ -49,7 +49,7 @@ impl Driver {
 
     /// Ends an experiment; a generation that is being stored is stored first.
     pub(super) fn end(&mut self, id: ExperimentId, state: ExperimentState, reason: String) {
-        self.engine.on_experiment_ended(clock::now(), id);
+        self.engine.on_job_ended(clock::now(), id.into());
         if let Some(running) = self.experiments.get_mut(&id).filter(|running| running.is_storing) {
             running.end.get_or_insert((state, reason));
             return;

@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use experiment_file::ExperimentConfig;
-use sim_core::held_out;
+use sim_core::TrialSet;
 
-use crate::{engine::JudgedGeneration, store::Generation};
+use crate::{engine::EvaluatedBatch, store::Generation};
 use evolution::{Champion, ChampionSource, Evolution, EvolutionError, Population, Reevaluation};
 
 /// What the fleet judges at once.
@@ -63,15 +63,15 @@ impl Round {
         Self::Generation(evolution, asked)
     }
 
-    /// The generation, or the address of the held-out trials.
-    pub fn address(&self) -> u64 {
+    /// Which worlds and noise its trials meet.
+    pub fn trial_set(&self) -> TrialSet {
         match self {
-            Self::Generation(_, asked) => asked.index,
-            Self::Reevaluation(_, reevaluation) => held_out(reevaluation.generation),
+            Self::Generation(_, asked) => TrialSet::Generation(asked.index),
+            Self::Reevaluation(_, reevaluation) => TrialSet::HeldOut(reevaluation.generation),
         }
     }
 
-    /// Who is judged.
+    /// Who is evaluated.
     pub fn genotypes(&self) -> Population {
         match self {
             Self::Generation(_, asked) => Arc::clone(&asked.genotypes),
@@ -93,13 +93,13 @@ impl Round {
     pub fn conclude(
         self,
         config: &ExperimentConfig,
-        judged: &JudgedGeneration,
+        evaluated: &EvaluatedBatch,
     ) -> Result<Next, EvolutionError> {
         match self {
             Self::Generation(evolution, asked) => {
                 // By now, the generation before is usually stored, and nothing is copied.
                 let evolution = Arc::unwrap_or_clone(evolution);
-                let learnt = learn(config, evolution, asked, judged)?;
+                let learnt = learn(config, evolution, asked, evaluated)?;
                 Ok(match learnt.evolution.reevaluation() {
                     Some(candidates) if learnt.over.is_some() || learnt.is_scheduled(config) => {
                         Next::Judge(Box::new(Self::Reevaluation(Box::new(learnt), candidates)))
@@ -109,7 +109,7 @@ impl Round {
             }
             Self::Reevaluation(mut learnt, candidates) => {
                 let mut crowned = learnt.evolution.clone();
-                crowned.set_champion(&candidates, &judged.trial_fitness);
+                crowned.set_champion(&candidates, &evaluated.values);
                 learnt.notices.extend(crowned.champion().map(describe));
                 if learnt.is_scheduled(config) {
                     learnt.evolution = crowned.clone();
@@ -152,17 +152,17 @@ fn learn(
     config: &ExperimentConfig,
     mut evolution: Evolution,
     asked: evolution::Generation,
-    judged: &JudgedGeneration,
+    evaluated: &EvaluatedBatch,
 ) -> Result<Learnt, EvolutionError> {
-    let record = evolution.tell(asked, &judged.trial_fitness)?;
+    let record = evolution.tell(asked, &evaluated.values)?;
     let generation = Generation {
         generation: record.generation,
         statistics: record.statistics,
         digest: record.digest.to_string(),
-        duration_ms: judged.duration.as_millis() as u64,
-        episodes: judged.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
-        workers: judged.n_workers as u64,
-        idle_share: judged.idle_share,
+        duration_ms: evaluated.duration.as_millis() as u64,
+        episodes: evaluated.values.iter().map(|trials| trials.len() as u64).sum(),
+        workers: evaluated.n_workers as u64,
+        idle_share: evaluated.idle_share,
     };
     let mut notices = Vec::new();
     if record.n_non_finite > 0 {

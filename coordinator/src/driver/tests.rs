@@ -51,7 +51,14 @@ async fn the_stale_end_of_a_reopened_run_does_not_end_it() {
     }
     let mut has_work = false;
     while let Ok(message) = inbox.try_recv() {
-        has_work |= matches!(message, ToWorker::Items(ID, 0, _));
+        has_work |= matches!(
+            message,
+            ToWorker::Assignments {
+                job: JobId::Experiment(ID),
+                trial_set: TrialSet::Generation(0),
+                ..
+            }
+        );
     }
     assert!(has_work, "and workers get its items");
 
@@ -101,11 +108,11 @@ impl Rig {
                 self.driver.carry_out(command);
             }
             let Ok(message) = self.inbox.try_recv() else { return answered };
-            let ToWorker::Items(_, generation, items) = message else { continue };
-            answered = Some(generation);
-            let results = items.into_iter().map(|item| ItemResult {
-                id: item.id,
-                outcome: Ok(item.trials.map(|_| item.genotype[0]).collect()),
+            let ToWorker::Assignments { trial_set, assignments, .. } = message else { continue };
+            answered = trial_set.generation();
+            let results = assignments.into_iter().map(|it| ItemResult {
+                id: it.id,
+                outcome: Ok(it.trials.map(|_| it.genotype[0]).collect()),
                 compute_time: Duration::from_millis(1),
             });
             let spoke = WorkerMessage::Results(results.collect());

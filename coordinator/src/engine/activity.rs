@@ -3,28 +3,30 @@
 
 use std::time::{Duration, Instant};
 
-use crate::ids::{ExperimentId, WorkerId};
+use sim_core::TrialSet;
 
-use super::{Engine, generation::GenerationInProgress};
+use crate::ids::{JobId, WorkerId};
+
+use super::{Engine, batch::BatchInProgress};
 
 /// What the engine knows of an experiment and of who could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Activity {
+pub struct JobActivity {
     /// What is being judged; none between rounds, and once it has ended.
-    pub round: Option<RoundActivity>,
+    pub batch: Option<BatchActivity>,
     /// Connected workers.
     pub n_workers: usize,
     /// Those that are given work.
     pub n_workers_available: usize,
     /// Other experiments with items that no worker has.
-    pub rivals: Vec<ExperimentId>,
+    pub rivals: Vec<JobId>,
 }
 
 /// A generation, or held-out trials, being judged.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RoundActivity {
-    /// Index of the generation, or address of held-out trials.
-    pub number: u64,
+pub struct BatchActivity {
+    /// Which worlds and noise its trials meet.
+    pub trial_set: TrialSet,
     /// Trials, over all individuals.
     pub n_episodes: usize,
     /// Those whose fitness is not known.
@@ -56,26 +58,20 @@ pub struct HeldItems {
 
 impl Engine {
     /// What becomes of an experiment's work.
-    pub fn activity(&self, now: Instant, id: ExperimentId) -> Activity {
-        let round = self.experiments.get(&id).and_then(|work| work.generation.as_ref());
-        let rivals =
-            self.experiments.iter().filter(|(other, work)| **other != id && work.is_ready());
-        Activity {
-            round: round.map(|generation| self.round_activity(now, id, generation)),
+    pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
+        let batch = self.jobs.get(&id).and_then(|work| work.batch.as_ref());
+        let rivals = self.jobs.iter().filter(|(other, work)| **other != id && work.is_ready());
+        JobActivity {
+            batch: batch.map(|batch| self.batch_activity(now, id, batch)),
             n_workers: self.workers.len(),
             n_workers_available: self.workers.values().filter(|worker| worker.is_usable()).count(),
             rivals: rivals.map(|(&other, _)| other).collect(),
         }
     }
 
-    fn round_activity(
-        &self,
-        now: Instant,
-        id: ExperimentId,
-        generation: &GenerationInProgress,
-    ) -> RoundActivity {
+    fn batch_activity(&self, now: Instant, id: JobId, batch: &BatchInProgress) -> BatchActivity {
         let held = self.workers.iter().filter_map(|(&worker_id, worker)| {
-            let ours = || worker.in_flight.values().filter(|assigned| assigned.experiment == id);
+            let ours = || worker.in_flight.values().filter(|assigned| assigned.job == id);
             Some(HeldItems {
                 worker: worker_id,
                 name: worker.name().to_owned(),
@@ -84,14 +80,14 @@ impl Engine {
                 silent_for: now.saturating_duration_since(worker.last_heard),
             })
         });
-        RoundActivity {
-            number: generation.number,
-            n_episodes: generation.n_episodes(),
-            n_episodes_left: generation.n_episodes_left(),
-            n_items_queued: generation.n_queued(),
-            n_individuals_failing: generation.blames.n_individuals(),
+        BatchActivity {
+            trial_set: batch.trial_set(),
+            n_episodes: batch.n_episodes(),
+            n_episodes_left: batch.n_episodes_left(),
+            n_items_queued: batch.n_queued(),
+            n_individuals_failing: batch.failures.n_individuals(),
             held: held.collect(),
-            running_for: generation.running_for(now),
+            running_for: batch.running_for(now),
         }
     }
 }

@@ -15,13 +15,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::ids::{ExperimentId, ItemId, WorkerId};
+use sim_core::{Output, TrialSet};
+
+use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
-    Command, Engine, Item, SharedGenotype,
-    experiment::{ExperimentWork, remaining},
-    generation::Task,
-    worker::{Assignment, FULL_LOAD, Worker},
+    Assignment, Command, Engine,
+    item::Item,
+    job::{JobWork, remaining},
+    worker::{AssignedItem, FULL_LOAD, Worker},
 };
 
 /// What moving work costs: a round trip, and the coordinator's own delays.
@@ -32,14 +34,14 @@ const N_LOOKED_AT: usize = 8;
 /// Messages to workers that are being put together.
 #[derive(Debug, Default)]
 pub struct Outgoing {
-    recalled: BTreeMap<WorkerId, Vec<ItemId>>,
-    items: BTreeMap<(WorkerId, ExperimentId), (u64, Vec<Item>)>,
+    recalled: BTreeMap<WorkerId, Vec<AssignmentId>>,
+    assignments: BTreeMap<(WorkerId, JobId), (TrialSet, Output, Vec<Assignment>)>,
 }
 
 impl Outgoing {
     /// Whether there is nothing to send.
     pub fn is_empty(&self) -> bool {
-        self.recalled.is_empty() && self.items.is_empty()
+        self.recalled.is_empty() && self.assignments.is_empty()
     }
 }
 
@@ -58,50 +60,50 @@ impl Engine {
     }
 
     pub(super) fn has_idle_slot(&self) -> bool {
-        self.standings.available.first().is_some_and(|&(load, ..)| load < FULL_LOAD)
+        self.load_index.available.first().is_some_and(|&(load, ..)| load < FULL_LOAD)
     }
 
     fn hand_out_queued(&mut self, now: Instant) {
-        while let Some((experiment, worker, is_audit)) = self.next_turn() {
-            self.served_until = self.served_until.max(self.experiments[&experiment].served);
-            let task = if is_audit {
+        while let Some((job, worker, is_audit)) = self.next_item() {
+            self.virtual_now = self.virtual_now.max(self.jobs[&job].virtual_time);
+            let item = if is_audit {
                 let name = self.workers[&worker].name().to_owned();
-                let audit = self.generation_mut(experiment).pop_audit_for(&name);
+                let audit = self.batch_mut(job).pop_audit_for(&name);
                 audit.expect("the turn was an audit's")
             } else {
-                let n_trials = self.n_trials_per_item(experiment, self.workers[&worker].pace);
-                let generation = self.generation_mut(experiment);
-                generation.pop_front(n_trials).expect("who has a turn has queued work")
+                let n_trials = self.n_trials_per_item(job, self.workers[&worker].pace);
+                let batch = self.batch_mut(job);
+                batch.pop_front(n_trials).expect("who has a turn has queued work")
             };
             let pace = self.workers[&worker].pace;
-            let work = self.experiments.get_mut(&experiment).expect("just seen");
-            let charge = work.charge(task.trials.len(), pace);
-            let was = work.served;
+            let work = self.jobs.get_mut(&job).expect("just seen");
+            let charge = work.charge(item.trials.len(), pace);
+            let was = work.virtual_time;
             work.add_charge(charge);
-            self.turns.remove(&(was, experiment));
+            self.ready_queue.remove(&(was, job));
             if work.is_ready() {
-                self.turns.insert((work.served, experiment));
+                self.ready_queue.insert((work.virtual_time, job));
             }
-            self.give(now, worker, experiment, task, is_audit, charge);
+            self.give(now, worker, job, item, is_audit, charge);
         }
     }
 
     /// Who is served next, by whom, and whether with an audit. An experiment that
     /// waits for a free slot keeps its turn: if others went on handing out ahead,
     /// no slot would ever be free.
-    fn next_turn(&self) -> Option<(ExperimentId, WorkerId, bool)> {
-        let available = &self.standings.available;
+    fn next_item(&self) -> Option<(JobId, WorkerId, bool)> {
+        let available = &self.load_index.available;
         let &(load, _, first) = available.first()?;
-        for &(_, id) in &self.turns {
-            let Some(generation) = &self.experiments[&id].generation else { continue };
-            if generation.has_audits() {
+        for &(_, id) in &self.ready_queue {
+            let Some(batch) = &self.jobs[&id].batch else { continue };
+            if batch.has_audits() {
                 let mut workers = available.iter().map(|&(.., worker)| worker);
-                let may = |id: &WorkerId| generation.has_audit_for(self.workers[id].name());
+                let may = |id: &WorkerId| batch.has_audit_for(self.workers[id].name());
                 if let Some(auditor) = workers.find(may) {
                     return Some((id, auditor, true));
                 }
             }
-            if generation.n_queued() > 0 {
+            if batch.n_queued() > 0 {
                 let may_have = load < FULL_LOAD || self.hands_out_ahead(id);
                 return may_have.then_some((id, first, false));
             }
@@ -112,34 +114,33 @@ impl Engine {
     /// Slots among which an experiment's work is divided: experiments with turns get
     /// about equal parts of them.
     fn n_slots_each(&self, n_slots: usize) -> usize {
-        n_slots / self.turns.len().max(1)
+        n_slots / self.ready_queue.len().max(1)
     }
 
     /// Whether workers whose slots are full get an experiment's items, too. Not
     /// near the end of a generation, when whoever is free first should have what
     /// is left; except items so short that they take no longer than their way.
-    fn hands_out_ahead(&self, id: ExperimentId) -> bool {
-        let work = &self.experiments[&id];
-        let Some(generation) = &work.generation else { return false };
-        let n_left =
-            generation.n_trials() as usize * self.n_slots_each(self.standings.n_usable_slots);
+    fn hands_out_ahead(&self, id: JobId) -> bool {
+        let work = &self.jobs[&id];
+        let Some(batch) = &work.batch else { return false };
+        let n_left = batch.n_trials() as usize * self.n_slots_each(self.load_index.n_usable_slots);
         let is_short = || work.expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST);
-        !self.config.split || generation.n_trials_queued() > n_left || is_short()
+        !self.config.split || batch.n_trials_queued() > n_left || is_short()
     }
 
     /// How many trials of the next task an item gets for a worker of a pace: all of
     /// them, unless slots would stay empty, or the generation is near its end, when
     /// the worker's share of what is left is smaller than a task.
-    fn n_trials_per_item(&self, id: ExperimentId, pace: f64) -> usize {
-        let Some(generation) = &self.experiments[&id].generation else { return usize::MAX };
+    fn n_trials_per_item(&self, id: JobId, pace: f64) -> usize {
+        let Some(batch) = &self.jobs[&id].batch else { return usize::MAX };
         if !self.config.split {
             return usize::MAX;
         }
-        let n_trials = generation.n_trials() as usize;
-        let n_idle_slots = self.n_slots_each(self.standings.n_idle_slots);
-        let n_parts = (n_idle_slots / generation.n_queued().max(1)).max(1);
-        let n_slots = self.n_slots_each(self.standings.n_usable_slots).max(1);
-        let share = generation.n_trials_queued() as f64 / (n_slots as f64 * pace);
+        let n_trials = batch.n_trials() as usize;
+        let n_idle_slots = self.n_slots_each(self.load_index.n_idle_slots);
+        let n_parts = (n_idle_slots / batch.n_queued().max(1)).max(1);
+        let n_slots = self.n_slots_each(self.load_index.n_usable_slots).max(1);
+        let share = batch.n_trials_queued() as f64 / (n_slots as f64 * pace);
         n_trials.div_ceil(n_parts).min(share.ceil() as usize).max(1)
     }
 
@@ -147,17 +148,17 @@ impl Engine {
     /// it; whether there was one that is worth it.
     fn move_waiting(&mut self, now: Instant) -> bool {
         let candidate =
-            self.standings.backlogged.iter().rev().take(N_LOOKED_AT).find_map(|&(_, holder)| {
+            self.load_index.backlogged.iter().rev().take(N_LOOKED_AT).find_map(|&(_, holder)| {
                 let worker = &self.workers[&holder];
                 let n_waiting = worker.in_flight.len() - worker.n_slots();
                 let mut waiting = worker.in_flight.iter().rev().take(n_waiting);
-                let (&item, _) =
+                let (&assignment_id, _) =
                     waiting.find(|(_, a)| !a.is_audit && a.expected > now + MOVING_COST)?;
-                Some((holder, item))
+                Some((holder, assignment_id))
             });
-        let Some((holder, item)) = candidate else { return false };
-        let assignment = self.recall(holder, item);
-        self.requeue(assignment.experiment, &assignment.task);
+        let Some((holder, assignment_id)) = candidate else { return false };
+        let assignment = self.recall(holder, assignment_id);
+        self.requeue(assignment.job, &assignment.item);
         true
     }
 
@@ -166,32 +167,32 @@ impl Engine {
     fn duplicate(&mut self, now: Instant) -> bool {
         let Some(idle) = self.idle_worker_except(None) else { return false };
         let pace = self.workers[&idle].pace;
-        let candidate = self.experiments.iter().find_map(|(&id, work)| {
-            let copy = work.slowest(now, self.standings.n_idle_slots, pace, &self.workers)?;
+        let candidate = self.jobs.iter().find_map(|(&id, work)| {
+            let copy = work.slowest(now, self.load_index.n_idle_slots, pace, &self.workers)?;
             Some((id, copy))
         });
-        let Some((experiment, Slow { key, holder, task, n_parts })) = candidate else {
+        let Some((job, Slow { key, holder, item, n_parts })) = candidate else {
             return false;
         };
         if self.idle_worker_except(Some(holder)).is_none() {
             return false;
         }
-        self.generation_mut(experiment).uncovered.remove(&key);
-        let n_per_part = task.trials.len().div_ceil(n_parts) as u32;
-        let mut start = task.trials.start;
-        while start < task.trials.end
+        self.batch_mut(job).uncovered.remove(&key);
+        let n_per_part = item.trials.len().div_ceil(n_parts) as u32;
+        let mut start = item.trials.start;
+        while start < item.trials.end
             && let Some(worker) = self.idle_worker_except(Some(holder))
         {
-            let trials = start..(start + n_per_part).min(task.trials.end);
+            let trials = start..(start + n_per_part).min(item.trials.end);
             start = trials.end;
-            let part = Task { individual: task.individual, trials };
-            self.give(now, worker, experiment, part, false, Duration::ZERO);
+            let part = Item { individual: item.individual, trials };
+            self.give(now, worker, job, part, false, Duration::ZERO);
         }
         true
     }
 
     fn idle_worker_except(&self, holder: Option<WorkerId>) -> Option<WorkerId> {
-        let idle = self.standings.available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
+        let idle = self.load_index.available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
         idle.map(|&(.., id)| id).find(|&id| Some(id) != holder)
     }
 
@@ -200,106 +201,97 @@ impl Engine {
         &mut self,
         now: Instant,
         worker_id: WorkerId,
-        experiment: ExperimentId,
-        task: Task,
+        job: JobId,
+        item: Item,
         is_audit: bool,
         charge: Duration,
     ) {
         self.n_items_assigned += 1;
-        let id = ItemId(self.n_items_assigned);
-        let work = self.experiments.get_mut(&experiment).expect("the caller has seen it");
+        let id = AssignmentId(self.n_items_assigned);
+        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
         let worker = &self.workers[&worker_id];
-        let expected = work.expected(task.trials.len(), worker.pace).unwrap_or_default();
+        let expected = work.expected(item.trials.len(), worker.pace).unwrap_or_default();
         // What it has been given before comes first.
         let n_before = (worker.in_flight.len() / worker.n_slots()) as u32;
         let expected = now + expected * (n_before + 1);
-        let generation = work.generation.as_mut().expect("the caller has seen it");
-        generation.add_holder(id, worker_id, &task, is_audit);
-        if !is_audit && generation.duplicable(&task).is_some() {
-            generation.uncovered.insert((expected, id), worker_id);
+        let batch = work.batch.as_mut().expect("the caller has seen it");
+        batch.add_holder(id, worker_id, &item, is_audit);
+        if !is_audit && batch.duplicable(&item).is_some() {
+            batch.uncovered.insert((expected, id), worker_id);
         }
-        let item = Item {
-            id,
-            trials: task.trials.clone(),
-            genotype: SharedGenotype {
-                population: Arc::clone(&generation.genotypes),
-                individual: task.individual,
-            },
-        };
-        let number = generation.number;
-        let batch = self.outgoing.items.entry((worker_id, experiment));
-        batch.or_insert_with(|| (number, Vec::new())).1.push(item);
-        let assignment = Assignment {
-            experiment,
-            generation: number,
-            task,
-            is_audit,
-            assigned: now,
-            expected,
-            charge,
-        };
-        self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assignment));
+        let (trial_set, output) = (batch.trial_set(), batch.output());
+        let genotype = batch.genotype(item.individual);
+        let assignment = Assignment { id, trials: item.trials.clone(), genotype };
+        let outgoing = self.outgoing.assignments.entry((worker_id, job));
+        outgoing.or_insert_with(|| (trial_set, output, Vec::new())).2.push(assignment);
+        let assigned =
+            AssignedItem { job, trial_set, item, is_audit, assigned: now, expected, charge };
+        self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 
     /// Ends an assignment and gives its worker the credit back.
-    pub(super) fn take_assignment(&mut self, worker: WorkerId, item: ItemId) -> Assignment {
-        let assignment = self.update_worker(worker, |worker| worker.in_flight.remove(&item));
+    pub(super) fn take_assignment(
+        &mut self,
+        worker: WorkerId,
+        assignment_id: AssignmentId,
+    ) -> AssignedItem {
+        let assignment =
+            self.update_worker(worker, |worker| worker.in_flight.remove(&assignment_id));
         let assignment = assignment.expect("the caller has seen it");
-        self.forget_holder(item, &assignment);
+        self.forget_holder(assignment_id, &assignment);
         assignment
     }
 
     /// A worker computes an assignment no more.
-    pub(super) fn forget_holder(&mut self, item: ItemId, assignment: &Assignment) {
-        let work = self.experiments.get_mut(&assignment.experiment);
-        let Some(generation) = work.and_then(|work| work.generation.as_mut()) else { return };
-        generation.remove_holder(item, assignment.task.individual);
-        generation.uncovered.remove(&(assignment.expected, item));
+    pub(super) fn forget_holder(&mut self, assignment_id: AssignmentId, assignment: &AssignedItem) {
+        let work = self.jobs.get_mut(&assignment.job);
+        let Some(batch) = work.and_then(|work| work.batch.as_mut()) else { return };
+        batch.remove_holder(assignment_id, assignment.item.individual);
+        batch.uncovered.remove(&(assignment.expected, assignment_id));
     }
 
     /// Takes an assignment back: its worker is told to drop it.
-    pub(super) fn recall(&mut self, worker: WorkerId, item: ItemId) -> Assignment {
-        let assignment = self.take_assignment(worker, item);
-        self.tally.n_items_recalled += 1;
-        self.correct_charge(assignment.experiment, assignment.charge, Duration::ZERO);
-        self.outgoing.recalled.entry(worker).or_default().push(item);
+    pub(super) fn recall(&mut self, worker: WorkerId, assignment_id: AssignmentId) -> AssignedItem {
+        let assignment = self.take_assignment(worker, assignment_id);
+        self.counters.n_items_recalled += 1;
+        self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
+        self.outgoing.recalled.entry(worker).or_default().push(assignment_id);
         let worker = self.workers.get_mut(&worker).expect("it had the assignment");
-        worker.remember_recalled(item, assignment.clone());
+        worker.remember_recalled(assignment_id, assignment.clone());
         assignment
     }
 
     /// Turns what has been put together into commands.
     fn send(&mut self) {
-        let Outgoing { recalled, items } = mem::take(&mut self.outgoing);
-        for (worker, items) in recalled {
+        let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
+        for (worker, assignments) in recalled {
             if self.workers.contains_key(&worker) {
-                self.commands.push_back(Command::SendDrop { worker, items });
+                self.commands.push_back(Command::SendDrop { worker, assignments });
             }
         }
-        for ((worker, experiment), (generation, items)) in items {
-            let is_new = self
-                .workers
-                .get_mut(&worker)
-                .is_some_and(|worker| worker.known_experiments.insert(experiment));
+        for ((worker, job), (trial_set, output, assignments)) in assignments {
+            let is_new =
+                self.workers.get_mut(&worker).is_some_and(|worker| worker.known_jobs.insert(job));
             if is_new {
-                let spec = Arc::clone(&self.experiments[&experiment].spec);
-                self.commands.push_back(Command::SendSpec { worker, experiment, spec });
+                let spec = Arc::clone(&self.jobs[&job].spec);
+                self.commands.push_back(Command::SendSpec { worker, job, spec });
             }
-            self.commands.push_back(Command::SendItems { worker, experiment, generation, items });
+            let send = Command::SendAssignments { worker, job, trial_set, output, assignments };
+            self.commands.push_back(send);
         }
     }
 }
 
 /// Work that is worth computing once more.
 struct Slow {
-    key: (Instant, ItemId),
+    key: (Instant, AssignmentId),
     holder: WorkerId,
-    task: Task,
+    item: Item,
     /// Into how many items it is split for that.
     n_parts: usize,
 }
 
-impl ExperimentWork {
+impl JobWork {
     /// Of the running work that nobody duplicates, that which is expected last, or
     /// else that which is latest, if idle slots should do it sooner. Experiments
     /// with queued work have no need.
@@ -310,19 +302,18 @@ impl ExperimentWork {
         pace: f64,
         workers: &BTreeMap<WorkerId, Worker>,
     ) -> Option<Slow> {
-        let generation =
-            self.generation.as_ref().filter(|generation| generation.n_queued() == 0)?;
-        let ends = [generation.uncovered.last_key_value(), generation.uncovered.first_key_value()];
+        let batch = self.batch.as_ref().filter(|batch| batch.n_queued() == 0)?;
+        let ends = [batch.uncovered.last_key_value(), batch.uncovered.first_key_value()];
         ends.into_iter().flatten().find_map(|(&key, &holder)| {
-            let (expected, item) = key;
-            let running = &workers[&holder].in_flight[&item].task;
-            let task = generation.duplicable(running)?;
-            let n_trials = task.trials.len();
-            let n_parts = (n_idle_slots / generation.uncovered.len()).clamp(1, n_trials);
+            let (expected, assignment_id) = key;
+            let running = &workers[&holder].in_flight[&assignment_id].item;
+            let item = batch.duplicable(running)?;
+            let n_trials = item.trials.len();
+            let n_parts = (n_idle_slots / batch.uncovered.len()).clamp(1, n_trials);
             let needed = self.expected(n_trials.div_ceil(n_parts), pace)?;
             // Half as long again, as a worker may finish what it is told to drop.
             let is_worth_it = needed.mul_f64(1.5) + MOVING_COST < remaining(expected, now);
-            is_worth_it.then_some(Slow { key, holder, task, n_parts })
+            is_worth_it.then_some(Slow { key, holder, item, n_parts })
         })
     }
 }

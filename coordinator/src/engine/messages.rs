@@ -8,96 +8,134 @@ use std::{
     time::Duration,
 };
 
-use crate::ids::{ExperimentId, ItemId, WorkerId};
+use sim_core::{Output, TrialSet};
+
+use crate::ids::{AssignmentId, JobId, WorkerId};
 use evolution::{Genotype, Population};
+
+/// What a job wants computed at once: every genotype on every trial.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Batch {
+    /// Which worlds and noise the trials meet.
+    pub trial_set: TrialSet,
+    /// The genotypes, by individual.
+    pub genotypes: Population,
+    /// Trials per genotype: trials 0 to `n_trials` - 1 of the set.
+    pub n_trials: u32,
+    /// What workers return for a trial.
+    pub output: Output,
+    /// Numbers per trial, at least 1; 1 for [`Output::Fitness`].
+    pub values_per_trial: usize,
+}
+
+impl Batch {
+    /// The fitness of genotypes, one number per trial.
+    pub fn fitness(trial_set: TrialSet, genotypes: Population, n_trials: u32) -> Self {
+        Self { trial_set, genotypes, n_trials, output: Output::Fitness, values_per_trial: 1 }
+    }
+
+    /// The measures of one genotype on trials of evaluations, `values_per_trial`
+    /// numbers each.
+    pub fn measures(genotype: Genotype, n_trials: u32, values_per_trial: usize) -> Self {
+        Self {
+            trial_set: TrialSet::Evaluation,
+            genotypes: vec![genotype].into(),
+            n_trials,
+            output: Output::Measures,
+            values_per_trial,
+        }
+    }
+}
 
 /// What the shell has to do.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
-    /// Send a worker the specification of an experiment.
+    /// Send a worker the specification of a job, before its first assignment.
     SendSpec {
-        /// To whom.
+        /// The worker that it is sent to.
         worker: WorkerId,
-        /// Of what.
-        experiment: ExperimentId,
-        /// As given to [`Engine::on_experiment_started`](super::Engine::on_experiment_started).
+        /// The job that it specifies.
+        job: JobId,
+        /// As given to [`Engine::on_job_started`](super::Engine::on_job_started).
         spec: Arc<str>,
     },
-    /// Send a worker items of one generation.
-    SendItems {
-        /// To whom.
+    /// Send a worker items of one batch.
+    SendAssignments {
+        /// The worker that computes them.
         worker: WorkerId,
-        /// Of what.
-        experiment: ExperimentId,
-        /// Whose trial seeds apply.
-        generation: u64,
+        /// The job whose batch it is.
+        job: JobId,
+        /// Which worlds and noise the trials meet.
+        trial_set: TrialSet,
+        /// What the worker returns for a trial.
+        output: Output,
         /// At least one.
-        items: Vec<Item>,
+        assignments: Vec<Assignment>,
     },
-    /// Tell a worker that results are not wanted any more.
+    /// Tell a worker that the results of assignments are not wanted any more.
     SendDrop {
-        /// To whom.
+        /// The worker that has them.
         worker: WorkerId,
-        /// Of which assignments.
-        items: Vec<ItemId>,
+        /// The assignments, at least one.
+        assignments: Vec<AssignmentId>,
     },
-    /// Tell a worker that an experiment is over, or paused.
+    /// Tell a worker that a job is over, or paused.
     SendEnd {
-        /// To whom.
+        /// The worker that knows its specification.
         worker: WorkerId,
-        /// What is over.
-        experiment: ExperimentId,
+        /// The job.
+        job: JobId,
     },
-    /// Close a worker's stream; the engine has forgotten it already.
+    /// Close a worker's stream; the engine has forgotten the worker already.
     Disconnect {
-        /// Whose.
+        /// The worker whose stream it is.
         worker: WorkerId,
         /// For the log and for the worker.
         reason: String,
-        /// Items that it held and that others will get.
+        /// Number of items that it held and that others will get.
         n_items_requeued: usize,
     },
-    /// A generation is judged.
-    FinishGeneration {
-        /// Of what.
-        experiment: ExperimentId,
-        /// The outcome.
-        judged: JudgedGeneration,
+    /// All results of a batch are there; the engine has forgotten the batch already.
+    FinishBatch {
+        /// The job whose batch it was.
+        job: JobId,
+        /// The results.
+        evaluated: EvaluatedBatch,
     },
-    /// An experiment must not go on until somebody has looked at it; the engine
-    /// has paused it already.
-    PauseExperiment {
-        /// Which.
-        experiment: ExperimentId,
+    /// A job must not go on until somebody has looked at it; the engine has paused
+    /// it already.
+    PauseJob {
+        /// The job.
+        job: JobId,
         /// For its owner.
         reason: String,
     },
-    /// An experiment cannot go on; the engine has forgotten it already.
-    FailExperiment {
-        /// Which.
-        experiment: ExperimentId,
+    /// A job cannot go on; the engine has forgotten it already.
+    FailJob {
+        /// The job.
+        job: JobId,
         /// For its owner.
         reason: String,
     },
 }
 
-/// One genotype and the trials to run it on, assigned to a worker.
+/// An item given to a worker: one genotype and the trials to run it on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Item {
-    /// This assignment.
-    pub id: ItemId,
-    /// Trials to run.
+pub struct Assignment {
+    /// Names this assignment in the worker's result.
+    pub id: AssignmentId,
+    /// Trials to run, at least one.
     pub trials: Range<u32>,
-    /// Its genes.
+    /// The genotype.
     pub genotype: SharedGenotype,
 }
 
-/// A genotype of a population that others hold, too.
+/// One genotype of a population, without a copy of its genes.
 #[derive(Clone)]
 pub struct SharedGenotype {
-    /// All of it.
+    /// The genotypes of all individuals.
     pub population: Population,
-    /// Whose genotype this is.
+    /// Index of the individual among them.
     pub individual: u32,
 }
 
@@ -121,34 +159,35 @@ impl fmt::Debug for SharedGenotype {
     }
 }
 
-/// A worker's answer to an item.
+/// What a worker returns for an assignment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ItemResult {
     /// The assignment.
-    pub id: ItemId,
-    /// Fitness per trial, or all that is measured of each; or why there is none.
+    pub id: AssignmentId,
+    /// The numbers of all its trials, one trial after the other, each as
+    /// [`Batch::output`] says; or why there are none.
     pub outcome: Result<Vec<f64>, String>,
-    /// Time the worker says it computed.
+    /// Time that the worker says it computed.
     pub compute_time: Duration,
 }
 
-/// A generation with all its fitness.
+/// A batch with all its results.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JudgedGeneration {
-    /// Index of the generation.
-    pub generation: u64,
-    /// Fitness per individual and trial; of an evaluation, all that was measured.
-    pub trial_fitness: Vec<Vec<f64>>,
-    /// From its start to its last result.
+pub struct EvaluatedBatch {
+    /// Which worlds and noise the trials met.
+    pub trial_set: TrialSet,
+    /// Per individual the numbers of all its trials, one trial after the other:
+    /// [`Batch::values_per_trial`] each.
+    pub values: Vec<Vec<f64>>,
+    /// From the batch's start to its last result.
     pub duration: Duration,
     /// Workers connected at its end.
     pub n_workers: usize,
-    /// Share of the slots' time, meanwhile, that was not spent on results that
-    /// counted.
+    /// Share of the slots' time, 0 to 1, that did not go into results meanwhile.
     pub idle_share: f64,
-    /// Audits that agreed, and audits for which there was no second worker.
+    /// Items that a second worker computed to the same bits.
     pub n_audited: usize,
-    /// See above.
+    /// Items that were to be audited while there was no second worker.
     pub n_unaudited: usize,
 }
 
@@ -176,11 +215,12 @@ pub struct WorkerStatus {
     pub version: String,
     /// Items it computes at the same time.
     pub n_slots: usize,
-    /// Items it was given and has not answered.
+    /// Assignments that it has not answered.
     pub n_in_flight: usize,
-    /// Recently.
+    /// Results per second of about the last minute.
     pub results_per_s: f64,
-    /// Recent share of its slots' time not spent on results that counted.
+    /// Share of its slots' time, 0 to 1, that did not go into results in about the
+    /// last minute.
     pub idle_share: f64,
     /// Time since it introduced itself.
     pub connected_for: Duration,

@@ -32,15 +32,16 @@
 //!   process comes back was not taken down.
 
 mod activity;
-mod blame;
+mod batch;
 mod dispatch;
-mod experiment;
-mod figures;
+mod failures;
 mod fleet_time;
-mod generation;
+mod item;
+mod job;
+mod load_index;
 mod messages;
 mod results;
-mod standings;
+mod stats;
 mod worker;
 
 use std::{
@@ -51,25 +52,26 @@ use std::{
     time::{Duration, Instant},
 };
 
+use sim_core::TrialSet;
+
 use crate::{
-    ids::{ExperimentId, WorkerId},
+    ids::{JobId, WorkerId},
     priority::Priority,
 };
-use evolution::{Genotype, Population};
 
-pub use activity::{Activity, HeldItems, RoundActivity};
+pub use activity::{BatchActivity, HeldItems, JobActivity};
+use batch::BatchInProgress;
 use dispatch::Outgoing;
-use experiment::ExperimentWork;
-pub use figures::{FleetFigures, Tally, WorkFigures};
 use fleet_time::FleetTime;
-use generation::{GenerationInProgress, Shape, Task};
-use standings::Standings;
-use worker::Worker;
-
+use item::Item;
+use job::JobWork;
+use load_index::WorkerLoadIndex;
 pub use messages::{
-    Command, FleetSize, Introduction, Item, ItemResult, JudgedGeneration, SharedGenotype,
-    WorkerStatus,
+    Assignment, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
+    SharedGenotype, WorkerStatus,
 };
+pub use stats::{Counters, FleetStats, JobStats};
+use worker::Worker;
 
 /// Times that work is tried before its experiment is given up.
 pub const MAX_ATTEMPTS: u32 = 3;
@@ -102,17 +104,17 @@ pub struct Engine {
     n_workers_seen: u64,
     n_items_assigned: u64,
     workers: BTreeMap<WorkerId, Worker>,
-    standings: Standings,
-    experiments: BTreeMap<ExperimentId, ExperimentWork>,
+    load_index: WorkerLoadIndex,
+    jobs: BTreeMap<JobId, JobWork>,
     /// Experiments with something to hand out, by what they were served.
-    turns: BTreeSet<(u128, ExperimentId)>,
+    ready_queue: BTreeSet<(u128, JobId)>,
     /// What the experiment that was served last had been served: who comes back
     /// from waiting begins there, so that nobody saves up turns.
-    served_until: u128,
+    virtual_now: u128,
     outgoing: Outgoing,
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
-    tally: Tally,
+    counters: Counters,
 }
 
 impl Engine {
@@ -124,14 +126,14 @@ impl Engine {
             n_workers_seen: 0,
             n_items_assigned: 0,
             workers: BTreeMap::new(),
-            standings: Standings::default(),
-            experiments: BTreeMap::new(),
-            turns: BTreeSet::new(),
-            served_until: 0,
+            load_index: WorkerLoadIndex::default(),
+            jobs: BTreeMap::new(),
+            ready_queue: BTreeSet::new(),
+            virtual_now: 0,
             outgoing: Outgoing::default(),
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
-            tally: Tally::default(),
+            counters: Counters::default(),
         }
     }
 
@@ -154,14 +156,14 @@ impl Engine {
     /// A worker has introduced itself.
     pub fn on_worker_joined(&mut self, now: Instant, introduction: Introduction) -> WorkerId {
         if let Some(process) = introduction.process {
-            self.forgive(process);
+            self.clear_failures(process);
         }
         self.n_workers_seen += 1;
-        self.tally.n_workers_joined += 1;
+        self.counters.n_workers_joined += 1;
         let id = WorkerId(self.n_workers_seen);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
         let worker = Worker::new(introduction, now);
-        self.standings.add(id, &worker);
+        self.load_index.add(id, &worker);
         self.workers.insert(id, worker);
         self.assign(now);
         id
@@ -201,63 +203,30 @@ impl Engine {
     }
 
     /// An experiment exists; workers will need its specification.
-    pub fn on_experiment_started(&mut self, id: ExperimentId, spec: Arc<str>, priority: Priority) {
-        self.experiments.insert(id, ExperimentWork::new(spec, priority));
+    pub fn on_job_started(&mut self, id: JobId, spec: Arc<str>, priority: Priority) {
+        self.jobs.insert(id, JobWork::new(spec, priority));
     }
 
-    /// The genotypes of an experiment's next generation are known.
-    pub fn on_generation_asked(
-        &mut self,
-        now: Instant,
-        id: ExperimentId,
-        generation: u64,
-        genotypes: Population,
-        n_trials: u32,
-    ) {
-        self.ask(now, id, generation, genotypes, Shape { n_trials, n_values: 1 });
-    }
-
-    /// A genotype is to be evaluated: for the engine a generation of one, of which
-    /// every trial gives `n_values` numbers.
-    pub fn on_evaluation_asked(
-        &mut self,
-        now: Instant,
-        id: ExperimentId,
-        genotype: Genotype,
-        n_trials: u32,
-        n_values: usize,
-    ) {
-        let genotypes = vec![genotype].into();
-        self.ask(now, id, sim_core::EVALUATION, genotypes, Shape { n_trials, n_values });
-    }
-
-    fn ask(
-        &mut self,
-        now: Instant,
-        id: ExperimentId,
-        generation: u64,
-        genotypes: Population,
-        shape: Shape,
-    ) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        assert!(work.generation.is_none(), "one generation at a time");
+    /// A job wants a batch computed. It has no other meanwhile.
+    pub fn on_batch_requested(&mut self, now: Instant, id: JobId, batch: Batch) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        assert!(work.batch.is_none(), "one batch at a time");
         self.fleet_time.advance(now);
-        let clock = self.fleet_time;
-        work.generation = Some(GenerationInProgress::new(generation, genotypes, shape, now, clock));
+        work.batch = Some(BatchInProgress::new(batch, now, self.fleet_time));
         self.make_ready(id);
         self.assign(now);
     }
 
     /// An experiment waits until it is resumed. Its work is taken back; what has
     /// been judged is kept.
-    pub fn on_experiment_paused(&mut self, now: Instant, id: ExperimentId) {
+    pub fn on_job_paused(&mut self, now: Instant, id: JobId) {
         self.pause(id);
         self.assign(now);
     }
 
     /// A paused experiment goes on.
-    pub fn on_experiment_resumed(&mut self, now: Instant, id: ExperimentId) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
+    pub fn on_job_resumed(&mut self, now: Instant, id: JobId) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
         work.is_paused = false;
         self.make_ready(id);
         self.finish_waived(now);
@@ -265,15 +234,15 @@ impl Engine {
     }
 
     /// An experiment's share of the fleet is another from now on.
-    pub fn on_priority_set(&mut self, id: ExperimentId, priority: Priority) {
-        if let Some(work) = self.experiments.get_mut(&id) {
+    pub fn on_priority_set(&mut self, id: JobId, priority: Priority) {
+        if let Some(work) = self.jobs.get_mut(&id) {
             work.priority = priority;
         }
     }
 
     /// An experiment is over, for whatever reason.
-    pub fn on_experiment_ended(&mut self, now: Instant, id: ExperimentId) {
-        self.forget_experiment(id);
+    pub fn on_job_ended(&mut self, now: Instant, id: JobId) {
+        self.forget_job(id);
         self.assign(now);
     }
 
@@ -286,9 +255,9 @@ impl Engine {
         let pause = now.saturating_duration_since(mem::replace(&mut self.last_tick, now));
         if pause > lease / 2 {
             self.workers.values_mut().for_each(|worker| worker.last_heard += pause);
-            let works = self.experiments.values_mut();
-            let generations = works.filter_map(|work| work.generation.as_mut());
-            generations.for_each(|generation| generation.blames.postpone(pause));
+            let works = self.jobs.values_mut();
+            let batches = works.filter_map(|work| work.batch.as_mut());
+            batches.for_each(|batch| batch.failures.postpone(pause));
         }
         let silent: Vec<WorkerId> = self
             .workers
@@ -305,185 +274,201 @@ impl Engine {
     }
 
     /// Lets an experiment take turns, if it has something to hand out.
-    fn make_ready(&mut self, id: ExperimentId) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        if work.is_ready() && !self.turns.contains(&(work.served, id)) {
-            work.served = work.served.max(self.served_until);
-            self.turns.insert((work.served, id));
+    fn make_ready(&mut self, id: JobId) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        if work.is_ready() && !self.ready_queue.contains(&(work.virtual_time, id)) {
+            work.virtual_time = work.virtual_time.max(self.virtual_now);
+            self.ready_queue.insert((work.virtual_time, id));
         }
     }
 
-    fn correct_charge(&mut self, id: ExperimentId, charged: Duration, real: Duration) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        let has_turn = self.turns.remove(&(work.served, id));
+    fn correct_charge(&mut self, id: JobId, charged: Duration, real: Duration) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        let has_turn = self.ready_queue.remove(&(work.virtual_time, id));
         work.correct_charge(charged, real);
         if has_turn {
-            self.turns.insert((work.served, id));
+            self.ready_queue.insert((work.virtual_time, id));
         }
     }
 
-    /// Whether the results of a task are compared with another worker's. Depends
-    /// on nothing but the seed-independent place of the individual, so that the
-    /// same individuals are audited whoever computes them.
-    fn is_audited(&self, id: ExperimentId, task: &Task) -> bool {
-        let Some(work) = self.experiments.get(&id) else { return false };
-        let Some(generation) = &work.generation else { return false };
-        let place = [id.0, generation.number, u64::from(task.individual)];
+    /// Whether the results of an item are compared with another worker's. Depends
+    /// on nothing but the place of the individual, so that the same individuals are
+    /// audited whoever computes them.
+    fn is_audited(&self, id: JobId, item: &Item) -> bool {
+        let Some(work) = self.jobs.get(&id) else { return false };
+        let Some(batch) = &work.batch else { return false };
+        let (kind, number) = match id {
+            JobId::Experiment(id) => (0, id.0),
+            JobId::Evaluation(id) => (1, id.0),
+        };
+        let (set, generation) = match batch.trial_set() {
+            TrialSet::Generation(generation) => (0, generation),
+            TrialSet::HeldOut(generation) => (1, generation),
+            TrialSet::Evaluation => (2, 0),
+        };
+        let place = [mix_in(number, kind), mix_in(generation, set), u64::from(item.individual)];
         let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
         (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
     }
 
     /// A process is alive, so that no work has taken it down.
-    fn forgive(&mut self, process: NonZeroU64) {
-        let ids: Vec<ExperimentId> = self.experiments.keys().copied().collect();
+    fn clear_failures(&mut self, process: NonZeroU64) {
+        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
-            let work = self.experiments.get_mut(&id).expect("just listed");
-            let Some(generation) = &mut work.generation else { continue };
-            for task in generation.blames.on_process_joined(process) {
-                self.requeue(id, &task);
+            let work = self.jobs.get_mut(&id).expect("just listed");
+            let Some(batch) = &mut work.batch else { continue };
+            for item in batch.failures.on_process_joined(process) {
+                self.requeue(id, &item);
             }
         }
     }
 
     /// Fails experiments whose work has taken too many workers down for good.
     fn give_up_overdue(&mut self, now: Instant) {
-        let overdue: Vec<(ExperimentId, Task, String)> = self
-            .experiments
+        let overdue: Vec<(JobId, Item, String)> = self
+            .jobs
             .iter()
             .filter_map(|(&id, work)| {
-                let generation = work.generation.as_ref()?;
-                let (task, blame) = generation.blames.overdue(now)?;
+                let batch = work.batch.as_ref()?;
+                let (item, failure) = batch.failures.overdue(now)?;
                 // Another copy's result may have come.
-                let is_needed = generation.duplicable(task).is_some();
-                is_needed.then(|| (id, task.clone(), blame.to_owned()))
+                let is_needed = batch.duplicable(item).is_some();
+                is_needed.then(|| (id, item.clone(), failure.to_owned()))
             })
             .collect();
-        for (id, task, blame) in overdue {
-            self.fail(id, &task, &blame);
+        for (id, item, failure) in overdue {
+            self.fail(id, &item, &failure);
         }
     }
 
-    fn drop_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>, reason: String) {
-        let n_items_requeued = self.forget_worker(now, id, blame);
+    fn drop_worker(&mut self, now: Instant, id: WorkerId, failure: Option<&str>, reason: String) {
+        let n_items_requeued = self.forget_worker(now, id, failure);
         self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
     }
 
     /// `blame`: what happened to it that the items it was computing may have
     /// caused, if they may.
-    fn forget_worker(&mut self, now: Instant, id: WorkerId, blame: Option<&str>) -> usize {
+    fn forget_worker(&mut self, now: Instant, id: WorkerId, failure: Option<&str>) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
         match worker.is_draining {
-            true => self.tally.n_workers_left += 1,
-            false => self.tally.n_workers_lost += 1,
+            true => self.counters.n_workers_left += 1,
+            false => self.counters.n_workers_lost += 1,
         }
-        self.standings.remove(id, &worker);
+        self.load_index.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
         // Only what it was computing can have taken it down: its oldest items,
         // one per slot. A worker that said goodbye was not taken down.
         let n_suspects = if worker.is_draining { 0 } else { worker.n_slots() };
         let n_items = worker.in_flight.len();
-        let blame = blame.map(|blame| format!("its worker \"{}\" {blame}", worker.name()));
+        let failure = failure.map(|failure| format!("its worker \"{}\" {failure}", worker.name()));
         let process = worker.introduction.process;
         // Later items first, so that the earliest ends up at the queue's front.
-        for (age_rank, (item, assignment)) in worker.in_flight.into_iter().enumerate().rev() {
-            self.forget_holder(item, &assignment);
-            self.correct_charge(assignment.experiment, assignment.charge, Duration::ZERO);
-            let blame = blame.as_deref().filter(|_| age_rank < n_suspects);
-            self.retry(now, assignment, blame.map(|blame| (process, blame)));
+        for (age_rank, (assignment_id, assignment)) in
+            worker.in_flight.into_iter().enumerate().rev()
+        {
+            self.forget_holder(assignment_id, &assignment);
+            self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
+            let failure = failure.as_deref().filter(|_| age_rank < n_suspects);
+            self.retry(now, assignment, failure.map(|failure| (process, failure)));
         }
         self.finish_waived(now);
         n_items
     }
 
-    fn forget_experiment(&mut self, id: ExperimentId) {
+    fn forget_job(&mut self, id: JobId) {
         self.withdraw(id);
-        self.experiments.remove(&id);
+        self.jobs.remove(&id);
     }
 
-    fn pause(&mut self, id: ExperimentId) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
+    fn pause(&mut self, id: JobId) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
         if !mem::replace(&mut work.is_paused, true) {
             self.withdraw(id);
         }
     }
 
     /// Takes an experiment away from all workers; its work waits again.
-    fn withdraw(&mut self, id: ExperimentId) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        self.turns.remove(&(work.served, id));
+    fn withdraw(&mut self, id: JobId) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        self.ready_queue.remove(&(work.virtual_time, id));
         let mut audits = Vec::new();
         for (&worker_id, worker) in &mut self.workers {
-            worker.recalled.retain(|(_, assignment)| assignment.experiment != id);
-            if worker.known_experiments.remove(&id) {
-                self.standings.remove(worker_id, worker);
-                let ours = worker.in_flight.extract_if(.., |_, a| a.experiment == id);
-                audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.task));
-                self.standings.add(worker_id, worker);
-                self.commands.push_back(Command::SendEnd { worker: worker_id, experiment: id });
+            worker.recalled.retain(|(_, assignment)| assignment.job != id);
+            if worker.known_jobs.remove(&id) {
+                self.load_index.remove(worker_id, worker);
+                let ours = worker.in_flight.extract_if(.., |_, a| a.job == id);
+                audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
+                self.load_index.add(worker_id, worker);
+                self.commands.push_back(Command::SendEnd { worker: worker_id, job: id });
             }
         }
-        if let Some(generation) = &mut work.generation {
-            generation.requeue_all();
-            audits.into_iter().for_each(|task| generation.push_audit(task));
+        if let Some(batch) = &mut work.batch {
+            batch.requeue_all();
+            audits.into_iter().for_each(|item| batch.push_audit(item));
         }
     }
 
-    fn generation_mut(&mut self, id: ExperimentId) -> &mut GenerationInProgress {
-        let work = self.experiments.get_mut(&id);
-        work.and_then(|work| work.generation.as_mut()).expect("what is assigned is being judged")
+    fn batch_mut(&mut self, id: JobId) -> &mut BatchInProgress {
+        let work = self.jobs.get_mut(&id);
+        work.and_then(|work| work.batch.as_mut()).expect("what is assigned is being evaluated")
     }
 
     fn update_worker<T>(&mut self, id: WorkerId, change: impl FnOnce(&mut Worker) -> T) -> T {
         let worker = self.workers.get_mut(&id).expect("the caller has seen it");
-        self.standings.remove(id, worker);
+        self.load_index.remove(id, worker);
         let result = change(worker);
-        self.standings.add(id, worker);
+        self.load_index.add(id, worker);
         result
     }
 
     /// Panics if the state contradicts itself. For tests: it looks at everything.
     pub fn sanity_check(&self) {
-        let mut standings = Standings::default();
-        let mut in_flight: BTreeMap<ExperimentId, BTreeMap<_, _>> = BTreeMap::new();
+        let mut load_index = WorkerLoadIndex::default();
+        let mut in_flight: BTreeMap<JobId, BTreeMap<_, _>> = BTreeMap::new();
         for (&id, worker) in &self.workers {
-            standings.add(id, worker);
-            for (&item, assignment) in &worker.in_flight {
-                assert!(worker.known_experiments.contains(&assignment.experiment));
-                let entry = (id, assignment.task.clone(), assignment.is_audit);
-                in_flight.entry(assignment.experiment).or_default().insert(item, entry);
+            load_index.add(id, worker);
+            for (&assignment_id, assignment) in &worker.in_flight {
+                assert!(worker.known_jobs.contains(&assignment.job));
+                let entry = (id, assignment.item.clone(), assignment.is_audit);
+                in_flight.entry(assignment.job).or_default().insert(assignment_id, entry);
             }
             assert!(worker.recalled.len() <= 2 * worker.n_slots());
         }
-        assert_eq!(standings.available, self.standings.available);
-        assert_eq!(standings.backlogged, self.standings.backlogged);
-        assert_eq!(standings.n_idle_slots, self.standings.n_idle_slots);
-        assert_eq!(standings.n_usable_slots, self.standings.n_usable_slots);
-        for (&id, work) in &self.experiments {
+        assert_eq!(load_index.available, self.load_index.available);
+        assert_eq!(load_index.backlogged, self.load_index.backlogged);
+        assert_eq!(load_index.n_idle_slots, self.load_index.n_idle_slots);
+        assert_eq!(load_index.n_usable_slots, self.load_index.n_usable_slots);
+        for (&id, work) in &self.jobs {
             let in_flight = in_flight.remove(&id).unwrap_or_default();
             assert!(!work.is_paused || in_flight.is_empty(), "paused work is nobody's");
-            assert_eq!(self.turns.contains(&(work.served, id)), work.is_ready());
-            match &work.generation {
-                Some(generation) => generation.sanity_check(&in_flight),
+            assert_eq!(self.ready_queue.contains(&(work.virtual_time, id)), work.is_ready());
+            match &work.batch {
+                Some(batch) => batch.sanity_check(&in_flight),
                 None => assert!(in_flight.is_empty()),
             }
         }
-        assert!(in_flight.is_empty(), "nobody computes for an experiment that is over");
-        let n_ready = self.experiments.values().filter(|work| work.is_ready()).count();
-        assert_eq!(self.turns.len(), n_ready);
-        let has_queued = |work: &&ExperimentWork| {
-            work.is_ready() && work.generation.as_ref().is_some_and(|g| g.n_queued() > 0)
+        assert!(in_flight.is_empty(), "nobody computes for a job that is over");
+        let n_ready = self.jobs.values().filter(|work| work.is_ready()).count();
+        assert_eq!(self.ready_queue.len(), n_ready);
+        let has_queued = |work: &&JobWork| {
+            work.is_ready() && work.batch.as_ref().is_some_and(|g| g.n_queued() > 0)
         };
         assert!(
-            !self.has_idle_slot() || self.experiments.values().find(has_queued).is_none(),
+            !self.has_idle_slot() || self.jobs.values().find(has_queued).is_none(),
             "no work waits while a slot is idle"
         );
         assert!(self.outgoing.is_empty(), "everything is sent");
         let n_slots: usize = self.workers.values().map(Worker::n_slots).sum();
         assert_eq!(n_slots, self.fleet_time.n_slots());
-        let Tally { n_workers_joined, n_workers_left, n_workers_lost, .. } = self.tally;
+        let Counters { n_workers_joined, n_workers_left, n_workers_lost, .. } = self.counters;
         let n_gone = n_workers_left + n_workers_lost;
         assert_eq!(n_workers_joined - n_gone, self.workers.len() as u64);
     }
+}
+
+/// A number of a kind; of kind 0, the number itself.
+fn mix_in(number: u64, kind: u64) -> u64 {
+    number ^ kind.wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 /// A step of SplitMix64 (Steele, Lea & Flood 2014).

@@ -5,13 +5,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::ids::{ExperimentId, ItemId, WorkerId};
+use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
     Command, Engine, ItemResult,
-    blame::Verdict,
-    generation::{Disagreement, GenerationInProgress, Task},
-    worker::{Assignment, Worker},
+    batch::{BatchInProgress, Disagreement},
+    failures::RetryDecision,
+    item::Item,
+    worker::{AssignedItem, Worker},
 };
 
 impl Engine {
@@ -26,9 +27,9 @@ impl Engine {
             // up. Neither can do harm.
             return;
         };
-        let n_trials = assignment.task.trials.len();
-        let generation = self.experiments[&assignment.experiment].generation.as_ref();
-        let n_values = generation.map_or(n_trials, |generation| generation.n_values(n_trials));
+        let n_trials = assignment.item.trials.len();
+        let batch = self.jobs[&assignment.job].batch.as_ref();
+        let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
         if let Ok(fitness) = &result.outcome
             && fitness.len() != n_values
         {
@@ -40,14 +41,14 @@ impl Engine {
         let busy = self.account(now, id, &assignment, result.compute_time);
         match result.outcome {
             Ok(fitness) => {
-                self.tally.n_items_computed += 1;
+                self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
                 self.accept(now, id, &assignment, &fitness);
             }
             Err(message) => {
-                self.tally.n_items_failed += 1;
-                let blame = format!("the worker reports: {message}");
-                self.retry(now, assignment, Some((None, &blame)));
+                self.counters.n_items_failed += 1;
+                let failure = format!("the worker reports: {message}");
+                self.retry(now, assignment, Some((None, &failure)));
             }
         }
     }
@@ -58,48 +59,48 @@ impl Engine {
         &mut self,
         now: Instant,
         id: WorkerId,
-        assignment: &Assignment,
+        assignment: &AssignedItem,
         compute_time: Duration,
     ) -> Duration {
-        let work = &self.experiments[&assignment.experiment];
-        let expected = work.expected(assignment.task.trials.len(), 1.0);
+        let work = &self.jobs[&assignment.job];
+        let expected = work.expected(assignment.item.trials.len(), 1.0);
         let (busy, pace) = self.update_worker(id, |worker| {
             let busy = worker.time.add_result(now, assignment.assigned, compute_time);
             let pace = worker.pace;
             worker.learn(busy, expected);
             (busy, pace)
         });
-        let work = self.experiments.get_mut(&assignment.experiment).expect("it is assigned");
-        work.learn(&assignment.task, busy, pace);
-        self.correct_charge(assignment.experiment, assignment.charge, busy);
+        let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
+        work.learn(&assignment.item, busy, pace);
+        self.correct_charge(assignment.job, assignment.charge, busy);
         busy
     }
 
-    fn accept(&mut self, now: Instant, id: WorkerId, assignment: &Assignment, fitness: &[f64]) {
-        let (experiment, task) = (assignment.experiment, &assignment.task);
-        if let Err(disagreement) = self.generation_mut(experiment).compare(task, fitness) {
-            self.on_disagreement(now, experiment, id, task, &disagreement);
+    fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, fitness: &[f64]) {
+        let (job, item) = (assignment.job, &assignment.item);
+        if let Err(disagreement) = self.batch_mut(job).compare(item, fitness) {
+            self.on_disagreement(now, job, id, item, &disagreement);
             return;
         }
         if assignment.is_audit {
-            self.generation_mut(experiment).count_audited();
+            self.batch_mut(job).count_audited();
         } else {
-            let is_audited = self.is_audited(experiment, task);
+            let is_audited = self.is_audited(job, item);
             let worker = &self.workers[&id];
-            let work = self.experiments.get_mut(&experiment).expect("it is assigned");
-            let generation = work.generation.as_mut().expect("it is assigned");
-            let n_new = generation.accept(id, worker.name(), task, fitness);
+            let work = self.jobs.get_mut(&job).expect("it is assigned");
+            let batch = work.batch.as_mut().expect("it is assigned");
+            let n_new = batch.accept(id, worker.name(), item, fitness);
             work.n_episodes += n_new as u64;
-            self.tally.n_episodes += n_new as u64;
+            self.counters.n_episodes += n_new as u64;
             if n_new > 0 && is_audited {
-                generation.push_audit(task.clone());
+                batch.push_audit(item.clone());
             }
-            for (holder, item) in generation.redundant(task.individual) {
-                self.recall(holder, item);
+            for (holder, assignment_id) in batch.redundant(item.individual) {
+                self.recall(holder, assignment_id);
             }
-            self.make_ready(experiment);
+            self.make_ready(job);
         }
-        self.finish_if_judged(now, experiment);
+        self.finish_if_evaluated(now, job);
     }
 
     /// Another's result came first, but this one is here, so compare them.
@@ -107,17 +108,17 @@ impl Engine {
         &mut self,
         now: Instant,
         id: WorkerId,
-        recalled: &Assignment,
+        recalled: &AssignedItem,
         fitness: &[f64],
     ) {
-        let experiment = recalled.experiment;
-        let work = self.experiments.get(&experiment);
-        let generation = work.and_then(|work| work.generation.as_ref());
-        if let Some(generation) = generation
-            && generation.number == recalled.generation
-            && let Err(disagreement) = generation.compare(&recalled.task, fitness)
+        let job = recalled.job;
+        let work = self.jobs.get(&job);
+        let batch = work.and_then(|work| work.batch.as_ref());
+        if let Some(batch) = batch
+            && batch.trial_set() == recalled.trial_set
+            && let Err(disagreement) = batch.compare(&recalled.item, fitness)
         {
-            self.on_disagreement(now, experiment, id, &recalled.task, &disagreement);
+            self.on_disagreement(now, job, id, &recalled.item, &disagreement);
         }
     }
 
@@ -128,37 +129,37 @@ impl Engine {
     fn on_disagreement(
         &mut self,
         now: Instant,
-        experiment: ExperimentId,
+        job: JobId,
         second: WorkerId,
-        task: &Task,
+        item: &Item,
         disagreement: &Disagreement,
     ) {
         let Disagreement { first, first_name, trial, values: (a, b) } = disagreement;
         let second_name = self.workers[&second].name().to_owned();
-        let generation = self.generation_mut(experiment);
+        let batch = self.batch_mut(job);
         let reason = format!(
             "workers \"{first_name}\" ({first}) and \"{second_name}\" ({second}) differ: {a:?} and \
              {b:?} for trial {trial} of individual {} of {}; at least one of them is faulty, and \
              results of earlier generations may be wrong, too; neither gets work until it is \
-             started again, and the generation is judged anew when the experiment is resumed",
-            task.individual,
-            generation.name(),
+             started again, and the generation is evaluated anew when the experiment is resumed",
+            item.individual,
+            batch.name(),
         );
-        self.pause(experiment);
-        self.generation_mut(experiment).start_over();
+        self.pause(job);
+        self.batch_mut(job).start_over();
         for id in [*first, second] {
             self.distrust(now, id, &reason);
         }
-        self.commands.push_back(Command::PauseExperiment { experiment, reason });
+        self.commands.push_back(Command::PauseJob { job, reason });
     }
 
     /// A worker gets no work any more, and what it has goes to others.
     fn distrust(&mut self, now: Instant, id: WorkerId, reason: &str) {
         let Some(worker) = self.workers.get(&id) else { return };
-        let items: Vec<ItemId> = worker.in_flight.keys().copied().collect();
+        let assignments: Vec<AssignmentId> = worker.in_flight.keys().copied().collect();
         self.update_worker(id, |worker| worker.distrusted = Some(reason.to_owned()));
-        for item in items.into_iter().rev() {
-            let assignment = self.recall(id, item);
+        for assignment_id in assignments.into_iter().rev() {
+            let assignment = self.recall(id, assignment_id);
             self.retry(now, assignment, None);
         }
         if let Some(worker) = self.workers.get_mut(&id) {
@@ -169,36 +170,36 @@ impl Engine {
 
     /// Concludes generations whose last audits nobody can do any more.
     pub(super) fn finish_waived(&mut self, now: Instant) {
-        let known = |generation: &GenerationInProgress| generation.is_known_throughout();
-        let waiting: Vec<ExperimentId> = self
-            .experiments
+        let known = |batch: &BatchInProgress| batch.is_known_throughout();
+        let waiting: Vec<JobId> = self
+            .jobs
             .iter()
-            .filter(|(_, work)| work.generation.as_ref().is_some_and(known))
+            .filter(|(_, work)| work.batch.as_ref().is_some_and(known))
             .map(|(&id, _)| id)
             .collect();
         for id in waiting {
-            self.finish_if_judged(now, id);
+            self.finish_if_evaluated(now, id);
         }
     }
 
     /// Reports a generation in which nothing is left to do. An audit for which
     /// there is no second worker is waived, and counted as such.
-    fn finish_if_judged(&mut self, now: Instant, id: ExperimentId) {
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        let Some(generation) = &work.generation else { return };
+    fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        let Some(batch) = &work.batch else { return };
         let workers = &self.workers;
-        let has_auditor = |generation: &GenerationInProgress| {
+        let has_auditor = |batch: &BatchInProgress| {
             let mut usable = workers.values().filter(|worker| worker.is_usable());
-            usable.any(|worker| generation.has_audit_for(worker.name()))
+            usable.any(|worker| batch.has_audit_for(worker.name()))
         };
-        if !generation.is_judged(has_auditor) {
+        if !batch.is_finished(has_auditor) {
             return;
         }
-        self.turns.remove(&(work.served, id));
+        self.ready_queue.remove(&(work.virtual_time, id));
         self.fleet_time.advance(now);
-        let generation = work.generation.take().expect("just seen");
-        let judged = generation.into_judged(now, self.workers.len(), &self.fleet_time);
-        self.commands.push_back(Command::FinishGeneration { experiment: id, judged });
+        let batch = work.batch.take().expect("just seen");
+        let evaluated = batch.into_evaluated(now, self.workers.len(), &self.fleet_time);
+        self.commands.push_back(Command::FinishBatch { job: id, evaluated });
     }
 
     /// Queues work again that gave no result. `blame`: what counts against it, if
@@ -206,59 +207,60 @@ impl Engine {
     pub(super) fn retry(
         &mut self,
         now: Instant,
-        assignment: Assignment,
-        blame: Option<(Option<NonZeroU64>, &str)>,
+        assignment: AssignedItem,
+        failure: Option<(Option<NonZeroU64>, &str)>,
     ) {
-        let Assignment { experiment: id, task, is_audit, .. } = assignment;
-        let Some(work) = self.experiments.get_mut(&id) else { return };
-        let Some(generation) = &mut work.generation else { return };
-        self.tally.n_items_requeued += 1;
+        let AssignedItem { job: id, item, is_audit, .. } = assignment;
+        let Some(work) = self.jobs.get_mut(&id) else { return };
+        let Some(batch) = &mut work.batch else { return };
+        self.counters.n_items_requeued += 1;
         if is_audit {
             // It may have been the second worker that made an audit possible.
-            generation.push_audit(task);
+            batch.push_audit(item);
             self.make_ready(id);
             return;
         }
-        if let Some((process, blame)) = blame {
+        if let Some((process, failure)) = failure {
             let until = now + self.config.lease;
-            match generation.blames.add(&task, process, blame, until) {
-                Verdict::Retry => {}
-                Verdict::HoldBack => return,
-                Verdict::Fail => return self.fail(id, &task, blame),
+            match batch.failures.add(&item, process, failure, until) {
+                RetryDecision::Retry => {}
+                RetryDecision::HoldBack => return,
+                RetryDecision::Fail => return self.fail(id, &item, failure),
             }
         }
-        self.requeue(id, &task);
+        self.requeue(id, &item);
     }
 
     /// Queues what nobody else computes of a task, before all other work, and lets
     /// what others compute of it be duplicated again.
-    pub(super) fn requeue(&mut self, id: ExperimentId, task: &Task) {
-        let work = self.experiments.get_mut(&id).expect("the caller has seen it");
-        let generation = work.generation.as_mut().expect("the caller has seen it");
-        for part in generation.unclaimed(task).into_iter().rev() {
-            generation.push_front(part);
+    pub(super) fn requeue(&mut self, id: JobId, item: &Item) {
+        let work = self.jobs.get_mut(&id).expect("the caller has seen it");
+        let batch = work.batch.as_mut().expect("the caller has seen it");
+        for part in batch.unclaimed(item).into_iter().rev() {
+            batch.push_front(part);
         }
-        let holders: Vec<(WorkerId, ItemId)> = generation.holders(task.individual).collect();
-        for (holder, item) in holders {
+        let holders: Vec<(WorkerId, AssignmentId)> = batch.holders(item.individual).collect();
+        for (holder, assignment_id) in holders {
             let worker: Option<&Worker> = self.workers.get(&holder);
-            if let Some(assignment) = worker.and_then(|worker| worker.in_flight.get(&item)) {
-                generation.uncovered.insert((assignment.expected, item), holder);
+            if let Some(assignment) = worker.and_then(|worker| worker.in_flight.get(&assignment_id))
+            {
+                batch.uncovered.insert((assignment.expected, assignment_id), holder);
             }
         }
         self.make_ready(id);
     }
 
-    pub(super) fn fail(&mut self, id: ExperimentId, task: &Task, blame: &str) {
-        let generation = self.generation_mut(id);
+    pub(super) fn fail(&mut self, id: JobId, item: &Item, failure: &str) {
+        let batch = self.batch_mut(id);
         let reason = format!(
-            "individual {} of {}, trials {}..{}, failed {} times; at last {blame}",
-            task.individual,
-            generation.name(),
-            task.trials.start,
-            task.trials.end,
+            "individual {} of {}, trials {}..{}, failed {} times; at last {failure}",
+            item.individual,
+            batch.name(),
+            item.trials.start,
+            item.trials.end,
             super::MAX_ATTEMPTS,
         );
-        self.forget_experiment(id);
-        self.commands.push_back(Command::FailExperiment { experiment: id, reason });
+        self.forget_job(id);
+        self.commands.push_back(Command::FailJob { job: id, reason });
     }
 }

@@ -5,11 +5,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use sim_core::TrialSet;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 
-use crate::ids::{ExperimentId, ItemId, WorkerId};
+use crate::ids::{AssignmentId, JobId, WorkerId};
 
-use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, generation::Task};
+use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, item::Item};
 
 /// A worker is given so much work ahead, so that it computes while results and
 /// new items travel: longer than a round trip and the coordinator's own delays.
@@ -29,11 +30,11 @@ pub struct Worker {
     /// Why it must not be given items.
     pub distrusted: Option<String>,
     /// Experiments whose specification it has.
-    pub known_experiments: BTreeSet<ExperimentId>,
+    pub known_jobs: BTreeSet<JobId>,
     /// What it has been given and has not answered; oldest first, as ids grow.
-    pub in_flight: BTreeMap<ItemId, Assignment>,
+    pub in_flight: BTreeMap<AssignmentId, AssignedItem>,
     /// What was taken back from it lately, as the answer may be under way.
-    pub recalled: VecDeque<(ItemId, Assignment)>,
+    pub recalled: VecDeque<(AssignmentId, AssignedItem)>,
     /// What it computed.
     pub time: WorkerTime,
     /// Time per item, s; smoothed.
@@ -45,13 +46,13 @@ pub struct Worker {
 
 /// Work in a worker's hands.
 #[derive(Debug, Clone)]
-pub struct Assignment {
+pub struct AssignedItem {
     /// Whose work.
-    pub experiment: ExperimentId,
+    pub job: JobId,
     /// Of which of its generations.
-    pub generation: u64,
+    pub trial_set: TrialSet,
     /// Which work.
-    pub task: Task,
+    pub item: Item,
     /// Whether it is computed only to be compared.
     pub is_audit: bool,
     /// When it was sent.
@@ -71,7 +72,7 @@ impl Worker {
             last_heard: now,
             is_draining: false,
             distrusted: None,
-            known_experiments: BTreeSet::new(),
+            known_jobs: BTreeSet::new(),
             in_flight: BTreeMap::new(),
             recalled: VecDeque::new(),
             item_s: None,
@@ -143,16 +144,16 @@ impl Worker {
     }
 
     /// Remembers what was taken back.
-    pub fn remember_recalled(&mut self, item: ItemId, assignment: Assignment) {
+    pub fn remember_recalled(&mut self, assignment_id: AssignmentId, assignment: AssignedItem) {
         if self.recalled.len() >= 2 * self.n_slots() {
             self.recalled.pop_front();
         }
-        self.recalled.push_back((item, assignment));
+        self.recalled.push_back((assignment_id, assignment));
     }
 
     /// What was taken back under this id, if it is remembered.
-    pub fn take_recalled(&mut self, item: ItemId) -> Option<Assignment> {
-        let index = self.recalled.iter().position(|(id, _)| *id == item)?;
+    pub fn take_recalled(&mut self, assignment_id: AssignmentId) -> Option<AssignedItem> {
+        let index = self.recalled.iter().position(|(id, _)| *id == assignment_id)?;
         self.recalled.remove(index).map(|(_, assignment)| assignment)
     }
 

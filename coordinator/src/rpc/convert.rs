@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use sim_core::{Output, TrialSet};
 use swarm_proto::v1::{
     self, WorkResponse, event::Kind, item_result::Outcome, work_response::Message,
 };
@@ -9,8 +10,8 @@ use tonic::Status;
 
 use crate::{
     driver::ToWorker,
-    engine::{Item, ItemResult, WorkerStatus},
-    ids::ItemId,
+    engine::{Assignment, ItemResult, WorkerStatus},
+    ids::{AssignmentId, JobId},
     limits::TEXT_LEN_MAX,
     store::{Event, EventKind, Experiment, ExperimentState, Generation},
 };
@@ -33,21 +34,21 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
             heartbeat_interval_ms: times.heartbeat_interval.as_millis() as u32,
             lease_ms: times.lease.as_millis() as u32,
         }),
-        ToWorker::Spec(experiment, config_json) => Message::Spec(v1::ExperimentSpec {
-            experiment_id: experiment.0,
-            config_json: config_json.to_string(),
-        }),
-        ToWorker::Items(experiment, generation, items) => Message::Batch(v1::ItemBatch {
-            experiment_id: experiment.0,
-            generation,
-            items: items.iter().map(item).collect(),
-        }),
-        ToWorker::End(experiment) => {
-            Message::EndExperiment(v1::EndExperiment { experiment_id: experiment.0 })
+        ToWorker::Spec(id, config_json) => {
+            Message::Spec(v1::JobSpec { job: job(id), config_json: config_json.to_string() })
         }
-        ToWorker::DropItems(items) => {
-            let item_ids = items.iter().map(|item| item.0).collect();
-            Message::DropItems(v1::DropItems { item_ids })
+        ToWorker::Assignments { job: id, trial_set: set, output: wanted, assignments } => {
+            Message::Assignments(v1::Assignments {
+                job: job(id),
+                trial_set: trial_set(set),
+                output: output(wanted).into(),
+                assignments: assignments.iter().map(assignment).collect(),
+            })
+        }
+        ToWorker::End(id) => Message::EndJob(v1::EndJob { job: job(id) }),
+        ToWorker::Drop(assignments) => {
+            let assignment_ids = assignments.iter().map(|id| id.0).collect();
+            Message::DropAssignments(v1::DropAssignments { assignment_ids })
         }
         ToWorker::Dropped(reason) => {
             return Err(Status::aborted(format!("the coordinator drops this worker: {reason}")));
@@ -56,19 +57,43 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
     Ok(WorkResponse { message: Some(message) })
 }
 
-fn item(item: &Item) -> v1::Item {
-    v1::Item {
-        item_id: item.id.0,
-        first_trial: item.trials.start,
-        trial_count: item.trials.end - item.trials.start,
-        genotype: item.genotype.to_vec(),
+fn job(id: JobId) -> Option<v1::JobId> {
+    let job = match id {
+        JobId::Experiment(id) => v1::job_id::Job::Experiment(id.0),
+        JobId::Evaluation(id) => v1::job_id::Job::Evaluation(id.0),
+    };
+    Some(v1::JobId { job: Some(job) })
+}
+
+fn trial_set(trial_set: TrialSet) -> Option<v1::TrialSet> {
+    let trial_set = match trial_set {
+        TrialSet::Generation(generation) => v1::trial_set::TrialSet::Generation(generation),
+        TrialSet::HeldOut(generation) => v1::trial_set::TrialSet::HeldOut(generation),
+        TrialSet::Evaluation => v1::trial_set::TrialSet::Evaluation(v1::EvaluationTrials {}),
+    };
+    Some(v1::TrialSet { trial_set: Some(trial_set) })
+}
+
+fn output(output: Output) -> v1::Output {
+    match output {
+        Output::Fitness => v1::Output::Fitness,
+        Output::Measures => v1::Output::Measures,
+    }
+}
+
+fn assignment(assignment: &Assignment) -> v1::Assignment {
+    v1::Assignment {
+        assignment_id: assignment.id.0,
+        first_trial: assignment.trials.start,
+        trial_count: assignment.trials.end - assignment.trials.start,
+        genotype: assignment.genotype.to_vec(),
     }
 }
 
 /// A worker's result.
 pub fn item_result(result: v1::ItemResult) -> ItemResult {
     ItemResult {
-        id: ItemId(result.item_id),
+        id: AssignmentId(result.assignment_id),
         outcome: match result.outcome {
             Some(Outcome::Fitness(fitness)) => Ok(fitness.values),
             Some(Outcome::Measures(measures)) => Ok(measures.values),

@@ -3,13 +3,15 @@
 
 use std::time::Duration;
 
+use sim_core::TrialSet;
 use swarm_proto::v1::{ExplainExperimentResponse, HeldItems, Round};
 use tokio::sync::oneshot;
 use tonic::Status;
 
 use crate::{
     driver::{Event, EventSender},
-    engine::RoundActivity,
+    engine::BatchActivity,
+    ids::JobId,
     shared_store::SharedStore,
     store::{EventKind, Experiment},
 };
@@ -40,11 +42,11 @@ pub async fn explain(
             sim_core::FINGERPRINT
         )
     };
-    let rivals = activity.rivals.into_iter().filter(|id| !id.is_evaluation());
+    let rivals = activity.rivals.into_iter().filter_map(JobId::experiment);
     Ok(ExplainExperimentResponse {
         notices: notices(store, &experiment).await?,
         experiment: Some(convert::experiment(experiment)),
-        round: activity.round.map(round),
+        round: activity.batch.and_then(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
         rivals: rivals.map(|id| id.0).collect(),
@@ -68,12 +70,12 @@ async fn notices(
     Ok(latest.into_iter().map(convert::event).collect())
 }
 
-fn round(activity: RoundActivity) -> Round {
+/// A batch of an experiment; none if it is an evaluation's.
+fn round(activity: BatchActivity) -> Option<Round> {
     let ms = |duration: Duration| duration.as_millis() as u64;
-    let held_out = activity.number.checked_sub(sim_core::held_out(0));
-    Round {
-        generation: held_out.unwrap_or(activity.number),
-        held_out: held_out.is_some(),
+    Some(Round {
+        generation: activity.trial_set.generation()?,
+        held_out: matches!(activity.trial_set, TrialSet::HeldOut(_)),
         episodes: activity.n_episodes as u64,
         episodes_left: activity.n_episodes_left as u64,
         items_queued: activity.n_items_queued as u32,
@@ -90,5 +92,5 @@ fn round(activity: RoundActivity) -> Round {
             })
             .collect(),
         running_ms: ms(activity.running_for),
-    }
+    })
 }

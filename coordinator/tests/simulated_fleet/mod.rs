@@ -10,13 +10,14 @@ use std::{
 
 use coordinator::{
     engine::{
-        Command, Engine, EngineConfig, Introduction, Item, ItemResult, JudgedGeneration,
+        Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
         WorkerStatus,
     },
-    ids::{ExperimentId, ItemId, WorkerId},
+    ids::{AssignmentId, JobId, WorkerId},
     priority::Priority,
 };
 use evolution::Population;
+use sim_core::TrialSet;
 
 /// What a call of the simulation costs beside its trials, in trials.
 const CALL_OVERHEAD: f64 = 0.4;
@@ -44,10 +45,10 @@ pub struct FleetModel {
 struct Worker {
     introduction: Introduction,
     speed: f64,
-    queue: VecDeque<(ExperimentId, Item)>,
-    running: BTreeMap<ItemId, ExperimentId>,
+    queue: VecDeque<(JobId, Assignment)>,
+    running: BTreeMap<AssignmentId, JobId>,
     /// Computed, but wanted no more.
-    dropped: BTreeSet<ItemId>,
+    dropped: BTreeSet<AssignmentId>,
     stalled_until: Duration,
     is_silent: bool,
     /// Makes up what it does not compute.
@@ -59,17 +60,17 @@ enum Happening {
     Tick,
     /// A message of these commands' numbers reaches a worker.
     Arrival(WorkerId, usize),
-    Computed(WorkerId, ItemId),
-    Result(WorkerId, ItemId),
+    Computed(WorkerId, AssignmentId),
+    Result(WorkerId, AssignmentId),
     Awake(WorkerId),
 }
 
 /// The fleet, the engine, and what became of experiments.
 pub struct SimulatedFleet {
     pub engine: Engine,
-    pub judged: Vec<(ExperimentId, JudgedGeneration)>,
-    pub failed: Vec<(ExperimentId, String)>,
-    pub paused: Vec<(ExperimentId, String)>,
+    pub evaluated: Vec<(JobId, EvaluatedBatch)>,
+    pub failed: Vec<(JobId, String)>,
+    pub paused: Vec<(JobId, String)>,
     pub n_items_sent: usize,
     pub n_items_dropped: usize,
     /// Time that workers computed, in all.
@@ -80,7 +81,7 @@ pub struct SimulatedFleet {
     n_happenings: u64,
     agenda: BinaryHeap<Reverse<(Duration, u64, Happening)>>,
     messages: BTreeMap<usize, Command>,
-    results: BTreeMap<ItemId, ItemResult>,
+    results: BTreeMap<AssignmentId, ItemResult>,
     n_messages: usize,
     workers: BTreeMap<WorkerId, Worker>,
     n_processes: u64,
@@ -113,7 +114,7 @@ impl SimulatedFleet {
         let origin = Instant::now();
         let mut fleet = Self {
             engine: Engine::new(origin, config),
-            judged: Vec::new(),
+            evaluated: Vec::new(),
             failed: Vec::new(),
             paused: Vec::new(),
             n_items_sent: 0,
@@ -224,20 +225,15 @@ impl SimulatedFleet {
         self.carry_out();
     }
 
-    pub fn submit(&mut self, id: ExperimentId, weight: u32) {
+    pub fn submit(&mut self, id: JobId, weight: u32) {
         let priority = Priority::new(weight).expect("within bounds");
-        self.engine.on_experiment_started(id, "spec".into(), priority);
+        self.engine.on_job_started(id, "spec".into(), priority);
     }
 
-    pub fn ask(
-        &mut self,
-        id: ExperimentId,
-        generation: u64,
-        population_size: usize,
-        n_trials: u32,
-    ) {
+    pub fn ask(&mut self, id: JobId, generation: u64, population_size: usize, n_trials: u32) {
         let genotypes = population(population_size);
-        self.engine.on_generation_asked(self.instant(), id, generation, genotypes, n_trials);
+        let batch = Batch::fitness(TrialSet::Generation(generation), genotypes, n_trials);
+        self.engine.on_batch_requested(self.instant(), id, batch);
         self.carry_out();
     }
 
@@ -289,9 +285,9 @@ impl SimulatedFleet {
                 let message = self.messages.remove(&number).expect("each arrives once");
                 self.arrive(id, message);
             }
-            Happening::Computed(id, item) => self.computed(id, item),
-            Happening::Result(id, item) => {
-                let result = self.results.remove(&item).expect("each is sent once");
+            Happening::Computed(id, assignment) => self.computed(id, assignment),
+            Happening::Result(id, assignment) => {
+                let result = self.results.remove(&assignment).expect("each is sent once");
                 if self.workers.get(&id).is_some_and(|worker| !worker.is_silent) {
                     self.engine.on_results(self.instant(), id, vec![result]);
                     self.carry_out();
@@ -304,26 +300,26 @@ impl SimulatedFleet {
     fn arrive(&mut self, id: WorkerId, message: Command) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         match message {
-            Command::SendItems { experiment, items, .. } => {
-                worker.queue.extend(items.into_iter().map(|item| (experiment, item)));
+            Command::SendAssignments { job, assignments, .. } => {
+                worker.queue.extend(assignments.into_iter().map(|assignment| (job, assignment)));
             }
-            Command::SendDrop { items, .. } => {
-                let items = BTreeSet::from_iter(items);
-                worker.queue.retain(|(_, item)| !items.contains(&item.id));
-                let running: Vec<ItemId> =
-                    worker.running.keys().copied().filter(|id| items.contains(id)).collect();
+            Command::SendDrop { assignments, .. } => {
+                let assignments = BTreeSet::from_iter(assignments);
+                worker.queue.retain(|(_, assignment)| !assignments.contains(&assignment.id));
+                let running: Vec<AssignmentId> =
+                    worker.running.keys().copied().filter(|id| assignments.contains(id)).collect();
                 if self.model.stops {
-                    for item in running {
-                        worker.running.remove(&item);
-                        worker.dropped.insert(item);
+                    for assignment in running {
+                        worker.running.remove(&assignment);
+                        worker.dropped.insert(assignment);
                     }
                 }
             }
-            Command::SendEnd { experiment, .. } => {
-                worker.queue.retain(|(of, _)| *of != experiment);
+            Command::SendEnd { job, .. } => {
+                worker.queue.retain(|(of, _)| *of != job);
                 if self.model.stops {
-                    let ours = worker.running.extract_if(.., |_, of| *of == experiment);
-                    worker.dropped.extend(ours.map(|(item, _)| item));
+                    let ours = worker.running.extract_if(.., |_, of| *of == job);
+                    worker.dropped.extend(ours.map(|(assignment, _)| assignment));
                 }
             }
             _ => {}
@@ -339,53 +335,58 @@ impl SimulatedFleet {
             if worker.running.len() >= worker.introduction.n_slots || now < worker.stalled_until {
                 return;
             }
-            let Some((experiment, item)) = worker.queue.pop_front() else { return };
-            worker.running.insert(item.id, experiment);
-            let trials: f64 = item
+            let Some((job, assignment)) = worker.queue.pop_front() else { return };
+            worker.running.insert(assignment.id, job);
+            let trials: f64 = assignment
                 .trials
                 .clone()
                 .map(|trial| {
-                    let place = (item.genotype[0] as u64) << 16 | u64::from(trial);
+                    let place = (assignment.genotype[0] as u64) << 16 | u64::from(trial);
                     1.0 + model.dispersion * (2.0 * uniform(place) - 1.0)
                 })
                 .sum();
             let time = model.trial.mul_f64((trials + CALL_OVERHEAD) / worker.speed);
             let wrong = if worker.is_faulty { 1e-9 } else { 0.0 };
-            let values = item.trials.clone().map(|t| fitness(&item.genotype, t) + wrong).collect();
-            let result = ItemResult { id: item.id, outcome: Ok(values), compute_time: time };
-            self.results.insert(item.id, result);
-            self.schedule(time, Happening::Computed(id, item.id));
+            let values = assignment
+                .trials
+                .clone()
+                .map(|t| fitness(&assignment.genotype, t) + wrong)
+                .collect();
+            let result = ItemResult { id: assignment.id, outcome: Ok(values), compute_time: time };
+            self.results.insert(assignment.id, result);
+            self.schedule(time, Happening::Computed(id, assignment.id));
         }
     }
 
-    fn computed(&mut self, id: WorkerId, item: ItemId) {
+    fn computed(&mut self, id: WorkerId, assignment: AssignmentId) {
         let now = self.now;
-        let gone = self.workers.get_mut(&id).is_none_or(|worker| worker.dropped.remove(&item));
+        let gone =
+            self.workers.get_mut(&id).is_none_or(|worker| worker.dropped.remove(&assignment));
         if gone {
-            self.results.remove(&item);
+            self.results.remove(&assignment);
             return;
         }
         let worker = self.workers.get_mut(&id).expect("just seen");
         if now < worker.stalled_until {
             let rest = worker.stalled_until - now;
-            self.schedule(rest, Happening::Computed(id, item));
+            self.schedule(rest, Happening::Computed(id, assignment));
             return;
         }
-        worker.running.remove(&item);
-        self.computed += self.results[&item].compute_time;
-        self.schedule(self.model.latency, Happening::Result(id, item));
+        worker.running.remove(&assignment);
+        self.computed += self.results[&assignment].compute_time;
+        self.schedule(self.model.latency, Happening::Result(id, assignment));
         self.start_slots(id);
     }
 
     fn carry_out(&mut self) {
         while let Some(command) = self.engine.poll_command() {
             match command {
-                Command::SendItems { worker, ref items, .. } => {
-                    self.n_items_sent += items.len();
+                Command::SendAssignments { worker, ref assignments, .. } => {
+                    self.n_items_sent += assignments.len();
                     self.post(worker, command);
                 }
-                Command::SendDrop { worker, ref items } => {
-                    self.n_items_dropped += items.len();
+                Command::SendDrop { worker, ref assignments } => {
+                    self.n_items_dropped += assignments.len();
                     self.post(worker, command);
                 }
                 Command::SendEnd { worker, .. } | Command::SendSpec { worker, .. } => {
@@ -394,14 +395,14 @@ impl SimulatedFleet {
                 Command::Disconnect { worker, .. } => {
                     self.workers.remove(&worker);
                 }
-                Command::FinishGeneration { experiment, judged } => {
-                    self.judged.push((experiment, judged));
+                Command::FinishBatch { job, evaluated } => {
+                    self.evaluated.push((job, evaluated));
                 }
-                Command::PauseExperiment { experiment, reason } => {
-                    self.paused.push((experiment, reason));
+                Command::PauseJob { job, reason } => {
+                    self.paused.push((job, reason));
                 }
-                Command::FailExperiment { experiment, reason } => {
-                    self.failed.push((experiment, reason));
+                Command::FailJob { job, reason } => {
+                    self.failed.push((job, reason));
                 }
             }
         }

@@ -8,9 +8,12 @@ use std::{
 };
 
 use experiment_file::ExperimentConfig;
-use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello, undisturbed};
+use harness::{
+    CoordinatorProcess, Experiment, HandWorker, WorkerProcess, experiment_of, generation_of, hello,
+    undisturbed,
+};
 use swarm_proto::v1::{
-    Draining, ExperimentSpec, Heartbeat, Hello, Item, ItemResult, ItemResults,
+    Assignment, Draining, Heartbeat, Hello, ItemResult, ItemResults, JobSpec,
     SubmitExperimentRequest, TrialFitness, WorkRequest, WorkResponse, item_result::Outcome,
     work_request::Message, work_response, worker_service_client::WorkerServiceClient,
 };
@@ -28,7 +31,7 @@ struct Intruder {
     worker: HandWorker,
     experiment: sim_core::Simulation,
     generation: u64,
-    items: Vec<Item>,
+    assignments: Vec<Assignment>,
 }
 
 impl Intruder {
@@ -40,28 +43,29 @@ impl Intruder {
                 break compile(&spec);
             }
         };
-        let batch = worker.receive_batch().await.unwrap();
-        Self { worker, experiment, generation: batch.generation, items: batch.items }
+        let batch = worker.receive_assignments().await.unwrap();
+        let (_, generation) = generation_of(&batch);
+        Self { worker, experiment, generation, assignments: batch.assignments }
     }
 
     /// What the first of its items is worth.
     fn honest_fitness(&self) -> Vec<f64> {
-        evaluate(&self.experiment, self.generation, &self.items[0])
+        evaluate(&self.experiment, self.generation, &self.assignments[0])
     }
 
     /// Computes honestly until its generation is complete, and leaves.
     async fn complete_generation(mut self, coordinator: &CoordinatorProcess, name: &str) {
-        let mut items = std::mem::take(&mut self.items);
+        let mut assignments = std::mem::take(&mut self.assignments);
         loop {
-            for item in &items {
-                let values = evaluate(&self.experiment, self.generation, item);
-                self.worker.answer_fitness(item.item_id, values).await;
+            for assignment in &assignments {
+                let values = evaluate(&self.experiment, self.generation, assignment);
+                self.worker.answer_fitness(assignment.assignment_id, values).await;
             }
-            let batch = self.worker.receive_batch().await.unwrap();
-            if batch.generation != self.generation {
+            let batch = self.worker.receive_assignments().await.unwrap();
+            if generation_of(&batch).1 != self.generation {
                 return self.leave(coordinator, name).await;
             }
-            items = batch.items;
+            assignments = batch.assignments;
         }
     }
 
@@ -75,20 +79,24 @@ impl Intruder {
     }
 }
 
-fn compile(spec: &ExperimentSpec) -> sim_core::Simulation {
+fn compile(spec: &JobSpec) -> sim_core::Simulation {
     let (config, _) =
         ExperimentConfig::from_json(&spec.config_json, "", evolution::ALGORITHMS).unwrap();
     sim_core::Simulation::compile(&config).unwrap()
 }
 
-fn evaluate(experiment: &sim_core::Simulation, generation: u64, item: &Item) -> Vec<f64> {
-    let trials = item.first_trial..item.first_trial + item.trial_count;
-    experiment.evaluate(&item.genotype, generation, trials).unwrap()
+fn evaluate(
+    experiment: &sim_core::Simulation,
+    generation: u64,
+    assignment: &Assignment,
+) -> Vec<f64> {
+    let trials = assignment.first_trial..assignment.first_trial + assignment.trial_count;
+    experiment.evaluate(&assignment.genotype, generation, trials).unwrap()
 }
 
-fn fitness(item_id: u64, values: Vec<f64>) -> ItemResult {
+fn fitness(assignment_id: u64, values: Vec<f64>) -> ItemResult {
     let outcome = Some(Outcome::Fitness(TrialFitness { values }));
-    ItemResult { item_id, outcome, compute_us: u64::MAX }
+    ItemResult { assignment_id, outcome, compute_us: u64::MAX }
 }
 
 /// Waits until a worker is lost; returns why.
@@ -117,10 +125,11 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     for (case, wrong) in wrong.into_iter().enumerate() {
         let name = format!("sizes-{case}");
         let mut intruder = Intruder::join(&url, &name).await;
-        let (item_id, n_trials) = (intruder.items[0].item_id, intruder.items[0].trial_count);
+        let (assignment_id, n_trials) =
+            (intruder.assignments[0].assignment_id, intruder.assignments[0].trial_count);
         let values = wrong(n_trials as usize);
         let expected = format!("{} values for {n_trials} trials", values.len());
-        intruder.worker.answer_fitness(item_id, values).await;
+        intruder.worker.answer_fitness(assignment_id, values).await;
         assert_eq!(intruder.worker.receive_end().await.code(), Code::Aborted);
         let reason = reason_of_loss(&coordinator, &name);
         assert!(reason.contains(&expected), "{reason}, not {expected}");
@@ -130,7 +139,8 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
 
     // Results for every item there is, except its own.
     let intruder = Intruder::join(&url, "greedy").await;
-    let own: Vec<u64> = intruder.items.iter().map(|item| item.item_id).collect();
+    let own: Vec<u64> =
+        intruder.assignments.iter().map(|assignment| assignment.assignment_id).collect();
     let others = (0..own[0] + 100).chain([u64::MAX]).filter(|id| !own.contains(id));
     let results = others.map(|id| fitness(id, vec![f64::NAN; 2])).collect();
     intruder.worker.say(Message::Results(ItemResults { results })).await;
@@ -138,11 +148,11 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
 
     // The same result twice, the second time with another value, and once more.
     let intruder = Intruder::join(&url, "repetitive").await;
-    let (item, right) = (intruder.items[0].item_id, intruder.honest_fitness());
+    let (first, right) = (intruder.assignments[0].assignment_id, intruder.honest_fitness());
     let wrong: Vec<f64> = right.iter().map(|fitness| fitness + 1.0).collect();
-    let results = vec![fitness(item, right), fitness(item, wrong.clone())];
+    let results = vec![fitness(first, right), fitness(first, wrong.clone())];
     intruder.worker.say(Message::Results(ItemResults { results })).await;
-    intruder.worker.answer_fitness(item, wrong).await;
+    intruder.worker.answer_fitness(first, wrong).await;
     intruder.leave(&coordinator, "repetitive").await;
 
     // Out of turn.
@@ -188,7 +198,7 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
     // A message that is too long. What its worker held goes to others.
     let mut intruder = Intruder::join(&url, "talkative").await;
     let values = vec![0.0; 3 << 20];
-    intruder.worker.answer_fitness(intruder.items[0].item_id, values).await;
+    intruder.worker.answer_fitness(intruder.assignments[0].assignment_id, values).await;
     intruder.worker.receive_end().await;
     assert!(reason_of_loss(&coordinator, "talkative").contains("its stream broke"));
 
@@ -216,21 +226,21 @@ async fn serve_until_poisoned(worker: &mut HandWorker, poison: &OnceLock<Vec<f64
     while let Ok(message) = worker.receive().await {
         let batch = match message {
             work_response::Message::Spec(spec) => {
-                experiments.insert(spec.experiment_id, compile(&spec));
+                experiments.insert(experiment_of(spec.job), compile(&spec));
                 continue;
             }
-            work_response::Message::Batch(batch) => batch,
+            work_response::Message::Assignments(batch) => batch,
             _ => continue,
         };
-        for item in &batch.items {
-            if (batch.experiment_id, batch.generation) == POISONED
-                && *poison.get_or_init(|| item.genotype.clone()) == item.genotype
+        let (experiment, generation) = generation_of(&batch);
+        for assignment in &batch.assignments {
+            if (experiment, generation) == POISONED
+                && *poison.get_or_init(|| assignment.genotype.clone()) == assignment.genotype
             {
                 return;
             }
-            let experiment = &experiments[&batch.experiment_id];
-            let values = evaluate(experiment, batch.generation, item);
-            worker.answer_fitness(item.item_id, values).await;
+            let values = evaluate(&experiments[&experiment], generation, assignment);
+            worker.answer_fitness(assignment.assignment_id, values).await;
         }
     }
 }

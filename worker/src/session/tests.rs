@@ -7,6 +7,7 @@ use std::{
     sync::{Mutex, mpsc as std_mpsc},
 };
 
+use sim_core::TrialSet;
 use swarm_proto::v1::{
     work_request,
     worker_service_server::{WorkerService, WorkerServiceServer},
@@ -66,7 +67,7 @@ impl Conversation {
                 other => panic!("expected results, not {other:?}"),
             }
         }
-        results.sort_by_key(|result| result.item_id);
+        results.sort_by_key(|result| result.assignment_id);
         results
     }
 
@@ -85,23 +86,42 @@ impl Conversation {
         hello
     }
 
-    async fn send_spec(&self, experiment_id: u64, config_json: &str) {
-        let config_json = config_json.into();
-        self.send(Message::Spec(v1::ExperimentSpec { experiment_id, config_json })).await;
+    /// The specification of an experiment.
+    async fn send_spec(&self, experiment: u64, config_json: &str) {
+        let (job, config_json) = (job(experiment), config_json.into());
+        self.send(Message::Spec(v1::JobSpec { job, config_json })).await;
     }
 
-    async fn send_items(&self, experiment_id: u64, item_ids: impl IntoIterator<Item = u64>) {
-        let items = item_ids
+    async fn send_end(&self, experiment: u64) {
+        self.send(Message::EndJob(v1::EndJob { job: job(experiment) })).await;
+    }
+
+    /// Assignments of generation 5 of an experiment, trials 1 and 2.
+    async fn send_assignments(&self, experiment: u64, ids: impl IntoIterator<Item = u64>) {
+        let assignments = ids
             .into_iter()
-            .map(|item_id| v1::Item {
-                item_id,
+            .map(|assignment_id| v1::Assignment {
+                assignment_id,
                 first_trial: 1,
                 trial_count: 2,
-                genotype: vec![0.1, 0.2, item_id as f64],
+                genotype: vec![0.1, 0.2, assignment_id as f64],
             })
             .collect();
-        let batch = v1::ItemBatch { experiment_id, generation: 5, items };
-        self.send(Message::Batch(batch)).await;
+        self.send(Message::Assignments(of_experiment(experiment, assignments))).await;
+    }
+}
+
+fn job(experiment: u64) -> Option<v1::JobId> {
+    Some(v1::JobId { job: Some(v1::job_id::Job::Experiment(experiment)) })
+}
+
+fn of_experiment(experiment: u64, assignments: Vec<v1::Assignment>) -> v1::Assignments {
+    let trial_set = Some(v1::trial_set::TrialSet::Generation(5));
+    v1::Assignments {
+        job: job(experiment),
+        trial_set: Some(v1::TrialSet { trial_set }),
+        output: v1::Output::Fitness.into(),
+        assignments,
     }
 }
 
@@ -153,13 +173,16 @@ fn serve(listener: TcpListener) -> mpsc::Receiver<Conversation> {
     conversations
 }
 
-/// Fitness that depends on everything that an item says.
+/// Fitness that depends on everything that an assignment says.
 fn arithmetic(config_json: String) -> Evaluator {
-    Arc::new(move |item, _| {
+    Arc::new(move |assignment, _| {
         let factor: f64 = config_json.parse().map_err(|_| format!("`{config_json}`?"))?;
-        let sum: f64 = item.genotype.iter().sum();
-        let fitness = |trial| factor * sum / (item.generation + u64::from(trial)) as f64;
-        Ok(Some(item.trials.clone().map(fitness).collect()))
+        let sum: f64 = assignment.genotype.iter().sum();
+        let TrialSet::Generation(generation) = assignment.trial_set else {
+            return Err(format!("{}?", assignment.trial_set));
+        };
+        let fitness = |trial| factor * sum / (generation + u64::from(trial)) as f64;
+        Ok(Some(assignment.trials.clone().map(fitness).collect()))
     })
 }
 
@@ -171,10 +194,10 @@ fn gated() -> (impl MakesEvaluators, mpsc::UnboundedReceiver<u64>, std_mpsc::Sen
     let permits = Arc::new(Mutex::new(permits));
     let gated = move |_| -> Evaluator {
         let (started, permits) = (started.clone(), Arc::clone(&permits));
-        Arc::new(move |item, keep_going| {
-            started.send(item.id).map_err(|error| error.to_string())?;
+        Arc::new(move |assignment, keep_going| {
+            started.send(assignment.id).map_err(|error| error.to_string())?;
             permits.lock().unwrap().recv().map_err(|error| error.to_string())?;
-            Ok(keep_going().then(|| vec![item.id as f64]))
+            Ok(keep_going().then(|| vec![assignment.id as f64]))
         })
     };
     (gated, starts, permit)
@@ -212,9 +235,9 @@ async fn results_are_what_was_computed_to_the_bit() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "0.3").await;
-    coordinator.send_items(1, 10..14).await;
+    coordinator.send_assignments(1, 10..14).await;
     for (result, id) in coordinator.results(4).await.iter().zip(10..) {
-        assert_eq!(result.item_id, id);
+        assert_eq!(result.assignment_id, id);
         let sum = 0.1 + 0.2 + id as f64;
         let expected = [0.3 * sum / 6.0, 0.3 * sum / 7.0].map(f64::to_bits);
         assert_eq!(fitness(result).iter().map(|x| x.to_bits()).collect::<Vec<_>>(), expected);
@@ -226,7 +249,7 @@ async fn results_are_what_was_computed_to_the_bit() {
 #[tokio::test]
 async fn an_item_that_cannot_be_computed_fails_alone() {
     fn panics_on_item_1(_: String) -> Evaluator {
-        Arc::new(|item, _| match item.id {
+        Arc::new(|assignment, _| match assignment.id {
             1 => panic!("division by swarm"),
             _ => Ok(Some(vec![1.0])),
         })
@@ -235,16 +258,20 @@ async fn an_item_that_cannot_be_computed_fails_alone() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "").await;
-    coordinator.send_items(1, [1, 2]).await;
+    coordinator.send_assignments(1, [1, 2]).await;
     let results = coordinator.results(2).await;
     assert_eq!(failure(&results[0]), "panicked: division by swarm");
     assert_eq!(fitness(&results[1]), [1.0]);
     // No specification; and trials whose numbers do not exist.
-    coordinator.send_items(2, [3]).await;
+    coordinator.send_assignments(2, [3]).await;
     assert!(failure(&coordinator.results(1).await[0]).contains("experiment 2"));
-    let item = v1::Item { item_id: 4, first_trial: u32::MAX, trial_count: 2, genotype: vec![] };
-    let batch = v1::ItemBatch { experiment_id: 1, generation: 0, items: vec![item] };
-    coordinator.send(Message::Batch(batch)).await;
+    let endless = v1::Assignment {
+        assignment_id: 4,
+        first_trial: u32::MAX,
+        trial_count: 2,
+        genotype: vec![],
+    };
+    coordinator.send(Message::Assignments(of_experiment(1, vec![endless]))).await;
     assert!(failure(&coordinator.results(1).await[0]).contains("trials"));
     drop(coordinator);
     stage.end().await;
@@ -256,7 +283,7 @@ async fn a_specification_that_does_not_parse_fails_its_items_with_the_reason() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "three").await;
-    coordinator.send_items(1, [1]).await;
+    coordinator.send_assignments(1, [1]).await;
     assert_eq!(failure(&coordinator.results(1).await[0]), "`three`?");
     drop(coordinator);
     stage.end().await;
@@ -268,8 +295,8 @@ async fn an_ended_experiment_is_forgotten() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "1").await;
-    coordinator.send(Message::EndExperiment(v1::EndExperiment { experiment_id: 1 })).await;
-    coordinator.send_items(1, [1]).await;
+    coordinator.send_end(1).await;
+    coordinator.send_assignments(1, [1]).await;
     assert!(failure(&coordinator.results(1).await[0]).contains("no specification"));
     drop(coordinator);
     stage.end().await;
@@ -282,41 +309,43 @@ async fn dropped_items_are_not_computed() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "").await;
-    coordinator.send_items(1, 1..=4).await;
+    coordinator.send_assignments(1, 1..=4).await;
     assert_eq!(starts.recv().await, Some(1));
-    coordinator.send(Message::DropItems(v1::DropItems { item_ids: vec![2, 4, 99] })).await;
+    coordinator
+        .send(Message::DropAssignments(v1::DropAssignments { assignment_ids: vec![2, 4, 99] }))
+        .await;
     // Answered at once, so that what was sent before has been read.
-    coordinator.send_items(9, [5]).await;
-    assert_eq!(coordinator.results(1).await[0].item_id, 5);
+    coordinator.send_assignments(9, [5]).await;
+    assert_eq!(coordinator.results(1).await[0].assignment_id, 5);
     permit.send(()).unwrap();
     permit.send(()).unwrap();
     let computed = coordinator.results(2).await;
-    assert_eq!(computed.iter().map(|result| result.item_id).collect::<Vec<_>>(), [1, 3]);
+    assert_eq!(computed.iter().map(|result| result.assignment_id).collect::<Vec<_>>(), [1, 3]);
     drop(coordinator);
     stage.end().await;
 }
 
 #[tokio::test]
 async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
-    let drop_item = Message::DropItems(v1::DropItems { item_ids: vec![1] });
-    let end = Message::EndExperiment(v1::EndExperiment { experiment_id: 1 });
-    for message in [drop_item, end] {
+    let drop_one = Message::DropAssignments(v1::DropAssignments { assignment_ids: vec![1] });
+    let end = Message::EndJob(v1::EndJob { job: job(1) });
+    for message in [drop_one, end] {
         let (gated, mut starts, permit) = gated();
         let mut stage = Stage::new(1, gated).await;
         let mut coordinator = stage.conversation().await;
         coordinator.welcome(LONG).await;
         coordinator.send_spec(1, "").await;
         coordinator.send_spec(2, "").await;
-        coordinator.send_items(1, [1]).await;
+        coordinator.send_assignments(1, [1]).await;
         assert_eq!(starts.recv().await, Some(1));
         coordinator.send(message).await;
-        coordinator.send_items(2, [2]).await;
+        coordinator.send_assignments(2, [2]).await;
         // Answered at once, so that what was sent before has been read.
-        coordinator.send_items(9, [3]).await;
-        assert_eq!(coordinator.results(1).await[0].item_id, 3);
+        coordinator.send_assignments(9, [3]).await;
+        assert_eq!(coordinator.results(1).await[0].assignment_id, 3);
         permit.send(()).unwrap();
         permit.send(()).unwrap();
-        assert_eq!(coordinator.results(1).await[0].item_id, 2, "of 1 nothing is heard");
+        assert_eq!(coordinator.results(1).await[0].assignment_id, 2, "of 1 nothing is heard");
         drop(coordinator);
         stage.end().await;
     }
@@ -332,7 +361,7 @@ async fn a_broken_stream_is_opened_again() {
         assert_eq!(hello.name, "ada");
         process_ids.insert(hello.process_id);
         coordinator.send_spec(1, "1").await;
-        coordinator.send_items(1, [1]).await;
+        coordinator.send_assignments(1, [1]).await;
         coordinator.results(1).await;
     }
     assert_eq!(process_ids.len(), 1, "it is recognised");
@@ -371,12 +400,12 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "").await;
-    coordinator.send_items(1, [1, 2]).await;
+    coordinator.send_assignments(1, [1, 2]).await;
     assert_eq!(starts.recv().await, Some(1));
     stage.shutdown.cancel();
     assert!(matches!(coordinator.next().await, Some(work_request::Message::Draining(_))));
     // Sent before the coordinator knew.
-    coordinator.send_items(1, [3]).await;
+    coordinator.send_assignments(1, [3]).await;
     permit.send(()).unwrap();
     assert_eq!(fitness(&coordinator.results(1).await[0]), [1.0]);
     assert_eq!(coordinator.next().await, None);
@@ -391,7 +420,7 @@ async fn hearts_beat_while_all_slots_compute() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(Duration::from_millis(5)).await;
     coordinator.send_spec(1, "").await;
-    coordinator.send_items(1, [1]).await;
+    coordinator.send_assignments(1, [1]).await;
     assert_eq!(starts.recv().await, Some(1));
     for _ in 0..3 {
         assert!(matches!(coordinator.next().await, Some(work_request::Message::Heartbeat(_))));
@@ -408,13 +437,13 @@ async fn more_items_than_the_credit_allows_are_failed() {
     let mut coordinator = stage.conversation().await;
     coordinator.welcome(LONG).await;
     coordinator.send_spec(1, "").await;
-    coordinator.send_items(1, [1]).await;
+    coordinator.send_assignments(1, [1]).await;
     assert_eq!(starts.recv().await, Some(1));
     let n_queued = swarm_proto::ITEMS_PER_SLOT_MAX as u64;
-    coordinator.send_items(1, 2..n_queued + 4).await;
+    coordinator.send_assignments(1, 2..n_queued + 4).await;
     let results = coordinator.results(2).await;
     assert!(results.iter().all(|result| failure(result).contains("queued")));
-    let failed: BTreeSet<u64> = results.iter().map(|result| result.item_id).collect();
+    let failed: BTreeSet<u64> = results.iter().map(|result| result.assignment_id).collect();
     assert_eq!(failed, BTreeSet::from([n_queued + 2, n_queued + 3]));
     for _ in 0..=n_queued {
         permit.send(()).unwrap();

@@ -25,7 +25,7 @@ pub struct Subject {
     genes: usize,
     fitness_function: Value,
     seed: u64,
-    /// Address of the trials.
+    /// The trial set: the trials of evaluations.
     trials_of: String,
     steps: u32,
 }
@@ -47,7 +47,7 @@ impl Subject {
             fitness_function: serde_json::to_value(algorithm.fitness_function)
                 .expect("a name serialises"),
             seed: config.seed,
-            trials_of: format!("generation {}", sim_core::EVALUATION),
+            trials_of: sim_core::TrialSet::Evaluation.to_string(),
             steps: algorithm.evaluation_steps,
         }
     }

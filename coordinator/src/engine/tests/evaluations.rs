@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::ids::EvaluationId;
+
 use super::{
     super::*,
     LEASE,
@@ -17,60 +19,63 @@ fn measures(trials: Range<u32>) -> Vec<f64> {
 }
 
 impl Fleet {
-    fn evaluate(&mut self, id: ExperimentId, n_trials: u32) {
-        self.engine.on_experiment_started(id, "spec".into(), Priority::default());
-        self.engine.on_evaluation_asked(self.now, id, vec![0.5], n_trials, N_VALUES);
+    fn evaluate(&mut self, id: JobId, n_trials: u32) {
+        self.engine.on_job_started(id, "spec".into(), Priority::default());
+        let batch = Batch::measures(vec![0.5], n_trials, N_VALUES);
+        self.engine.on_batch_requested(self.now, id, batch);
         self.carry_out();
     }
 
     /// The worker's oldest item, which is one of an evaluation, is computed.
     fn measure(&mut self, id: WorkerId) -> bool {
-        let Some((_, item)) = self.workers.get_mut(&id).and_then(|w| w.items.pop_front()) else {
+        let Some((_, assignment)) =
+            self.workers.get_mut(&id).and_then(|w| w.assignments.pop_front())
+        else {
             return false;
         };
-        let values = measures(item.trials.clone());
+        let values = measures(assignment.trials.clone());
         assert!(values.len() <= 1 << 16, "an answer of {} numbers", values.len());
-        self.answer(id, item.id, Ok(values));
+        self.answer(id, assignment.id, Ok(values));
         true
     }
 }
 
 #[test]
 fn an_evaluation_is_a_generation_of_one_whose_trials_have_many_numbers() {
-    let id = ExperimentId::evaluation(1);
+    let id = JobId::Evaluation(EvaluationId(1));
     let mut fleet = Fleet::new();
     fleet.evaluate(id, 200);
     let (first, second, victim) = (fleet.join(1), fleet.join(2), fleet.join(1));
     assert!(fleet.measure(first));
     fleet.kill(victim);
-    while fleet.judged.is_empty() {
+    while fleet.evaluated.is_empty() {
         assert!(fleet.measure(second) | fleet.measure(first));
         fleet.engine.sanity_check();
     }
-    let (judged_id, judged) = &fleet.judged[0];
-    assert_eq!((*judged_id, judged.generation), (id, sim_core::EVALUATION));
-    assert_eq!(judged.trial_fitness, [measures(0..200)]);
+    let (evaluated_id, evaluated) = &fleet.evaluated[0];
+    assert_eq!((*evaluated_id, evaluated.trial_set), (id, TrialSet::Evaluation));
+    assert_eq!(evaluated.values, [measures(0..200)]);
 }
 
 #[test]
 fn a_worker_that_returns_too_few_or_too_many_measures_is_dropped() {
     for n_wrong in [0, 1, N_VALUES - 1, 1_000_000] {
-        let id = ExperimentId::evaluation(1);
+        let id = JobId::Evaluation(EvaluationId(1));
         let mut fleet = Fleet::plain();
         fleet.evaluate(id, 3);
         let bad = fleet.join(1);
-        let item = fleet.workers[&bad].items[0].1.id;
-        fleet.answer(bad, item, Ok(vec![0.0; n_wrong]));
+        let assignment = fleet.workers[&bad].assignments[0].1.id;
+        fleet.answer(bad, assignment, Ok(vec![0.0; n_wrong]));
         assert!(fleet.engine.worker_status(fleet.now).is_empty(), "{n_wrong}");
         let good = fleet.join(1);
         while fleet.measure(good) {}
-        assert_eq!(fleet.judged[0].1.trial_fitness, [measures(0..3)]);
+        assert_eq!(fleet.evaluated[0].1.values, [measures(0..3)]);
     }
 }
 
 #[test]
 fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
-    let id = ExperimentId::evaluation(1);
+    let id = JobId::Evaluation(EvaluationId(1));
     let config = EngineConfig { audit_fraction: 1.0, ..EngineConfig::new(LEASE) };
     let mut fleet = Fleet::with(config);
     fleet.evaluate(id, 2);
@@ -86,15 +91,16 @@ fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
         let worker = names[n_answered % 2];
         n_answered += 1;
         assert!(n_answered < 20, "nobody noticed");
-        let Some((_, item)) = fleet.workers.get_mut(&worker).unwrap().items.pop_front() else {
+        let Some((_, assignment)) = fleet.workers.get_mut(&worker).unwrap().assignments.pop_front()
+        else {
             continue;
         };
-        let mut values = measures(item.trials.clone());
+        let mut values = measures(assignment.trials.clone());
         if worker == names[1] {
             let last = values.last_mut().unwrap();
             *last = f64::from_bits(last.to_bits() ^ 1);
         }
-        fleet.answer(worker, item.id, Ok(values));
+        fleet.answer(worker, assignment.id, Ok(values));
     }
     assert_eq!(fleet.paused[0].0, id);
     assert!(fleet.paused[0].1.contains("of the evaluation"), "{}", fleet.paused[0].1);

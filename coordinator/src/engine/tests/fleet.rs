@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use evolution::Population;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 
 use super::{super::*, LEASE};
-use crate::ids::ItemId;
+use crate::ids::AssignmentId;
 
 /// A fleet in virtual time: carries out the engine's commands on fake workers,
 /// whose fitness is a function of genotype and trial.
@@ -13,9 +14,9 @@ pub(super) struct Fleet {
     pub(super) engine: Engine,
     pub(super) now: Instant,
     pub(super) workers: BTreeMap<WorkerId, FakeWorker>,
-    pub(super) judged: Vec<(ExperimentId, JudgedGeneration)>,
-    pub(super) failed: Vec<(ExperimentId, String)>,
-    pub(super) paused: Vec<(ExperimentId, String)>,
+    pub(super) evaluated: Vec<(JobId, EvaluatedBatch)>,
+    pub(super) failed: Vec<(JobId, String)>,
+    pub(super) paused: Vec<(JobId, String)>,
     pub(super) n_items_sent: usize,
     /// What workers say that an item took.
     pub(super) compute_time: Duration,
@@ -23,8 +24,8 @@ pub(super) struct Fleet {
 
 #[derive(Default)]
 pub(super) struct FakeWorker {
-    pub(super) specs: BTreeSet<ExperimentId>,
-    pub(super) items: VecDeque<(ExperimentId, Item)>,
+    pub(super) specs: BTreeSet<JobId>,
+    pub(super) assignments: VecDeque<(JobId, Assignment)>,
 }
 
 pub(super) fn fitness(genotype: &[f64], trial: u32) -> f64 {
@@ -59,7 +60,7 @@ impl Fleet {
             engine: Engine::new(now, config),
             now,
             workers: BTreeMap::new(),
-            judged: Vec::new(),
+            evaluated: Vec::new(),
             failed: Vec::new(),
             paused: Vec::new(),
             n_items_sent: 0,
@@ -67,20 +68,15 @@ impl Fleet {
         }
     }
 
-    pub(super) fn start(&mut self, id: ExperimentId, n_individuals: usize, n_trials: u32) {
-        self.engine.on_experiment_started(id, "spec".into(), Priority::default());
+    pub(super) fn start(&mut self, id: JobId, n_individuals: usize, n_trials: u32) {
+        self.engine.on_job_started(id, "spec".into(), Priority::default());
         self.ask(id, 0, n_individuals, n_trials);
     }
 
-    pub(super) fn ask(
-        &mut self,
-        id: ExperimentId,
-        generation: u64,
-        n_individuals: usize,
-        n_trials: u32,
-    ) {
+    pub(super) fn ask(&mut self, id: JobId, generation: u64, n_individuals: usize, n_trials: u32) {
         let genotypes = genotypes(n_individuals);
-        self.engine.on_generation_asked(self.now, id, generation, genotypes, n_trials);
+        let batch = Batch::fitness(TrialSet::Generation(generation), genotypes, n_trials);
+        self.engine.on_batch_requested(self.now, id, batch);
         self.carry_out();
     }
 
@@ -99,21 +95,24 @@ impl Fleet {
 
     /// The worker's oldest item is computed.
     pub(super) fn step(&mut self, id: WorkerId) -> bool {
-        let Some((_, item)) = self.workers.get_mut(&id).and_then(|w| w.items.pop_front()) else {
+        let Some((_, assignment)) =
+            self.workers.get_mut(&id).and_then(|w| w.assignments.pop_front())
+        else {
             return false;
         };
-        let fitness = item.trials.clone().map(|trial| fitness(&item.genotype, trial)).collect();
-        self.answer(id, item.id, Ok(fitness));
+        let fitness =
+            assignment.trials.clone().map(|trial| fitness(&assignment.genotype, trial)).collect();
+        self.answer(id, assignment.id, Ok(fitness));
         true
     }
 
     pub(super) fn answer(
         &mut self,
         worker: WorkerId,
-        item: ItemId,
+        assignment: AssignmentId,
         outcome: Result<Vec<f64>, String>,
     ) {
-        let result = ItemResult { id: item, outcome, compute_time: self.compute_time };
+        let result = ItemResult { id: assignment, outcome, compute_time: self.compute_time };
         self.engine.on_results(self.now, worker, vec![result]);
         self.carry_out();
     }
@@ -121,43 +120,50 @@ impl Fleet {
     pub(super) fn carry_out(&mut self) {
         while let Some(command) = self.engine.poll_command() {
             match command {
-                Command::SendSpec { worker, experiment, .. } => {
-                    let is_new = self.workers.get_mut(&worker).unwrap().specs.insert(experiment);
+                Command::SendSpec { worker, job, .. } => {
+                    let is_new = self.workers.get_mut(&worker).unwrap().specs.insert(job);
                     assert!(is_new, "a specification is sent once");
                 }
-                Command::SendItems { worker, experiment, items, .. } => {
+                Command::SendAssignments { worker, job, assignments, .. } => {
                     let worker = self.workers.get_mut(&worker).unwrap();
-                    assert!(worker.specs.contains(&experiment), "the specification comes first");
-                    self.n_items_sent += items.len();
-                    worker.items.extend(items.into_iter().map(|item| (experiment, item)));
+                    assert!(worker.specs.contains(&job), "the specification comes first");
+                    self.n_items_sent += assignments.len();
+                    worker
+                        .assignments
+                        .extend(assignments.into_iter().map(|assignment| (job, assignment)));
                 }
-                Command::SendEnd { worker, experiment } => {
+                Command::SendEnd { worker, job } => {
                     let worker = self.workers.get_mut(&worker).unwrap();
-                    worker.specs.remove(&experiment);
-                    worker.items.retain(|(of, _)| *of != experiment);
+                    worker.specs.remove(&job);
+                    worker.assignments.retain(|(of, _)| *of != job);
                 }
                 Command::Disconnect { worker, .. } => {
                     self.workers.remove(&worker);
                 }
-                Command::FinishGeneration { experiment, judged } => {
-                    self.judged.push((experiment, judged));
+                Command::FinishBatch { job, evaluated } => {
+                    self.evaluated.push((job, evaluated));
                 }
-                Command::SendDrop { worker, items } => {
+                Command::SendDrop { worker, assignments } => {
                     let worker = self.workers.get_mut(&worker).unwrap();
-                    worker.items.retain(|(_, item)| !items.contains(&item.id));
+                    worker
+                        .assignments
+                        .retain(|(_, assignment)| !assignments.contains(&assignment.id));
                 }
-                Command::PauseExperiment { experiment, reason } => {
-                    self.paused.push((experiment, reason));
+                Command::PauseJob { job, reason } => {
+                    self.paused.push((job, reason));
                 }
-                Command::FailExperiment { experiment, reason } => {
-                    self.failed.push((experiment, reason));
+                Command::FailJob { job, reason } => {
+                    self.failed.push((job, reason));
                 }
             }
         }
         self.engine.sanity_check();
         for (id, worker) in &self.workers {
             let n_slots = self.engine.workers[id].n_slots();
-            assert!(worker.items.len() <= ITEMS_PER_SLOT_MAX * n_slots, "credits are respected");
+            assert!(
+                worker.assignments.len() <= ITEMS_PER_SLOT_MAX * n_slots,
+                "credits are respected"
+            );
         }
     }
 
@@ -172,13 +178,13 @@ impl Fleet {
         }
     }
 
-    pub(super) fn assert_judged(&self, n_individuals: usize, n_trials: u32) {
-        let (_, judged) = &self.judged[0];
+    pub(super) fn assert_evaluated(&self, n_individuals: usize, n_trials: u32) {
+        let (_, evaluated) = &self.evaluated[0];
         let expected: Vec<Vec<f64>> = genotypes(n_individuals)
             .iter()
             .map(|genotype| (0..n_trials).map(|trial| fitness(genotype, trial)).collect())
             .collect();
-        assert_eq!(judged.trial_fitness, expected);
-        assert_eq!(self.judged.len(), 1, "a generation is judged once");
+        assert_eq!(evaluated.values, expected);
+        assert_eq!(self.evaluated.len(), 1, "a batch is evaluated once");
     }
 }

@@ -59,9 +59,9 @@ proptest! {
         fleet.join(2);
         fleet.run();
         if fleet.failed.is_empty() {
-            fleet.assert_judged(n_individuals, n_trials);
+            fleet.assert_evaluated(n_individuals, n_trials);
         } else {
-            prop_assert!(fleet.judged.is_empty());
+            prop_assert!(fleet.evaluated.is_empty());
         }
     }
 }

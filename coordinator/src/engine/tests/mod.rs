@@ -7,12 +7,12 @@ mod histories;
 use std::time::Duration;
 
 use super::*;
-use crate::ids::ItemId;
+use crate::ids::{AssignmentId, ExperimentId};
 
 use fleet::{FakeWorker, Fleet, fitness, introduction};
 
 const LEASE: Duration = Duration::from_secs(10);
-const EXPERIMENT: ExperimentId = ExperimentId(1);
+const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
 
 #[test]
 fn fitness_is_in_index_order_whoever_computed_it() {
@@ -21,7 +21,7 @@ fn fitness_is_in_index_order_whoever_computed_it() {
     fleet.join(3);
     fleet.start(EXPERIMENT, 50, 4);
     fleet.run();
-    fleet.assert_judged(50, 4);
+    fleet.assert_evaluated(50, 4);
     assert_eq!(fleet.n_items_sent, 50);
 }
 
@@ -31,7 +31,7 @@ fn work_waits_for_the_first_worker() {
     fleet.start(EXPERIMENT, 3, 1);
     fleet.join(1);
     fleet.run();
-    fleet.assert_judged(3, 1);
+    fleet.assert_evaluated(3, 1);
 }
 
 #[test]
@@ -42,11 +42,11 @@ fn items_of_a_lost_worker_go_to_others() {
     fleet.compute_time = Duration::from_secs(1);
     fleet.now += fleet.compute_time;
     fleet.step(lost);
-    assert_eq!(fleet.workers[&lost].items.len(), 3, "long items do not wait in line");
+    assert_eq!(fleet.workers[&lost].assignments.len(), 3, "long items do not wait in line");
     fleet.kill(lost);
     fleet.join(1);
     fleet.run();
-    fleet.assert_judged(10, 2);
+    fleet.assert_evaluated(10, 2);
     assert_eq!(fleet.n_items_sent, 10 + 3);
 }
 
@@ -63,9 +63,13 @@ fn a_silent_worker_is_dropped_after_its_lease_and_a_busy_one_is_not() {
         fleet.carry_out();
     }
     assert!(!fleet.workers.contains_key(&silent));
-    assert_eq!(fleet.workers[&busy].items.len(), 2, "long episodes are no reason to lose work");
+    assert_eq!(
+        fleet.workers[&busy].assignments.len(),
+        2,
+        "long episodes are no reason to lose work"
+    );
     fleet.run();
-    fleet.assert_judged(6, 1);
+    fleet.assert_evaluated(6, 1);
 }
 
 #[test]
@@ -78,7 +82,7 @@ fn a_pause_of_the_coordinator_is_not_its_workers_silence() {
     fleet.carry_out();
     assert!(fleet.workers.contains_key(&id));
     fleet.run();
-    fleet.assert_judged(2, 1);
+    fleet.assert_evaluated(2, 1);
 }
 
 #[test]
@@ -96,7 +100,7 @@ fn silence_is_not_blamed_on_items() {
     }
     fleet.join(1);
     fleet.run();
-    fleet.assert_judged(1, 1);
+    fleet.assert_evaluated(1, 1);
 }
 
 #[test]
@@ -111,15 +115,15 @@ fn a_draining_worker_gets_nothing_more_and_is_not_blamed() {
     let id = fleet.join(1);
     fleet.engine.on_draining(fleet.now, id);
     fleet.step(id);
-    fleet.assert_judged(1, 1);
+    fleet.assert_evaluated(1, 1);
     fleet.ask(EXPERIMENT, 1, 1, 1);
-    assert!(fleet.workers[&id].items.is_empty());
+    assert!(fleet.workers[&id].assignments.is_empty());
 }
 
 #[test]
 fn an_item_that_takes_its_workers_down_fails_its_experiment_and_no_other() {
     let mut fleet = Fleet::new();
-    let other = ExperimentId(2);
+    let other = JobId::Experiment(ExperimentId(2));
     fleet.start(EXPERIMENT, 1, 1);
     for _ in 0..MAX_ATTEMPTS {
         assert!(fleet.failed.is_empty());
@@ -132,7 +136,7 @@ fn an_item_that_takes_its_workers_down_fails_its_experiment_and_no_other() {
     fleet.join(1);
     fleet.start(other, 5, 1);
     fleet.run();
-    assert_eq!(fleet.judged[0].0, other);
+    assert_eq!(fleet.evaluated[0].0, other);
 }
 
 #[test]
@@ -143,7 +147,7 @@ fn items_that_wait_in_a_lost_worker_are_not_blamed() {
     // time under a fresh worker, and 1 is never the oldest.
     for _ in 0..MAX_ATTEMPTS - 1 {
         let id = fleet.join(1);
-        assert_eq!(fleet.workers[&id].items.len(), 2);
+        assert_eq!(fleet.workers[&id].assignments.len(), 2);
         fleet.kill(id);
     }
     let id = fleet.join(1);
@@ -152,7 +156,7 @@ fn items_that_wait_in_a_lost_worker_are_not_blamed() {
     let id = fleet.join(1);
     fleet.step(id);
     assert!(fleet.failed.is_empty());
-    fleet.assert_judged(2, 1);
+    fleet.assert_evaluated(2, 1);
 }
 
 #[test]
@@ -161,8 +165,8 @@ fn failing_items_are_tried_again_and_then_fail_the_experiment() {
     let id = fleet.join(1);
     fleet.start(EXPERIMENT, 1, 1);
     for _ in 0..MAX_ATTEMPTS {
-        let item = fleet.workers.get_mut(&id).unwrap().items.pop_front().unwrap().1;
-        fleet.answer(id, item.id, Err("it overflowed".to_owned()));
+        let assignment = fleet.workers.get_mut(&id).unwrap().assignments.pop_front().unwrap().1;
+        fleet.answer(id, assignment.id, Err("it overflowed".to_owned()));
     }
     assert!(fleet.failed[0].1.contains("it overflowed"));
     assert!(fleet.workers.contains_key(&id), "the worker is not to blame");
@@ -173,9 +177,9 @@ fn a_result_of_the_wrong_length_drops_its_worker() {
     let mut fleet = Fleet::new();
     let id = fleet.join(1);
     fleet.start(EXPERIMENT, 1, 2);
-    let item = fleet.workers[&id].items[0].1.id;
-    fleet.answer(id, item, Ok(vec![1.0]));
-    assert!(fleet.workers.is_empty() && fleet.judged.is_empty());
+    let assignment = fleet.workers[&id].assignments[0].1.id;
+    fleet.answer(id, assignment, Ok(vec![1.0]));
+    assert!(fleet.workers.is_empty() && fleet.evaluated.is_empty());
 }
 
 #[test]
@@ -183,12 +187,12 @@ fn results_of_unknown_items_and_of_ended_experiments_are_ignored() {
     let mut fleet = Fleet::new();
     let id = fleet.join(1);
     fleet.start(EXPERIMENT, 2, 1);
-    let item = fleet.workers[&id].items[0].1.id;
-    fleet.answer(id, ItemId(999), Ok(vec![5.0]));
-    fleet.engine.on_experiment_ended(fleet.now, EXPERIMENT);
+    let assignment = fleet.workers[&id].assignments[0].1.id;
+    fleet.answer(id, AssignmentId(999), Ok(vec![5.0]));
+    fleet.engine.on_job_ended(fleet.now, EXPERIMENT);
     fleet.carry_out();
-    fleet.answer(id, item, Ok(vec![5.0]));
-    assert!(fleet.judged.is_empty());
+    fleet.answer(id, assignment, Ok(vec![5.0]));
+    assert!(fleet.evaluated.is_empty());
     assert!(fleet.workers[&id].specs.is_empty());
 }
 
@@ -197,21 +201,21 @@ fn a_result_that_comes_twice_counts_once() {
     let mut fleet = Fleet::new();
     let id = fleet.join(1);
     fleet.start(EXPERIMENT, 2, 1);
-    let item = fleet.workers[&id].items[0].1.clone();
-    fleet.answer(id, item.id, Ok(vec![fitness(&item.genotype, 0)]));
-    fleet.answer(id, item.id, Ok(vec![-1.0]));
-    fleet.workers.get_mut(&id).unwrap().items.pop_front();
+    let assignment = fleet.workers[&id].assignments[0].1.clone();
+    fleet.answer(id, assignment.id, Ok(vec![fitness(&assignment.genotype, 0)]));
+    fleet.answer(id, assignment.id, Ok(vec![-1.0]));
+    fleet.workers.get_mut(&id).unwrap().assignments.pop_front();
     fleet.run();
-    fleet.assert_judged(2, 1);
+    fleet.assert_evaluated(2, 1);
 }
 
 /// Three workers with an item each; the first has finished its own, and has been
 /// given the third's as well, which is late.
-fn fleet_with_a_late_item() -> (Fleet, [WorkerId; 3], Item) {
+fn fleet_with_a_late_item() -> (Fleet, [WorkerId; 3], Assignment) {
     let mut fleet = Fleet::new();
     let workers = [fleet.join(1), fleet.join(1), fleet.join(1)];
     fleet.start(EXPERIMENT, 3, 1);
-    let late = fleet.workers[&workers[2]].items[0].1.clone();
+    let late = fleet.workers[&workers[2]].assignments[0].1.clone();
     fleet.compute_time = Duration::from_secs(1);
     fleet.now += fleet.compute_time;
     fleet.step(workers[0]);
@@ -221,7 +225,7 @@ fn fleet_with_a_late_item() -> (Fleet, [WorkerId; 3], Item) {
     }
     fleet.engine.on_tick(fleet.now);
     fleet.carry_out();
-    let copy = &fleet.workers[&workers[0]].items[0].1;
+    let copy = &fleet.workers[&workers[0]].assignments[0].1;
     assert_eq!((&copy.genotype, &copy.trials), (&late.genotype, &late.trials));
     (fleet, workers, late)
 }
@@ -230,12 +234,14 @@ fn fleet_with_a_late_item() -> (Fleet, [WorkerId; 3], Item) {
 fn the_first_of_two_results_wins_and_the_other_worker_drops_the_item() {
     let (mut fleet, [first, _, third], late) = fleet_with_a_late_item();
     fleet.step(first);
-    assert!(fleet.workers[&third].items.iter().all(|(_, item)| item.id != late.id));
+    assert!(
+        fleet.workers[&third].assignments.iter().all(|(_, assignment)| assignment.id != late.id)
+    );
     // Its answer was under way already.
     fleet.answer(third, late.id, Ok(vec![fitness(&late.genotype, 0)]));
     assert!(fleet.paused.is_empty());
     fleet.run();
-    fleet.assert_judged(3, 1);
+    fleet.assert_evaluated(3, 1);
 }
 
 #[test]
@@ -244,40 +250,43 @@ fn a_late_result_that_differs_pauses_the_experiment_and_its_generation_starts_ov
     fleet.step(first);
     fleet.answer(third, late.id, Ok(vec![-1.0]));
     assert_eq!(fleet.paused.len(), 1);
-    assert!(fleet.workers[&second].items.is_empty(), "paused");
-    fleet.engine.on_experiment_resumed(fleet.now, EXPERIMENT);
+    assert!(fleet.workers[&second].assignments.is_empty(), "paused");
+    fleet.engine.on_job_resumed(fleet.now, EXPERIMENT);
     fleet.carry_out();
-    assert!(fleet.workers[&first].items.is_empty() && fleet.workers[&third].items.is_empty());
+    assert!(
+        fleet.workers[&first].assignments.is_empty()
+            && fleet.workers[&third].assignments.is_empty()
+    );
     fleet.run();
-    fleet.assert_judged(3, 1);
+    fleet.assert_evaluated(3, 1);
 }
 
 #[test]
 fn experiments_take_turns() {
     let mut fleet = Fleet::new();
-    let other = ExperimentId(2);
+    let other = JobId::Experiment(ExperimentId(2));
     fleet.start(EXPERIMENT, 100, 1);
     fleet.start(other, 4, 1);
     let id = fleet.join(1);
-    while fleet.judged.is_empty() {
+    while fleet.evaluated.is_empty() {
         assert!(fleet.step(id));
     }
-    assert_eq!(fleet.judged[0].0, other, "the short one need not wait for the long one");
+    assert_eq!(fleet.evaluated[0].0, other, "the short one need not wait for the long one");
 }
 
 #[test]
 fn activity_says_who_holds_what_since_when() {
     let mut fleet = Fleet::plain();
-    let other = ExperimentId(2);
+    let other = JobId::Experiment(ExperimentId(2));
     fleet.start(EXPERIMENT, 5, 2);
     let waiting = fleet.engine.activity(fleet.now, EXPERIMENT);
     assert_eq!((waiting.n_workers, waiting.rivals), (0, vec![]));
-    let round = waiting.round.unwrap();
-    assert_eq!((round.n_items_queued, round.n_episodes, round.n_episodes_left), (5, 10, 10));
+    let batch = waiting.batch.unwrap();
+    assert_eq!((batch.n_items_queued, batch.n_episodes, batch.n_episodes_left), (5, 10, 10));
 
     let worker = fleet.join(1);
     fleet.now += Duration::from_secs(1);
-    let failure = fleet.workers.get_mut(&worker).unwrap().items.pop_front().unwrap().1;
+    let failure = fleet.workers.get_mut(&worker).unwrap().assignments.pop_front().unwrap().1;
     fleet.answer(worker, failure.id, Err("too hot".to_owned()));
     fleet.engine.on_draining(fleet.now, worker);
     fleet.now += Duration::from_secs(3);
@@ -285,14 +294,14 @@ fn activity_says_who_holds_what_since_when() {
     let activity = fleet.engine.activity(fleet.now, EXPERIMENT);
     assert_eq!((activity.n_workers, activity.n_workers_available), (1, 0));
     assert_eq!(activity.rivals, [other]);
-    let round = activity.round.unwrap();
-    assert_eq!(round.n_individuals_failing, 1);
-    assert_eq!(round.running_for, Duration::from_secs(4));
-    let [held] = &round.held[..] else { panic!("{round:?}") };
-    assert_eq!(round.n_items_queued + held.n_items, 5);
+    let batch = activity.batch.unwrap();
+    assert_eq!(batch.n_individuals_failing, 1);
+    assert_eq!(batch.running_for, Duration::from_secs(4));
+    let [held] = &batch.held[..] else { panic!("{batch:?}") };
+    assert_eq!(batch.n_items_queued + held.n_items, 5);
     assert_eq!((held.worker, held.silent_for), (worker, Duration::from_secs(3)));
     assert_eq!(held.held_for, Duration::from_secs(4), "the oldest counts");
-    assert_eq!(fleet.engine.activity(fleet.now, ExperimentId(9)).round, None);
+    assert_eq!(fleet.engine.activity(fleet.now, JobId::Experiment(ExperimentId(9))).batch, None);
 }
 
 #[test]
@@ -302,9 +311,9 @@ fn idle_share_is_the_time_slots_did_not_compute() {
     fleet.start(EXPERIMENT, 1, 1);
     fleet.now += Duration::from_millis(20);
     fleet.step(id);
-    let (_, judged) = &fleet.judged[0];
-    assert_eq!(judged.duration, Duration::from_millis(20));
-    assert!((judged.idle_share - 0.75).abs() < 1e-9, "{}", judged.idle_share);
+    let (_, evaluated) = &fleet.evaluated[0];
+    assert_eq!(evaluated.duration, Duration::from_millis(20));
+    assert!((evaluated.idle_share - 0.75).abs() < 1e-9, "{}", evaluated.idle_share);
 }
 
 #[test]
@@ -314,5 +323,5 @@ fn ten_thousand_workers_share_a_generation() {
         (0..10_000).map(|_| fleet.engine.on_worker_joined(fleet.now, introduction(1))).collect();
     fleet.workers = ids.iter().map(|&id| (id, FakeWorker::default())).collect();
     fleet.start(EXPERIMENT, 10_000, 1);
-    assert!(fleet.workers.values().all(|worker| worker.items.len() == 1));
+    assert!(fleet.workers.values().all(|worker| worker.assignments.len() == 1));
 }

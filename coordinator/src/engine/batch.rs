@@ -8,52 +8,39 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::ids::{ItemId, WorkerId};
-use evolution::Population;
+use sim_core::{Output, TrialSet};
 
-use super::{FleetTime, JudgedGeneration, blame::Blames};
+use crate::ids::{AssignmentId, WorkerId};
+
+use super::{
+    Batch, EvaluatedBatch, SharedGenotype, failures::FailureRecord, fleet_time::FleetTime,
+    item::Item,
+};
 
 /// Copies of a trial that are computed at the same time, at most.
 const COPIES_MAX: usize = 3;
 /// Who judged a trial that nobody has judged.
 const NOBODY: WorkerId = WorkerId(0);
 
-/// Numbers of one task of measured trials, half a MiB: results travel in messages of
+/// Numbers of one item of measures, half a MiB: results travel in messages of
 /// limited size.
-const VALUES_PER_TASK: usize = 1 << 16;
+const VALUES_PER_ITEM: usize = 1 << 16;
 
-/// What there is to know of each individual.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shape {
-    /// Trials.
-    pub n_trials: u32,
-    /// Numbers per trial: 1, its fitness, or all that is measured of it.
-    pub n_values: usize,
-}
-
-impl Shape {
-    /// Trials of a task: all, if they are no more than numbers.
-    fn trials_per_task(self) -> u32 {
-        match self.n_values {
-            1 => self.n_trials,
-            n_values => u32::try_from(VALUES_PER_TASK / n_values).unwrap_or(u32::MAX).max(1),
+/// Trials of an item: all of them, unless they give more numbers than that.
+fn trials_per_item(batch: &Batch) -> u32 {
+    let n_trials = match batch.output {
+        Output::Fitness => batch.n_trials,
+        Output::Measures => {
+            u32::try_from(VALUES_PER_ITEM / batch.values_per_trial.max(1)).unwrap_or(u32::MAX)
         }
-    }
-}
-
-/// A part of a generation: one individual on a range of trials.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Task {
-    /// Index of the individual.
-    pub individual: u32,
-    /// Trials to run.
-    pub trials: Range<u32>,
+    };
+    n_trials.max(1)
 }
 
 /// Somebody who computes a task.
 #[derive(Debug, Clone)]
 struct Holder {
-    item: ItemId,
+    assignment_id: AssignmentId,
     worker: WorkerId,
     trials: Range<u32>,
     is_audit: bool,
@@ -74,78 +61,81 @@ pub struct Disagreement {
 
 /// A generation that is being judged.
 #[derive(Debug)]
-pub struct GenerationInProgress {
-    /// Index of the generation, or address of held-out trials.
-    pub number: u64,
-    /// Who is judged.
-    pub genotypes: Population,
-    shape: Shape,
+pub struct BatchInProgress {
+    batch: Batch,
     /// What no worker has been given, in the order in which it will be.
-    queue: VecDeque<Task>,
+    queue: VecDeque<Item>,
     n_trials_queued: usize,
     /// By individual.
     holders: BTreeMap<u32, Vec<Holder>>,
     /// Running work that nobody duplicates, by when it should be done.
-    pub uncovered: BTreeMap<(Instant, ItemId), WorkerId>,
+    pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
     /// Work that takes workers down.
-    pub blames: Blames,
+    pub failures: FailureRecord,
     /// Per individual and trial, [`Shape::n_values`] each; meaningless until judged.
-    trial_fitness: Vec<Vec<f64>>,
+    values: Vec<Vec<f64>>,
     /// Whose result it is; per individual and trial, in one row.
-    judges: Vec<WorkerId>,
+    evaluated_by: Vec<WorkerId>,
     /// Of everybody among `judges`.
     names: BTreeMap<WorkerId, Arc<str>>,
     n_trials_left: usize,
     /// Work that another worker has to confirm, by the name of the first.
-    audits: BTreeMap<Arc<str>, VecDeque<Task>>,
+    audits: BTreeMap<Arc<str>, VecDeque<Item>>,
     n_audits_in_flight: usize,
     n_audited: usize,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
 
-/// All there is to do, in tasks.
-fn tasks(n_individuals: usize, shape: Shape) -> impl Iterator<Item = Task> {
-    let n_per_task = shape.trials_per_task();
-    let firsts = move |_| (0..shape.n_trials).step_by(n_per_task.max(1) as usize);
-    (0..n_individuals as u32).flat_map(move |individual| {
-        firsts(individual).map(move |first| {
-            let last = shape.n_trials.min(first.saturating_add(n_per_task));
-            Task { individual, trials: first..last }
+/// Everything that a batch asks for, as items.
+fn items(batch: &Batch) -> impl Iterator<Item = Item> + use<> {
+    let (n_trials, n_per_item) = (batch.n_trials, trials_per_item(batch));
+    (0..batch.genotypes.len() as u32).flat_map(move |individual| {
+        (0..n_trials).step_by(n_per_item as usize).map(move |first| {
+            let last = n_trials.min(first.saturating_add(n_per_item));
+            Item { individual, trials: first..last }
         })
     })
 }
 
-impl GenerationInProgress {
-    /// A generation of which nothing is judged.
-    pub fn new(
-        number: u64,
-        genotypes: Population,
-        shape: Shape,
-        now: Instant,
-        fleet_time: FleetTime,
-    ) -> Self {
-        let n_all = genotypes.len() * shape.n_trials as usize;
-        let n_values = shape.n_trials as usize * shape.n_values;
+impl BatchInProgress {
+    /// A batch without results.
+    pub fn new(batch: Batch, now: Instant, fleet_time: FleetTime) -> Self {
+        let n_individuals = batch.genotypes.len();
+        let n_episodes = n_individuals * batch.n_trials as usize;
+        let n_values = batch.n_trials as usize * batch.values_per_trial;
         Self {
-            number,
-            shape,
-            queue: tasks(genotypes.len(), shape).collect(),
-            n_trials_queued: n_all,
+            queue: items(&batch).collect(),
+            n_trials_queued: n_episodes,
             holders: BTreeMap::new(),
             uncovered: BTreeMap::new(),
-            blames: Blames::default(),
-            trial_fitness: vec![vec![f64::NAN; n_values]; genotypes.len()],
-            judges: vec![NOBODY; n_all],
+            failures: FailureRecord::default(),
+            values: vec![vec![f64::NAN; n_values]; n_individuals],
+            evaluated_by: vec![NOBODY; n_episodes],
             names: BTreeMap::new(),
-            n_trials_left: n_all,
+            n_trials_left: n_episodes,
             audits: BTreeMap::new(),
             n_audits_in_flight: 0,
             n_audited: 0,
-            genotypes,
+            batch,
             started: now,
             fleet_time_at_start: fleet_time,
         }
+    }
+
+    /// Which worlds and noise its trials meet.
+    pub fn trial_set(&self) -> TrialSet {
+        self.batch.trial_set
+    }
+
+    /// What workers return for a trial.
+    pub fn output(&self) -> Output {
+        self.batch.output
+    }
+
+    /// The genotype of an individual.
+    pub fn genotype(&self, individual: u32) -> SharedGenotype {
+        SharedGenotype { population: Arc::clone(&self.batch.genotypes), individual }
     }
 
     /// Queues all that is not judged; nobody computes anything any more.
@@ -155,47 +145,47 @@ impl GenerationInProgress {
         self.uncovered.clear();
         self.queue.clear();
         self.n_trials_queued = 0;
-        for task in tasks(self.genotypes.len(), self.shape) {
-            for task in self.unclaimed(&task) {
-                self.n_trials_queued += task.trials.len();
-                self.queue.push_back(task);
+        for item in items(&self.batch) {
+            for item in self.unclaimed(&item) {
+                self.n_trials_queued += item.trials.len();
+                self.queue.push_back(item);
             }
         }
     }
 
     /// Forgets all results: whoever gave them cannot be trusted.
     pub fn start_over(&mut self) {
-        self.judges.fill(NOBODY);
+        self.evaluated_by.fill(NOBODY);
         self.names.clear();
-        self.n_trials_left = self.judges.len();
+        self.n_trials_left = self.evaluated_by.len();
         self.audits.clear();
         self.n_audited = 0;
         self.requeue_all();
     }
 
     fn index(&self, individual: u32, trial: u32) -> usize {
-        individual as usize * self.shape.n_trials as usize + trial as usize
+        individual as usize * self.batch.n_trials as usize + trial as usize
     }
 
     fn is_known(&self, individual: u32, trial: u32) -> bool {
-        self.judges[self.index(individual, trial)] != NOBODY
+        self.evaluated_by[self.index(individual, trial)] != NOBODY
     }
 
     /// The parts of a task that are neither judged, nor computed by anybody, nor
     /// held back.
-    pub fn unclaimed(&self, task: &Task) -> Vec<Task> {
-        self.parts(task, |trial| {
-            !self.is_known(task.individual, trial)
-                && self.n_copies(task.individual, trial) == 0
-                && !self.blames.is_held_back(task.individual, trial)
+    pub fn unclaimed(&self, item: &Item) -> Vec<Item> {
+        self.parts(item, |trial| {
+            !self.is_known(item.individual, trial)
+                && self.n_copies(item.individual, trial) == 0
+                && !self.failures.is_held_back(item.individual, trial)
         })
     }
 
     /// The part of a task that may be computed once more.
-    pub fn duplicable(&self, task: &Task) -> Option<Task> {
-        let parts = self.parts(task, |trial| {
-            !self.is_known(task.individual, trial)
-                && self.n_copies(task.individual, trial) < COPIES_MAX
+    pub fn duplicable(&self, item: &Item) -> Option<Item> {
+        let parts = self.parts(item, |trial| {
+            !self.is_known(item.individual, trial)
+                && self.n_copies(item.individual, trial) < COPIES_MAX
         });
         parts.into_iter().next()
     }
@@ -206,44 +196,44 @@ impl GenerationInProgress {
     }
 
     /// The contiguous parts of a task whose trials satisfy a condition.
-    fn parts(&self, task: &Task, is_in: impl Fn(u32) -> bool) -> Vec<Task> {
-        let individual = task.individual;
-        let mut parts: Vec<Task> = Vec::new();
-        for trial in task.trials.clone().filter(|&trial| is_in(trial)) {
+    fn parts(&self, item: &Item, is_in: impl Fn(u32) -> bool) -> Vec<Item> {
+        let individual = item.individual;
+        let mut parts: Vec<Item> = Vec::new();
+        for trial in item.trials.clone().filter(|&trial| is_in(trial)) {
             match parts.last_mut() {
                 Some(part) if part.trials.end == trial => part.trials.end += 1,
-                _ => parts.push(Task { individual, trials: trial..trial + 1 }),
+                _ => parts.push(Item { individual, trials: trial..trial + 1 }),
             }
         }
         parts
     }
 
     /// Queues work before all other.
-    pub fn push_front(&mut self, task: Task) {
-        self.n_trials_queued += task.trials.len();
-        self.queue.push_front(task);
+    pub fn push_front(&mut self, item: Item) {
+        self.n_trials_queued += item.trials.len();
+        self.queue.push_front(item);
     }
 
     /// Takes the first `n_trials` trials at most of the first task in the queue.
-    pub fn pop_front(&mut self, n_trials: usize) -> Option<Task> {
-        let mut task = self.queue.pop_front()?;
-        self.n_trials_queued -= task.trials.len();
-        if n_trials < task.trials.len() {
-            let middle = task.trials.start + n_trials as u32;
-            self.push_front(Task { trials: middle..task.trials.end, ..task.clone() });
-            task.trials.end = middle;
+    pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
+        let mut item = self.queue.pop_front()?;
+        self.n_trials_queued -= item.trials.len();
+        if n_trials < item.trials.len() {
+            let middle = item.trials.start + n_trials as u32;
+            self.push_front(Item { trials: middle..item.trials.end, ..item.clone() });
+            item.trials.end = middle;
         }
-        Some(task)
+        Some(item)
     }
 
     /// Trials per individual.
     pub fn n_trials(&self) -> u32 {
-        self.shape.n_trials
+        self.batch.n_trials
     }
 
     /// Numbers that so many trials give.
     pub fn n_values(&self, n_trials: usize) -> usize {
-        n_trials * self.shape.n_values
+        n_trials * self.batch.values_per_trial
     }
 
     /// Tasks that wait.
@@ -277,14 +267,14 @@ impl GenerationInProgress {
     }
 
     /// Takes the first audit that a worker of this name may do.
-    pub fn pop_audit_for(&mut self, name: &str) -> Option<Task> {
-        let (first, tasks) = self.audits.iter_mut().find(|(first, _)| ***first != *name)?;
-        let task = tasks.pop_front();
-        if tasks.is_empty() {
+    pub fn pop_audit_for(&mut self, name: &str) -> Option<Item> {
+        let (first, items) = self.audits.iter_mut().find(|(first, _)| ***first != *name)?;
+        let item = items.pop_front();
+        if items.is_empty() {
             let first = Arc::clone(first);
             self.audits.remove(&first);
         }
-        task
+        item
     }
 
     /// Whether anything waits.
@@ -293,16 +283,25 @@ impl GenerationInProgress {
     }
 
     /// A worker has been given a task.
-    pub fn add_holder(&mut self, item: ItemId, worker: WorkerId, task: &Task, is_audit: bool) {
+    pub fn add_holder(
+        &mut self,
+        assignment_id: AssignmentId,
+        worker: WorkerId,
+        item: &Item,
+        is_audit: bool,
+    ) {
         self.n_audits_in_flight += usize::from(is_audit);
-        let holder = Holder { item, worker, trials: task.trials.clone(), is_audit };
-        self.holders.entry(task.individual).or_default().push(holder);
+        let holder = Holder { assignment_id, worker, trials: item.trials.clone(), is_audit };
+        self.holders.entry(item.individual).or_default().push(holder);
     }
 
     /// A worker has a task no more. An audit that is not over waits again.
-    pub fn remove_holder(&mut self, item: ItemId, individual: u32) {
+    pub fn remove_holder(&mut self, assignment_id: AssignmentId, individual: u32) {
         let Some(holders) = self.holders.get_mut(&individual) else { return };
-        let Some(index) = holders.iter().position(|holder| holder.item == item) else { return };
+        let Some(index) = holders.iter().position(|holder| holder.assignment_id == assignment_id)
+        else {
+            return;
+        };
         let holder = holders.remove(index);
         if holders.is_empty() {
             self.holders.remove(&individual);
@@ -311,27 +310,31 @@ impl GenerationInProgress {
     }
 
     /// Everybody who computes parts of an individual, apart from audits.
-    pub fn holders(&self, individual: u32) -> impl Iterator<Item = (WorkerId, ItemId)> {
+    pub fn holders(&self, individual: u32) -> impl Iterator<Item = (WorkerId, AssignmentId)> {
         let holders = self.holders.get(&individual).into_iter().flatten();
-        holders.filter(|holder| !holder.is_audit).map(|holder| (holder.worker, holder.item))
+        holders
+            .filter(|holder| !holder.is_audit)
+            .map(|holder| (holder.worker, holder.assignment_id))
     }
 
     /// Queues an audit; the first worker is the one whose result is known.
-    pub fn push_audit(&mut self, task: Task) {
-        let first = self.judges[self.index(task.individual, task.trials.start)];
+    pub fn push_audit(&mut self, item: Item) {
+        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
         if let Some(name) = self.names.get(&first) {
-            self.audits.entry(Arc::clone(name)).or_default().push_back(task);
+            self.audits.entry(Arc::clone(name)).or_default().push_back(item);
         }
     }
 
     /// Whether a worker's values agree with what is known.
-    pub fn compare(&self, task: &Task, fitness: &[f64]) -> Result<(), Disagreement> {
-        for (trial, values) in task.trials.clone().zip(fitness.chunks_exact(self.shape.n_values)) {
-            let first = self.judges[self.index(task.individual, trial)];
+    pub fn compare(&self, item: &Item, fitness: &[f64]) -> Result<(), Disagreement> {
+        for (trial, values) in
+            item.trials.clone().zip(fitness.chunks_exact(self.batch.values_per_trial))
+        {
+            let first = self.evaluated_by[self.index(item.individual, trial)];
             if first == NOBODY {
                 continue;
             }
-            let known = &self.trial_fitness[task.individual as usize][self.places(trial)];
+            let known = &self.values[item.individual as usize][self.places(trial)];
             let mut pairs = known.iter().copied().zip(values.iter().copied());
             if let Some(values) = pairs.find(|(known, value)| known.to_bits() != value.to_bits()) {
                 let first_name = Arc::clone(&self.names[&first]);
@@ -344,17 +347,19 @@ impl GenerationInProgress {
     /// Where the numbers of a trial are among those of its individual.
     fn places(&self, trial: u32) -> Range<usize> {
         let first = self.n_values(trial as usize);
-        first..first + self.shape.n_values
+        first..first + self.batch.values_per_trial
     }
 
     /// Records those values of a task that are not known; returns their number.
-    pub fn accept(&mut self, worker: WorkerId, name: &str, task: &Task, fitness: &[f64]) -> usize {
+    pub fn accept(&mut self, worker: WorkerId, name: &str, item: &Item, fitness: &[f64]) -> usize {
         let mut n_new = 0;
-        for (trial, values) in task.trials.clone().zip(fitness.chunks_exact(self.shape.n_values)) {
-            let (index, places) = (self.index(task.individual, trial), self.places(trial));
-            if self.judges[index] == NOBODY {
-                self.judges[index] = worker;
-                self.trial_fitness[task.individual as usize][places].copy_from_slice(values);
+        for (trial, values) in
+            item.trials.clone().zip(fitness.chunks_exact(self.batch.values_per_trial))
+        {
+            let (index, places) = (self.index(item.individual, trial), self.places(trial));
+            if self.evaluated_by[index] == NOBODY {
+                self.evaluated_by[index] = worker;
+                self.values[item.individual as usize][places].copy_from_slice(values);
                 n_new += 1;
             }
         }
@@ -372,18 +377,18 @@ impl GenerationInProgress {
 
     /// Who computes parts of an individual whose results are all known, apart from
     /// audits.
-    pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, ItemId)> {
+    pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, AssignmentId)> {
         let holders = self.holders.get(&individual).into_iter().flatten();
         holders
             .filter(|holder| !holder.is_audit)
             .filter(|holder| holder.trials.clone().all(|trial| self.is_known(individual, trial)))
-            .map(|holder| (holder.worker, holder.item))
+            .map(|holder| (holder.worker, holder.assignment_id))
             .collect()
     }
 
     /// Trials of all individuals.
     pub fn n_episodes(&self) -> usize {
-        self.judges.len()
+        self.evaluated_by.len()
     }
 
     /// Those whose fitness is not known.
@@ -398,18 +403,18 @@ impl GenerationInProgress {
 
     /// What it is called in messages.
     pub fn name(&self) -> String {
-        if self.number == sim_core::EVALUATION {
-            return "the evaluation".into();
-        }
-        match self.number.checked_sub(sim_core::held_out(0)) {
-            Some(generation) => format!("the re-evaluation after generation {generation}"),
-            None => format!("generation {}", self.number),
+        match self.batch.trial_set {
+            TrialSet::Generation(generation) => format!("generation {generation}"),
+            TrialSet::HeldOut(generation) => {
+                format!("the re-evaluation after generation {generation}")
+            }
+            TrialSet::Evaluation => "the evaluation".into(),
         }
     }
 
     /// Whether all fitness is known and no audit is under way, or waits for a worker
     /// that is there.
-    pub fn is_judged(&self, is_there: impl Fn(&Self) -> bool) -> bool {
+    pub fn is_finished(&self, is_there: impl Fn(&Self) -> bool) -> bool {
         self.n_trials_left == 0
             && self.n_audits_in_flight == 0
             && (self.audits.is_empty() || !is_there(self))
@@ -421,15 +426,15 @@ impl GenerationInProgress {
     }
 
     /// The outcome.
-    pub fn into_judged(
+    pub fn into_evaluated(
         self,
         now: Instant,
         n_workers: usize,
         fleet_time: &FleetTime,
-    ) -> JudgedGeneration {
-        JudgedGeneration {
-            generation: self.number,
-            trial_fitness: self.trial_fitness,
+    ) -> EvaluatedBatch {
+        EvaluatedBatch {
+            trial_set: self.batch.trial_set,
+            values: self.values,
             duration: now.saturating_duration_since(self.started),
             n_workers,
             idle_share: fleet_time.idle_share_since(&self.fleet_time_at_start),
@@ -440,40 +445,40 @@ impl GenerationInProgress {
 
     /// Panics if the state contradicts itself; `in_flight`: what workers hold of
     /// it, in any order.
-    pub fn sanity_check(&self, in_flight: &BTreeMap<ItemId, (WorkerId, Task, bool)>) {
-        let n_queued: usize = self.queue.iter().map(|task| task.trials.len()).sum();
+    pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
+        let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
         assert_eq!(n_queued, self.n_trials_queued);
-        let n_known = self.judges.iter().filter(|&&judge| judge != NOBODY).count();
-        assert_eq!(n_known + self.n_trials_left, self.judges.len());
+        let n_known = self.evaluated_by.iter().filter(|&&worker| worker != NOBODY).count();
+        assert_eq!(n_known + self.n_trials_left, self.evaluated_by.len());
         let mut n_holders = 0;
         for (&individual, holders) in &self.holders {
             assert!(!holders.is_empty());
-            for Holder { item, worker, trials, is_audit } in holders {
+            for Holder { assignment_id, worker, trials, is_audit } in holders {
                 n_holders += 1;
-                let task = Task { individual, trials: trials.clone() };
-                assert_eq!(in_flight[item], (*worker, task, *is_audit));
+                let item = Item { individual, trials: trials.clone() };
+                assert_eq!(in_flight[assignment_id], (*worker, item, *is_audit));
             }
         }
         assert_eq!(n_holders, in_flight.len(), "every holder is known");
         let n_audits = in_flight.values().filter(|(.., is_audit)| *is_audit).count();
         assert_eq!(n_audits, self.n_audits_in_flight);
-        for ((_, item), worker) in &self.uncovered {
-            assert_eq!(in_flight[item].0, *worker);
+        for ((_, assignment_id), worker) in &self.uncovered {
+            assert_eq!(in_flight[assignment_id].0, *worker);
         }
         // Every trial is judged, queued or being computed, possibly by several, or
         // held back; and it is queued only if it is nothing else.
-        let mut claims = vec![0_u32; self.judges.len()];
-        for task in &self.queue {
-            for trial in task.trials.clone() {
-                claims[self.index(task.individual, trial)] += 1;
+        let mut claims = vec![0_u32; self.evaluated_by.len()];
+        for item in &self.queue {
+            for trial in item.trials.clone() {
+                claims[self.index(item.individual, trial)] += 1;
             }
         }
         for (index, n_queued) in claims.into_iter().enumerate() {
-            let n_trials = self.shape.n_trials as usize;
+            let n_trials = self.batch.n_trials as usize;
             let (individual, trial) = ((index / n_trials) as u32, (index % n_trials) as u32);
             let n_copies = self.n_copies(individual, trial);
             let is_known = self.is_known(individual, trial);
-            let is_held_back = self.blames.is_held_back(individual, trial);
+            let is_held_back = self.failures.is_held_back(individual, trial);
             let is_waited_for = !is_known && (n_copies > 0 || is_held_back);
             let n_states = u32::from(is_known) + n_queued + u32::from(is_waited_for);
             assert_eq!(n_states, 1, "individual {individual}, trial {trial}");

@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use crate::ids::ExperimentId;
+use crate::ids::JobId;
 
-use super::{Engine, generation::GenerationInProgress};
+use super::{Engine, batch::BatchInProgress};
 
 /// What has happened since the engine began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
+pub struct Counters {
     /// Workers that joined; one that comes back counts again.
     pub n_workers_joined: u64,
     /// Workers that left after they had said so.
@@ -32,9 +32,9 @@ pub struct Tally {
 
 /// The fleet in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FleetFigures {
+pub struct FleetStats {
     /// What has happened.
-    pub tally: Tally,
+    pub counters: Counters,
     /// Connected workers that are given work.
     pub n_workers_available: usize,
     /// Connected workers that want no more.
@@ -51,7 +51,7 @@ pub struct FleetFigures {
 
 /// An experiment's work in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct WorkFigures {
+pub struct JobStats {
     /// Whether it waits to be resumed.
     pub is_paused: bool,
     /// Items that wait for a worker; none while it is paused.
@@ -64,13 +64,13 @@ pub struct WorkFigures {
 
 impl Engine {
     /// The fleet in numbers.
-    pub fn fleet_figures(&self, now: Instant) -> FleetFigures {
+    pub fn fleet_stats(&self, now: Instant) -> FleetStats {
         let mut fleet_time = self.fleet_time;
         fleet_time.advance(now);
         let n_draining = self.workers.values().filter(|worker| worker.is_draining).count();
         let n_available = self.workers.values().filter(|worker| worker.is_usable()).count();
-        FleetFigures {
-            tally: Tally { n_items_assigned: self.n_items_assigned, ..self.tally },
+        FleetStats {
+            counters: Counters { n_items_assigned: self.n_items_assigned, ..self.counters },
             n_workers_available: n_available,
             n_workers_draining: n_draining,
             n_workers_distrusted: self.workers.len() - n_available - n_draining,
@@ -81,13 +81,13 @@ impl Engine {
     }
 
     /// An experiment's work in numbers; zeros if it has ended.
-    pub fn work_figures(&self, id: ExperimentId) -> WorkFigures {
-        let Some(work) = self.experiments.get(&id) else { return WorkFigures::default() };
-        let count = |of: fn(&GenerationInProgress) -> usize| work.generation.as_ref().map_or(0, of);
-        WorkFigures {
+    pub fn job_stats(&self, id: JobId) -> JobStats {
+        let Some(work) = self.jobs.get(&id) else { return JobStats::default() };
+        let count = |of: fn(&BatchInProgress) -> usize| work.batch.as_ref().map_or(0, of);
+        JobStats {
             is_paused: work.is_paused,
-            n_items_queued: if work.is_paused { 0 } else { count(GenerationInProgress::n_waiting) },
-            n_items_in_flight: count(GenerationInProgress::n_in_flight),
+            n_items_queued: if work.is_paused { 0 } else { count(BatchInProgress::n_waiting) },
+            n_items_in_flight: count(BatchInProgress::n_in_flight),
             n_episodes: work.n_episodes,
         }
     }

@@ -7,7 +7,7 @@ use std::{
 
 use crate::priority::Priority;
 
-use super::generation::{GenerationInProgress, Task};
+use super::{batch::BatchInProgress, item::Item};
 
 /// What a call costs beside its trials, in trials. Measured: one trial of the
 /// shipped experiments takes 1.3 to 1.5 times as long as one of ten.
@@ -17,18 +17,18 @@ const UNKNOWN_TRIAL: Duration = Duration::from_millis(10);
 
 /// An experiment that has not ended.
 #[derive(Debug)]
-pub struct ExperimentWork {
+pub struct JobWork {
     /// Opaque to the engine; every worker gets it once.
     pub spec: Arc<str>,
     /// Whether it waits to be resumed.
     pub is_paused: bool,
     /// What is being judged.
-    pub generation: Option<GenerationInProgress>,
+    pub batch: Option<BatchInProgress>,
     /// Its share.
     pub priority: Priority,
     /// Workers' time that it was given, divided by its priority, in ns: who has
     /// least is served next.
-    pub served: u128,
+    pub virtual_time: u128,
     /// Trials whose fitness became known.
     pub n_episodes: u64,
     /// Time per trial for a worker of pace 1, s; smoothed.
@@ -36,15 +36,15 @@ pub struct ExperimentWork {
     n_learnt: u64,
 }
 
-impl ExperimentWork {
+impl JobWork {
     /// An experiment without work.
     pub fn new(spec: Arc<str>, priority: Priority) -> Self {
         Self {
             spec,
             is_paused: false,
-            generation: None,
+            batch: None,
             priority,
-            served: 0,
+            virtual_time: 0,
             n_episodes: 0,
             trial_s: None,
             n_learnt: 0,
@@ -53,7 +53,7 @@ impl ExperimentWork {
 
     /// Whether it has something to hand out.
     pub fn is_ready(&self) -> bool {
-        !self.is_paused && self.generation.as_ref().is_some_and(GenerationInProgress::has_waiting)
+        !self.is_paused && self.batch.as_ref().is_some_and(BatchInProgress::has_waiting)
     }
 
     /// How long so many trials take a worker of a pace; none before any result.
@@ -69,8 +69,8 @@ impl ExperimentWork {
     }
 
     /// Learns from a task that took a worker of a pace so long.
-    pub fn learn(&mut self, task: &Task, busy: Duration, pace: f64) {
-        let trial_s = busy.as_secs_f64() / (task.trials.len() as f64 + CALL_OVERHEAD) / pace;
+    pub fn learn(&mut self, item: &Item, busy: Duration, pace: f64) {
+        let trial_s = busy.as_secs_f64() / (item.trials.len() as f64 + CALL_OVERHEAD) / pace;
         let smoothed = self.trial_s.get_or_insert(trial_s);
         // The mean of the first few, then of the last few.
         self.n_learnt += 1;
@@ -80,12 +80,13 @@ impl ExperimentWork {
 
     /// Charges it for workers' time.
     pub fn add_charge(&mut self, time: Duration) {
-        self.served += self.weighted(time);
+        self.virtual_time += self.weighted(time);
     }
 
     /// Replaces a charge by what it was really.
     pub fn correct_charge(&mut self, charged: Duration, real: Duration) {
-        self.served = (self.served + self.weighted(real)).saturating_sub(self.weighted(charged));
+        self.virtual_time =
+            (self.virtual_time + self.weighted(real)).saturating_sub(self.weighted(charged));
     }
 
     fn weighted(&self, time: Duration) -> u128 {

@@ -8,7 +8,7 @@ use super::worker::{FULL_LOAD, Worker};
 
 /// The workers, sorted by what they can take.
 #[derive(Debug, Default)]
-pub struct Standings {
+pub struct WorkerLoadIndex {
     /// Workers with credit, least loaded first, and among those the fastest.
     pub available: BTreeSet<(u64, u32, WorkerId)>,
     /// Workers with items that wait behind others, most loaded last.
@@ -19,7 +19,7 @@ pub struct Standings {
     pub n_usable_slots: usize,
 }
 
-impl Standings {
+impl WorkerLoadIndex {
     /// Sorts a worker in.
     pub fn add(&mut self, id: WorkerId, worker: &Worker) {
         let load = worker.load();

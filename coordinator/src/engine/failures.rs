@@ -12,11 +12,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{MAX_ATTEMPTS, generation::Task};
+use super::{MAX_ATTEMPTS, item::Item};
 
 /// What is held against the work of a generation.
 #[derive(Debug, Default)]
-pub struct Blames {
+pub struct FailureRecord {
     /// By individual and trial; only where there is something. A process that may
     /// come back, or none.
     by_trial: BTreeMap<(u32, u32), Vec<Option<NonZeroU64>>>,
@@ -26,15 +26,15 @@ pub struct Blames {
 /// Work that nobody is given until it is clear what happened.
 #[derive(Debug)]
 struct HeldBack {
-    task: Task,
+    item: Item,
     until: Instant,
     /// What happened last.
-    blame: String,
+    failure: String,
 }
 
 /// What is to be done with work that has failed.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum RetryDecision {
     /// Try it again.
     Retry,
     /// Wait: see [`Blames::on_process_joined`] and [`Blames::overdue`].
@@ -43,39 +43,39 @@ pub enum Verdict {
     Fail,
 }
 
-impl Blames {
+impl FailureRecord {
     /// Holds an attempt against a task. `process`: which came back if this was no
     /// fault of the task's.
     pub fn add(
         &mut self,
-        task: &Task,
+        item: &Item,
         process: Option<NonZeroU64>,
-        blame: &str,
+        failure: &str,
         until: Instant,
-    ) -> Verdict {
-        for trial in task.trials.clone() {
-            self.by_trial.entry((task.individual, trial)).or_default().push(process);
+    ) -> RetryDecision {
+        for trial in item.trials.clone() {
+            self.by_trial.entry((item.individual, trial)).or_default().push(process);
         }
-        if self.n_attempts(task) < MAX_ATTEMPTS {
-            return Verdict::Retry;
+        if self.n_attempts(item) < MAX_ATTEMPTS {
+            return RetryDecision::Retry;
         }
         let may_be_retracted = self
             .by_trial
-            .range(range(task))
-            .filter(|(_, blames)| blames.len() >= MAX_ATTEMPTS as usize)
-            .all(|(_, blames)| blames.iter().any(Option::is_some));
+            .range(range(item))
+            .filter(|(_, failures)| failures.len() >= MAX_ATTEMPTS as usize)
+            .all(|(_, failures)| failures.iter().any(Option::is_some));
         if may_be_retracted {
-            let (task, blame) = (task.clone(), blame.to_owned());
-            self.held_back.push(HeldBack { task, until, blame });
-            Verdict::HoldBack
+            let (item, failure) = (item.clone(), failure.to_owned());
+            self.held_back.push(HeldBack { item, until, failure });
+            RetryDecision::HoldBack
         } else {
-            Verdict::Fail
+            RetryDecision::Fail
         }
     }
 
-    fn n_attempts(&self, task: &Task) -> u32 {
-        let blames = self.by_trial.range(range(task)).map(|(_, blames)| blames.len());
-        blames.max().unwrap_or(0) as u32
+    fn n_attempts(&self, item: &Item) -> u32 {
+        let failures = self.by_trial.range(range(item)).map(|(_, failures)| failures.len());
+        failures.max().unwrap_or(0) as u32
     }
 
     /// Individuals with something held against them.
@@ -86,22 +86,22 @@ impl Blames {
 
     /// A process is here, so that nothing has taken it down; returns what may be
     /// tried again.
-    pub fn on_process_joined(&mut self, process: NonZeroU64) -> Vec<Task> {
-        self.by_trial.retain(|_, blames| {
-            blames.retain(|blame| *blame != Some(process));
-            !blames.is_empty()
+    pub fn on_process_joined(&mut self, process: NonZeroU64) -> Vec<Item> {
+        self.by_trial.retain(|_, failures| {
+            failures.retain(|failure| *failure != Some(process));
+            !failures.is_empty()
         });
         let (held_back, released): (Vec<_>, Vec<_>) = std::mem::take(&mut self.held_back)
             .into_iter()
-            .partition(|held_back| self.n_attempts(&held_back.task) >= MAX_ATTEMPTS);
+            .partition(|held_back| self.n_attempts(&held_back.item) >= MAX_ATTEMPTS);
         self.held_back = held_back;
-        released.into_iter().map(|released| released.task).collect()
+        released.into_iter().map(|released| released.item).collect()
     }
 
     /// Work that has been held back for long enough, and what happened to it.
-    pub fn overdue(&self, now: Instant) -> Option<(&Task, &str)> {
+    pub fn overdue(&self, now: Instant) -> Option<(&Item, &str)> {
         let overdue = self.held_back.iter().find(|held_back| held_back.until <= now)?;
-        Some((&overdue.task, &overdue.blame))
+        Some((&overdue.item, &overdue.failure))
     }
 
     /// The coordinator itself has paused: nobody could come back.
@@ -111,11 +111,11 @@ impl Blames {
 
     /// Whether a trial waits for a verdict.
     pub fn is_held_back(&self, individual: u32, trial: u32) -> bool {
-        let mut tasks = self.held_back.iter().map(|held_back| &held_back.task);
-        tasks.any(|task| task.individual == individual && task.trials.contains(&trial))
+        let mut items = self.held_back.iter().map(|held_back| &held_back.item);
+        items.any(|item| item.individual == individual && item.trials.contains(&trial))
     }
 }
 
-fn range(task: &Task) -> Range<(u32, u32)> {
-    (task.individual, task.trials.start)..(task.individual, task.trials.end)
+fn range(item: &Item) -> Range<(u32, u32)> {
+    (item.individual, item.trials.start)..(item.individual, item.trials.end)
 }

@@ -1,0 +1,48 @@
+//! What the coordinator asks for, and what becomes of it.
+
+use std::{fmt, ops::Range, time::Duration};
+
+use sim_core::{Output, TrialSet};
+
+/// What an assignment belongs to, under the coordinator's number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum JobId {
+    Experiment(u64),
+    Evaluation(u64),
+}
+
+/// An item given to this worker: one genotype and the trials to run it on.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Assignment {
+    /// The coordinator's number, which the result carries.
+    pub(crate) id: u64,
+    pub(crate) job: JobId,
+    /// Which worlds and noise the trials meet.
+    pub(crate) trial_set: TrialSet,
+    /// What is returned for a trial.
+    pub(crate) output: Output,
+    pub(crate) trials: Range<u32>,
+    /// Genes, unchecked.
+    pub(crate) genotype: Vec<f64>,
+}
+
+/// The result of an assignment.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ItemResult {
+    pub(crate) assignment_id: u64,
+    /// What the numbers of the outcome are.
+    pub(crate) output: Output,
+    /// The numbers of all trials, one trial after the other; or why there are none.
+    pub(crate) outcome: Result<Vec<f64>, String>,
+    /// Time that the computation took.
+    pub(crate) duration: Duration,
+}
+
+impl fmt::Display for JobId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Experiment(id) => write!(f, "experiment {id}"),
+            Self::Evaluation(id) => write!(f, "evaluation {id}"),
+        }
+    }
+}
