@@ -2,7 +2,7 @@
 //! drives simulated workers in virtual time. Prints the tables of
 //! `docs/scaling.md`.
 
-#[path = "../tests/simulated_fleet/mod.rs"]
+#[path = "../tests/api/simulated_fleet/mod.rs"]
 #[allow(dead_code, reason = "shared with the tests, which use more of it")]
 mod simulated_fleet;
 

@@ -1,6 +1,24 @@
-//! What documents state agrees with what is in the sources. Needs no fleet.
+//! What documents and manifests state agrees with the sources. Needs no fleet.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod logs;
 mod reliability;
+mod targets;
 mod versions;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Every Rust file below a directory.
+fn rust_files(directory: &Path) -> Vec<PathBuf> {
+    let paths = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
+    paths
+        .flat_map(|path| match path.extension() {
+            _ if path.is_dir() => rust_files(&path),
+            Some(extension) if extension == "rs" => vec![path],
+            _ => Vec::new(),
+        })
+        .collect()
+}

@@ -1,24 +1,10 @@
 //! What the documents promise is tested by tests that exist.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, fs, path::Path};
 
 use harness::workspace_file;
 
-/// Every Rust file below a directory.
-fn rust_files(directory: &Path) -> Vec<PathBuf> {
-    let paths = fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path());
-    paths
-        .flat_map(|path| match path.extension() {
-            _ if path.is_dir() => rust_files(&path),
-            Some(extension) if extension == "rs" => vec![path],
-            _ => Vec::new(),
-        })
-        .collect()
-}
+use super::rust_files;
 
 /// The names of the tests in a file: functions right after an attribute `test`.
 fn tests_in(path: &Path) -> Vec<String> {

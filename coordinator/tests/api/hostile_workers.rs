@@ -1,5 +1,4 @@
 //! A coordinator, and workers that send anything at all.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::{
@@ -53,7 +52,7 @@ impl Stage {
         HOOK.call_once(|| {
             let default = panic::take_hook();
             panic::set_hook(Box::new(move |info| {
-                if info.location().is_some_and(|at| !at.file().ends_with("hostile_workers.rs")) {
+                if info.location().is_some_and(|at| !at.file().contains("tests/api")) {
                     N_PANICS.fetch_add(1, Ordering::SeqCst);
                 }
                 default(info);
@@ -70,7 +69,7 @@ impl Stage {
 
     async fn submit(&self) -> u64 {
         let mut config: serde_json::Value =
-            serde_json::from_str(include_str!("../../configs/quickstart.json")).unwrap();
+            serde_json::from_str(include_str!("../../../configs/quickstart.json")).unwrap();
         let algorithm = &mut config["algorithm"];
         algorithm["population_size"] = 4.into();
         algorithm["num_evaluations"] = N_TRIALS.into();

@@ -1,5 +1,4 @@
 //! Whom a health check believes, and what it says otherwise.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, io::Write as _, net::SocketAddr};
 

@@ -1,17 +1,14 @@
 //! The engine under fleets in virtual time: nothing is lost, nothing counts
 //! twice, nothing grows without bound, whatever happens to the workers.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-
-mod simulated_fleet;
 
 use std::time::Duration;
 
+use crate::simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 use coordinator::{
     engine::EngineConfig,
     ids::{ExperimentId, JobId},
 };
 use proptest::prelude::*;
-use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 
 const LEASE: Duration = Duration::from_secs(10);
 const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
