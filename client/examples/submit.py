@@ -29,7 +29,7 @@ from swarm.v1.experiment_pb2_grpc import ExperimentServiceStub
 
 Response = TypeVar("Response")
 
-# What may pass without anybody's doing. Every request can be repeated safely.
+# Errors after which the same request may succeed. Every request can be repeated safely.
 TRANSIENT = (
     StatusCode.UNAVAILABLE, StatusCode.DEADLINE_EXCEEDED,
     StatusCode.RESOURCE_EXHAUSTED, StatusCode.ABORTED,
@@ -60,7 +60,7 @@ class Coordinator:
             token = args.token_file.read_text().strip()
         is_here = url.hostname in ("127.0.0.1", "::1", "localhost")
         if token and url.scheme != "https" and not is_here:
-            raise ValueError("the token would travel unencrypted; use https:// and --tls-ca")
+            raise ValueError("the token would be sent unencrypted; use https:// and --tls-ca")
         options = [
             # Only pings tell a patient coordinator from a dead one.
             ("grpc.keepalive_time_ms", 20_000),

@@ -1,31 +1,23 @@
-//! The command line.
+//! The command line: the options of all commands, and the arguments that several
+//! commands share. Each command's own arguments are in its module.
 
-mod evaluate;
-mod help;
-mod plot;
-mod simulate;
+use std::path::PathBuf;
 
-use std::{path::PathBuf, time::Duration};
-
-use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum, value_parser};
-use clap_complete::Shell;
+use clap::{Args as ClapArgs, Parser, ValueEnum, value_parser};
 use sim_core::Isa;
 
 use crate::{
+    commands::Command,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
     settings::Settings,
 };
 
-pub use evaluate::EvaluateArgs;
-pub use plot::PlotArgs;
-pub use simulate::SimulateArgs;
-
 /// Evolves controllers for swarms of robots.
 #[derive(Debug, Parser)]
-#[command(name = "swarmctl", version, after_help = help::SWARMCTL, max_term_width = 100)]
+#[command(name = "swarmctl", version, after_help = HELP, max_term_width = 100)]
 pub struct Args {
-    /// What standard output is for.
+    /// Format of standard output.
     #[arg(
         long,
         short,
@@ -38,18 +30,18 @@ pub struct Args {
     pub output: OutputFormat,
     #[command(flatten)]
     pub settings: Settings,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What standard output is for.
+/// Format of standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OutputFormat {
-    /// For people: tables fit the terminal, colours obey `NO_COLOR`.
+    /// For people: tables fit the terminal; NO_COLOR turns colours off.
     #[value(alias = "text")]
     Table,
-    /// For people who want to see it all: more columns, nothing cut.
+    /// As table, with all columns, and nothing cut off.
     Wide,
     /// For programs: `run`, `watch`, `wait`, `logs` and `submit --watch` print one
     /// object per line, the other commands one document.
@@ -58,243 +50,46 @@ pub enum OutputFormat {
     Csv,
 }
 
-/// What to do.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    /// Run an experiment in this process, from file to champion.
-    ///
-    /// Starts a coordinator and workers, the same as a fleet's, and follows the
-    /// experiment to its end. Interrupted, it loses at most one generation: the
-    /// same command continues it.
-    Run(RunArgs),
-    #[command(flatten)]
-    Remote(RemoteCommand),
-    /// Check experiment files, here and without a coordinator.
-    ///
-    /// Prints a line per good file, and every problem of every bad one.
-    Validate {
-        /// The experiment files.
-        #[arg(required = true, value_name = "FILE")]
-        files: Vec<PathBuf>,
-    },
-    /// Print the JSON Schema of experiment files.
-    ///
-    /// For editors that complete and check them.
-    Schema,
-    /// Simulate single episodes here, and show how well a genotype does.
-    ///
-    /// Fitness and measures are the same, bit for bit, as in evolution: a champion
-    /// in the worlds of its generation gets the fitness that is stored with it.
-    Simulate(SimulateArgs),
-    /// Evaluate a genotype: many episodes under several conditions, every step measured.
-    ///
-    /// The episodes are the same for every genotype and condition, and no evolution
-    /// has met them. There is always the nominal condition, which is the experiment
-    /// file as it is; each of the other options adds conditions beside it. Measures
-    /// and their statistics go to a directory: steps.csv, trials.csv, summary.json.
-    /// They are the same, byte by byte, whoever computes them.
-    #[command(after_help = help::EVALUATE)]
-    Evaluate(EvaluateArgs),
-    /// Draw the fitness of runs against their generations.
-    ///
-    /// A curve per run: the mean over the individuals of each generation, in a band
-    /// from the worst to the best of them. The same runs give the same file, byte by
-    /// byte.
-    #[command(after_help = help::PLOT)]
-    Plot(PlotArgs),
-    /// Measure how fast this machine simulates an experiment.
-    ///
-    /// Every core evaluates random genotypes for some seconds. Says how long the
-    /// whole experiment will take here, and on larger fleets.
-    #[command(after_help = help::BENCH)]
-    Bench(BenchArgs),
-    /// Print a script with which a shell completes this program's command line.
-    #[command(after_help = help::COMPLETIONS)]
-    Completions {
-        /// The shell.
-        shell: Shell,
-    },
-}
+/// Below the list of commands.
+const HELP: &str = "\
+Examples:
+  swarmctl validate experiments/*.json
+  swarmctl run experiment.json --generations 20
+  swarmctl submit experiment.json --seed 7 --watch
+  swarmctl explain 3
+  swarmctl history 3 --output csv > history.csv
+  swarmctl champion 3 > champion.json
 
-impl Command {
-    /// Whether what it prints is a table, and so can be CSV.
-    pub fn has_table(&self) -> bool {
-        use RemoteCommand::{History, List, Workers};
-        matches!(self, Self::Remote(List | History { .. } | Workers))
-    }
-}
+The connection to the coordinator is configured by the options, else by their
+environment variables, else by the settings file. SWARM_CONFIG names that file;
+the default is ~/.config/swarmevo/config.json. For example:
+  {\"coordinator\": \"https://fleet.example:7700\", \"tls-ca\": \"ca.pem\",
+   \"token-file\": \"client.token\"}
 
-/// What to ask a coordinator for.
-#[derive(Debug, Subcommand)]
-pub enum RemoteCommand {
-    /// Give an experiment to the coordinator.
-    Submit(SubmitArgs),
-    /// List all experiments.
-    List,
-    /// Follow an experiment from its first generation to its end.
-    ///
-    /// Generations that are complete already are shown first. A coordinator that
-    /// goes away is waited for, up to a minute. Interrupting this does not
-    /// interrupt the experiment.
-    #[command(after_help = help::WATCH)]
-    Watch {
-        /// Number of the experiment.
-        id: u64,
-    },
-    /// Wait until an experiment ends.
-    Wait(WaitArgs),
-    /// Print what has happened to an experiment, or to all of them.
-    ///
-    /// Generations, changes of state, and what else is worth a line, such as a
-    /// champion's re-evaluation.
-    Logs(LogsArgs),
-    /// Print every completed generation of an experiment.
-    #[command(after_help = help::HISTORY)]
-    History {
-        /// Number of the experiment.
-        id: u64,
-    },
-    /// Print the best genotype so far and the network that it encodes, as JSON.
-    ///
-    /// `fitness` is that on held-out trials, which selected nothing, as soon as
-    /// there have been some; `fitness_when_chosen` is that for which it was chosen.
-    #[command(after_help = help::CHAMPION)]
-    Champion {
-        /// Number of the experiment.
-        id: u64,
-    },
-    /// Say why nothing happens to an experiment, and what to do about it.
-    ///
-    /// No workers, paused, queued behind others, waiting at the barrier for the
-    /// last items of a generation, failing items, a full disk: the coordinator
-    /// knows, and this prints it on one screen, with the next steps.
-    Explain {
-        /// Number of the experiment.
-        id: u64,
-    },
-    /// List the connected workers.
-    ///
-    /// Results per second and the idle share of their slots are those of the last
-    /// minute. `items` is what a worker has in hand. A worker that is distrusted has
-    /// returned other bits than others did; `--output wide` says which.
-    Workers,
-    /// Take an experiment's work from the workers until it is resumed.
-    ///
-    /// It stays paused when the coordinator is started again, and goes on with
-    /// `swarmctl resume`. The pause changes no bit of what the experiment computes.
-    Pause {
-        /// Number of the experiment.
-        id: u64,
-        /// Why, for whoever finds it paused.
-        #[arg(long, value_name = "TEXT")]
-        reason: Option<String>,
-    },
-    /// Let a paused experiment go on.
-    Resume {
-        /// Number of the experiment.
-        id: u64,
-    },
-    /// Change an experiment's share of the fleet.
-    ///
-    /// While several experiments have work to hand out, each gets a share of the
-    /// workers' time in proportion to its priority.
-    Priority {
-        /// Number of the experiment.
-        id: u64,
-        /// Its new priority, 1 to 1000; 100 is what experiments begin with.
-        #[arg(value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
-        priority: u32,
-    },
-    /// End an experiment early; its history and champion stay.
-    Cancel {
-        /// Number of the experiment.
-        id: u64,
-    },
-}
+Exit codes:
+  0    success
+  1    internal error
+  2    bad input: arguments, settings, a token, a certificate, a genotype, an
+       experiment file, a directory, a file to write
+  3    no such experiment, or its state does not allow the request (no champion
+       yet, ended)
+  4    the coordinator cannot be reached
+  5    the experiment failed (run, watch, wait, submit --watch)
+  6    the experiment was cancelled (the same commands)
+  7    the coordinator does not accept the token
+  8    no TLS connection: one side has no TLS, or the certificate is not trusted
+  9    the server at the address is not a coordinator, or one of another version
+  10   the experiment has not ended within wait --timeout
+  130  interrupted";
 
-/// What to wait for.
+/// The experiment that a command is about.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = help::WAIT)]
-pub struct WaitArgs {
+pub struct ExperimentId {
     /// Number of the experiment.
     pub id: u64,
-    /// Which end is success.
-    #[arg(long = "for", value_enum, default_value_t = WaitFor::Completed, value_name = "END")]
-    pub target: WaitFor,
-    /// Wait no longer than this: 90s, 15m, 2h [default: for ever]
-    #[arg(long, value_name = "TIME", value_parser = duration)]
-    pub timeout: Option<Duration>,
 }
 
-/// Which end is success.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum WaitFor {
-    /// All generations done, or the target fitness reached.
-    Completed,
-    /// Any: it is enough that the experiment goes on no more.
-    Ended,
-}
-
-/// Which log to print.
-#[derive(Debug, ClapArgs)]
-#[command(after_help = help::LOGS)]
-pub struct LogsArgs {
-    /// Number of the experiment [default: all, in the order of time]
-    pub id: Option<u64>,
-    /// Go on with what happens next; of one experiment, until it ends.
-    #[arg(long, short)]
-    pub follow: bool,
-    /// Begin with the event of this sequence number.
-    #[arg(long = "from", value_name = "SEQ", default_value_t = 1, requires = "id")]
-    pub from_sequence: u64,
-}
-
-/// A time with its unit.
-fn duration(text: &str) -> Result<Duration, String> {
-    let n_digits = text.bytes().take_while(u8::is_ascii_digit).count();
-    let (number, unit) = text.split_at(n_digits);
-    let unit_s = match unit {
-        "s" => 1,
-        "m" => 60,
-        "h" => 3600,
-        _ => return Err("expected a number and its unit: 90s, 15m or 2h".into()),
-    };
-    let number: u32 = number.parse().map_err(|_| "expected a number that is not so large")?;
-    Ok(Duration::from_secs(u64::from(number) * unit_s))
-}
-
-/// What to run.
-#[derive(Debug, ClapArgs)]
-#[command(after_help = help::RUN)]
-pub struct RunArgs {
-    #[command(flatten)]
-    pub experiment: ExperimentArgs,
-    /// Number of workers, each computing one thing at a time [default: the
-    /// number of cores]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
-    pub workers: Option<u16>,
-    /// Where everything is stored.
-    #[arg(long, value_name = "DIR", default_value = "./swarm-data")]
-    pub data_dir: PathBuf,
-    #[command(flatten)]
-    pub isa: IsaArgs,
-}
-
-/// What to submit.
-#[derive(Debug, ClapArgs)]
-#[command(after_help = help::SUBMIT)]
-pub struct SubmitArgs {
-    #[command(flatten)]
-    pub experiment: ExperimentArgs,
-    /// Its share of the fleet, 1 to 1000, beside other experiments [default: 100]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
-    pub priority: Option<u32>,
-    /// Follow it to its end.
-    #[arg(long)]
-    pub watch: bool,
-}
-
-/// An experiment, and what to change in it.
+/// An experiment file to evolve, and replacements of its values.
 #[derive(Debug, ClapArgs)]
 pub struct ExperimentArgs {
     /// The experiment file.
@@ -302,19 +97,18 @@ pub struct ExperimentArgs {
     /// Number of generations, instead of the file's.
     #[arg(long, value_name = "G", value_parser = value_parser!(u64).range(1..))]
     pub generations: Option<u64>,
-    /// Seed of all randomness, instead of the file's.
-    #[arg(long, value_name = "S")]
-    pub seed: Option<u64>,
+    #[command(flatten)]
+    pub seed: SeedArg,
 }
 
 impl ExperimentArgs {
-    /// What to change.
+    /// The replacements.
     pub fn overrides(&self) -> Overrides {
-        let Self { seed, generations, .. } = *self;
+        let Self { seed: SeedArg { seed }, generations, .. } = *self;
         Overrides { seed, generations, ..Overrides::default() }
     }
 
-    /// The file, if the experiment can be evolved.
+    /// Reads the file; fails if the experiment cannot be evolved.
     pub fn checked_file(&self) -> Result<ExperimentFile, Error> {
         let file = ExperimentFile::read(&self.config);
         let checked = file.and_then(|file| file.compile(&self.overrides()).map(|_| file));
@@ -322,26 +116,27 @@ impl ExperimentArgs {
     }
 }
 
-/// What to measure.
-#[derive(Debug, ClapArgs)]
-pub struct BenchArgs {
-    /// The experiment file [default: the thesis's leader selection, by SNES]
-    pub config: Option<PathBuf>,
-    /// How long to measure.
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = value_parser!(u16).range(1..))]
-    pub seconds: u16,
-    /// Number of cores to keep busy [default: all]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
-    pub cores: Option<u16>,
-    #[command(flatten)]
-    pub isa: IsaArgs,
+/// A replacement of the file's seed.
+#[derive(Debug, Clone, Copy, Default, ClapArgs)]
+pub struct SeedArg {
+    /// Seed of all randomness, instead of the file's.
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
 }
 
-/// With what to compute.
+/// A replacement of the file's length of a trial.
+#[derive(Debug, Clone, Copy, Default, ClapArgs)]
+pub struct StepsArg {
+    /// Number of steps per trial, instead of the file's.
+    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
+    pub steps: Option<u32>,
+}
+
+/// Vector instructions of the simulation.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct IsaArgs {
-    /// Vector instructions: portable, avx2, avx512 or neon. They change how fast it
-    /// is, and no bit [default: the best of this processor]
+    /// Vector instructions: portable, avx2, avx512 or neon. They change the speed and
+    /// no bit of the results [default: the fastest that this processor has]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
     isa: Option<Isa>,
 }
@@ -358,6 +153,7 @@ mod tests {
     use clap::{CommandFactory as _, error::ErrorKind};
 
     use super::*;
+    use crate::commands::RemoteCommand;
 
     fn parse(line: &str) -> Result<Args, ErrorKind> {
         Args::try_parse_from(line.split(' ')).map_err(|error| error.kind())
@@ -372,10 +168,8 @@ mod tests {
     fn run_has_defaults() {
         let Command::Run(args) = parse("swarmctl run a.json").unwrap().command else { panic!() };
         assert_eq!(args.experiment.config, PathBuf::from("a.json"));
-        assert_eq!(
-            (args.workers, args.experiment.generations, args.experiment.seed),
-            (None, None, None)
-        );
+        assert_eq!(args.experiment.overrides(), Overrides::default());
+        assert_eq!(args.workers, None);
         assert_eq!(args.data_dir, PathBuf::from("./swarm-data"));
     }
 
@@ -397,7 +191,7 @@ mod tests {
         let Command::Remote(RemoteCommand::Submit(args)) = parse(&line).unwrap().command else {
             panic!()
         };
-        assert_eq!(args.experiment.seed, Some(u64::MAX));
+        assert_eq!(args.experiment.overrides().seed, Some(u64::MAX));
         assert!(args.watch);
     }
 

@@ -1,4 +1,4 @@
-//! Times as people read them, and the one place that reads the clock.
+//! Times for people; the only module that reads the clock.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -8,7 +8,7 @@ pub fn unix_ms() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64
 }
 
-/// The time, for how long something takes.
+/// The time, for measuring durations.
 #[expect(clippy::disallowed_methods, reason = "speeds are measured from now")]
 pub fn now() -> Instant {
     Instant::now()
@@ -38,7 +38,7 @@ fn date(days: u64) -> (u64, u64, u64) {
     (400 * era + year_of_era + u64::from(month <= 2), month, day)
 }
 
-/// How long something takes, or took: its two largest units.
+/// A duration in its two largest units.
 pub fn duration(duration: Duration) -> String {
     let seconds = duration.as_secs();
     match seconds {
@@ -55,7 +55,7 @@ pub fn duration_ms(ms: u64) -> String {
     duration(Duration::from_millis(ms))
 }
 
-/// How long ago something was, on clocks that may differ a little.
+/// The age of a time; 0 if the clocks differ so that it is in the future.
 pub fn ago(at_ms: u64, now_ms: u64) -> String {
     let age = Duration::from_secs(now_ms.saturating_sub(at_ms) / 1000);
     format!("{} ago", duration(age))

@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use swarm_proto::v1::{
-    CancelExperimentRequest, CompletedGeneration, EvaluateRequest, EvaluateResponse, Event,
-    Experiment, ExplainExperimentRequest, ExplainExperimentResponse, GetChampionRequest,
+    CompletedGeneration, EvaluateRequest, EvaluateResponse, Event, Experiment, GetChampionRequest,
     GetChampionResponse, GetExperimentRequest, ListEventsRequest, ListExperimentsRequest,
-    ListGenerationsRequest, ListWorkersRequest, PauseExperimentRequest, ResumeExperimentRequest,
-    SetPriorityRequest, SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
-    WatchExperimentResponse, Worker, evaluation_service_client::EvaluationServiceClient,
+    ListGenerationsRequest, SubmitExperimentRequest, SubmitExperimentResponse,
+    WatchExperimentRequest, WatchExperimentResponse,
+    evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
 use swarm_transport::{
@@ -21,23 +20,23 @@ use tonic::{
 use worker::Backoff;
 
 use crate::{
+    banner::banner,
     error::{Error, is_transient},
-    greeting::greeting,
     settings::Settings,
 };
 
 /// How long a request is repeated before the coordinator counts as unreachable.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How long a coordinator may be away from whoever follows an experiment.
+/// The same, while a command follows an experiment.
 pub const PATIENCE_WHILE_FOLLOWING: Duration = Duration::from_secs(60);
-/// Events of an experiment that are held at once.
+/// Number of events per request.
 const EVENT_PAGE_LEN: u32 = 100;
 
 /// A channel on which every call carries the token, if there is one.
 type Authorised = InterceptedService<Channel, Bearer>;
 
-/// A coordinator's address, and the way there once one is needed. All requests
-/// are safe to repeat.
+/// A coordinator's address and the clients of its services, which connect with the
+/// first request. All requests are safe to repeat.
 #[derive(Debug, Clone)]
 pub struct Connection {
     address: String,
@@ -49,13 +48,13 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// To the coordinator that the settings name, or that the settings file names.
+    /// A connection to the coordinator of the settings and the settings file.
     pub fn open(settings: Settings) -> Result<Self, Error> {
         let settings = settings.or_file()?;
         Self::new(settings.address(), &settings.credentials()?)
     }
 
-    /// Connects with the first request.
+    /// A connection to the coordinator at an address.
     pub fn new(address: &str, credentials: &Credentials) -> Result<Self, Error> {
         let link =
             Link::new(address, credentials).map_err(|error| Error::Input(error.to_string()))?;
@@ -64,8 +63,8 @@ impl Connection {
             .clone()
             .connect_timeout(Duration::from_secs(5))
             .timeout(Duration::from_secs(30))
-            // While a stream is silent, only pings tell a patient coordinator
-            // from a dead one.
+            // While a stream is silent, only pings tell a live coordinator from a dead
+            // one.
             .http2_keep_alive_interval(Duration::from_secs(10))
             .keep_alive_timeout(Duration::from_secs(10))
             .connect_lazy();
@@ -82,7 +81,7 @@ impl Connection {
         Ok(Self { address: address.into(), link, client, evaluations, fleet, patience: PATIENCE })
     }
 
-    /// The same, but giving up later.
+    /// The same connection, which repeats requests for this long.
     pub fn with_patience(&self, patience: Duration) -> Self {
         Self { patience, ..self.clone() }
     }
@@ -92,21 +91,21 @@ impl Connection {
         &self.address
     }
 
-    /// How long to try.
+    /// How long requests are repeated.
     pub fn patience(&self) -> Duration {
         self.patience
     }
 
-    /// That the coordinator cannot be reached.
+    /// The error that the coordinator cannot be reached.
     pub fn unreachable(&self, reason: String) -> Error {
         Error::Unreachable { address: self.address.clone(), reason }
     }
 
     /// A status as this program's error.
     pub fn error(&self, status: &Status) -> Error {
-        match (Error::from_status(status, &self.address), self.link.suspicion(status)) {
-            (Error::Unreachable { address, reason }, Some(suspicion)) => {
-                Error::Unreachable { address, reason: format!("{reason} ({suspicion})") }
+        match (Error::from_status(status, &self.address), self.link.hint(status)) {
+            (Error::Unreachable { address, reason }, Some(hint)) => {
+                Error::Unreachable { address, reason: format!("{reason} ({hint})") }
             }
             (error, _) => error,
         }
@@ -141,59 +140,12 @@ impl Connection {
         Ok(response.config_json)
     }
 
-    /// What is measured of a genotype; tried once.
+    /// The measures of a genotype, as a stream; tried once.
     pub async fn evaluate(
         &self,
         request: EvaluateRequest,
     ) -> Result<Streaming<EvaluateResponse>, Status> {
         self.evaluations.clone().evaluate(request).await.map(Response::into_inner)
-    }
-
-    /// Ends an experiment and returns it.
-    pub async fn cancel(&self, experiment_id: u64) -> Result<Experiment, Error> {
-        let request = CancelExperimentRequest { experiment_id };
-        let response = self.call(async |client| client.cancel_experiment(request).await).await?;
-        present(response.experiment)
-    }
-
-    /// Has an experiment wait until it is resumed, and returns it.
-    pub async fn pause(&self, experiment_id: u64, reason: String) -> Result<Experiment, Error> {
-        let request = PauseExperimentRequest { experiment_id, reason };
-        let response =
-            self.call(async |client| client.pause_experiment(request.clone()).await).await?;
-        present(response.experiment)
-    }
-
-    /// Lets a paused experiment go on, and returns it.
-    pub async fn resume(&self, experiment_id: u64) -> Result<Experiment, Error> {
-        let request = ResumeExperimentRequest { experiment_id };
-        let response = self.call(async |client| client.resume_experiment(request).await).await?;
-        present(response.experiment)
-    }
-
-    /// Changes an experiment's share of the fleet, and returns it.
-    pub async fn set_priority(
-        &self,
-        experiment_id: u64,
-        priority: u32,
-    ) -> Result<Experiment, Error> {
-        let request = SetPriorityRequest { experiment_id, priority };
-        let response = self.call(async |client| client.set_priority(request).await).await?;
-        present(response.experiment)
-    }
-
-    /// What an experiment does, or waits for.
-    pub async fn explain(&self, experiment_id: u64) -> Result<ExplainExperimentResponse, Error> {
-        let request = ExplainExperimentRequest { experiment_id };
-        self.call(async |client| client.explain_experiment(request).await).await
-    }
-
-    /// The connected workers.
-    pub async fn workers(&self) -> Result<Vec<Worker>, Error> {
-        let request = ListWorkersRequest {};
-        let fleet = &self.fleet;
-        let response = self.retry(async || fleet.clone().list_workers(request).await).await?;
-        Ok(response.workers)
     }
 
     /// The best genotype so far; [`Error::NotFound`] if there is none.
@@ -237,11 +189,21 @@ impl Connection {
         self.client.clone().watch_experiment(request).await.map(Response::into_inner)
     }
 
-    async fn call<T>(
+    /// Sends a request to the experiment service, again and again while the coordinator
+    /// cannot be reached, up to this connection's patience.
+    pub async fn call<T>(
         &self,
         request: impl AsyncFn(&mut ExperimentServiceClient<Authorised>) -> Result<Response<T>, Status>,
     ) -> Result<T, Error> {
         self.retry(async || request(&mut self.client.clone()).await).await
+    }
+
+    /// As [`Self::call`], to the fleet service.
+    pub async fn call_fleet<T>(
+        &self,
+        request: impl AsyncFn(&mut FleetServiceClient<Authorised>) -> Result<Response<T>, Status>,
+    ) -> Result<T, Error> {
+        self.retry(async || request(&mut self.fleet.clone()).await).await
     }
 
     async fn retry<T>(
@@ -261,11 +223,11 @@ impl Connection {
         }
     }
 
-    /// Tells a coordinator that is not there from something else that is.
+    /// If another server answers at the address, says so.
     async fn diagnose(&self, error: Error) -> Error {
         let Error::Unreachable { .. } = error else { return error };
-        match greeting(self.authority()).await {
-            Some(greeting) => Error::foreign(&self.address, &greeting),
+        match banner(self.authority()).await {
+            Some(banner) => Error::foreign(&self.address, &banner),
             None => error,
         }
     }
@@ -277,12 +239,12 @@ impl Connection {
     }
 }
 
-/// The delays between attempts: short, as somebody is waiting.
+/// The delays between attempts: short, because a person may be waiting.
 pub fn backoff() -> Backoff {
     Backoff::new(Duration::from_millis(250), Duration::from_secs(2))
 }
 
-/// A field that every coordinator fills in.
+/// A field of an answer that every coordinator sets.
 pub fn present<T>(field: Option<T>) -> Result<T, Error> {
     field.ok_or_else(|| Error::Internal("the coordinator's answer is incomplete".into()))
 }

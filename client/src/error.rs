@@ -1,4 +1,4 @@
-//! Everything that ends a command early: what to say, and the exit code.
+//! The errors of commands: their messages and exit codes.
 
 use std::{
     io,
@@ -6,12 +6,12 @@ use std::{
 };
 
 use experiment_file::ConfigError;
-use swarm_transport::tls_trouble;
+use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
 
 use crate::text::with_reason;
 
-/// Why a command did not do what it was asked.
+/// Why a command did not succeed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Bad input; the message says what would be right.
@@ -22,44 +22,43 @@ pub enum Error {
     Config {
         /// The file.
         file: PathBuf,
-        /// One per line.
+        /// The problems, one per line.
         problems: String,
     },
-    /// The coordinator of `run` does not start, which is the data directory's
-    /// fault.
+    /// The coordinator of `run` does not start, because of the data directory.
     #[error(transparent)]
     Start(#[from] coordinator::StartError),
     /// No such experiment, or no champion.
     #[error("{0}")]
     NotFound(String),
-    /// No answer.
+    /// The coordinator did not answer within the patience.
     #[error(
-        "cannot reach a coordinator at {address}: {reason}; start one with `coordinator`, or say \
-         where it is with --coordinator, SWARM_COORDINATOR or the settings file"
+        "cannot reach a coordinator at {address}: {reason}; start one with `coordinator`, or set \
+         its address with --coordinator, SWARM_COORDINATOR or the settings file"
     )]
     Unreachable {
-        /// Where it should be.
+        /// The coordinator's address.
         address: String,
-        /// The cause.
+        /// The deepest cause that is known.
         reason: String,
     },
-    /// The token is not the right one.
-    #[error("the coordinator at {address} does not let this client in: {refusal}")]
+    /// The coordinator does not accept the token.
+    #[error("the coordinator at {address} does not accept this client: {refusal}")]
     Denied {
         /// The coordinator's address.
         address: String,
         /// The coordinator's reason.
         refusal: String,
     },
-    /// No TLS where there should be, or the wrong kind.
-    #[error("no TLS connection to the coordinator at {address}: {trouble}")]
+    /// One side has no TLS, or a certificate is not accepted.
+    #[error("no TLS connection to the coordinator at {address}: {diagnosis}")]
     Tls {
         /// The coordinator's address.
         address: String,
         /// What is wrong and what to do.
-        trouble: String,
+        diagnosis: String,
     },
-    /// Something else answers, or a coordinator that does not know the request.
+    /// The server at the address is not a coordinator, or does not know the request.
     #[error("{0}")]
     Foreign(String),
     /// The experiment failed.
@@ -70,7 +69,7 @@ pub enum Error {
         /// Why; may be empty.
         reason: String,
     },
-    /// Somebody cancelled the experiment.
+    /// The experiment was cancelled.
     #[error("{}", with_reason(&format!("experiment {id} was cancelled"), reason))]
     Cancelled {
         /// Number of the experiment.
@@ -78,16 +77,16 @@ pub enum Error {
         /// Why; may be empty.
         reason: String,
     },
-    /// The experiment goes on, and the patience of `wait` is over.
+    /// The experiment has not ended within the time limit of `wait`.
     #[error("experiment {id} has not ended; `swarmctl explain {id}` says what it waits for")]
     TimedOut {
         /// Number of the experiment.
         id: u64,
     },
-    /// A signal; the text says what becomes of the experiment.
+    /// A signal interrupted the command; the text says what happens to the experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
-    /// Whoever read standard output has had enough.
+    /// The reader of standard output closed it.
     #[error("standard output is closed")]
     OutputClosed,
     /// Standard output, or a file, cannot be written.
@@ -95,29 +94,29 @@ pub enum Error {
     Write {
         /// What was to be written.
         what: String,
-        /// Why it cannot.
+        /// The cause.
         source: io::Error,
     },
-    /// Not the user's fault.
+    /// A bug in this program or the coordinator.
     #[error("{0}")]
     Internal(String),
 }
 
 impl Error {
-    /// What is wrong with an experiment file.
+    /// The error of an invalid experiment file.
     pub fn invalid(file: &Path, error: &ConfigError) -> Self {
         Self::Config { file: file.into(), problems: error.to_string() }
     }
 
-    /// That something else answers where a coordinator should.
-    pub fn foreign(address: &str, greeting: &str) -> Self {
+    /// The error that the server at the address is not a coordinator.
+    pub fn foreign(address: &str, banner: &str) -> Self {
         Self::Foreign(format!(
-            "what answers at {address} is not a coordinator: it says \"{greeting}\"; is this the \
+            "the server at {address} is not a coordinator: it answers \"{banner}\"; is this the \
              right port?"
         ))
     }
 
-    /// See `swarmctl --help`.
+    /// The exit code of `swarmctl`, as its help lists them.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::OutputClosed => 0,
@@ -145,7 +144,7 @@ impl Error {
         }
     }
 
-    /// Standard output's errors: a closed pipe is none.
+    /// The error of writing to standard output; a closed pipe ends the command quietly.
     pub fn from_stdout(source: io::Error) -> Self {
         match source.kind() {
             io::ErrorKind::BrokenPipe => Self::OutputClosed,
@@ -153,11 +152,11 @@ impl Error {
         }
     }
 
-    /// A coordinator's refusal, or its silence.
+    /// The error of a failed call.
     pub fn from_status(status: &Status, address: &str) -> Self {
         let message = status.message();
-        if let Some(trouble) = tls_trouble(status) {
-            return Self::Tls { address: address.into(), trouble };
+        if let Some(diagnosis) = tls_diagnosis(status) {
+            return Self::Tls { address: address.into(), diagnosis };
         }
         match status.code() {
             _ if is_transport(status) => {
@@ -181,24 +180,24 @@ impl Error {
     }
 }
 
-/// Whether the same request may succeed later, without anyone's doing.
+/// Whether the same request may succeed later without any change by the user.
 pub fn is_transient(status: &Status) -> bool {
     let code = status.code();
-    if tls_trouble(status).is_some() {
+    if tls_diagnosis(status).is_some() {
         return false;
     }
     is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
 }
 
-/// Whether the status is about the connection: the ones that this side makes up
-/// know their cause, those of a coordinator do not.
+/// Whether the status is about the connection. A status that this side creates has a
+/// source, one that a coordinator sent has none.
 fn is_transport(status: &Status) -> bool {
     let code = status.code();
     std::error::Error::source(status).is_some()
         || matches!(code, Code::Unavailable | Code::DeadlineExceeded)
 }
 
-/// The deepest cause, which names the thing that went wrong.
+/// The deepest cause, which is the most specific.
 pub fn reason(status: &Status) -> String {
     let mut source = std::error::Error::source(status);
     let mut text = status.message().to_owned();
@@ -209,7 +208,7 @@ pub fn reason(status: &Status) -> String {
     if text.is_empty() { status.code().description().into() } else { text }
 }
 
-/// Each line of a text behind a name.
+/// A text with a name before each line.
 pub fn prefix_lines(text: &str, name: &impl std::fmt::Display) -> String {
     let lines: Vec<String> = text.lines().map(|line| format!("{name}: {line}")).collect();
     lines.join("\n")

@@ -1,4 +1,4 @@
-//! Experiment files: read, checked, and on their way to a coordinator.
+//! Experiment files: reading, checking, compiling, and submitting them.
 
 use std::{
     fs::File,
@@ -13,7 +13,7 @@ use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::error::{Error, prefix_lines};
 
-/// Longest default name that the protocol carries.
+/// Longest default name that the protocol allows, in bytes.
 const NAME_BYTES_MAX: usize = 128;
 
 /// The text of an experiment file.
@@ -23,7 +23,7 @@ pub struct ExperimentFile {
     text: String,
 }
 
-/// What to change in an experiment.
+/// Values that replace those of the file; none keeps the file's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Overrides {
     pub seed: Option<u64>,
@@ -32,7 +32,7 @@ pub struct Overrides {
     pub trials: Option<u32>,
 }
 
-/// An experiment that can be simulated.
+/// An experiment file, ready to be simulated.
 #[derive(Debug)]
 pub struct Compiled {
     pub config: ExperimentConfig,
@@ -43,12 +43,12 @@ pub struct Compiled {
 }
 
 impl ExperimentFile {
-    /// The text of something that is not a file here.
+    /// An experiment file whose text is known; the path is for messages only.
     pub fn new(path: PathBuf, text: String) -> Self {
         Self { path, text }
     }
 
-    /// What is wrong with it.
+    /// The error of this file being invalid.
     pub fn invalid(&self, error: &ConfigError) -> Error {
         Error::invalid(&self.path, error)
     }
@@ -93,8 +93,8 @@ impl ExperimentFile {
         }
     }
 
-    /// A refusal of this file says so.
-    pub fn blame(&self, error: Error) -> Error {
+    /// Names this file in a coordinator's refusal of it.
+    pub fn locate(&self, error: Error) -> Error {
         match error {
             Error::Input(problems) => Error::Config { file: self.path.clone(), problems },
             error => error,
@@ -108,7 +108,7 @@ impl ExperimentFile {
         (!text.is_empty()).then(|| prefix_lines(&text, &prefix))
     }
 
-    /// The file's stem, as far as the protocol carries it.
+    /// The file's stem, cut to the length that the protocol allows.
     fn default_name(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= NAME_BYTES_MAX;
@@ -117,7 +117,7 @@ impl ExperimentFile {
 }
 
 impl Overrides {
-    /// The format's limits hold for what replaces parts of a file, too.
+    /// Replaces the values and checks the limits of the format again.
     fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
         if *self == Self::default() {
             return Ok(config);
@@ -130,7 +130,7 @@ impl Overrides {
         match ExperimentConfig::from_json(&config.to_canonical_json(), &config.name, ALGORITHMS) {
             Ok((config, _)) => Ok(config),
             Err(mut error) => {
-                // Lines of the canonical form mean nothing to anybody.
+                // The lines are those of the canonical form, not of the user's file.
                 error.problems.iter_mut().for_each(|problem| problem.line = None);
                 Err(error)
             }
@@ -138,12 +138,12 @@ impl Overrides {
     }
 }
 
-/// A remark about a file as a whole.
+/// A problem of the file as a whole.
 fn unlocated(message: String) -> Problem {
     Problem { path: String::new(), line: None, message }
 }
 
-/// An id that nobody else chooses.
+/// A request id of 128 random bits.
 pub fn random_request_id(kind: &str) -> String {
     format!("{kind}-{:032x}", rand::random::<u128>())
 }
@@ -185,7 +185,7 @@ pub mod tests {
     }
 
     #[test]
-    fn what_cannot_be_an_experiment_file_is_a_problem_of_the_file() {
+    fn an_unreadable_file_is_a_problem_of_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let missing = dir.path().join("missing");
         let binary = dir.path().join("binary");

@@ -29,7 +29,7 @@ use swarm_transport::Credentials;
 
 use crate::connection::Connection;
 
-/// What to answer, and what was asked.
+/// The answers to give, and a record of requests.
 #[derive(Debug, Default)]
 pub struct Script {
     /// The one experiment that there is.
@@ -37,7 +37,7 @@ pub struct Script {
     pub champion: Option<GetChampionResponse>,
     /// What has happened to it, from event 1 on without gaps.
     pub past: Vec<Event>,
-    /// What there is to say about it.
+    /// The answer to `Explain`, without the experiment.
     pub explanation: ExplainExperimentResponse,
     pub workers: Vec<Worker>,
     /// For each `Watch` in turn: its events, and what then ends the stream if
@@ -81,7 +81,7 @@ impl FakeCoordinator {
     }
 }
 
-/// A connection to a port where nobody listens.
+/// A connection to a port without a server.
 pub async fn unreachable_connection() -> Connection {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = format!("http://{}", listener.local_addr().unwrap());

@@ -7,15 +7,15 @@ use std::{fs, path::Path};
 
 use crate::error::Error;
 
-/// Curves that one figure can tell apart.
+/// Most curves of a figure: more could not be told apart.
 pub const CURVES_MAX: usize = 14;
 
 /// Curves over the same axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// What x is.
+    /// Label of the x axis.
     pub x_label: String,
-    /// What y is, with its unit.
+    /// Label of the y axis, with the unit.
     pub y_label: String,
     /// At most [`CURVES_MAX`], in the order of the legend.
     pub curves: Vec<Curve>,
@@ -24,25 +24,25 @@ pub struct Figure {
 /// A line with a band around it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// For the legend.
+    /// Name in the legend.
     pub name: String,
-    /// By ascending x.
+    /// The points, by ascending x.
     pub points: Vec<Point>,
 }
 
-/// A place of a curve; all of it is finite.
+/// A point of a curve; all values are finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
     pub x: f64,
     /// Lower edge of the band.
     pub low: f64,
-    /// The line.
+    /// Value of the line.
     pub middle: f64,
     /// Upper edge of the band.
     pub high: f64,
 }
 
-/// How a figure is stored.
+/// File format of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     Svg,
@@ -50,7 +50,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that a file's name asks for.
+    /// The format that the extension of a file's name selects.
     pub fn of(path: &Path) -> Result<Self, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(Self::Svg),
@@ -64,7 +64,7 @@ impl Format {
 }
 
 impl Figure {
-    /// Writes the figure in the format that the file's name asks for.
+    /// Writes the figure in the format that the extension of the file's name selects.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let bytes = match Format::of(path)? {
             Format::Svg => self.to_svg()?.into_bytes(),

@@ -1,4 +1,4 @@
-//! SIGINT and SIGTERM: the first asks, the second insists.
+//! SIGINT and SIGTERM: the first requests an orderly end, the second ends at once.
 
 use std::process;
 

@@ -11,7 +11,7 @@ pub fn line(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("plain data with string keys serialises")
 }
 
-/// A value for reading.
+/// A value on several, indented lines.
 pub fn document(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain data with string keys serialises")
 }
@@ -28,7 +28,7 @@ pub fn state_name(state: ExperimentState) -> &'static str {
     }
 }
 
-/// Whether an experiment in this state goes on no more.
+/// Whether an experiment in this state has ended.
 pub fn has_ended(state: ExperimentState) -> bool {
     use ExperimentState::{Cancelled, Completed, Failed};
     matches!(state, Completed | Failed | Cancelled)
@@ -48,7 +48,7 @@ pub struct LogLine<'a> {
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum LogKind<'a> {
-    Generation(Summary<'a>),
+    Generation(GenerationFields<'a>),
     State { state: &'static str, reason: &'a str },
     Notice { message: &'a str },
 }
@@ -69,14 +69,14 @@ impl<'a> LogLine<'a> {
 
 /// A generation, as `run`, `watch` and `history` print it.
 #[derive(Debug, Serialize)]
-pub struct Generation<'a> {
+pub struct GenerationLine<'a> {
     experiment: u64,
     #[serde(flatten)]
-    summary: Summary<'a>,
+    summary: GenerationFields<'a>,
 }
 
 #[derive(Debug, Serialize)]
-struct Summary<'a> {
+struct GenerationFields<'a> {
     generation: u64,
     best: f64,
     mean: f64,
@@ -89,13 +89,13 @@ struct Summary<'a> {
     digest: &'a str,
 }
 
-impl<'a> Generation<'a> {
+impl<'a> GenerationLine<'a> {
     pub fn new(experiment_id: u64, summary: &'a GenerationSummary) -> Self {
         Self { experiment: experiment_id, summary: summary.into() }
     }
 }
 
-impl<'a> From<&'a GenerationSummary> for Summary<'a> {
+impl<'a> From<&'a GenerationSummary> for GenerationFields<'a> {
     fn from(summary: &'a GenerationSummary) -> Self {
         Self {
             generation: summary.generation,
@@ -112,9 +112,9 @@ impl<'a> From<&'a GenerationSummary> for Summary<'a> {
     }
 }
 
-/// The end of an experiment, the last line of `run` and `watch`.
+/// How an experiment ended: the last line of `run` and `watch`.
 #[derive(Debug, Serialize)]
-pub struct End<'a> {
+pub struct EndLine<'a> {
     experiment: u64,
     state: &'static str,
     #[serde(skip_serializing_if = "str::is_empty")]
@@ -163,7 +163,7 @@ struct HeldOut {
     generation: u64,
 }
 
-impl<'a> End<'a> {
+impl<'a> EndLine<'a> {
     pub fn new(experiment: &'a Experiment, champion: Option<&GetChampionResponse>) -> Self {
         Self {
             experiment: experiment.id,
@@ -198,7 +198,7 @@ pub struct ExperimentDocument<'a> {
     submitted_at_ms: u64,
     champion_fitness: Option<f64>,
     config_digest: &'a str,
-    latest: Option<Generation<'a>>,
+    latest: Option<GenerationLine<'a>>,
 }
 
 impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
@@ -218,12 +218,15 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
             submitted_at_ms: experiment.submitted_at_ms,
             champion_fitness: experiment.champion_fitness,
             config_digest: &experiment.config_digest,
-            latest: experiment.latest.as_ref().map(|latest| Generation::new(experiment.id, latest)),
+            latest: experiment
+                .latest
+                .as_ref()
+                .map(|latest| GenerationLine::new(experiment.id, latest)),
         }
     }
 }
 
-/// A champion, all of it and of what it is one, as `champion` prints it.
+/// A champion with its genes, network and experiment, as `champion` prints it.
 #[derive(Debug, Serialize)]
 pub struct ChampionDocument<'a> {
     experiment: u64,
@@ -296,7 +299,7 @@ mod tests {
     #[test]
     fn a_generation_is_one_line_whose_numbers_read_back_exactly() {
         let summary = summary();
-        let text = line(&Generation::new(3, &summary));
+        let text = line(&GenerationLine::new(3, &summary));
         assert!(!text.contains('\n'));
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["experiment"], 3);
@@ -312,7 +315,7 @@ mod tests {
     #[test]
     fn a_fitness_that_is_no_number_is_null() {
         let summary = GenerationSummary { min: f64::NAN, ..summary() };
-        let value: Value = serde_json::from_str(&line(&Generation::new(3, &summary))).unwrap();
+        let value: Value = serde_json::from_str(&line(&GenerationLine::new(3, &summary))).unwrap();
         assert_eq!(value["min"], Value::Null);
     }
 
@@ -325,7 +328,7 @@ mod tests {
             ..Experiment::default()
         };
         let champion = champion();
-        let value = serde_json::to_value(End::new(&experiment, Some(&champion))).unwrap();
+        let value = serde_json::to_value(EndLine::new(&experiment, Some(&champion))).unwrap();
         assert_eq!(
             value,
             json!({
@@ -362,7 +365,7 @@ mod tests {
             reason: "item 7 killed 3 workers".into(),
             ..Experiment::default()
         };
-        let value = serde_json::to_value(End::new(&experiment, None)).unwrap();
+        let value = serde_json::to_value(EndLine::new(&experiment, None)).unwrap();
         let reason = "item 7 killed 3 workers";
         assert_eq!(
             value,

@@ -1,8 +1,9 @@
-//! `swarmctl`: submit experiments, follow them, read what they found; or run one
-//! here and now, coordinator and workers included; or check files and watch robots
-//! without any of them.
+//! `swarmctl`: submits experiments to a coordinator, follows them and reads their
+//! results; runs an experiment in this process, with its own coordinator and workers;
+//! and checks files and simulates trials without a coordinator.
 
 mod args;
+mod banner;
 mod clock;
 mod commands;
 mod connection;
@@ -11,7 +12,6 @@ mod experiment_file;
 #[cfg(test)]
 mod fake_coordinator;
 mod figure;
-mod greeting;
 mod interrupt;
 mod json;
 mod progress;
@@ -35,7 +35,7 @@ async fn main() -> ExitCode {
     let result = commands::execute(args, progress).await;
     let Err(error) = result else { return ExitCode::SUCCESS };
     if let Some(report) = error.report() {
-        // Whoever closed standard error does not want to know.
+        // If standard error is closed there is no place left to report to.
         let _ = writeln!(io::stderr(), "{report}");
     }
     error.exit_code().into()

@@ -1,5 +1,5 @@
-//! How a command shows what it does: a bar on a terminal, lines elsewhere, or
-//! JSON lines. Results go to standard output, remarks to standard error.
+//! Output of a command: a progress bar on a terminal, lines elsewhere, or JSON lines.
+//! Results go to standard output, remarks to standard error.
 
 use std::{
     collections::VecDeque,
@@ -22,7 +22,7 @@ use crate::{
 /// Generations over which the estimate of the remaining time averages.
 const ETA_WINDOW: usize = 20;
 
-/// Where output goes, and the bar if there is one.
+/// The outputs of a command, and the progress bar.
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
@@ -45,7 +45,7 @@ impl Progress {
         Self { has_terminal, screen, ..Self::to(format, Box::new(io::stdout())) }
     }
 
-    /// Prints to something that is not a terminal.
+    /// Prints to a writer that is not a terminal.
     pub fn to(format: OutputFormat, stdout: Box<dyn Write + Send>) -> Self {
         Self {
             format,
@@ -69,8 +69,8 @@ impl Progress {
         self.screen
     }
 
-    /// Records, in the format that was asked for. `empty` is for people if there
-    /// is none.
+    /// Prints records in the chosen format. `empty` is printed for people if there are
+    /// no records.
     pub fn print_table(
         &mut self,
         table: &Table,
@@ -97,11 +97,11 @@ impl Progress {
 
     /// A remark on standard error.
     pub fn remark(&self, text: &str) {
-        // Whoever closed standard error does not want to know.
+        // If standard error is closed there is no place left to report to.
         let _ = self.stderr()().write_all(format!("{text}\n").as_bytes());
     }
 
-    /// Makes writers to standard error that do not garble the bar.
+    /// Makes writers to standard error that hide the bar while they write.
     pub fn stderr(&self) -> impl Fn() -> BesideBar + Send + Sync + 'static {
         let bar = self.bar.clone();
         move || BesideBar(bar.clone())
@@ -129,7 +129,7 @@ impl Progress {
         self.durations_ms.push_front(summary.duration_ms);
         match self.format {
             OutputFormat::Json => {
-                self.print(&json::line(&json::Generation::new(self.experiment_id, summary)))
+                self.print(&json::line(&json::GenerationLine::new(self.experiment_id, summary)))
             }
             _ if self.has_terminal => {
                 let done = summary.generation + 1;
@@ -143,19 +143,19 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// Time for `generations` more like the latest ones.
+/// Time that `generations` more will take if they are as fast as the latest ones.
 fn remaining(durations_ms: &VecDeque<u64>, generations: u64) -> Duration {
     let mean_ms = durations_ms.iter().sum::<u64>() as f64 / durations_ms.len().max(1) as f64;
     Duration::from_secs((mean_ms * generations as f64 / 1000.0).round() as u64)
 }
 
-/// Standard error, while a bar may be in the way.
+/// Standard error, beside a bar that may be shown there.
 pub struct BesideBar(ProgressBar);
 
 impl Write for BesideBar {
@@ -174,7 +174,7 @@ pub mod tests {
 
     use super::*;
 
-    /// Standard output that can be read.
+    /// Standard output that a test can read.
     #[derive(Debug, Clone, Default)]
     pub struct Captured(Arc<Mutex<Vec<u8>>>);
 
@@ -199,7 +199,7 @@ pub mod tests {
         }
     }
 
-    /// What `| head` leaves behind.
+    /// Standard output whose reader has gone, as with `| head`.
     struct Closed;
 
     impl Write for Closed {

@@ -1,5 +1,5 @@
-//! How to reach the coordinator: flags, else the environment, else the settings
-//! file, else its usual place.
+//! How to reach the coordinator: from flags, else the environment, else the settings
+//! file, else the default address.
 
 use std::{
     env, fs, io,
@@ -12,22 +12,21 @@ use swarm_transport::{CredentialArgs, Credentials};
 
 use crate::error::Error;
 
-/// Where a coordinator listens unless it is told otherwise.
+/// The coordinator's default address.
 const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
-/// Holds the client token itself.
+/// The environment variable that holds the client token itself.
 const TOKEN_VARIABLE: &str = "SWARM_CLIENT_TOKEN";
-/// Names the settings file.
+/// The environment variable that names the settings file.
 pub const FILE_VARIABLE: &str = "SWARM_CONFIG";
-/// Where the settings file is otherwise, below the directory of the user's
-/// configuration.
+/// The default settings file, relative to the user's configuration directory.
 const FILE: &str = "swarmevo/config.json";
 
-/// What has been said about the way to the coordinator.
+/// Address of the coordinator and credentials, as far as they have been set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
-#[command(next_help_heading = "Way to the coordinator")]
+#[command(next_help_heading = "Connection to the coordinator")]
 pub struct Settings {
-    /// Address of the coordinator; `run` brings its own [default:
-    /// http://127.0.0.1:7700]
+    /// Address of the coordinator; `run` does not use it, because it starts its own
+    /// [default: http://127.0.0.1:7700]
     #[arg(
         long,
         global = true,
@@ -36,8 +35,8 @@ pub struct Settings {
         hide_env_values = true
     )]
     pub coordinator: Option<String>,
-    /// File of the client token, if the coordinator wants one; or put the token
-    /// itself into SWARM_CLIENT_TOKEN.
+    /// File with the client token, if the coordinator requires one; alternatively
+    /// SWARM_CLIENT_TOKEN holds the token itself.
     #[arg(
         long,
         global = true,
@@ -64,7 +63,7 @@ struct SettingsFile {
 }
 
 impl Settings {
-    /// Fills in from the settings file what has not been said.
+    /// These settings, completed from the settings file.
     pub fn or_file(self) -> Result<Self, Error> {
         let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
             Some(path) => (PathBuf::from(path), true),
@@ -96,15 +95,15 @@ impl Settings {
         self.coordinator.as_deref().unwrap_or(DEFAULT_COORDINATOR)
     }
 
-    /// Reads the files of token and certificates.
+    /// Reads the token file and the certificate files.
     pub fn credentials(&self) -> Result<Credentials, Error> {
         self.credentials
             .load(self.token_file.as_deref(), TOKEN_VARIABLE)
             .map_err(|error| Error::Input(error.to_string()))
     }
 
-    /// These settings, and `others` where these say nothing. Those of another
-    /// coordinator say nothing about this one: its token is not for this one to see.
+    /// These settings, completed from `others`. Nothing is taken from `others` if they
+    /// are about another coordinator: this one must not see its token.
     fn or(self, others: Self) -> Self {
         if self.coordinator.is_some() && self.address() != others.address() {
             return self;
@@ -125,7 +124,7 @@ impl Settings {
 }
 
 impl SettingsFile {
-    /// The settings in a file of this directory, beside which it names others.
+    /// The settings; relative paths in the file are relative to its directory.
     fn within(self, directory: &Path) -> Settings {
         let beside = |path: Option<PathBuf>| path.map(|path| directory.join(path));
         Settings {
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_first_counts() {
+    fn flags_take_precedence_over_the_file() {
         let (flag, file) = (settings(Some("http://flag:1")), settings(Some("http://file:1")));
         assert_eq!(flag.clone().or(file.clone()), flag);
         assert_eq!(settings(None).or(file.clone()), file);

@@ -4,14 +4,14 @@ use console::{Style, Term, measure_text_width, truncate_str};
 use serde::Serialize;
 use serde_json::Value;
 
-/// Between columns.
+/// Space between columns.
 const GAP: &str = "  ";
-/// Stands for what has been cut off.
+/// Replaces the end of a text that is cut off.
 const ELLIPSIS: &str = "…";
 /// Columns of text are not made narrower than this.
 const COLUMN_WIDTH_MIN: usize = 8;
 
-/// What standard output is shown on.
+/// The terminal of standard output.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Screen {
     /// Characters per line; none if it is not a terminal.
@@ -33,7 +33,7 @@ impl Screen {
     }
 }
 
-/// A column's heading and ways.
+/// A column's heading and properties.
 #[derive(Debug, Clone)]
 pub struct Column {
     heading: String,
@@ -44,7 +44,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column of words that must be read whole.
+    /// A column of words that are never cut.
     pub fn new(heading: &str) -> Self {
         let heading = heading.to_owned();
         Self {
@@ -94,12 +94,12 @@ impl Table {
     pub fn push(&mut self, cells: impl Into<Vec<String>>) {
         let cells = cells.into();
         debug_assert_eq!(cells.len(), self.columns.len());
-        // Names come from people and their machines: they must not move the cursor.
+        // Names are chosen by others: control characters in them must not move the cursor.
         let is_plain = |c: char| if c.is_control() { ' ' } else { c };
         self.rows.push(cells.iter().map(|cell| cell.chars().map(is_plain).collect()).collect());
     }
 
-    /// The columns that everybody wants, no line longer than the screen.
+    /// The default columns, with no line longer than the screen.
     pub fn to_text(&self, screen: Screen) -> String {
         self.render(|column| !column.is_wide, screen)
     }
@@ -139,8 +139,8 @@ impl Table {
         lines.join("\n")
     }
 
-    /// The shown columns' widths; if they are too wide for the screen together,
-    /// the widest of those that may be cut give way.
+    /// The shown columns' widths; if they are too wide for the screen together, the
+    /// widest of those that may be cut are made narrower.
     fn widths(&self, shown: &[usize], screen_width: Option<usize>) -> Vec<usize> {
         let mut widths: Vec<usize> = shown
             .iter()

@@ -1,4 +1,4 @@
-//! What people read.
+//! Output for people.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use swarm_proto::v1::{
 
 use crate::{clock, json::state_name};
 
-/// Digits of a digest that tell runs apart at a glance.
+/// Number of hexadecimal digits of a digest that are shown.
 const DIGEST_DIGITS: usize = 12;
 
-/// One generation on one line: how many are done, and its number, from 0, as in
-/// every other place.
+/// One generation on one line: the number of completed generations, then the number of
+/// this one, from 0.
 pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     let done = summary.generation + 1;
     let width = generations.to_string().len();
@@ -26,17 +26,17 @@ pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     )
 }
 
-/// The two numbers that people follow.
+/// Best and mean fitness of a generation.
 pub fn fitness(summary: &GenerationSummary) -> String {
     format!("best {:.3}  mean {:.3}", summary.best, summary.mean)
 }
 
-/// Speed of a generation.
+/// Speed of a generation, in episodes per second.
 pub fn episodes_per_s(summary: &GenerationSummary) -> f64 {
     summary.episodes as f64 * 1000.0 / summary.duration_ms.max(1) as f64
 }
 
-/// As much of a digest as people compare.
+/// The first digits of a digest.
 pub fn short(digest: &str) -> &str {
     digest.get(..DIGEST_DIGITS).unwrap_or(digest)
 }
@@ -46,12 +46,12 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
-/// A share of 1.
+/// A share of 1, in percent.
 pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// What happened, when and to which experiment, on one line.
+/// An event on one line: its time, its experiment, what happened.
 pub fn log_line(experiment: &Experiment, event: &Event) -> String {
     let what = match &event.kind {
         Some(Kind::GenerationCompleted(summary)) => format!(
@@ -64,12 +64,12 @@ pub fn log_line(experiment: &Experiment, event: &Event) -> String {
         ),
         Some(Kind::StateChanged(change)) => with_reason(state_name(change.state()), &change.reason),
         Some(Kind::Notice(notice)) => notice.message.clone(),
-        None => "something that this version of swarmctl does not know".into(),
+        None => "an event of a kind that this version of swarmctl does not know".into(),
     };
     format!("{}  {}  {what}", clock::utc(event.at_ms), title(experiment))
 }
 
-/// "failed: because".
+/// "failed: REASON", or "failed" without a reason.
 pub fn with_reason(what: &str, reason: &str) -> String {
     if reason.is_empty() { what.into() } else { format!("{what}: {reason}") }
 }
@@ -79,7 +79,7 @@ pub fn title(experiment: &Experiment) -> String {
     format!("experiment {} ({})", experiment.id, experiment.name)
 }
 
-/// What was submitted.
+/// A submitted experiment, on one line.
 pub fn submitted(experiment: &Experiment) -> String {
     format!(
         "{}: {} generations of {} by {}, {} genes, seed {}",
@@ -92,8 +92,8 @@ pub fn submitted(experiment: &Experiment) -> String {
     )
 }
 
-/// Where an experiment stands, on one line.
-pub fn standing(experiment: &Experiment) -> String {
+/// An experiment's state, completed generations and reason, on one line.
+pub fn state_line(experiment: &Experiment) -> String {
     let text = format!(
         "{} {} after {} of {} generations",
         title(experiment),
@@ -104,13 +104,13 @@ pub fn standing(experiment: &Experiment) -> String {
     with_reason(&text, &experiment.reason)
 }
 
-/// What an experiment has come to.
+/// How an experiment ended: its state, fitness, champion and digest.
 pub fn end(
     experiment: &Experiment,
     first_best: Option<f64>,
     champion: Option<&GetChampionResponse>,
 ) -> String {
-    let mut lines = vec![standing(experiment)];
+    let mut lines = vec![state_line(experiment)];
     if let Some(best) = first_best {
         lines.push(row("best of the first generation", &format!("{best:.6}")));
     }
@@ -128,7 +128,7 @@ pub fn end(
 
 fn champion_line(champion: &GetChampionResponse) -> String {
     let generation = champion.generation;
-    let origin = match champion.individual {
+    let source = match champion.individual {
         Some(individual) => format!("individual {individual} of generation {generation}"),
         None => format!("mean after generation {generation}"),
     };
@@ -138,14 +138,14 @@ fn champion_line(champion: &GetChampionResponse) -> String {
             let chosen = chosen.map_or_else(String::new, |chosen| format!("{chosen}, "));
             let (mean, ci95) = (held_out.mean, held_out.ci95);
             let n = held_out.trials;
-            format!("{mean:.6} +- {ci95:.6} on {n} held-out trials ({chosen}{origin})")
+            format!("{mean:.6} +- {ci95:.6} on {n} held-out trials ({chosen}{source})")
         }
-        (None, Some(chosen)) => format!("{chosen} ({origin})"),
-        (None, None) => origin,
+        (None, Some(chosen)) => format!("{chosen} ({source})"),
+        (None, None) => source,
     }
 }
 
-/// Where `run` has left things.
+/// The places of the files that `run` wrote.
 pub fn files(data_dir: &Path, champion_file: Option<&Path>) -> String {
     let mut lines = vec![row("data", &data_dir.display().to_string())];
     if let Some(file) = champion_file {
@@ -158,11 +158,11 @@ fn row(name: &str, value: &str) -> String {
     format!("  {name:<30}{value}")
 }
 
-/// What became of a request to cancel.
+/// The outcome of a request to cancel.
 pub fn cancelled(experiment: &Experiment) -> String {
     match experiment.state() {
-        ExperimentState::Cancelled => standing(experiment),
-        _ => format!("{}; nothing to cancel", standing(experiment)),
+        ExperimentState::Cancelled => state_line(experiment),
+        _ => format!("{}; nothing to cancel", state_line(experiment)),
     }
 }
 
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_tells_the_whole_story() {
+    fn the_end_has_state_fitness_champion_and_digest() {
         let champion = GetChampionResponse {
             generation: 6,
             individual: Some(4),

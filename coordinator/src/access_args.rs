@@ -1,4 +1,4 @@
-//! The options that say who may connect, and the files that they name.
+//! The options for tokens and TLS, and reading the files that they name.
 
 use std::path::PathBuf;
 
@@ -9,51 +9,51 @@ use swarm_transport::{Identity, PemError, Token, TokenError, certificates};
 const CLIENT_TOKEN: &str = "SWARM_CLIENT_TOKEN";
 const WORKER_TOKEN: &str = "SWARM_WORKER_TOKEN";
 
-/// Who may connect.
+/// Tokens and TLS.
 #[derive(Debug, clap::Args)]
 pub struct AccessArgs {
-    /// File of the token that clients have to send; or put the token itself into
-    /// SWARM_CLIENT_TOKEN.
+    /// File with the token that clients must send; alternatively SWARM_CLIENT_TOKEN holds
+    /// the token itself.
     #[arg(long, value_name = "FILE", env = "SWARM_CLIENT_TOKEN_FILE")]
     client_token_file: Option<PathBuf>,
-    /// File of the token that workers have to send; or put the token itself into
-    /// SWARM_WORKER_TOKEN.
+    /// File with the token that workers must send; alternatively SWARM_WORKER_TOKEN holds
+    /// the token itself.
     #[arg(long, value_name = "FILE", env = "SWARM_WORKER_TOKEN_FILE")]
     worker_token_file: Option<PathBuf>,
-    /// PEM file of the coordinator's certificate, and of those between it and its
-    /// authority: serve TLS only.
+    /// PEM file of the coordinator's certificate and any intermediate certificates; with
+    /// it the coordinator serves TLS only.
     #[arg(long, value_name = "FILE", env = "SWARM_TLS_CERT", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
     /// PEM file of the certificate's private key.
     #[arg(long, value_name = "FILE", env = "SWARM_TLS_KEY", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// PEM file of authorities: clients and workers need a certificate of one of
-    /// them, beside their token.
+    /// PEM file of authorities; with it clients and workers must have a certificate signed
+    /// by one of them, in addition to their token.
     #[arg(long, value_name = "FILE", env = "SWARM_TLS_CLIENT_CA", requires = "tls_cert")]
     tls_client_ca: Option<PathBuf>,
-    /// Serve a network without TLS: every member of it is trusted.
+    /// Listen on a network without TLS; use this only if every member of it is trusted.
     #[arg(long, env = "SWARM_PLAINTEXT", value_parser = FalseyValueParser::new())]
     plaintext: bool,
 }
 
-/// Why access cannot be what the options say.
+/// Why the options for tokens and TLS cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AccessInputError {
-    /// A token.
+    /// A token is not valid.
     #[error(transparent)]
     Token(#[from] TokenError),
-    /// A certificate or key.
+    /// A certificate or key file is not valid.
     #[error(transparent)]
     Pem(#[from] PemError),
-    /// The tokens together.
+    /// The two tokens are the same.
     #[error(transparent)]
     Access(#[from] AccessError),
-    /// One role would need no token.
+    /// Only one of the two tokens is given.
     #[error("there is a {present} token but no {absent} token; give both or none")]
     OneToken {
-        /// Whose there is.
+        /// The role whose token is given.
         present: &'static str,
-        /// Whose there is not.
+        /// The role whose token is missing.
         absent: &'static str,
     },
 }

@@ -11,34 +11,34 @@ use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
 
-/// Owns the evolution of robot swarms: takes experiment files, hands genotypes
-/// to workers, keeps every generation.
+/// Coordinates the evolution of robot swarms: accepts experiment files, sends
+/// genotypes to workers, stores every generation.
 ///
-/// Follow its log: one line per generation. Stop it with SIGTERM or Ctrl-C; at
-/// the next start, unfinished experiments go on from their last completed
-/// generation, to the same bits.
+/// The log has one line per generation. Stop the coordinator with SIGTERM or Ctrl-C;
+/// at the next start, unfinished experiments continue from their last completed
+/// generation, with the same bits.
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Args {
-    /// Address to listen on. Other than loopback, it takes tokens, and TLS or
+    /// Address to listen on. An address other than loopback requires tokens, and TLS or
     /// --plaintext.
     #[arg(long, env = "SWARM_LISTEN", default_value = "127.0.0.1:7700")]
     listen: SocketAddr,
-    /// Directory for the database; created if need be.
+    /// Directory of the database; created if it does not exist.
     #[arg(long, env = "SWARM_DATA_DIR", default_value = "swarm-data")]
     data_dir: PathBuf,
     #[command(flatten)]
     access: AccessArgs,
-    /// Start nothing; ask the coordinator that runs here with the same --listen and
-    /// --tls-... options whether it is healthy. Exit code 0 if so, 1 if not, and a
-    /// line that says why.
+    /// Do not start a coordinator; check the health of the one that runs here with the
+    /// same --listen and --tls-... options. Exit code 0 if it is healthy, 1 if not, with
+    /// a line that says why.
     #[arg(long)]
     health_check: bool,
-    /// Seconds of silence after which a worker's items go to others.
+    /// Seconds of silence after which other workers get a worker's items.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     lease: u32,
-    /// Share of the individuals, 0 to 1, that are computed by a second worker, too:
-    /// if the bits differ, one of the two is faulty, and the experiment is paused.
+    /// Share of the individuals, 0 to 1, that a second worker computes, too. If the bits
+    /// differ, one of the two is faulty, and the experiment is paused.
     #[arg(long, default_value_t = 0.0, value_parser = fraction)]
     audit_fraction: f64,
     #[command(flatten)]
@@ -50,11 +50,11 @@ struct Args {
 const EXIT_CODES: &str = "\
 Exit codes:
   0  stopped by a signal
-  1  internal error; what was committed is safe, the next start goes on from there
+  1  internal error; committed generations are safe, the next start continues after them
   2  bad input: address in use, or open to a network without tokens or TLS; token,
      certificate or data directory unusable; wrong arguments
 
-docs/security.md says how to make tokens and certificates.";
+docs/security.md says how to create tokens and certificates.";
 
 fn fraction(text: &str) -> Result<f64, String> {
     let fraction: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
@@ -81,7 +81,7 @@ async fn main() -> ExitCode {
     }
 }
 
-/// Says in one line how the coordinator is.
+/// Prints in one line whether the coordinator is healthy.
 async fn report_health(args: &Args) -> ExitCode {
     let health = async {
         let tls = args.access.load_tls()?;

@@ -11,7 +11,7 @@ use swarm_proto::{
     },
 };
 use swarm_telemetry::{Endpoint, ListenError};
-use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX, tls_trouble};
+use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX, tls_diagnosis};
 use tokio::{net::TcpListener, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Server;
@@ -270,7 +270,7 @@ impl Coordinator {
 /// What is wrong with the TLS files.
 fn cause(error: &tonic::transport::Error) -> String {
     let source = || std::error::Error::source(error).map(ToString::to_string);
-    tls_trouble(error).or_else(source).unwrap_or_else(|| error.to_string())
+    tls_diagnosis(error).or_else(source).unwrap_or_else(|| error.to_string())
 }
 
 /// Hands every unfinished experiment that this program can compute to the

@@ -1,8 +1,7 @@
-//! What the programs say about themselves: log lines on standard error, and metrics
-//! for whoever scrapes them.
+//! Observing the programs: log lines on standard error, and metrics for Prometheus.
 //!
-//! Which lines and which metrics there are is each program's own business;
-//! `docs/logs.md` and `docs/metrics.md` list them.
+//! Each program defines its own lines and metrics; `docs/logs.md` and
+//! `docs/metrics.md` list them.
 
 mod endpoint;
 mod log;
@@ -15,11 +14,11 @@ pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
 pub use prometheus::Histogram;
 
-/// Where metrics are served.
+/// The address at which metrics are served.
 #[derive(Debug, clap::Args)]
 pub struct MetricsArgs {
-    /// Serve metrics for Prometheus on this address, at /metrics, to everybody who
-    /// reaches it [default: they are not served]
+    /// Serve metrics for Prometheus on this address, at /metrics, without a token to any
+    /// program that reaches it [default: not served]
     #[arg(long, env = "SWARM_METRICS_LISTEN", value_name = "ADDR:PORT")]
     pub metrics_listen: Option<SocketAddr>,
 }

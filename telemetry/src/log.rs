@@ -4,10 +4,10 @@ use std::io::{self, IsTerminal as _};
 
 use tracing_subscriber::{EnvFilter, filter::ParseError};
 
-/// What is logged, and how.
+/// Format and level of the log.
 #[derive(Debug, clap::Args)]
 pub struct LogArgs {
-    /// Form of the log lines.
+    /// Format of the log lines.
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
     /// What to log: error, warn, info, debug or trace, also per module
@@ -24,7 +24,7 @@ enum LogFormat {
     Json,
 }
 
-/// What is to be logged is none of what there is.
+/// The value of `--log-level` is not valid.
 #[derive(Debug, thiserror::Error)]
 #[error("--log-level {level}: {source}")]
 pub struct LogError {

@@ -1,4 +1,4 @@
-//! What a worker or a client proves itself with, and whom it believes.
+//! Credentials of a worker or client, and the authorities that it trusts.
 
 use std::path::{Path, PathBuf};
 
@@ -7,31 +7,31 @@ use tonic::transport::Certificate;
 
 use crate::{Identity, PemError, Token, TokenError, certificates};
 
-/// What a worker or a client proves itself with, and whom it believes.
+/// Credentials of a worker or client, and the authorities that it trusts.
 #[derive(Debug, Clone, Default)]
 pub struct Credentials {
     /// Sent with every call.
     pub token: Option<Token>,
     /// Authorities one of which must have signed the coordinator's certificate.
     pub authorities: Option<Certificate>,
-    /// Shown to a coordinator that asks for it.
+    /// Client certificate, for a coordinator that requires one.
     pub identity: Option<Identity>,
     /// The name in the coordinator's certificate, if it is not the address's.
     pub domain: Option<String>,
-    /// Whether a token may travel unencrypted.
+    /// Whether the token may be sent unencrypted.
     pub plaintext: bool,
 }
 
-/// Why credentials are of no use.
+/// Why credentials cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CredentialError {
-    /// The token.
+    /// The token is not valid.
     #[error(transparent)]
     Token(#[from] TokenError),
-    /// A certificate or key.
+    /// A certificate or key file is not valid.
     #[error(transparent)]
     Pem(#[from] PemError),
-    /// Half an identity.
+    /// A certificate without a key, or a key without a certificate.
     #[error(
         "a certificate and its key go together: give both --tls-cert and --tls-key, or neither"
     )]
@@ -45,7 +45,7 @@ pub struct CredentialArgs {
     /// against; needed for https:// addresses.
     #[arg(long, global = true, value_name = "FILE", env = "SWARM_TLS_CA", hide_env_values = true)]
     pub tls_ca: Option<PathBuf>,
-    /// PEM file of this program's certificate, for a coordinator that asks for one.
+    /// PEM file of this program's certificate, for a coordinator that requires one.
     #[arg(
         long,
         global = true,
@@ -66,8 +66,8 @@ pub struct CredentialArgs {
         hide_env_values = true
     )]
     pub tls_domain: Option<String>,
-    /// Send the token unencrypted to another machine: every member of that network
-    /// is trusted.
+    /// Send the token unencrypted to another machine; use this only if every member of
+    /// that network is trusted.
     #[arg(
         long,
         global = true,

@@ -9,15 +9,15 @@ mod credentials;
 mod link;
 mod pem;
 mod pinned;
+mod tls_diagnosis;
 mod token;
-mod trouble;
 
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
 pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};
 pub use pinned::{PinError, pinned};
+pub use tls_diagnosis::tls_diagnosis;
 pub use token::{BEARER, Token, TokenError};
-pub use trouble::tls_trouble;
 
 /// Largest message to a coordinator, bytes. An experiment file has at most 1 MiB;
 /// 512 results, more than a worker sends at once, of 1,000 trials each have about

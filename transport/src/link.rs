@@ -1,4 +1,4 @@
-//! The way to a coordinator: an address and credentials that fit together.
+//! A link to a coordinator: its address, and credentials that fit the address.
 
 use std::net::IpAddr;
 
@@ -11,27 +11,28 @@ use tonic::{
 
 use crate::{
     Credentials, Token,
-    trouble::{is_break, tls_trouble},
+    tls_diagnosis::{is_break, tls_diagnosis},
 };
 
-/// The way to a coordinator.
+/// An address of a coordinator, with the credentials for it.
 #[derive(Debug, Clone)]
 pub struct Link {
-    /// Where; times are up to the caller.
+    /// The endpoint; the caller sets its timeouts.
     pub endpoint: Endpoint,
-    /// Puts the token into every call.
+    /// Adds the token to every call.
     pub bearer: Bearer,
-    suspicion: &'static str,
+    /// The likely cause, as a question, if a connection breaks without an error.
+    hint: &'static str,
 }
 
-/// Puts a token, if there is one, into every call.
+/// Adds the token, if there is one, to every call.
 #[derive(Debug, Clone, Default)]
 pub struct Bearer(Option<MetadataValue<Ascii>>);
 
-/// Why there is no way to a coordinator. Fix the input.
+/// Why a link cannot be made: the input is wrong.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The address is none.
+    /// The address is not one of a coordinator.
     #[error(
         "`{address}` is not the address of a coordinator ({reason}); expected something like \
          http://127.0.0.1:7700"
@@ -42,15 +43,15 @@ pub enum LinkError {
         /// What is wrong with it.
         reason: String,
     },
-    /// TLS without anybody to believe.
+    /// TLS without an authority to check the coordinator's certificate against.
     #[error("{0} needs --tls-ca: the certificate of the authority that signed the coordinator's")]
     NoAuthority(String),
-    /// TLS is configured and would not be used.
+    /// TLS options with an address without TLS.
     #[error("--tls-... options are given, but {0} is without TLS; use https:// or leave them out")]
     NoTls(String),
-    /// A token would be readable on its way.
+    /// The token would be sent unencrypted over a network.
     #[error(
-        "the token would travel to {0} unencrypted; use https://, or pass --plaintext if every \
+        "the token would be sent to {0} unencrypted; use https://, or pass --plaintext if every \
          member of that network is trusted"
     )]
     Exposed(String),
@@ -68,16 +69,16 @@ impl Link {
             .map_err(|error| not_an_address(deepest(&error)))?;
         let uri = endpoint.uri().clone();
         let host = uri.host().filter(|host| !host.is_empty());
-        let suspicion;
+        let hint;
         let Credentials { token, authorities, identity, domain, plaintext } = credentials;
         match (uri.scheme_str(), host) {
             (Some("https"), Some(_)) => {
                 let Some(authorities) = authorities else {
                     return Err(LinkError::NoAuthority(address.to_owned()));
                 };
-                suspicion = match identity {
+                hint = match identity {
                     Some(_) => "does it accept the certificate of --tls-cert?",
-                    None => "does it want a client certificate, with --tls-cert and --tls-key?",
+                    None => "does it require a client certificate, with --tls-cert and --tls-key?",
                 };
                 let mut tls = ClientTlsConfig::new().ca_certificate(authorities.clone());
                 if let Some(identity) = identity {
@@ -87,14 +88,14 @@ impl Link {
                     tls = tls.domain_name(domain);
                 }
                 endpoint = endpoint.tls_config(tls).map_err(|error| {
-                    LinkError::Tls(tls_trouble(&error).unwrap_or_else(|| deepest(&error)))
+                    LinkError::Tls(tls_diagnosis(&error).unwrap_or_else(|| deepest(&error)))
                 })?;
             }
             (Some("http"), Some(_)) => {
                 if authorities.is_some() || identity.is_some() || domain.is_some() {
                     return Err(LinkError::NoTls(address.to_owned()));
                 }
-                suspicion = "does it want https://, and is it a coordinator at all?";
+                hint = "does it require https://, and is it a coordinator?";
                 if token.is_some() && !plaintext && !is_loopback(&uri) {
                     return Err(LinkError::Exposed(address.to_owned()));
                 }
@@ -105,12 +106,12 @@ impl Link {
             }
         }
         let bearer = Bearer(token.as_ref().map(Token::header));
-        Ok(Self { endpoint, bearer, suspicion })
+        Ok(Self { endpoint, bearer, hint })
     }
 
-    /// What may be the matter if a call failed with this error, as a question.
-    pub fn suspicion(&self, error: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
-        is_break(error).then_some(self.suspicion)
+    /// The likely cause of a call that failed with this error, as a question.
+    pub fn hint(&self, error: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+        is_break(error).then_some(self.hint)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The `worker` program: computes for a coordinator until it is told to stop.
+//! The `worker` program: computes items for a coordinator until a signal stops it.
 
 use std::{
     env, fs,
@@ -26,17 +26,17 @@ const EXIT_INTERRUPTED: i32 = 130;
 
 /// Computes the fitness of genotypes for a coordinator.
 ///
-/// Connects, and reconnects for as long as it takes. On SIGTERM or SIGINT it
-/// finishes what it is computing, delivers that and exits; a second signal ends
-/// it at once, at no loss but time.
+/// Connects, and reconnects without limit. On SIGTERM or SIGINT it finishes its items,
+/// sends the results and exits; a second signal ends it at once, and other workers
+/// repeat its items.
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Args {
     /// Address of the coordinator.
     #[arg(long, env = "SWARM_COORDINATOR", default_value = "http://127.0.0.1:7700")]
     coordinator: String,
-    /// File of the worker token, if the coordinator wants one; or put the token
-    /// itself into SWARM_WORKER_TOKEN.
+    /// File with the worker token, if the coordinator requires one; alternatively
+    /// SWARM_WORKER_TOKEN holds the token itself.
     #[arg(long, value_name = "FILE", env = "SWARM_WORKER_TOKEN_FILE")]
     token_file: Option<PathBuf>,
     #[command(flatten)]
@@ -47,17 +47,17 @@ struct Args {
     /// Number of items computed at the same time [default: the number of cores]
     #[arg(long)]
     slots: Option<usize>,
-    /// Vector instructions: portable, avx2, avx512 or neon. They change how fast it
-    /// is, and no bit [default: the best of this processor]
+    /// Vector instructions: portable, avx2, avx512 or neon. They change the speed and no
+    /// bit of the results [default: the fastest that this processor has]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
     isa: Option<Isa>,
-    /// A file that exists while this worker has a session with its coordinator, and
-    /// is written every two seconds; for --health-check.
+    /// File that exists while this worker has a session with its coordinator, and is
+    /// written every two seconds; --health-check reads it.
     #[arg(long, value_name = "FILE", env = "SWARM_SESSION_FILE")]
     session_file: Option<PathBuf>,
-    /// Start nothing; look whether the worker with the same --session-file has a
-    /// session with its coordinator. Exit code 0 if so, 1 if not, and a line that
-    /// says why.
+    /// Do not start a worker; check whether the one with the same --session-file has a
+    /// session with its coordinator. Exit code 0 if it has one, 1 if not, with a line
+    /// that says why.
     #[arg(long, requires = "session_file")]
     health_check: bool,
     #[command(flatten)]
@@ -70,8 +70,8 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    stopped by a signal
   1    internal error
-  2    bad arguments; token or certificate unusable; address for metrics in use
-  6    coordinator and worker are of different versions
+  2    bad arguments; token or certificate unusable; address of metrics in use
+  6    coordinator and worker have different versions
   7    the coordinator does not accept the token
   130  ended at once by a second signal";
 

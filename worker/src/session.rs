@@ -12,7 +12,7 @@ use swarm_proto::v1::{
     worker_service_client::WorkerServiceClient,
 };
 use swarm_transport::{
-    Bearer, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, tls_trouble,
+    Bearer, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, tls_diagnosis,
 };
 use tokio::{
     sync::mpsc,
@@ -81,7 +81,7 @@ impl Session {
         process_id: u64,
     ) -> Result<Self, OpenError> {
         let channel = link.endpoint.connect().await.map_err(|error| {
-            let reason = tls_trouble(&error);
+            let reason = tls_diagnosis(&error);
             let or_else = || with_causes(error.source().unwrap_or(&error));
             OpenError::Unreachable(reason.unwrap_or_else(or_else))
         })?;
@@ -274,16 +274,16 @@ fn refusal(status: &Status, link: &Link) -> OpenError {
         Code::Unauthenticated | Code::PermissionDenied => {
             OpenError::Denied(status.message().into())
         }
-        _ => OpenError::Refused(match link.suspicion(status) {
-            Some(suspicion) => format!("{}; {suspicion}", describe(status)),
+        _ => OpenError::Refused(match link.hint(status) {
+            Some(hint) => format!("{}; {hint}", describe(status)),
             None => describe(status),
         }),
     }
 }
 
 fn describe(status: &Status) -> String {
-    if let Some(trouble) = tls_trouble(status) {
-        return trouble;
+    if let Some(diagnosis) = tls_diagnosis(status) {
+        return diagnosis;
     }
     let message = status.message();
     let text = if message.is_empty() { status.code().description() } else { message };

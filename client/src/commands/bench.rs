@@ -1,19 +1,20 @@
 //! `swarmctl bench`: how fast this machine simulates, and how long an experiment
-//! will take, for whoever wants to size a fleet.
+//! will take here and on larger fleets.
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     thread,
     time::{Duration, Instant},
 };
 
+use clap::{Args, value_parser};
 use experiment_file::ExperimentConfig;
 use numeric::random::{Purpose, Stream};
 use serde::Serialize;
 use sim_core::{Isa, Simulation};
 
 use crate::{
-    args::BenchArgs,
+    args::IsaArgs,
     clock,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
@@ -23,6 +24,30 @@ use crate::{
 
 /// The experiment to simulate if none is named.
 const DEFAULT: &str = include_str!("../../../configs/leader_selection_snes.json");
+
+/// Measure how fast this machine simulates an experiment.
+///
+/// Every core evaluates random genotypes for some seconds. Prints how long the whole
+/// experiment will take here, and on larger fleets.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct BenchArgs {
+    /// The experiment file [default: the thesis's leader selection, by SNES]
+    config: Option<PathBuf>,
+    /// Duration of the measurement, in seconds.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = value_parser!(u16).range(1..))]
+    seconds: u16,
+    /// Number of cores to keep busy [default: all]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    cores: Option<u16>,
+    #[command(flatten)]
+    isa: IsaArgs,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl bench
+  swarmctl bench configs/borderline_snes.json --cores 1 --output json";
 
 /// Simulates for some seconds on every core, and prints how fast that was.
 pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
@@ -62,11 +87,11 @@ fn experiment(path: Option<&Path>) -> Result<(ExperimentConfig, Simulation), Err
     Ok((config, experiment))
 }
 
-/// What some cores have done.
+/// Work of one or more cores.
 #[derive(Debug, Default, Clone, Copy)]
 struct Speed {
     n_genotypes: u64,
-    /// Time of all cores together.
+    /// Time summed over the cores.
     time: Duration,
 }
 
@@ -79,7 +104,7 @@ impl Speed {
         while start.elapsed() < duration {
             let genotype: Vec<f64> =
                 (0..experiment.genotype_len()).map(|_| genes.uniform()).collect();
-            // Worlds that cannot be set up cost a worker no time worth measuring.
+            // A world that cannot be set up takes a negligible time.
             let _ = experiment.evaluate(&genotype, n_genotypes, 0..n_trials);
             n_genotypes += 1;
         }
@@ -91,7 +116,7 @@ impl Speed {
     }
 }
 
-/// What was measured, and what follows for the experiment.
+/// The measured speed, and the estimated time of the experiment.
 #[derive(Debug, Serialize)]
 struct Report<'a> {
     experiment: &'a str,
@@ -100,7 +125,7 @@ struct Report<'a> {
     robot_steps_per_second_per_core: f64,
     us_per_robot_step: f64,
     episodes_per_second_per_core: f64,
-    /// Of the whole experiment, without the re-evaluations of champions.
+    /// Robot-steps of the whole experiment, without re-evaluations of champions.
     robot_steps: f64,
     core_minutes: f64,
     minutes: f64,

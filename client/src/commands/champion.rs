@@ -1,18 +1,34 @@
 //! `swarmctl champion`: the best genotype so far, as JSON.
 
+use clap::Args;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
-use crate::{connection::Connection, error::Error, json, progress::Progress};
+use super::Remote;
+use crate::{args::ExperimentId, connection::Connection, error::Error, json, progress::Progress};
 
-/// Prints JSON in any case.
-pub async fn champion(
-    connection: &Connection,
-    experiment_id: u64,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    let experiment = connection.experiment(experiment_id).await?;
-    let champion = connection.champion(experiment_id).await?;
-    progress.print(&champion_document(&experiment, &champion)?)
+/// Print the best genotype so far and the network that it encodes, as JSON.
+///
+/// `fitness` is the mean on held-out trials, which selected nothing, once the
+/// champion has been re-evaluated on them; `fitness_when_chosen` is the fitness
+/// that made it the champion.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct ChampionArgs {
+    #[command(flatten)]
+    experiment: ExperimentId,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl champion 3 > champion.json
+  swarmctl champion 3 | jq .network";
+
+impl Remote for ChampionArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let experiment = connection.experiment(self.experiment.id).await?;
+        let champion = connection.champion(self.experiment.id).await?;
+        progress.print(&champion_document(&experiment, &champion)?)
+    }
 }
 
 /// A champion as `champion` prints it and `run` stores it.

@@ -1,9 +1,23 @@
-//! `swarmctl completions`: what a shell needs to complete the command line.
+//! `swarmctl completions`: a script that completes the command line in a shell.
 
-use clap::CommandFactory as _;
+use clap::{Args as ClapArgs, CommandFactory as _};
 use clap_complete::Shell;
 
 use crate::{args::Args, error::Error, progress::Progress};
+
+/// Print a script that completes this program's command line in a shell.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = HELP)]
+pub struct CompletionsArgs {
+    /// The shell.
+    pub shell: Shell,
+}
+
+const HELP: &str = "\
+Examples:
+  source <(swarmctl completions bash)             # in ~/.bashrc
+  swarmctl completions zsh > ~/.zfunc/_swarmctl   # a directory in $fpath
+  swarmctl completions fish > ~/.config/fish/completions/swarmctl.fish";
 
 /// Prints the shell's script.
 pub fn completions(shell: Shell, progress: &mut Progress) -> Result<(), Error> {

@@ -1,5 +1,6 @@
-//! `swarmctl evaluate`: what a genotype is worth, under several conditions.
+//! `swarmctl evaluate`: measures of a genotype under several conditions.
 
+mod args;
 mod conditions;
 mod files;
 mod measured;
@@ -14,7 +15,6 @@ use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    args::EvaluateArgs,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
     experiment_file::ExperimentFile,
@@ -24,6 +24,7 @@ use crate::{
     table::{Column, Table},
 };
 
+pub use self::args::EvaluateArgs;
 use self::{
     conditions::Condition,
     measured::Measured,
@@ -34,10 +35,10 @@ use super::{
     simulate::genotype::Genotype,
 };
 
-/// Conditions that are asked for at the same time.
+/// Most conditions that are evaluated at the same time.
 const CALLS_MAX: usize = 8;
 
-/// Evaluates, and writes the files when all is there.
+/// Evaluates all conditions, then writes the files.
 pub async fn evaluate(
     settings: Settings,
     args: &EvaluateArgs,
@@ -47,7 +48,7 @@ pub async fn evaluate(
     let result = tokio::select! {
         biased;
         () = interrupt.cancelled() => {
-            Err(Error::Interrupted("nothing is written; the same command starts over".into()))
+            Err(Error::Interrupted("nothing was written; the same command starts from the beginning".into()))
         }
         result = evaluate_all(settings, args, &mut progress) => result,
     };
@@ -67,7 +68,7 @@ async fn evaluate_all(
     for condition in &conditions {
         condition.check(&genotype)?;
     }
-    // Rather now than after an hour.
+    // An unusable directory is an error now, not after the computation.
     fs::create_dir_all(&args.to).map_err(|error| unwritable(&args.to, &error))?;
     let measured = match remote.filter(|_| !args.local) {
         Some(connection) => ask_all(&connection, &conditions, &genotype, args, progress).await?,
@@ -88,7 +89,7 @@ async fn evaluate_all(
     ))
 }
 
-/// The experiment file, and the genes.
+/// The experiment file and the genes to evaluate.
 async fn subject(
     remote: Option<&Connection>,
     args: &EvaluateArgs,
@@ -109,7 +110,7 @@ async fn subject(
     }
 }
 
-/// Starts a fleet, computes, stops the fleet, whatever happens.
+/// Starts a fleet, computes, and stops the fleet even if computing failed.
 async fn compute_here(
     conditions: &[Condition],
     genotype: &[f64],
@@ -136,7 +137,7 @@ async fn compute_here(
     result
 }
 
-/// Asks for all conditions, some at a time, in whatever order they come.
+/// Evaluates all conditions, some at a time; the result has their order.
 async fn ask_all(
     connection: &Connection,
     conditions: &[Condition],
@@ -164,7 +165,7 @@ async fn ask_all(
         let Some(call) = calls.join_next().await else { break };
         let (index, result) = call.map_err(|error| Error::Internal(error.to_string()))?;
         let condition = &conditions[index];
-        measured[index] = Some(result.map_err(|error| condition.blame(error))?);
+        measured[index] = Some(result.map_err(|error| condition.locate(error))?);
         n_done += 1;
         if !progress.is_json() {
             progress.remark(&format!("{n_done}/{} {}", conditions.len(), condition.name));
@@ -173,7 +174,7 @@ async fn ask_all(
     Ok(measured.into_iter().map(|it| it.expect("every condition has been asked for")).collect())
 }
 
-/// For people: means over trials and steps, with their confidence.
+/// For people: means over trials and steps, with their confidence intervals.
 fn table(summary: &Summary) -> Table {
     let names = summary.metric_names();
     let headings = ["fitness"].into_iter().chain(names.iter().map(String::as_str));

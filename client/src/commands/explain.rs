@@ -1,11 +1,16 @@
-//! `swarmctl explain`: why nothing happens, and what to do about it.
+//! `swarmctl explain`: what an experiment waits for, and the next steps.
 
 mod finding;
 
+use clap::Args;
 use serde::Serialize;
-use swarm_proto::v1::{Event, ExplainExperimentResponse, HeldItems, Round, event::Kind};
+use swarm_proto::v1::{
+    Event, ExplainExperimentRequest, ExplainExperimentResponse, HeldItems, Round, event::Kind,
+};
 
+use super::Remote;
 use crate::{
+    args::ExperimentId,
     clock,
     connection::{Connection, present},
     error::Error,
@@ -16,7 +21,7 @@ use crate::{
 
 use self::finding::Finding;
 
-/// Workers that are listed: all fits one screen.
+/// Most workers that are listed, so that everything fits one screen.
 const WORKERS_MAX: usize = 8;
 
 #[derive(Debug, Serialize)]
@@ -25,28 +30,38 @@ struct Explanation<'a> {
     findings: &'a [Finding],
 }
 
-/// Prints what the experiment does or waits for.
-pub async fn explain(
-    connection: &Connection,
-    experiment_id: u64,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    let answer = connection.explain(experiment_id).await?;
-    let experiment = present(answer.experiment.clone())?;
-    let findings = finding::findings(&experiment, &answer, connection.address());
-    progress.print(&if progress.is_json() {
-        json::document(&Explanation { experiment: (&experiment).into(), findings: &findings })
-    } else {
-        let mut sections = vec![text::standing(&experiment)];
-        sections.extend(findings.iter().map(Finding::to_string));
-        sections.extend(answer.round.as_ref().map(round));
-        sections.extend(notices(&answer));
-        sections.join("\n\n")
-    })
+/// Explain what an experiment waits for, and what to do about it.
+///
+/// Prints on one screen what the coordinator knows: no workers, paused, queued
+/// behind other experiments, waiting at the barrier for the last items of a
+/// generation, failing items, a full disk; and for each the next steps.
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    experiment: ExperimentId,
 }
 
-/// "generation 12", or what else is being judged.
-fn name(round: &Round) -> String {
+impl Remote for ExplainArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let request = ExplainExperimentRequest { experiment_id: self.experiment.id };
+        let answer =
+            connection.call(async |client| client.explain_experiment(request).await).await?;
+        let experiment = present(answer.experiment.clone())?;
+        let findings = finding::findings(&experiment, &answer, connection.address());
+        progress.print(&if progress.is_json() {
+            json::document(&Explanation { experiment: (&experiment).into(), findings: &findings })
+        } else {
+            let mut sections = vec![text::state_line(&experiment)];
+            sections.extend(findings.iter().map(Finding::to_string));
+            sections.extend(answer.round.as_ref().map(batch_lines));
+            sections.extend(notices(&answer));
+            sections.join("\n\n")
+        })
+    }
+}
+
+/// What a batch evaluates: "generation 12", or the champion after it.
+fn batch_name(round: &Round) -> String {
     if round.held_out {
         format!("the re-evaluation of the champion after generation {}", round.generation)
     } else {
@@ -54,10 +69,10 @@ fn name(round: &Round) -> String {
     }
 }
 
-fn round(round: &Round) -> String {
+fn batch_lines(round: &Round) -> String {
     let mut lines = vec![format!(
         "{}: {} of {} episodes done in {}; {} without a worker",
-        name(round),
+        batch_name(round),
         round.episodes - round.episodes_left.min(round.episodes),
         round.episodes,
         clock::duration_ms(round.running_ms),

@@ -1,9 +1,12 @@
 //! `swarmctl history`: every generation of an experiment.
 
+use clap::Args;
 use serde::Serialize;
 use swarm_proto::v1::GenerationSummary;
 
+use super::Remote;
 use crate::{
+    args::ExperimentId,
     clock,
     connection::{Connection, present},
     error::Error,
@@ -32,28 +35,47 @@ const CSV_KEYS: [&str; 12] = [
 #[derive(Debug, Serialize)]
 struct Record<'a> {
     #[serde(flatten)]
-    generation: json::Generation<'a>,
+    generation: json::GenerationLine<'a>,
     completed_at_ms: u64,
 }
 
-/// Prints a table.
-pub async fn history(
-    connection: &Connection,
-    experiment_id: u64,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    let mut generations = Vec::new();
-    for completed in connection.generations(experiment_id).await? {
-        generations.push((present(completed.summary)?, completed.completed_at_ms));
+/// Print every completed generation of an experiment.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct HistoryArgs {
+    #[command(flatten)]
+    experiment: ExperimentId,
+}
+
+const HELP: &str = "\
+Tables and CSV have one row per generation. Best, mean, min and standard
+deviation are taken over the individuals' mean fitness. CSV and JSON have every
+digit.
+
+Examples:
+  swarmctl history 3 | tail -1
+  swarmctl history 3 --output csv > history.csv
+  swarmctl history 3 --output json | jq '.[].best'";
+
+impl Remote for HistoryArgs {
+    const HAS_TABLE: bool = true;
+
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let experiment_id = self.experiment.id;
+        let mut generations = Vec::new();
+        for completed in connection.generations(experiment_id).await? {
+            generations.push((present(completed.summary)?, completed.completed_at_ms));
+        }
+        let records: Vec<Record<'_>> = generations
+            .iter()
+            .map(|&(ref summary, completed_at_ms)| {
+                let generation = json::GenerationLine::new(experiment_id, summary);
+                Record { generation, completed_at_ms }
+            })
+            .collect();
+        let empty = "no generation is complete yet";
+        progress.print_table(&table(&generations), &CSV_KEYS, &records, empty)
     }
-    let records: Vec<Record<'_>> = generations
-        .iter()
-        .map(|&(ref summary, completed_at_ms)| {
-            let generation = json::Generation::new(experiment_id, summary);
-            Record { generation, completed_at_ms }
-        })
-        .collect();
-    progress.print_table(&table(&generations), &CSV_KEYS, &records, "no generation is complete yet")
 }
 
 fn table(generations: &[(GenerationSummary, u64)]) -> Table {

@@ -1,8 +1,10 @@
 //! `swarmctl list`: all experiments.
 
+use clap::Args;
 use console::Style;
 use swarm_proto::v1::Experiment;
 
+use super::Remote;
 use crate::{
     clock,
     connection::Connection,
@@ -12,7 +14,7 @@ use crate::{
     table::{Column, Table},
 };
 
-/// What of an experiment is a column of CSV.
+/// Columns of the CSV: keys of [`ExperimentDocument`].
 const CSV_KEYS: [&str; 12] = [
     "id",
     "name",
@@ -28,11 +30,18 @@ const CSV_KEYS: [&str; 12] = [
     "submitted_at_ms",
 ];
 
-/// Prints a table.
-pub async fn list(connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-    let experiments = connection.experiments().await?;
-    let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
-    progress.print_table(&table(&experiments), &CSV_KEYS, &documents, "no experiments yet")
+/// List all experiments.
+#[derive(Debug, Args)]
+pub struct ListArgs {}
+
+impl Remote for ListArgs {
+    const HAS_TABLE: bool = true;
+
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let experiments = connection.experiments().await?;
+        let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
+        progress.print_table(&table(&experiments), &CSV_KEYS, &documents, "no experiments yet")
+    }
 }
 
 fn table(experiments: &[Experiment]) -> Table {
@@ -69,7 +78,7 @@ fn table(experiments: &[Experiment]) -> Table {
     table
 }
 
-/// What needs attention stands out.
+/// Colours the states that need attention.
 fn state_style(state: &str) -> Style {
     match state {
         "running" => Style::new().green(),

@@ -1,4 +1,5 @@
-//! The commands, one per module.
+//! The commands, each in a module of its own: its arguments with their help, its
+//! requests and its output. To add one, write the module and name it twice below.
 
 mod bench;
 mod champion;
@@ -11,6 +12,7 @@ mod list;
 mod logs;
 mod plot;
 mod run;
+mod schema;
 mod simulate;
 mod submit;
 mod validate;
@@ -18,18 +20,91 @@ mod wait;
 mod watch;
 mod workers;
 
+use clap::Subcommand;
+
 use crate::{
-    args::{Args, Command, OutputFormat, RemoteCommand},
+    args::{Args, OutputFormat},
     connection::Connection,
     error::Error,
-    interrupt, json,
+    interrupt,
     progress::Progress,
 };
 
-/// Does what the command line asks for.
+/// The commands, in the order of the help.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Run(run::RunArgs),
+    #[command(flatten)]
+    Remote(RemoteCommand),
+    Validate(validate::ValidateArgs),
+    Schema(schema::SchemaArgs),
+    Simulate(simulate::SimulateArgs),
+    Evaluate(evaluate::EvaluateArgs),
+    Plot(plot::PlotArgs),
+    Bench(bench::BenchArgs),
+    Completions(completions::CompletionsArgs),
+}
+
+/// The arguments of a command that sends requests to a coordinator and does nothing
+/// else, so that an interrupt may end it at any time.
+trait Remote: clap::Args {
+    /// Whether its answer is a table, which can be printed as CSV.
+    const HAS_TABLE: bool = false;
+
+    /// Sends the requests and prints the answers.
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error>;
+}
+
+macro_rules! remote_commands {
+    ($($name:ident($args:ty),)*) => {
+        /// The commands that are requests to a coordinator, in the order of the help.
+        #[derive(Debug, Subcommand)]
+        pub enum RemoteCommand {
+            $($name($args),)*
+        }
+
+        impl RemoteCommand {
+            /// Whether the answer is a table, which can be printed as CSV.
+            fn has_table(&self) -> bool {
+                match self {
+                    $(Self::$name(_) => <$args as Remote>::HAS_TABLE,)*
+                }
+            }
+
+            async fn execute(
+                self,
+                connection: &Connection,
+                progress: &mut Progress,
+            ) -> Result<(), Error> {
+                match self {
+                    $(Self::$name(args) => args.execute(connection, progress).await,)*
+                }
+            }
+        }
+    };
+}
+
+remote_commands! {
+    Submit(submit::SubmitArgs),
+    List(list::ListArgs),
+    Watch(watch::WatchArgs),
+    Wait(wait::WaitArgs),
+    Logs(logs::LogsArgs),
+    History(history::HistoryArgs),
+    Champion(champion::ChampionArgs),
+    Explain(explain::ExplainArgs),
+    Workers(workers::WorkersArgs),
+    Pause(control::PauseArgs),
+    Resume(control::ResumeArgs),
+    Priority(control::PriorityArgs),
+    Cancel(control::CancelArgs),
+}
+
+/// Executes the command of a command line.
 pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     let Args { settings, output, command } = args;
-    if output == OutputFormat::Csv && !command.has_table() {
+    let has_table = matches!(&command, Command::Remote(command) if command.has_table());
+    if output == OutputFormat::Csv && !has_table {
         return Err(Error::Input(
             "`--output csv` is for tables: history, list and workers; this command has table, \
              wide and json"
@@ -37,19 +112,16 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         ));
     }
     let command = match command {
-        // A signal ends these at once: there is nothing to put in order.
-        Command::Validate { files } => return validate::validate(&files, &mut progress),
-        Command::Schema => {
-            return progress
-                .print(&json::document(&experiment_file::json_schema(evolution::ALGORITHMS)));
-        }
-        Command::Simulate(simulation) => {
-            return simulate::simulate(settings, &simulation, &mut progress).await;
+        // An interrupt ends these at once: they leave nothing to clean up.
+        Command::Validate(args) => return validate::validate(&args.files, &mut progress),
+        Command::Schema(_) => return schema::schema(&mut progress),
+        Command::Simulate(args) => {
+            return simulate::simulate(settings, &args, &mut progress).await;
         }
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
-        Command::Completions { shell } => return completions::completions(shell, &mut progress),
-        // Stops what it started before it ends.
+        Command::Completions(args) => return completions::completions(args.shell, &mut progress),
+        // These start a coordinator and workers, and stop them when interrupted.
         Command::Run(args) => return run::run(&args, progress, interrupt::token()?).await,
         Command::Evaluate(args) => {
             return evaluate::evaluate(settings, &args, progress, interrupt::token()?).await;
@@ -60,37 +132,13 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     let interrupt = interrupt::token()?;
     let result = tokio::select! {
         biased;
-        () = interrupt.cancelled() => Err(Error::Interrupted("what was submitted goes on".into())),
-        result = ask(&connection, command, &mut progress) => result,
+        () = interrupt.cancelled() => {
+            Err(Error::Interrupted("a submitted experiment continues on the coordinator".into()))
+        }
+        result = command.execute(&connection, &mut progress) => result,
     };
     progress.clear();
     result
-}
-
-async fn ask(
-    connection: &Connection,
-    command: RemoteCommand,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    match command {
-        RemoteCommand::Submit(args) => submit::submit(connection, &args, progress).await,
-        RemoteCommand::List => list::list(connection, progress).await,
-        RemoteCommand::Watch { id } => watch::watch(connection, id, progress).await,
-        RemoteCommand::Wait(args) => wait::wait(connection, &args, progress).await,
-        RemoteCommand::Logs(args) => logs::logs(connection, &args, progress).await,
-        RemoteCommand::History { id } => history::history(connection, id, progress).await,
-        RemoteCommand::Champion { id } => champion::champion(connection, id, progress).await,
-        RemoteCommand::Explain { id } => explain::explain(connection, id, progress).await,
-        RemoteCommand::Workers => workers::workers(connection, progress).await,
-        RemoteCommand::Pause { id, reason } => {
-            control::pause(connection, id, reason, progress).await
-        }
-        RemoteCommand::Resume { id } => control::resume(connection, id, progress).await,
-        RemoteCommand::Priority { id, priority } => {
-            control::set_priority(connection, id, priority, progress).await
-        }
-        RemoteCommand::Cancel { id } => control::cancel(connection, id, progress).await,
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
-//! `swarmctl plot`: fitness against generation, as the thesis draws it.
+//! `swarmctl plot`: figures of fitness against generation, or of a measure against
+//! the step.
 
+mod args;
 mod source;
 mod steps;
 
@@ -9,7 +11,6 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::{
-    args::PlotArgs,
     connection::Connection,
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
@@ -18,6 +19,7 @@ use crate::{
     settings::Settings,
 };
 
+pub use self::args::PlotArgs;
 use self::source::{Run, Source};
 
 /// Reads the runs and draws them. The coordinator is asked only for what is not in
@@ -27,7 +29,7 @@ pub async fn plot(
     args: &PlotArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    // Before anything is read.
+    // A bad name of the figure is refused before anything is read.
     Format::of(&args.to)?;
     if let Some(dir) = &args.steps {
         return plot_steps(dir, args, progress);
@@ -43,7 +45,8 @@ pub async fn plot(
         runs.push(match source {
             Source::File(path) => Run::read(path)?,
             Source::Experiment(id) => {
-                let connection = connection.as_ref().expect("somebody asks for an experiment");
+                let connection =
+                    connection.as_ref().expect("connected if a source is an experiment");
                 Run::fetch(connection, *id).await?
             }
         });
@@ -60,7 +63,7 @@ pub async fn plot(
     })
 }
 
-/// Draws what an evaluation has measured.
+/// Draws a measure of an evaluation.
 fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<(), Error> {
     let figure = steps::figure(dir, args.metric.as_deref(), &args.conditions)?;
     if figure.curves.len() > CURVES_MAX {
@@ -76,7 +79,7 @@ fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<()
     })
 }
 
-/// What is in the figure.
+/// The contents of the figure, as JSON.
 #[derive(Debug, Serialize)]
 struct Plotted {
     figure: String,
@@ -100,11 +103,11 @@ impl Plotted {
     }
 }
 
-/// Names for the legend: where two are the same, with what tells them apart.
+/// Names for the legend; those that several runs have are followed by the source.
 fn names(runs: &[Run]) -> Vec<String> {
     let is_ambiguous = |run: &Run| runs.iter().filter(|other| other.name == run.name).count() > 1;
     let name = |run: &Run| match is_ambiguous(run) {
-        true => format!("{} ({})", run.name, run.origin),
+        true => format!("{} ({})", run.name, run.source),
         false => run.name.clone(),
     };
     runs.iter().map(name).collect()

@@ -9,11 +9,12 @@ use std::{
     thread,
 };
 
+use clap::{Args, value_parser};
 use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse, SubmitExperimentRequest};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    args::RunArgs,
+    args::{ExperimentArgs, IsaArgs},
     connection::{Connection, present},
     error::Error,
     experiment_file::{ExperimentFile, random_request_id},
@@ -31,13 +32,41 @@ use super::{
 /// Longest part of an experiment's name in a file's name, in characters.
 const FILE_NAME_CHARS_MAX: usize = 50;
 
-/// Starts a fleet, evolves, and stops the fleet, whatever happens.
+/// Run an experiment in this process, from file to champion.
+///
+/// Starts a coordinator and workers in this process, the same code as on a fleet,
+/// and follows the experiment to its end. An interrupt loses at most one
+/// generation: the same command continues the experiment.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct RunArgs {
+    #[command(flatten)]
+    pub experiment: ExperimentArgs,
+    /// Number of workers, each of one slot [default: the number of cores]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub workers: Option<u16>,
+    /// Directory of the database and the champion file.
+    #[arg(long, value_name = "DIR", default_value = "./swarm-data")]
+    pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub isa: IsaArgs,
+}
+
+const HELP: &str = "\
+With --output json it prints a line per generation (numbered from 0), then one
+with state, digest and champion.
+
+Examples:
+  swarmctl run experiment.json
+  swarmctl run experiment.json --generations 20 --seed 7 --data-dir /tmp/try";
+
+/// Starts a fleet, evolves, and stops the fleet even if evolving failed.
 pub async fn run(
     args: &RunArgs,
     mut progress: Progress,
     interrupt: CancellationToken,
 ) -> Result<(), Error> {
-    // Before anything is created.
+    // A bad file is refused before the data directory is created.
     let file = args.experiment.checked_file()?;
     let n_workers = args
         .workers
@@ -56,7 +85,7 @@ pub async fn run(
     progress.clear();
     if matches!(result, Err(Error::Interrupted(_))) {
         progress
-            .remark("stopping once the running episodes are done; interrupt again to stop at once");
+            .remark("stopping when the running items are done; interrupt again to stop at once");
     }
     fleet.shutdown().await;
     result
@@ -79,7 +108,7 @@ async fn evolve(
         resume_unfinished: true,
         ..file.request(&args.experiment.overrides(), random_request_id("run"))
     };
-    let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
+    let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
     let experiment = present(response.experiment)?;
     let remarks =
         file.warnings(&response.warnings).into_iter().chain(remarks(&experiment, &unfinished));
@@ -99,7 +128,7 @@ async fn evolve(
     let champion_file = champion_file.as_deref();
     progress.print(&if progress.is_json() {
         let champion_file = champion_file.map(Path::to_string_lossy);
-        let end = json::End::new(experiment, champion.as_ref());
+        let end = json::EndLine::new(experiment, champion.as_ref());
         json::line(&end.with_champion_file(champion_file.as_deref()))
     } else {
         format!(
@@ -108,10 +137,10 @@ async fn evolve(
             text::files(&args.data_dir, champion_file)
         )
     })?;
-    followed.verdict()
+    watch::success(experiment)
 }
 
-/// What is going on beside, or otherwise than, what was asked for.
+/// Remarks that the experiment is continued, and on other unfinished experiments.
 fn remarks(experiment: &Experiment, unfinished: &[Experiment]) -> Vec<String> {
     let mut remarks = Vec::new();
     let (this, others): (Vec<_>, Vec<_>) =
@@ -126,7 +155,7 @@ fn remarks(experiment: &Experiment, unfinished: &[Experiment]) -> Vec<String> {
     }
     for other in others {
         remarks.push(format!(
-            "{} is also unfinished in this data directory, and continues beside it",
+            "{} in this data directory is also unfinished, and continues at the same time",
             text::title(other)
         ));
     }
@@ -142,7 +171,7 @@ fn interrupted(data_dir: &Path) -> Error {
     ))
 }
 
-/// Writes the champion where people will look for it.
+/// Writes the champion to a file in the data directory; returns its path.
 fn write_champion(
     data_dir: &Path,
     experiment: &Experiment,

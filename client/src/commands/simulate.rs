@@ -1,5 +1,6 @@
-//! `swarmctl simulate`: single episodes, as evolution sees them.
+//! `swarmctl simulate`: single trials, the same as in evolution.
 
+mod args;
 pub mod genotype;
 mod trace;
 
@@ -9,7 +10,6 @@ use serde::Serialize;
 use sim_core::{EpisodeSummary, EvaluateError, Metrics};
 
 use crate::{
-    args::SimulateArgs,
     error::Error,
     json,
     progress::Progress,
@@ -17,10 +17,11 @@ use crate::{
     table::{Column, Screen, Table},
 };
 
+pub use self::args::SimulateArgs;
 use self::{genotype::Genotype, trace::Trace};
 
-/// Simulates the trials one after the other. The coordinator is asked for a champion
-/// if one is wanted.
+/// Simulates the trials one after the other. The coordinator is asked only if the
+/// genotype is the champion of one of its experiments.
 pub async fn simulate(
     settings: Settings,
     args: &SimulateArgs,
@@ -50,7 +51,7 @@ pub async fn simulate(
         trials.push(Trial { trial, summary });
     }
     let n_rows = trace.map(Trace::finish).transpose()?;
-    let simulation = Simulation {
+    let report = SimulationReport {
         name: &compiled.config.name,
         genotype: genotype.to_string(),
         seed: compiled.config.seed,
@@ -62,15 +63,15 @@ pub async fn simulate(
         trace_rows: n_rows,
     };
     progress.print(&if progress.is_json() {
-        json::document(&simulation)
+        json::document(&report)
     } else {
-        simulation.to_text(progress.screen())
+        report.to_text(progress.screen())
     })
 }
 
-/// What was simulated, and what came of it.
+/// What was simulated, with fitness and measures per trial.
 #[derive(Debug, Serialize)]
-struct Simulation<'a> {
+struct SimulationReport<'a> {
     name: &'a str,
     genotype: String,
     seed: u64,
@@ -91,7 +92,7 @@ struct Trial {
     summary: EpisodeSummary,
 }
 
-impl Simulation<'_> {
+impl SimulationReport<'_> {
     fn to_text(&self, screen: Screen) -> String {
         let Self { name, genotype, seed, generation, steps, .. } = self;
         let mut lines = vec![format!(

@@ -1,9 +1,10 @@
 //! `swarmctl submit`: gives an experiment to the coordinator.
 
+use clap::{Args, value_parser};
 use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::{
-    args::SubmitArgs,
+    args::ExperimentArgs,
     connection::{Connection, present},
     error::Error,
     experiment_file::random_request_id,
@@ -12,12 +13,36 @@ use crate::{
     text,
 };
 
-use super::watch;
+use super::{Remote, watch};
 
-/// Submits, and follows if asked to.
-pub async fn submit(
-    connection: &Connection,
+/// Submit an experiment to the coordinator.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct SubmitArgs {
+    #[command(flatten)]
+    pub experiment: ExperimentArgs,
+    /// Its share of the fleet relative to other experiments, 1 to 1000 [default: 100]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    pub priority: Option<u32>,
+    /// Follow the experiment to its end, as `swarmctl watch` does.
+    #[arg(long)]
+    pub watch: bool,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl submit experiment.json --watch
+  swarmctl submit experiment.json --priority 200 --output json | jq .id";
+
+impl Remote for SubmitArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        submit(&self, connection, progress).await
+    }
+}
+
+async fn submit(
     args: &SubmitArgs,
+    connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let file = args.experiment.checked_file()?;
@@ -25,7 +50,7 @@ pub async fn submit(
         priority: args.priority,
         ..file.request(&args.experiment.overrides(), random_request_id("submit"))
     };
-    let response = connection.submit(request).await.map_err(|error| file.blame(error))?;
+    let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
     if let Some(warnings) = file.warnings(&response.warnings) {
         progress.remark(&warnings);
     }
@@ -54,14 +79,15 @@ mod tests {
 
     use super::*;
     use crate::{
-        args::{ExperimentArgs, OutputFormat},
+        args::{OutputFormat, SeedArg},
         experiment_file::tests::quickstart,
         fake_coordinator::{FakeCoordinator, Script},
         progress::tests::Captured,
     };
 
     fn args(config: PathBuf) -> SubmitArgs {
-        let experiment = ExperimentArgs { config, generations: None, seed: Some(7) };
+        let seed = SeedArg { seed: Some(7) };
+        let experiment = ExperimentArgs { config, generations: None, seed };
         SubmitArgs { experiment, priority: Some(200), watch: false }
     }
 
@@ -75,7 +101,7 @@ mod tests {
         .await;
         let captured = Captured::default();
         let mut progress = captured.progress(OutputFormat::Json);
-        submit(&connection, &args(quickstart()), &mut progress).await.unwrap();
+        args(quickstart()).execute(&connection, &mut progress).await.unwrap();
         let submitted = fake.script(|script| script.submitted.clone());
         assert_eq!(submitted.len(), 3);
         assert_eq!(submitted[0].priority, Some(200));
@@ -95,7 +121,7 @@ mod tests {
         .await;
         let path = quickstart();
         let mut progress = Captured::default().progress(OutputFormat::Table);
-        let error = submit(&connection, &args(path.clone()), &mut progress).await.unwrap_err();
+        let error = args(path.clone()).execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         let path = path.display();
         assert_eq!(error.report().unwrap(), format!("{path}: line 1: a\n{path}: line 2: b"));
@@ -108,7 +134,7 @@ mod tests {
         let path = dir.path().join("bad.json");
         fs::write(&path, "{}").unwrap();
         let mut progress = Captured::default().progress(OutputFormat::Table);
-        let error = submit(&connection, &args(path), &mut progress).await.unwrap_err();
+        let error = args(path).execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         for key in ["topology", "algorithm", "world"] {
             assert!(error.report().unwrap().contains(key), "{}", error.report().unwrap());

@@ -1,8 +1,8 @@
-//! `swarmctl validate`: what is wrong with experiment files, without a
-//! coordinator.
+//! `swarmctl validate`: checks experiment files, without a coordinator.
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use experiment_file::{ConfigError, Problem};
 use serde::Serialize;
 
@@ -13,7 +13,17 @@ use crate::{
     progress::Progress,
 };
 
-/// Checks all files, good and bad; fails if there is a bad one.
+/// Check experiment files, without a coordinator.
+///
+/// Prints one line per valid file, and every problem of every invalid one.
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    /// The experiment files.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+}
+
+/// Checks all files and reports on each; fails if one is invalid.
 pub fn validate(files: &[PathBuf], progress: &mut Progress) -> Result<(), Error> {
     let mut reports = Vec::new();
     for file in files {
@@ -40,7 +50,7 @@ pub fn validate(files: &[PathBuf], progress: &mut Progress) -> Result<(), Error>
     }
 }
 
-/// What there is to say about a file.
+/// The problems and warnings of a file, and its summary if it is valid.
 #[derive(Debug, Serialize)]
 struct Report {
     file: String,
@@ -53,7 +63,7 @@ struct Report {
     summary: Option<Summary>,
 }
 
-/// A good file in brief.
+/// The main values of a valid file.
 #[derive(Debug, Serialize)]
 struct Summary {
     name: String,
@@ -109,7 +119,7 @@ impl std::fmt::Display for Summary {
     }
 }
 
-/// Problems as JSON; the core's type is for people.
+/// Problems as JSON.
 fn problems<S: serde::Serializer>(problems: &[Problem], serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
     struct Located<'a> {

@@ -2,11 +2,14 @@
 
 use std::time::Duration;
 
+use clap::Args;
 use swarm_proto::v1::{Event, Experiment, ExperimentState, GetChampionResponse, event::Kind};
 use tokio::time::{Instant, sleep};
 use tonic::Streaming;
 
+use super::Remote;
 use crate::{
+    args::ExperimentId,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
     error::{Error, is_transient, reason},
     json::{self, has_ended},
@@ -14,27 +17,46 @@ use crate::{
     text,
 };
 
-/// A stream that lasted so long was contact, even if nothing happened.
+/// A stream that lasted so long counts as contact with the coordinator, even if it
+/// brought no event.
 const LASTING: Duration = Duration::from_secs(5);
 
 /// An experiment that has ended.
 #[derive(Debug)]
 pub struct Followed {
     pub experiment: Experiment,
-    /// None if it ended before its first generation did.
+    /// None if the experiment ended before its first generation was complete.
     pub champion: Option<GetChampionResponse>,
     /// Best fitness of the first generation.
     pub first_best: Option<f64>,
 }
 
-impl Followed {
-    /// Completing is success, ending otherwise is not.
-    pub fn verdict(&self) -> Result<(), Error> {
-        verdict(&self.experiment)
+/// Follow an experiment from its first generation to its end.
+///
+/// Generations that are complete already are shown first. If the coordinator
+/// becomes unreachable, this tries for a minute to reach it again. Interrupting
+/// this command does not interrupt the experiment.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct WatchArgs {
+    #[command(flatten)]
+    experiment: ExperimentId,
+}
+
+const HELP: &str = "\
+With --output json it prints a line per generation (numbered from 0), then one
+with state, digest and champion.
+
+Example:
+  swarmctl watch 3 --output json | jq .best";
+
+impl Remote for WatchArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        watch(connection, self.experiment.id, progress).await
     }
 }
 
-/// `swarmctl watch`
+/// Follows an experiment to its end and prints how it ended.
 pub async fn watch(
     connection: &Connection,
     experiment_id: u64,
@@ -43,14 +65,14 @@ pub async fn watch(
     let followed = follow(connection, experiment_id, progress).await?;
     let Followed { experiment, champion, first_best } = &followed;
     progress.print(&if progress.is_json() {
-        json::line(&json::End::new(experiment, champion.as_ref()))
+        json::line(&json::EndLine::new(experiment, champion.as_ref()))
     } else {
         text::end(experiment, *first_best, champion.as_ref())
     })?;
-    followed.verdict()
+    success(experiment)
 }
 
-/// Shows an experiment's events, from the first to the last.
+/// Shows an experiment's events until it ends.
 pub async fn follow(
     connection: &Connection,
     experiment_id: u64,
@@ -69,8 +91,8 @@ pub async fn follow(
     Ok(Followed { experiment, champion, first_best })
 }
 
-/// Completing is success, ending otherwise is not.
-pub fn verdict(experiment: &Experiment) -> Result<(), Error> {
+/// Success if the experiment completed; fails if it failed or was cancelled.
+pub fn success(experiment: &Experiment) -> Result<(), Error> {
     let (id, reason) = (experiment.id, experiment.reason.clone());
     match experiment.state() {
         ExperimentState::Completed => Ok(()),
@@ -87,14 +109,14 @@ struct Follower<'a> {
 
 /// How a stream of events ended.
 enum StreamEnd {
-    /// With the experiment.
+    /// The experiment has ended.
     Final,
-    /// For this reason, which may pass.
+    /// For this reason, which may be transient.
     Broken(String),
 }
 
 impl Follower<'_> {
-    /// Returns the best fitness of the first generation, once all is over.
+    /// Returns the best fitness of the first generation once the experiment has ended.
     async fn run(mut self) -> Result<Option<f64>, Error> {
         let mut seen = Seen { next_sequence: 1, first_best: None, is_over: false };
         let mut backoff = backoff();
@@ -122,7 +144,7 @@ impl Follower<'_> {
             let now = Instant::now();
             let since = *unreachable_since.get_or_insert_with(|| {
                 self.progress.remark(&format!(
-                    "lost the coordinator ({reason}); trying for {} s to reach it again",
+                    "lost the connection to the coordinator ({reason}); trying to reconnect for {} s",
                     PATIENCE.as_secs()
                 ));
                 now
@@ -145,7 +167,9 @@ impl Follower<'_> {
                     self.show(present(response.event)?, seen)?;
                 }
                 Ok(None) if seen.is_over => return Ok(StreamEnd::Final),
-                Ok(None) => return Ok(StreamEnd::Broken("it ended the stream".into())),
+                Ok(None) => {
+                    return Ok(StreamEnd::Broken("the coordinator ended the stream".into()));
+                }
                 Err(status) if is_transient(&status) => {
                     return Ok(StreamEnd::Broken(reason(&status)));
                 }
@@ -171,14 +195,14 @@ impl Follower<'_> {
                 seen.is_over = has_ended(change.state());
             }
             Some(Kind::Notice(notice)) => self.progress.remark(&notice.message),
-            // A kind of event from the future.
+            // A kind of event that only newer versions know.
             None => {}
         }
         Ok(())
     }
 }
 
-/// What earlier streams have brought.
+/// What has been read from the streams so far.
 struct Seen {
     next_sequence: u64,
     first_best: Option<f64>,

@@ -1,9 +1,11 @@
-//! `swarmctl workers`: who computes.
+//! `swarmctl workers`: the connected workers.
 
+use clap::Args;
 use console::Style;
 use serde::Serialize;
-use swarm_proto::v1::Worker;
+use swarm_proto::v1::{ListWorkersRequest, Worker};
 
+use super::Remote;
 use crate::{
     clock,
     connection::Connection,
@@ -27,7 +29,7 @@ const CSV_KEYS: [&str; 11] = [
     "distrusted",
 ];
 
-/// A connected worker.
+/// A connected worker, as JSON and CSV have it.
 #[derive(Debug, Serialize)]
 struct Record<'a> {
     id: u64,
@@ -61,15 +63,30 @@ impl<'a> From<&'a Worker> for Record<'a> {
     }
 }
 
-/// Prints a table.
-pub async fn workers(connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-    let workers = connection.workers().await?;
-    let records: Vec<Record<'_>> = workers.iter().map(Into::into).collect();
-    let empty = format!(
-        "no worker is connected; start some with: worker --coordinator {}",
-        connection.address()
-    );
-    progress.print_table(&table(&workers, clock::unix_ms()), &CSV_KEYS, &records, &empty)
+/// List the connected workers.
+///
+/// Results per second and the idle share of the slots are those of the last minute.
+/// `items` is the number of items assigned to a worker. A distrusted worker has
+/// returned other bits than another worker for the same item; `--output wide` names
+/// the other one.
+#[derive(Debug, Args)]
+pub struct WorkersArgs {}
+
+impl Remote for WorkersArgs {
+    const HAS_TABLE: bool = true;
+
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let request = ListWorkersRequest {};
+        let response =
+            connection.call_fleet(async |client| client.list_workers(request).await).await?;
+        let workers = response.workers;
+        let records: Vec<Record<'_>> = workers.iter().map(Into::into).collect();
+        let empty = format!(
+            "no worker is connected; start some with: worker --coordinator {}",
+            connection.address()
+        );
+        progress.print_table(&table(&workers, clock::unix_ms()), &CSV_KEYS, &records, &empty)
+    }
 }
 
 fn table(workers: &[Worker], now_ms: u64) -> Table {

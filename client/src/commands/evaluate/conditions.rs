@@ -1,26 +1,29 @@
-//! Conditions: the experiment file as it is, and with something changed.
+//! Conditions: the experiment file as it is, and with changes.
 
 use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
 use sim_core::Simulation;
 
-use super::patch::{Change, Json};
+use super::{
+    EvaluateArgs,
+    patch::{Change, Json},
+};
 use crate::{
-    args::EvaluateArgs,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
     json,
 };
 
-/// Conditions of one evaluation.
+/// Most conditions of one evaluation.
 const CONDITIONS_MAX: usize = 64;
 
-/// Under what a genotype is evaluated.
+/// A variant of the experiment file under which a genotype is evaluated.
 #[derive(Debug, Clone)]
 pub struct Condition {
-    /// For tables and legends.
+    /// Name for tables and legends.
     pub name: String,
-    /// Beyond the nominal condition; of that one, beyond the experiment file.
+    /// Changes relative to the nominal condition; those of the nominal condition are
+    /// relative to the experiment file.
     pub changes: Vec<Change>,
     /// The experiment file, changed.
     pub config: ExperimentConfig,
@@ -28,15 +31,15 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Makes sure that the genotype fits.
+    /// Checks that the genotype has the length and range that the experiment demands.
     pub fn check(&self, genotype: &[f64]) -> Result<(), Error> {
         let checked = self.experiment.check_genotype(genotype);
         let misfit = |error| Error::Input(format!("the genotype does not fit: {error}"));
-        checked.map_err(|error| self.blame(misfit(error)))
+        checked.map_err(|error| self.locate(misfit(error)))
     }
 
-    /// A refusal of this condition says so.
-    pub fn blame(&self, error: Error) -> Error {
+    /// Names this condition in a refusal of it.
+    pub fn locate(&self, error: Error) -> Error {
         match error {
             Error::Input(problem) => Error::Input(format!("condition {}: {problem}", self.name)),
             error => error,
@@ -53,7 +56,7 @@ impl Condition {
 
 /// All conditions that the arguments ask for, the nominal one first.
 pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>, Error> {
-    let overrides = Overrides { steps: args.steps, ..Overrides::default() };
+    let overrides = Overrides { steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.compile(&overrides).map_err(|error| file.invalid(&error))?;
     let mut base = to_json(&compiled.config);
     let mut base_changes = Vec::new();
@@ -84,13 +87,13 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
     }
     for (index, condition) in conditions.iter().enumerate() {
         if conditions[..index].iter().any(|other| other.name == condition.name) {
-            return Err(Error::Input(format!("condition {} is there twice", condition.name)));
+            return Err(Error::Input(format!("condition {} is given twice", condition.name)));
         }
     }
     Ok(conditions)
 }
 
-/// What conditions are made from.
+/// The nominal condition, from which the others are made.
 struct Nominal {
     config: ExperimentConfig,
     base: Json,
@@ -116,7 +119,7 @@ impl Nominal {
         format!("world.objects.{}.{key}", self.evolvable())
     }
 
-    /// What stands at a key of the robots.
+    /// The value of a key of the robots' object.
     fn robots_have(&self, key: &str) -> Option<&Json> {
         self.base.get(["world", "objects", self.evolvable(), key])
     }
@@ -160,7 +163,7 @@ impl Nominal {
         Ok(vec![Change::new(path, Json::Object(params))])
     }
 
-    /// All robots lose a stimulus, beside what they have lost already.
+    /// Inhibits a stimulus in all robots, in addition to what is inhibited already.
     fn inhibition(&self, name: &str) -> Result<Vec<Change>, Error> {
         let stimuli = self.base.get(["topology", "stimuli"]).and_then(Json::object);
         let sensors: Vec<(&str, &str)> = stimuli
@@ -221,14 +224,14 @@ fn to_json(config: &ExperimentConfig) -> Json {
     Json::parse(&config.to_canonical_json())
 }
 
-fn read(whose: &str, file: &Json) -> Result<ExperimentConfig, Error> {
+fn read(owner: &str, file: &Json) -> Result<ExperimentConfig, Error> {
     match ExperimentConfig::from_json(&json::line(file), "", evolution::ALGORITHMS) {
         Ok((config, _)) => Ok(config),
-        Err(error) => Err(Error::Input(format!("{whose}: {}", problems(&error)))),
+        Err(error) => Err(Error::Input(format!("{owner}: {}", problems(&error)))),
     }
 }
 
-/// Lines of a file that nobody has written mean nothing.
+/// The problems without line numbers, which are not those of the user's file.
 fn problems(error: &ConfigError) -> String {
     let mut error = error.clone();
     error.problems.iter_mut().for_each(|problem| problem.line = None);

@@ -1,4 +1,4 @@
-//! The tables: one row per condition, step or trial, and measure.
+//! The CSV files: one row per condition, step or trial, and measure.
 
 use std::{fs, path::Path};
 
@@ -11,8 +11,8 @@ use super::{
 };
 use crate::error::Error;
 
-/// Statistics over the trials, for every so many steps and the last one; six
-/// significant digits.
+/// Writes steps.csv: statistics over the trials in every `every`-th step and the last
+/// one, with six significant digits.
 pub fn write_steps(
     dir: &Path,
     conditions: &[Condition],
@@ -46,8 +46,8 @@ pub fn write_steps(
     write_table(dir, "steps.csv", &header, &rows)
 }
 
-/// Every trial: fitness, and of each measure its mean over the steps and its last
-/// value; every digit.
+/// Writes trials.csv: per trial its fitness, and the mean over the steps and the last
+/// value of each measure, with every digit.
 pub fn write_trials(
     dir: &Path,
     conditions: &[Condition],

@@ -1,4 +1,4 @@
-//! What a coordinator has measured under one condition.
+//! The measures of all trials of one condition, requested from a coordinator.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::{
     error::{Error, is_transient},
 };
 
-/// An attempt that takes so long was contact.
+/// An attempt that lasted so long counts as contact with the coordinator.
 const LASTING: Duration = Duration::from_secs(10);
 
 /// All trials of a condition.
@@ -27,8 +27,9 @@ pub struct Measured {
 /// One episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
+    /// Fitness of the trial.
     pub fitness: f64,
-    /// Per step and measure; NaN where there is none.
+    /// Per step and measure; NaN where a measure has no value.
     values: Vec<f64>,
 }
 
@@ -38,7 +39,7 @@ impl Measured {
         self.trials[trial].values.iter().skip(metric).step_by(self.metrics.len()).copied()
     }
 
-    /// Those of a measure in one step, trial by trial, where there are some.
+    /// The values of a measure in one step, trial by trial, without missing ones.
     pub fn at_step(&self, step: usize, metric: usize) -> Vec<f64> {
         let place = step * self.metrics.len() + metric;
         let values = self.trials.iter().map(|trial| trial.values[place]);
@@ -54,8 +55,8 @@ impl Measured {
     }
 }
 
-/// Asks until there is an answer. A coordinator that goes away forgets what it was
-/// asked, so it is asked again, and answers the same.
+/// Sends the request until there is an answer. A coordinator that restarts forgets the
+/// request, so it is sent again, and gives the same answer.
 pub async fn ask(connection: &Connection, request: EvaluateRequest) -> Result<Measured, Error> {
     let mut backoff = backoff();
     let mut unreachable_since = None;
@@ -66,7 +67,8 @@ pub async fn ask(connection: &Connection, request: EvaluateRequest) -> Result<Me
             Err(status) => status,
         };
         let now = Instant::now();
-        // What counts is how long it has been away, not for how long it has worked.
+        // Patience is about how long the coordinator is unreachable, not about how long it
+        // computes.
         if now - asked > LASTING {
             backoff.reset();
             unreachable_since = None;
@@ -96,7 +98,7 @@ async fn once(
     Ok(checked(task, trials, request.trial_count))
 }
 
-/// Makes sure that all is there.
+/// Checks that the answer has all trials with all values.
 fn checked(
     task: Option<MeasuredTask>,
     trials: Vec<MeasuredTrial>,

@@ -1,11 +1,11 @@
-//! Changes of an experiment file: places in it, and new values.
+//! Changes of an experiment file: a path and a new value.
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// JSON whose objects keep the order of their keys: in experiment files it means
-/// something, and `serde_json`'s own lose it.
+/// JSON whose objects keep the order of their keys, which is the order of the genes in
+/// an experiment file; `serde_json`'s own objects lose it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Json {
@@ -15,12 +15,12 @@ pub enum Json {
 }
 
 impl Json {
-    /// Reads JSON, or takes the text as it is if it is none.
+    /// Reads JSON; text that is not JSON becomes a string.
     pub fn parse(text: &str) -> Self {
         serde_json::from_str(text).unwrap_or_else(|_| Self::Scalar(text.into()))
     }
 
-    /// What stands at the end of a path of keys.
+    /// The value at the end of a path of keys.
     pub fn get<'a>(&self, path: impl IntoIterator<Item = &'a str>) -> Option<&Self> {
         path.into_iter().try_fold(self, |place, key| place.object()?.get(key))
     }
@@ -44,13 +44,13 @@ impl From<u64> for Json {
     }
 }
 
-/// A place, and what shall stand there.
+/// A path in an experiment file and the value to put there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// Keys joined by dots, as in the messages about experiment files; elements of
     /// lists by their number.
     pub path: String,
-    /// Whatever the reader of experiment files makes of it.
+    /// The value, checked only when the changed file is read.
     pub value: Json,
 }
 
@@ -72,7 +72,7 @@ impl Change {
         Ok(Self { path: path.trim().to_owned(), value: Json::parse(value.trim()) })
     }
 
-    /// Puts the value in its place; objects on the way there are made.
+    /// Sets the value at its path; missing objects on the path are created.
     pub fn apply(&self, file: &mut Json) -> Result<(), String> {
         let mut place = file;
         for key in self.path.split('.') {

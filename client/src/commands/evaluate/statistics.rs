@@ -17,7 +17,7 @@ pub struct Quartiles {
 }
 
 impl Quartiles {
-    /// None of no values.
+    /// None if there are no values.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let last = values.len().checked_sub(1)?;
@@ -31,17 +31,17 @@ impl Quartiles {
     }
 }
 
-/// What a sample says of the mean of a quantity.
+/// Statistics of a sample, and confidence intervals of its mean.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
     /// Size of the sample.
     pub n: usize,
     pub mean: f64,
-    /// Of the sample, with n - 1 in its denominator; 0 for n = 1.
+    /// Standard deviation of the sample, with n - 1 in its denominator; 0 for n = 1.
     pub standard_deviation: f64,
-    /// mean -+ z s / sqrt(n).
+    /// 95 % confidence interval of the mean: mean -+ z s / sqrt(n).
     pub ci95: [f64; 2],
-    /// Of shares: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
+    /// Of shares only: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proportion_ci95: Option<[f64; 2]>,
     #[serde(flatten)]
@@ -51,7 +51,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// None of no values; `is_share`: whether they lie in [0, 1].
+    /// None if there are no values; `is_share`: whether they lie in [0, 1].
     pub fn of(values: &[f64], is_share: bool) -> Option<Self> {
         let quartiles = Quartiles::of(values.to_vec())?;
         let n = values.len() as f64;
@@ -80,7 +80,7 @@ impl fmt::Display for Estimate {
     }
 }
 
-/// None of no values.
+/// The mean; none if there are no values.
 pub fn mean(values: &[f64]) -> Option<f64> {
     let sum = values.iter().fold(0.0, |sum, value| sum + value);
     (!values.is_empty()).then(|| sum / values.len() as f64)

@@ -1,4 +1,4 @@
-//! The summary: what was evaluated, and estimates of what it is worth.
+//! The summary: what was evaluated, and estimates of its fitness and measures.
 
 use indexmap::IndexMap;
 use serde::Serialize;
@@ -31,7 +31,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The genotype under conditions, the nominal one first.
+    /// The subject of an evaluation; the first condition is the nominal one.
     pub fn new(conditions: &[Condition], genotype: &[f64]) -> Self {
         let config = &conditions[0].config;
         let algorithm = &config.algorithm;
@@ -61,26 +61,26 @@ pub struct Summary {
     pub conditions: Vec<ConditionSummary>,
 }
 
-/// One condition.
+/// The results of one condition.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConditionSummary {
     pub name: String,
-    /// Of the experiment file, changed; as the coordinator shows it.
+    /// Digest of the changed experiment file, as the coordinator shows it.
     config_digest: String,
     changes: IndexMap<String, Json>,
     robots: u32,
     pub fitness: Estimate,
-    /// Those that there are.
+    /// Per name, the measures that have a value.
     pub metrics: IndexMap<String, MetricSummary>,
 }
 
-/// One measure.
+/// The results of one measure.
 #[derive(Debug, Clone, Serialize)]
 pub struct MetricSummary {
     unit: &'static str,
-    /// Of its means over the steps.
+    /// Estimate of the mean over the steps.
     pub time_mean: Estimate,
-    /// Of its values in the last step.
+    /// Estimate of the value in the last step.
     #[serde(skip_serializing_if = "Option::is_none")]
     end: Option<Estimate>,
 }

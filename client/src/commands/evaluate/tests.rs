@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{measured::Measured, *};
 use crate::{
-    args::IsaArgs,
+    args::{IsaArgs, StepsArg},
     experiment_file::{Overrides, tests::shipped},
 };
 
@@ -16,7 +16,7 @@ fn args() -> EvaluateArgs {
         genotype: None,
         config: None,
         trials: 3,
-        steps: None,
+        steps: StepsArg::default(),
         robots: Vec::new(),
         perturb: Vec::new(),
         inhibit: Vec::new(),
@@ -114,7 +114,7 @@ fn changes_make_a_condition_or_all_of_them() {
     let args = EvaluateArgs {
         set: strings(&[path]),
         base: strings(&["world.height=2000; seed=7"]),
-        steps: Some(50),
+        steps: StepsArg { steps: Some(50) },
         ..args()
     };
     let conditions = conditions("light_follower_snes", &args).unwrap();
@@ -143,7 +143,7 @@ fn changes_make_a_condition_or_all_of_them() {
 fn a_condition_is_there_once() {
     let args = EvaluateArgs { robots: vec![5, 5], ..args() };
     let error = conditions("light_follower_snes", &args).unwrap_err();
-    assert_eq!(error.to_string(), "condition robots=5 is there twice");
+    assert_eq!(error.to_string(), "condition robots=5 is given twice");
 }
 
 /// Two trials of two steps; one of them never has the second measure.

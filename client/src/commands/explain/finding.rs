@@ -1,4 +1,4 @@
-//! What there is to say about an experiment's progress, and the next steps.
+//! The findings about an experiment's progress, with the next steps.
 
 use std::fmt;
 
@@ -7,19 +7,20 @@ use swarm_proto::v1::{Experiment, ExperimentState, ExplainExperimentResponse, Ro
 
 use crate::{clock, text};
 
-/// Items that a worker has for so long deserve a look at it.
+/// If a worker holds an item for longer, the findings suggest to look at the worker.
 const LONG_MS: u64 = 60_000;
 
-/// Something that explains what happens or does not.
+/// One cause of an experiment's progress, or of the lack of it.
 #[derive(Debug, PartialEq, Serialize)]
 pub struct Finding {
     kind: Kind,
+    /// The finding, in one sentence.
     what: String,
-    /// What to do about it; empty if nothing.
+    /// What the user can do; empty if nothing needs to be done.
     next_steps: Vec<String>,
 }
 
-/// What it is about, for programs.
+/// The kind of a finding, for programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -43,7 +44,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// All that explains an experiment's progress, the most decisive first.
+/// All findings about an experiment, the most important first.
 pub fn findings(
     experiment: &Experiment,
     answer: &ExplainExperimentResponse,
@@ -52,38 +53,38 @@ pub fn findings(
     let id = experiment.id;
     match experiment.state() {
         ExperimentState::Completed => {
-            let steps = [format!("its best: swarmctl champion {id}"), history(id)];
+            let steps = [format!("read its champion: swarmctl champion {id}"), history(id)];
             return vec![finding(Kind::Ended, "it has completed", steps)];
         }
         ExperimentState::Failed | ExperimentState::Cancelled => {
-            let steps = [format!("what happened: swarmctl logs {id}"), history(id)];
+            let steps = [format!("read its events: swarmctl logs {id}"), history(id)];
             return vec![finding(Kind::Ended, "it has ended early, for the reason above", steps)];
         }
         ExperimentState::Paused => {
-            let steps = [format!("let it go on: swarmctl resume {id}")];
+            let steps = [format!("continue it: swarmctl resume {id}")];
             return vec![finding(Kind::Paused, "it is paused, for the reason above", steps)];
         }
         ExperimentState::Running | ExperimentState::Unspecified => {}
     }
     if !answer.incompatible.is_empty() {
-        let what = format!("another version has to compute it: {}", answer.incompatible);
+        let what = format!("it can only be computed by another version: {}", answer.incompatible);
         let steps = [
             "finish it with a coordinator of that version".to_owned(),
-            format!("or give it up and submit it again: swarmctl cancel {id}"),
+            format!("or cancel it and submit it again: swarmctl cancel {id}"),
         ];
         return vec![finding(Kind::Incompatible, what, steps)];
     }
     let mut findings = Vec::new();
     if !answer.store_trouble.is_empty() {
         let what = format!("the coordinator cannot store anything: {}", answer.store_trouble);
-        let steps = ["make room on its disk; it tries again by itself".to_owned()];
+        let steps = ["free space on its disk; it tries again by itself".to_owned()];
         findings.push(finding(Kind::StoreTrouble, what, steps));
     }
     findings.extend(of_workers(answer, address));
     match &answer.round {
         Some(round) => findings.extend(of_round(id, round, answer)),
         None => {
-            let what = "between generations: what was judged is being learnt from and stored";
+            let what = "between generations: the algorithm is updated and the generation is stored";
             findings.push(finding(Kind::BetweenGenerations, what, []));
         }
     }
@@ -97,8 +98,8 @@ fn of_workers(answer: &ExplainExperimentResponse, address: &str) -> Option<Findi
     }
     if answer.workers_available == 0 {
         let workers = text::counted(answer.workers.into(), "connected worker");
-        let what = format!("none of {workers} is given work: all are leaving or distrusted");
-        let steps = ["see which: swarmctl workers --output wide".to_owned(), start];
+        let what = format!("none of {workers} gets items: all are leaving or distrusted");
+        let steps = ["see the reasons: swarmctl workers --output wide".to_owned(), start];
         return Some(finding(Kind::NoWorkersAvailable, what, steps));
     }
     None
@@ -109,11 +110,11 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
     if round.individuals_failing > 0 {
         let individuals = text::counted(round.individuals_failing.into(), "individual");
         let what = format!(
-            "{individuals} failed, or took a worker down; the third time ends the experiment"
+            "{individuals} failed, or ended a worker; the third failure of an individual ends the experiment"
         );
         let steps = [
-            "see who is there: swarmctl workers".to_owned(),
-            "see why: the coordinator's and the workers' logs".to_owned(),
+            "see the workers: swarmctl workers".to_owned(),
+            "read the logs of the coordinator and the workers".to_owned(),
         ];
         findings.push(finding(Kind::IndividualsFailing, what, steps));
     }
@@ -123,13 +124,13 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
     if is_served && round.items_queued > 0 && !answer.rivals.is_empty() {
         let ids: Vec<String> = answer.rivals.iter().take(10).map(u64::to_string).collect();
         let what = format!(
-            "queued beside {} with work to hand out: {}",
+            "queued beside {} with unassigned items: {}",
             text::counted(answer.rivals.len() as u64, "other experiment"),
             ids.join(", ")
         );
         let steps = [
             format!("raise its share: swarmctl priority {id} N"),
-            "or hold another back: swarmctl pause ID".to_owned(),
+            "or pause another experiment: swarmctl pause ID".to_owned(),
         ];
         findings.push(finding(Kind::Queued, what, steps));
     } else if round.items_queued == 0 && n_held > 0 {
@@ -138,9 +139,9 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
             holders => text::counted(holders.len() as u64, "worker"),
         };
         let what = format!(
-            "at the barrier: it waits for the last {} of {}, on {holders} for {held_for}",
+            "at the barrier: waiting for the last {} of {}, on {holders} for {held_for}",
             text::counted(n_held, "item"),
-            super::name(round),
+            super::batch_name(round),
         );
         findings.push(finding(Kind::Barrier, what, look(round)));
     } else if n_held > 0 {
@@ -154,24 +155,25 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
     findings
 }
 
-/// How long the oldest item has been with a worker.
+/// Time since the oldest assignment, in milliseconds.
 fn held_ms(round: &Round) -> u64 {
     round.held.iter().map(|held| held.held_ms).max().unwrap_or(0)
 }
 
-/// What to do about a round that takes long.
+/// What to do about a batch that takes long.
 fn look(round: &Round) -> Vec<String> {
     if held_ms(round) < LONG_MS {
         return Vec::new();
     }
     vec![
-        "long episodes may take so long; if not, look at the machines: swarmctl workers".into(),
-        "a worker that is stopped or killed loses nothing: others get its items".into(),
+        "long episodes can take so long; if these should not, check the workers: swarmctl workers"
+            .into(),
+        "stopping or killing a worker is safe: other workers get its items".into(),
     ]
 }
 
 fn history(id: u64) -> String {
-    format!("all generations: swarmctl history {id}")
+    format!("read all generations: swarmctl history {id}")
 }
 
 fn finding(
@@ -258,7 +260,7 @@ mod tests {
         let answer = ExplainExperimentResponse { round: Some(round), ..healthy() };
         let findings = findings(&running(), &answer, "http://h:1");
         assert_eq!(findings[0].kind, Kind::Barrier);
-        let text = "at the barrier: it waits for the last 2 items of generation 5, on worker w \
+        let text = "at the barrier: waiting for the last 2 items of generation 5, on worker w \
                     for 1 min 1 s";
         assert_eq!(findings[0].what, text);
         assert_eq!(findings[0].next_steps.len(), 2);

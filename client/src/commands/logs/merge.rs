@@ -1,4 +1,5 @@
-//! Events of many experiments in the order of time, one page of each in memory.
+//! Merges the events of many experiments in the order of time, with one page of each
+//! in memory.
 
 use std::{
     cmp::Reverse,
@@ -9,7 +10,8 @@ use swarm_proto::v1::{Event, Experiment};
 
 use crate::{connection::Connection, error::Error};
 
-/// Events to come, up to each experiment's last that was known at the beginning.
+/// The events to print, up to the last one of each experiment that was known at the
+/// start.
 pub struct Merge<'a> {
     connection: &'a Connection,
     sources: Vec<Source<'a>>,

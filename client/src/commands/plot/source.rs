@@ -1,4 +1,4 @@
-//! Where runs come from: a coordinator, or files that `history` has written.
+//! Reads runs to plot: from a coordinator, or from files that `history` wrote.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::{
     figure::Point,
 };
 
-/// What the command line names.
+/// A run that the command line names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Source {
     /// A number: an experiment of the coordinator.
@@ -30,14 +30,14 @@ impl Source {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub name: String,
-    /// The experiment's number, or the file.
-    pub origin: String,
-    pub points: Vec<Generation>,
+    /// "experiment 3", or the path of the file.
+    pub source: String,
+    pub points: Vec<GenerationFitness>,
 }
 
-/// What is drawn of a generation; a row of the file.
+/// The fitness of a generation; a row of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-pub struct Generation {
+pub struct GenerationFitness {
     generation: u64,
     // Empty in a file if it is not finite.
     best: Option<f64>,
@@ -45,15 +45,15 @@ pub struct Generation {
     min: Option<f64>,
 }
 
-impl Generation {
+impl GenerationFitness {
     /// Whether there is something to draw.
     fn is_finite(&self) -> bool {
         [self.best, self.mean, self.min].iter().all(|value| value.is_some_and(f64::is_finite))
     }
 }
 
-impl From<&Generation> for Point {
-    fn from(generation: &Generation) -> Self {
+impl From<&GenerationFitness> for Point {
+    fn from(generation: &GenerationFitness) -> Self {
         let value = |value: Option<f64>| value.expect("only finite ones are kept");
         Self {
             x: generation.generation as f64,
@@ -71,17 +71,17 @@ impl Run {
         let mut generations = Vec::new();
         for completed in connection.generations(experiment_id).await? {
             let summary = present(completed.summary)?;
-            generations.push(Generation {
+            generations.push(GenerationFitness {
                 generation: summary.generation,
                 best: Some(summary.best),
                 mean: Some(summary.mean),
                 min: Some(summary.min),
             });
         }
-        let origin = format!("experiment {experiment_id}");
-        match Self::new(experiment.name, origin.clone(), generations) {
+        let source = format!("experiment {experiment_id}");
+        match Self::new(experiment.name, source.clone(), generations) {
             run if run.points.is_empty() => {
-                Err(Error::NotFound(format!("{origin} has no complete generation yet")))
+                Err(Error::NotFound(format!("{source} has no complete generation yet")))
             }
             run => Ok(run),
         }
@@ -91,7 +91,7 @@ impl Run {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
         let mut reader = csv::Reader::from_path(path).map_err(|error| problem(plain(&error)))?;
-        let generations: Vec<Generation> =
+        let generations: Vec<GenerationFitness> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
                 problem(format!(
                     "{}; expected what `swarmctl history ID --output csv` writes",
@@ -109,13 +109,13 @@ impl Run {
         Ok(run)
     }
 
-    fn new(name: String, origin: String, mut points: Vec<Generation>) -> Self {
-        points.retain(Generation::is_finite);
-        Self { name, origin, points }
+    fn new(name: String, source: String, mut points: Vec<GenerationFitness>) -> Self {
+        points.retain(GenerationFitness::is_finite);
+        Self { name, source, points }
     }
 }
 
-/// Says what is wrong with a table, in one line.
+/// The error of a CSV file, in one line.
 pub fn plain(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Io(error) => error.to_string(),

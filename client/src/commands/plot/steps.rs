@@ -11,7 +11,7 @@ use crate::{
     figure::{Curve, Figure, Point},
 };
 
-/// What is drawn of a row of `steps.csv`.
+/// The columns of `steps.csv` that are drawn.
 #[derive(Debug, Deserialize)]
 struct Row {
     condition: String,

@@ -11,9 +11,9 @@ use crate::{
     progress::tests::Captured,
 };
 
-/// Where nobody is.
+/// An address without a server.
 const NOWHERE: &str = "http://127.0.0.1:1";
-/// As `history` writes them, with columns that nobody draws, and a fitness that is
+/// As `history` writes them, with columns that are not drawn, and a fitness that is
 /// not finite.
 const HISTORY: &str = "\
 experiment,generation,best,mean,min,digest
@@ -82,7 +82,7 @@ async fn the_band_goes_from_the_worst_to_the_best() {
 #[test]
 fn runs_of_the_same_name_are_told_apart() {
     let run =
-        |name: &str, origin: &str| Run { name: name.into(), origin: origin.into(), points: vec![] };
+        |name: &str, source: &str| Run { name: name.into(), source: source.into(), points: vec![] };
     let runs = [run("ga", "experiment 1"), run("snes", "experiment 2"), run("ga", "b/ga.csv")];
     assert_eq!(names(&runs), ["ga (experiment 1)", "snes", "ga (b/ga.csv)"]);
 }

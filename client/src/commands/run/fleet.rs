@@ -1,5 +1,5 @@
-//! A coordinator and workers inside this process, talking over loopback as any
-//! fleet does.
+//! A coordinator and workers inside this process, connected over loopback as in any
+//! fleet.
 
 use std::{net::Ipv4Addr, path::Path};
 
@@ -21,8 +21,8 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Starts a coordinator on a free port and workers of one slot each. Their tokens
-    /// keep the machine's other users out.
+    /// Starts a coordinator on a free port and workers of one slot each. Random tokens
+    /// exclude the machine's other users.
     pub async fn start(data_dir: &Path, n_workers: usize, isa: Isa) -> Result<Self, Error> {
         let listen = (Ipv4Addr::LOCALHOST, 0).into();
         let (client_token, worker_token) = (random_token(), random_token());
@@ -59,7 +59,7 @@ impl Fleet {
         format!("http://{}", self.coordinator.local_addr())
     }
 
-    /// Waits for the coordinator or a worker to end, which none should.
+    /// Waits for the coordinator or a worker to end unexpectedly.
     pub async fn failure(&mut self) -> Error {
         let ended = tokio::select! {
             error = self.coordinator.failure() => return Error::Internal(error.to_string()),
@@ -68,12 +68,12 @@ impl Fleet {
         let reason = match ended {
             Some(Ok(Err(error))) => error.to_string(),
             Some(Err(error)) => error.to_string(),
-            Some(Ok(Ok(()))) | None => "nobody asked it to".into(),
+            Some(Ok(Ok(()))) | None => "it ended by itself".into(),
         };
         Error::Internal(format!("a worker ended: {reason}"))
     }
 
-    /// Lets the workers finish what they are computing, then closes the store.
+    /// Lets the workers finish their items, then closes the store.
     pub async fn shutdown(self) {
         let Self { coordinator, mut workers, shutdown, .. } = self;
         shutdown.cancel();

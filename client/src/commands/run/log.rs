@@ -1,4 +1,4 @@
-//! Warnings of the services that `run` embeds, past the progress bar.
+//! The log of the coordinator and workers that `run` and `evaluate --local` start.
 
 use tracing_subscriber::filter::LevelFilter;
 

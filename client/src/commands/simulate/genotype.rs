@@ -1,20 +1,19 @@
-//! Where the genotype comes from: a file, a coordinator, or chance.
+//! The genotype to simulate: from a file, from a coordinator, or random.
 
 use std::{fmt, fs, path::Path};
 
 use numeric::random::{Purpose, Stream};
 use serde_json::Value;
 
-use crate::{
-    args::SimulateArgs, connection::Connection, error::Error, experiment_file::Compiled,
-    settings::Settings,
-};
+use super::SimulateArgs;
+use crate::{connection::Connection, error::Error, experiment_file::Compiled, settings::Settings};
 
-/// Genes and their origin, which is what it displays as.
+/// Genes, and where they come from, which is what this displays as.
 #[derive(Debug)]
 pub struct Genotype {
     pub genes: Vec<f64>,
-    origin: String,
+    /// Where the genes come from, for people: "champion of experiment 3".
+    source: String,
 }
 
 impl Genotype {
@@ -23,10 +22,10 @@ impl Genotype {
         let genes = read(path).map_err(|problem| {
             Error::Input(format!("no genotype in {}: {problem}", path.display()))
         })?;
-        Ok(Self { genes, origin: format!("genotype in {}", path.display()) })
+        Ok(Self { genes, source: format!("genotype in {}", path.display()) })
     }
 
-    /// The genotype that was asked for; nobody has checked it yet.
+    /// The genotype that the arguments name, not yet checked against the experiment.
     pub async fn choose(
         settings: Settings,
         args: &SimulateArgs,
@@ -37,16 +36,16 @@ impl Genotype {
         }
         if let Some(id) = args.experiment {
             let champion = Connection::open(settings)?.champion(id).await?;
-            let origin = format!("champion of experiment {id}");
-            return Ok(Self { genes: champion.genotype, origin });
+            let source = format!("champion of experiment {id}");
+            return Ok(Self { genes: champion.genotype, source });
         }
-        Ok(Self { genes: random(compiled), origin: "random genotype".into() })
+        Ok(Self { genes: random(compiled), source: "random genotype".into() })
     }
 }
 
 impl fmt::Display for Genotype {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.origin)
+        f.write_str(&self.source)
     }
 }
 

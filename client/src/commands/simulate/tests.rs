@@ -7,13 +7,13 @@ use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::*;
 use crate::{
-    args::{IsaArgs, OutputFormat},
+    args::{IsaArgs, OutputFormat, SeedArg, StepsArg},
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script},
     progress::tests::Captured,
 };
 
-/// Where nobody is.
+/// An address without a server.
 const NOWHERE: &str = "http://127.0.0.1:1";
 /// Genes of the quickstart.
 const N_GENES: usize = 424;
@@ -23,10 +23,10 @@ fn args() -> SimulateArgs {
         config: quickstart(),
         genotype: None,
         experiment: None,
-        seed: Some(7),
+        seed: SeedArg { seed: Some(7) },
         generation: 0,
         trials: Some(2),
-        steps: Some(20),
+        steps: StepsArg { steps: Some(20) },
         trace: None,
         isa: IsaArgs::default(),
     }
@@ -77,7 +77,10 @@ async fn seed_and_generation_choose_the_worlds() {
     let fitness = async |args: &SimulateArgs| run(NOWHERE, args).await.unwrap()["mean"].clone();
     let same = fitness(&first).await;
     assert_eq!(fitness(&first).await, same);
-    assert_ne!(fitness(&SimulateArgs { seed: Some(8), ..first.clone() }).await, same);
+    assert_ne!(
+        fitness(&SimulateArgs { seed: SeedArg { seed: Some(8) }, ..first.clone() }).await,
+        same
+    );
     assert_ne!(fitness(&SimulateArgs { generation: 1, ..first }).await, same);
 }
 
@@ -143,7 +146,7 @@ async fn a_trace_that_cannot_be_written_is_bad_input() {
 
 #[tokio::test]
 async fn a_file_with_problems_is_not_simulated() {
-    let args = SimulateArgs { steps: Some(u32::MAX), ..args() };
+    let args = SimulateArgs { steps: StepsArg { steps: Some(u32::MAX) }, ..args() };
     let error = run(NOWHERE, &args).await.unwrap_err();
     assert_eq!(error.exit_code(), 2);
     assert!(error.report().unwrap().contains("quickstart.json: algorithm.evaluation_steps: "));

@@ -1,4 +1,4 @@
-//! The trace: everything that every robot does, as CSV (RFC 4180).
+//! The trace: the state of every robot in every step, as CSV (RFC 4180).
 
 use std::{
     fs::File,
@@ -12,7 +12,7 @@ use sim_core::{Mode, ReceivedFrame, RobotRecord, StepRecord};
 
 use crate::error::Error;
 
-/// A CSV file in the making: one row per trial, step and robot.
+/// A CSV file being written: one row per trial, step and robot.
 pub struct Trace {
     path: PathBuf,
     rows: Rows<BufWriter<File>>,
@@ -28,14 +28,14 @@ impl Trace {
         Ok(Self { path: path.into(), rows, result: Ok(()) })
     }
 
-    /// Adds a step.
+    /// Adds the rows of a step.
     pub fn record(&mut self, trial: u32, record: &StepRecord) {
         if self.result.is_ok() {
             self.result = self.rows.write(trial, record);
         }
     }
 
-    /// Ends the file; returns its number of rows, or what went wrong at any time.
+    /// Finishes the file; returns its number of rows, or the first error of writing it.
     pub fn finish(self) -> Result<u64, Error> {
         let Self { path, mut rows, result } = self;
         let flushed = result.and_then(|()| rows.out.flush());
@@ -47,10 +47,10 @@ fn unwritable(path: &Path, error: &io::Error) -> Error {
     Error::Input(format!("cannot write {}: {error}", path.display()))
 }
 
-/// The rows, on their way to a writer.
+/// Formats the rows and writes them.
 struct Rows<W> {
     out: W,
-    /// Per robot, the object that it belongs to.
+    /// Per robot, the index of its object in `objects`.
     robots: Vec<usize>,
     objects: Vec<Object>,
     /// Names of all inputs of all controllers.
@@ -58,10 +58,10 @@ struct Rows<W> {
     n_rows: u64,
 }
 
-/// What its robots have in common.
+/// An object of the experiment file, and what its robots have in common.
 struct Object {
     name: String,
-    /// Per input of the controller, its place in `Rows::stimuli`.
+    /// Per input of the controller, its index in `Rows::stimuli`.
     inputs: Vec<usize>,
 }
 
@@ -134,7 +134,7 @@ impl<W: io::Write> Rows<W> {
     }
 }
 
-/// From the position to the received frame.
+/// The cells from the position to the received frame.
 fn robot_cells(robot: &RobotRecord) -> Vec<String> {
     let [right, left] = robot.wheels;
     let mut cells: Vec<String> =

@@ -1,12 +1,12 @@
-//! What is wrong when TLS, or the lack of it, keeps two programs apart.
+//! Explains connections that fail because of TLS, or of the lack of it.
 
 use std::{error::Error, io};
 
 use rustls::{AlertDescription, CertificateError, Error as TlsError};
 use tonic::{ConnectError, TimeoutExpired};
 
-/// What is wrong and what to do about it, if an error has to do with TLS.
-pub fn tls_trouble(error: &(dyn Error + 'static)) -> Option<String> {
+/// If an error is one of TLS: what is wrong and what to do about it.
+pub fn tls_diagnosis(error: &(dyn Error + 'static)) -> Option<String> {
     let mut next = Some(error);
     while let Some(error) = next {
         // An io::Error shows what it wraps, but not as its source.

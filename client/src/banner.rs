@@ -1,19 +1,19 @@
-//! What answers at an address where no coordinator does.
+//! The banner of a server that is not a coordinator, for the error message.
 
 use std::{io, time::Duration};
 
 use tokio::{net::TcpStream, time::timeout};
 
-/// Time for an answer.
+/// Time limit of the connection and the answer.
 const LIMIT: Duration = Duration::from_secs(1);
-/// Longest part of an answer that is shown.
+/// Number of bytes of the answer that are read.
 const SHOWN_BYTES_MAX: usize = 60;
-/// Anything that speaks HTTP/1 answers this; a coordinator closes the connection.
+/// A server that speaks HTTP/1 answers this; a coordinator closes the connection.
 const REQUEST: &[u8] = b"GET / HTTP/1.0\r\n\r\n";
 
-/// The beginning of what something else than a coordinator says at `HOST:PORT`;
-/// none if nobody is there, or says nothing that people could read.
-pub async fn greeting(address: &str) -> Option<String> {
+/// The first line that the server at `HOST:PORT` sends; none if no server is there, or
+/// if the line is not text, as that of a coordinator (HTTP/2) is not.
+pub async fn banner(address: &str) -> Option<String> {
     let answer = timeout(LIMIT, answer(address)).await.ok()?.ok()?;
     let line = answer.lines().next().filter(|line| !line.trim().is_empty())?;
     // HTTP/2 and TLS begin with control characters.
@@ -47,34 +47,34 @@ mod tests {
         fake_coordinator::{FakeCoordinator, Script},
     };
 
-    /// A service that says this to everyone.
-    fn service(words: &'static [u8]) -> String {
+    /// A service that sends this to every client.
+    fn service(banner: &'static [u8]) -> String {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap().to_string();
         thread::spawn(move || {
             for stream in listener.incoming() {
-                // Whoever has gone away does not want to know.
-                let _ = stream.and_then(|mut stream| stream.write_all(words));
+                // A client that is gone needs no answer.
+                let _ = stream.and_then(|mut stream| stream.write_all(banner));
             }
         });
         address
     }
 
     #[tokio::test]
-    async fn other_services_are_recognised_by_their_words() {
+    async fn other_services_are_recognised_by_their_banner() {
         let http = service(b"HTTP/1.0 404 Not Found\r\nServer: x\r\n\r\n");
-        assert_eq!(greeting(&http).await.unwrap(), "HTTP/1.0 404 Not Found");
-        assert_eq!(greeting(&service(b"220 mail ESMTP\r\n")).await.unwrap(), "220 mail ESMTP");
-        assert_eq!(greeting(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, None);
-        assert_eq!(greeting(&service(b"")).await, None);
-        assert_eq!(greeting("127.0.0.1:1").await, None);
+        assert_eq!(banner(&http).await.unwrap(), "HTTP/1.0 404 Not Found");
+        assert_eq!(banner(&service(b"220 mail ESMTP\r\n")).await.unwrap(), "220 mail ESMTP");
+        assert_eq!(banner(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, None);
+        assert_eq!(banner(&service(b"")).await, None);
+        assert_eq!(banner("127.0.0.1:1").await, None);
     }
 
     #[tokio::test]
     async fn a_coordinator_is_not_another_service() {
         let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
         let address = connection.address().strip_prefix("http://").unwrap();
-        assert_eq!(greeting(address).await, None);
+        assert_eq!(banner(address).await, None);
     }
 
     #[tokio::test]
@@ -84,8 +84,8 @@ mod tests {
             Connection::new(&format!("http://{address}"), &Credentials::default()).unwrap();
         let error = connection.with_patience(Duration::ZERO).experiments().await.unwrap_err();
         let expected = format!(
-            "what answers at http://{address} is not a coordinator: it says \"220 mail ESMTP\"; is \
-             this the right port?"
+            "the server at http://{address} is not a coordinator: it answers \"220 mail ESMTP\"; \
+             is this the right port?"
         );
         assert_eq!((error.exit_code(), error.to_string()), (9, expected));
     }

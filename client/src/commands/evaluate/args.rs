@@ -1,0 +1,81 @@
+//! The arguments of `swarmctl evaluate`.
+
+use std::path::PathBuf;
+
+use clap::{Args, value_parser};
+
+use crate::args::{IsaArgs, StepsArg};
+
+/// Evaluate a genotype: many trials under several conditions, every step measured.
+///
+/// The trials are the same for every genotype and condition, and no evolution uses
+/// them. The nominal condition, which is the experiment file as it is, is always
+/// evaluated; the options below add more conditions. Measures and their statistics
+/// are written to a directory: steps.csv, trials.csv, summary.json. The files are
+/// the same, byte by byte, on any fleet.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = HELP)]
+pub struct EvaluateArgs {
+    /// Number of the experiment whose champion and experiment file are used.
+    #[arg(required_unless_present = "genotype")]
+    pub id: Option<u64>,
+    /// File with the genotype, such as a champion file.
+    #[arg(long, value_name = "FILE", conflicts_with = "id", requires = "config")]
+    pub genotype: Option<PathBuf>,
+    /// The experiment file that goes with --genotype.
+    #[arg(long, value_name = "FILE", requires = "genotype")]
+    pub config: Option<PathBuf>,
+    /// Number of trials per condition.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = value_parser!(u32).range(1..=1000))]
+    pub trials: u32,
+    #[command(flatten)]
+    pub steps: StepsArg,
+    /// Add a condition for each of these numbers of robots. The world keeps its size.
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub robots: Vec<u32>,
+    /// Add a condition with a perturbation: leader_failure, topology_switch,
+    /// uncontrollable_rotation or stimuli_inhibition. Parameters that are not given
+    /// keep their defaults.
+    #[arg(long, value_name = "NAME[:KEY=VALUE,...]")]
+    pub perturb: Vec<String>,
+    /// Add a condition for each of these stimuli, in which the network gets zeros for
+    /// it. A stimulus is named by its key in the file or by its sensor, such as
+    /// wireless_receiver:msg or msg.
+    #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
+    pub inhibit: Vec<String>,
+    /// Add a condition with changes of the experiment file, separated by semicolons.
+    #[arg(long, value_name = "PATH=VALUE[;...]")]
+    pub set: Vec<String>,
+    /// Change the experiment file in all conditions, including the nominal one.
+    #[arg(long, value_name = "PATH=VALUE[;...]")]
+    pub base: Vec<String>,
+    /// Write every K-th step, and the last one, to steps.csv.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
+    pub every: u32,
+    /// Share of the fleet relative to experiments, 1 to 1000 [default: 100]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    pub priority: Option<u32>,
+    /// Compute in this process, with its own coordinator and workers, as `run` does.
+    #[arg(long)]
+    pub local: bool,
+    /// Number of workers of --local [default: the number of cores]
+    #[arg(long, value_name = "N", requires = "local", value_parser = value_parser!(u16).range(1..=1024))]
+    pub workers: Option<u16>,
+    /// Directory of the results; created if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+    #[command(flatten)]
+    pub isa: IsaArgs,
+}
+
+const HELP: &str = "\
+A PATH is a place in the experiment file, as its error messages name it; a VALUE
+is JSON, or text. docs/evaluation.md explains files, measures and statistics.
+
+Examples:
+  swarmctl evaluate 3 --robots 5,10,20,30,50 --to leader/scalability
+  swarmctl evaluate 3 --perturb leader_failure:time_to_failure=50 --to leader/fault
+  swarmctl evaluate 3 --inhibit msg,receiving_direction,state --to leader/stimuli
+  swarmctl evaluate 5 --steps 2000 --to light/path \\
+      --set world.objects.light_red.controller=light_rnd_pos_controller
+  swarmctl evaluate --genotype champion.json --config experiment.json --local --to out";
