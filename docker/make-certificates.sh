@@ -1,7 +1,7 @@
 #!/bin/sh
-# Makes an authority and the coordinator's certificate by it, for the names and IP
-# addresses under which other machines reach it, where docker/compose.tls.yaml looks
-# for them. An authority that is there already stays, the certificate is renewed.
+# Creates an authority, and the coordinator's certificate signed by it for the names and IP
+# addresses under which other machines reach the coordinator. docker/compose.tls.yaml reads
+# them. An existing authority stays, the certificate is renewed.
 set -eu
 cd "$(dirname "$0")"
 
@@ -16,8 +16,8 @@ for name in "$@"; do
     esac
 done
 
-# Nobody else can look into the directory; the containers' user, who gets single
-# files of it, can read those.
+# Only you can read the directory. Single files of it are mounted into containers, whose
+# user can read them.
 umask 077
 mkdir -p secrets
 for file in ca.pem coordinator.pem coordinator.key; do

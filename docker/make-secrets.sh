@@ -1,16 +1,15 @@
 #!/bin/sh
-# Makes the two tokens of a fleet, where docker/compose.yaml looks for them. What is
-# there already stays as it is.
+# Creates the two tokens of a fleet, which docker/compose.yaml reads. Existing ones stay.
 set -eu
 cd "$(dirname "$0")"
 
 command -v openssl >/dev/null || { echo "error: needs openssl, to draw random tokens" >&2; exit 1; }
-# Nobody else can look into the directory; the containers' user, who gets single
-# files of it, can read those.
+# Only you can read the directory. Single files of it are mounted into containers, whose
+# user can read them.
 umask 077
 mkdir -p secrets
 for token in client.token worker.token; do
-    # A fleet that was started without them has left empty directories.
+    # Docker creates empty directories in place of missing files.
     if [ -d "secrets/$token" ]; then rmdir "secrets/$token"; fi
     if [ ! -e "secrets/$token" ]; then
         openssl rand -hex 32 > "secrets/$token.new"
