@@ -39,6 +39,7 @@ mod record;
 mod senses;
 mod sensors;
 mod simulation;
+mod specified;
 mod swarm;
 #[cfg(test)]
 mod testing;
@@ -51,6 +52,7 @@ pub use numeric::{Isa, UnknownIsa, random::TrialSet};
 pub use output::Output;
 pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};
+pub use specified::{SpecifiedSimulation, panic_to_failure};
 pub use torus::Vec2;
 
 /// Identifies the function that this crate computes. Raise the number after the

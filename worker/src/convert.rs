@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use experiment_file::{ConfigError, ExperimentConfig, limits};
-use sim_core::{Isa, Output, Simulation, TrialSet};
+use experiment_file::limits;
+use sim_core::{Isa, Output, SpecifiedSimulation, TrialSet};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{self, work_request::Message},
@@ -26,40 +26,16 @@ const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) -> Evaluator {
     let compiled = OnceLock::new();
     Arc::new(move |assignment: &Assignment, keep_going: &dyn Fn() -> bool| {
-        let Computable { simulation, robot_steps }: &Computable =
-            compiled.get_or_init(|| compile(&config_json, isa)).as_ref().map_err(String::clone)?;
+        let simulation: &SpecifiedSimulation = compiled
+            .get_or_init(|| SpecifiedSimulation::compile(&config_json, isa))
+            .as_ref()
+            .map_err(String::clone)?;
         let Assignment { genotype, trial_set, trials, output, .. } = assignment;
-        let compute = match output {
-            Output::Fitness => Simulation::evaluate_while,
-            Output::Measures => Simulation::measure_while,
-        };
-        let computed = compute(simulation, genotype, *trial_set, trials.clone(), keep_going);
-        let computed = computed.map_err(|error| error.to_string())?;
+        let computed =
+            simulation.compute(genotype, *trial_set, trials.clone(), *output, keep_going)?;
         let n_episodes = computed.as_ref().map_or(0, |_| trials.len()) as u64;
-        activity.add_robot_steps(n_episodes * robot_steps);
+        activity.add_robot_steps(n_episodes * simulation.robot_steps_per_episode());
         Ok(computed)
-    })
-}
-
-/// A compiled specification.
-struct Computable {
-    simulation: Simulation,
-    /// Environment steps of an episode, summed over robots.
-    robot_steps: u64,
-}
-
-fn compile(config_json: &str, isa: Isa) -> Result<Computable, String> {
-    computable(config_json, isa)
-        .map_err(|error| format!("the experiment's specification is not valid: {error}"))
-}
-
-fn computable(config_json: &str, isa: Isa) -> Result<Computable, ConfigError> {
-    let config = ExperimentConfig::from_canonical_json(config_json)?;
-    let simulation = Simulation::compile(&config)?.with_isa(isa);
-    let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
-    Ok(Computable {
-        simulation,
-        robot_steps: n_robots * u64::from(config.algorithm.evaluation_steps),
     })
 }
 

@@ -2,10 +2,8 @@
 //! that talk to the network.
 
 use std::{
-    any::Any,
     collections::VecDeque,
     fmt, io, mem,
-    panic::{self, AssertUnwindSafe},
     sync::{
         Arc, Condvar, Mutex, MutexGuard,
         atomic::{AtomicBool, Ordering::Relaxed},
@@ -14,6 +12,7 @@ use std::{
     time::Instant,
 };
 
+use sim_core::panic_to_failure;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 
@@ -190,8 +189,7 @@ fn compute(
 ) -> Option<ItemResult> {
     let started = Instant::now();
     let keep_going = || !cancelled.load(Relaxed);
-    let outcome = panic::catch_unwind(AssertUnwindSafe(|| evaluator(assignment, &keep_going)))
-        .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))));
+    let outcome = panic_to_failure(|| evaluator(assignment, &keep_going));
     let duration = started.elapsed();
     let made = match &outcome {
         Ok(Some(_)) => Made::Fitness { n_episodes: assignment.trials.len() as u64 },
@@ -201,14 +199,6 @@ fn compute(
     activity.on_item(made, duration);
     let &Assignment { id: assignment_id, output, .. } = assignment;
     Some(ItemResult { assignment_id, output, outcome: outcome.transpose()?, duration })
-}
-
-fn panic_message(payload: &(dyn Any + Send)) -> &str {
-    payload
-        .downcast_ref::<&str>()
-        .copied()
-        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("no message")
 }
 
 #[cfg(test)]

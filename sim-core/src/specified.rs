@@ -1,0 +1,95 @@
+//! An experiment as one process hands it to another: from the text of its
+//! specification to numbers, or to a failure in words.
+//!
+//! The simulation is deterministic, and so are its failures: every process that
+//! computes an item by way of this module fails it with the same words, to the byte.
+
+use std::{
+    any::Any,
+    ops::Range,
+    panic::{self, AssertUnwindSafe},
+};
+
+use experiment_file::{ConfigError, ExperimentConfig};
+use numeric::{Isa, random::TrialSet};
+
+use crate::{Output, Simulation};
+
+/// A simulation that is compiled from text and says in words why it fails.
+#[derive(Debug)]
+pub struct SpecifiedSimulation {
+    simulation: Simulation,
+    robot_steps: u64,
+}
+
+impl SpecifiedSimulation {
+    /// Compiles a specification, which is an experiment in its canonical form. The
+    /// error is the failure of every item of that experiment.
+    pub fn compile(config_json: &str, isa: Isa) -> Result<Self, String> {
+        Self::try_compile(config_json, isa)
+            .map_err(|error| format!("the experiment's specification is not valid: {error}"))
+    }
+
+    fn try_compile(config_json: &str, isa: Isa) -> Result<Self, ConfigError> {
+        let config = ExperimentConfig::from_canonical_json(config_json)?;
+        let simulation = Simulation::compile(&config)?.with_isa(isa);
+        let n_robots: u64 = config.robots().map(|(_, robot)| u64::from(robot.num_instances)).sum();
+        let robot_steps = n_robots * u64::from(config.algorithm.evaluation_steps);
+        Ok(Self { simulation, robot_steps })
+    }
+
+    /// Environment steps of an episode, summed over robots.
+    pub fn robot_steps_per_episode(&self) -> u64 {
+        self.robot_steps
+    }
+
+    /// Computes the trials of one genotype: [`Simulation::evaluate_while`] or
+    /// [`Simulation::measure_while`], as `output` says. None if `keep_going` stopped it.
+    pub fn compute(
+        &self,
+        genotype: &[f64],
+        trial_set: TrialSet,
+        trials: Range<u32>,
+        output: Output,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, String> {
+        let Self { simulation, .. } = self;
+        let computed = match output {
+            Output::Fitness => simulation.evaluate_while(genotype, trial_set, trials, keep_going),
+            Output::Measures => simulation.measure_while(genotype, trial_set, trials, keep_going),
+        };
+        computed.map_err(|error| error.to_string())
+    }
+}
+
+/// Runs a computation; a panic is its failure, not the process's.
+pub fn panic_to_failure<T>(computation: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    panic::catch_unwind(AssertUnwindSafe(computation))
+        .unwrap_or_else(|payload| Err(format!("panicked: {}", panic_message(&*payload))))
+}
+
+fn panic_message(payload: &(dyn Any + Send)) -> &str {
+    payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_are_words() {
+        let invalid = SpecifiedSimulation::compile("{}", Isa::best()).unwrap_err();
+        let start = "the experiment's specification is not valid: ";
+        assert!(invalid.starts_with(start), "{invalid}");
+        let fail = |message: &'static str| panic_to_failure::<()>(move || panic!("{message}"));
+        assert_eq!(fail("no such robot"), Err("panicked: no such robot".into()));
+        let robot = 1;
+        let formatted = panic_to_failure::<()>(|| panic!("robot {robot}"));
+        assert_eq!(formatted, Err("panicked: robot 1".into()));
+        assert_eq!(panic_to_failure(|| Ok(3)), Ok(3));
+    }
+}
