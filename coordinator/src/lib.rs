@@ -8,6 +8,7 @@
 //! - `rpc`: gRPC services, translation only
 //! - `listener`, `gate`: who gets as far as the services
 //! - `health_check`: asks another process's coordinator how it is
+//! - [`referee`]: evaluates single items, in a process of its own
 //! - [`metrics`]: what can be scraped
 //! - [`limits`]: every bound on what the network can ask for
 
@@ -24,6 +25,7 @@ pub mod limits;
 mod listener;
 pub mod metrics;
 pub mod priority;
+pub mod referee;
 mod rpc;
 mod server;
 mod shared_store;

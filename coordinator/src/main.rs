@@ -5,8 +5,8 @@ mod access_args;
 use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use access_args::{AccessArgs, AccessInputError};
-use clap::Parser;
-use coordinator::{Coordinator, CoordinatorConfig, StartError, health_check};
+use clap::{Parser, Subcommand};
+use coordinator::{Coordinator, CoordinatorConfig, StartError, health_check, referee};
 use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -18,7 +18,7 @@ use tracing::{error, info};
 /// at the next start, unfinished experiments continue from their last completed
 /// generation, with the same bits.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version, after_help = EXIT_CODES, disable_help_subcommand = true)]
 struct Args {
     /// Address to listen on. An address other than loopback requires tokens, and TLS or
     /// --plaintext.
@@ -45,6 +45,19 @@ struct Args {
     metrics: MetricsArgs,
     #[command(flatten)]
     log: LogArgs,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Evaluate items for a coordinator, which starts this process itself.
+    ///
+    /// Reads requests from standard input and writes answers to standard output, in a
+    /// format of this release; ends when standard input does. No option of the
+    /// coordinator matters to it.
+    #[command(hide = true)]
+    Referee,
 }
 
 const EXIT_CODES: &str = "\
@@ -61,17 +74,35 @@ fn fraction(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&fraction) { Ok(fraction) } else { Err("not within 0..=1".to_owned()) }
 }
 
-#[tokio::main]
-async fn main() -> ExitCode {
+fn main() -> ExitCode {
     let args = Args::parse();
+    match args.command {
+        Some(Command::Referee) => evaluate_items(),
+        None => run(&args),
+    }
+}
+
+/// The process of a referee.
+fn evaluate_items() -> ExitCode {
+    match referee::serve_stdio() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[tokio::main]
+async fn run(args: &Args) -> ExitCode {
     if args.health_check {
-        return report_health(&args).await;
+        return report_health(args).await;
     }
     if let Err(error) = args.log.init() {
         eprintln!("error: {error}");
         return ExitCode::from(2);
     }
-    match serve(&args).await {
+    match serve(args).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error!("{error}");

@@ -43,6 +43,12 @@ pub enum Command {
     Plot(plot::PlotArgs),
     Bench(bench::BenchArgs),
     Completions(completions::CompletionsArgs),
+    /// Evaluate items for the coordinator of `run`, which starts this process itself.
+    ///
+    /// Reads requests from standard input and writes answers to standard output, in a
+    /// format of this release; ends when standard input ends.
+    #[command(hide = true)]
+    Referee,
 }
 
 /// The arguments of a command that sends requests to a coordinator and does nothing
@@ -121,6 +127,10 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
         Command::Completions(args) => return completions::completions(args.shell, &mut progress),
+        Command::Referee => {
+            return coordinator::referee::serve_stdio()
+                .map_err(|error| Error::Internal(error.to_string()));
+        }
         // These start a coordinator and workers, and stop them when interrupted.
         Command::Run(args) => return run::run(&args, progress, interrupt::token()?).await,
         Command::Evaluate(args) => {

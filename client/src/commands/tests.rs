@@ -151,8 +151,8 @@ async fn transcript(script: Script, lines: &[&str]) -> String {
 fn the_manual() {
     let mut swarmctl = Args::command().term_width(80);
     swarmctl.build();
-    let names: Vec<String> =
-        swarmctl.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    let shown = swarmctl.get_subcommands().filter(|command| !command.is_hide_set());
+    let names: Vec<String> = shown.map(|command| command.get_name().to_owned()).collect();
     let mut pages = vec![swarmctl.render_long_help().to_string()];
     for name in names.iter().filter(|name| *name != "help") {
         let command = swarmctl.find_subcommand_mut(name).unwrap();

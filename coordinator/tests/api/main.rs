@@ -5,4 +5,5 @@ mod engine;
 mod health_check;
 mod hostile_clients;
 mod hostile_workers;
+mod referee;
 mod simulated_fleet;

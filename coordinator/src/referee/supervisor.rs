@@ -1,0 +1,114 @@
+//! Starts the referee process when there is an item, and ends it when there is none.
+
+use std::{
+    sync::{Arc, Mutex, MutexGuard, Weak},
+    time::{Duration, Instant},
+};
+
+use tokio::{task::JoinSet, time::sleep};
+
+use super::{RefereeProgram, RefereeRequest, RefereeStats, Verdict, process::Process};
+use crate::clock;
+
+/// Evaluates items in a process of its own, one at a time. Clones share the process;
+/// when the last one is dropped, it is killed.
+#[derive(Debug, Clone)]
+pub struct Referee {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    program: RefereeProgram,
+    idle_time: Duration,
+    /// Locked while there is an item: the others wait here, first come, first served.
+    state: tokio::sync::Mutex<State>,
+    stats: Mutex<RefereeStats>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// None before the first item, after a death, and after a time without items.
+    process: Option<Process>,
+    /// Ends the process in a while.
+    idle_timer: JoinSet<()>,
+}
+
+impl Referee {
+    /// Starts nothing yet. `idle_time`: how long the process is kept without an item.
+    pub fn new(program: RefereeProgram, idle_time: Duration) -> Self {
+        let (state, stats) = Default::default();
+        Self { shared: Arc::new(Shared { program, idle_time, state, stats }) }
+    }
+
+    /// Evaluates an item, after those that were asked for before it; the caller limits
+    /// how many these are, and how long it waits: items may take minutes. Dropping the
+    /// future forgets the item, and kills the process if it is computing it.
+    pub async fn evaluate(&self, request: &RefereeRequest) -> Verdict {
+        let Shared { program, idle_time, state, .. } = &*self.shared;
+        let mut state = state.lock().await;
+        state.idle_timer = JoinSet::new();
+        let busy = BusyTime { shared: &self.shared, since: clock::now() };
+        // Taken out, so that it is killed if this future is dropped.
+        let process = match state.process.take_if(|process| process.is_alive()) {
+            Some(process) => Ok(process),
+            None => Process::start(program).await,
+        };
+        let (verdict, process) = match process {
+            Ok(process) => process.evaluate(request).await,
+            Err(reason) => (Verdict::Unavailable(reason), None),
+        };
+        drop(busy);
+        if process.is_some() {
+            let shared = Arc::downgrade(&self.shared);
+            state.idle_timer.spawn(end_idle(shared, *idle_time));
+        }
+        state.process = process;
+        self.shared.count(&verdict);
+        verdict
+    }
+
+    /// What has been done so far.
+    pub fn stats(&self) -> RefereeStats {
+        *self.shared.stats()
+    }
+}
+
+impl Shared {
+    fn stats(&self) -> MutexGuard<'_, RefereeStats> {
+        self.stats.lock().expect("nothing panics while it holds the statistics")
+    }
+
+    fn count(&self, verdict: &Verdict) {
+        let mut stats = self.stats();
+        *match verdict {
+            Verdict::Values(_) => &mut stats.n_values,
+            Verdict::Failed(_) => &mut stats.n_failed,
+            Verdict::Died(_) => &mut stats.n_died,
+            Verdict::Unavailable(_) => &mut stats.n_unavailable,
+        } += 1;
+    }
+}
+
+/// Counts, when it is dropped, the time that has passed since.
+struct BusyTime<'a> {
+    shared: &'a Shared,
+    since: Instant,
+}
+
+impl Drop for BusyTime<'_> {
+    fn drop(&mut self) {
+        self.shared.stats().busy += clock::now().saturating_duration_since(self.since);
+    }
+}
+
+/// Waits, then ends the process, unless it is aborted because there is an item.
+async fn end_idle(shared: Weak<Shared>, idle_time: Duration) {
+    sleep(idle_time).await;
+    let Some(shared) = shared.upgrade() else { return };
+    let process = shared.state.lock().await.process.take();
+    drop(shared);
+    if let Some(process) = process {
+        process.end().await;
+    }
+}
