@@ -8,6 +8,7 @@ mod problems;
 mod reference;
 mod schema;
 mod shipped;
+mod validator;
 mod values;
 
 use evolution::ALGORITHMS;

@@ -1,20 +1,16 @@
 //! The schema and the reader agree, as far as a schema can.
 
-use jsonschema::Validator;
 use serde_json::{Value, json};
 
 use super::generator::{Dice, damage, experiment};
 use super::shipped::shipped;
+use super::validator::{is_valid, problems};
 use super::{BASE, edited, read};
 use evolution::ALGORITHMS;
 use experiment_file::json_schema;
 
-fn validator() -> Validator {
-    jsonschema::draft202012::new(&json_schema(ALGORITHMS)).unwrap()
-}
-
-fn problems(validator: &Validator, file: &Value) -> Vec<String> {
-    validator.iter_errors(file).map(|error| error.to_string()).collect()
+fn schema() -> Value {
+    json_schema(ALGORITHMS)
 }
 
 fn base(from: &str, to: &str) -> Value {
@@ -23,20 +19,20 @@ fn base(from: &str, to: &str) -> Value {
 
 #[test]
 fn shipped_files_and_their_canonical_forms_fit_the_schema() {
-    let validator = validator();
+    let schema = schema();
     for (stem, text) in shipped() {
         let canonical = super::accept(&text).to_canonical_json();
         for text in [text, canonical] {
             let file = serde_json::from_str(&text).unwrap();
-            assert_eq!(problems(&validator, &file), [""; 0], "{stem}");
+            assert_eq!(problems(&schema, &file), [""; 0], "{stem}");
         }
     }
 }
 
 #[test]
 fn unknown_keys_missing_keys_and_wrong_types_do_not_fit_the_schema() {
-    let validator = validator();
-    assert!(validator.is_valid(&serde_json::from_str(BASE).unwrap()));
+    let schema = schema();
+    assert!(is_valid(&schema, &serde_json::from_str(BASE).unwrap()));
     for (from, to) in [
         (r#""name": "base","#, r#""nane": "base","#),
         (r#""generations": 10,"#, ""),
@@ -60,14 +56,14 @@ fn unknown_keys_missing_keys_and_wrong_types_do_not_fit_the_schema() {
         (r#""values": [[500, 500]]"#, r#""value": [[500, 500]]"#),
         (r#""affected_robots": 2"#, r#""affected_robots": "some""#),
     ] {
-        assert!(!validator.is_valid(&base(from, to)), "{to}");
+        assert!(!is_valid(&schema, &base(from, to)), "{to}");
     }
 }
 
 /// Whatever the reader accepts fits; so what does not fit is refused.
 #[test]
 fn what_the_reader_accepts_fits_the_schema() {
-    let validator = validator();
+    let schema = schema();
     let (mut n_refused_by_both, mut n_refused_by_reader) = (0, 0);
     for index in 0..4_000 {
         let mut dice = Dice::new(index);
@@ -76,10 +72,10 @@ fn what_the_reader_accepts_fits_the_schema() {
             damage(&mut dice, &mut file);
         }
         match read(&file.to_string()) {
-            Ok(_) => assert_eq!(problems(&validator, &file), [""; 0], "{file}"),
+            Ok(_) => assert_eq!(problems(&schema, &file), [""; 0], "{file}"),
             Err(_) => {
                 n_refused_by_reader += 1;
-                n_refused_by_both += u32::from(!validator.is_valid(&file));
+                n_refused_by_both += u32::from(!is_valid(&schema, &file));
             }
         }
     }

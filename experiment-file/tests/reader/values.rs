@@ -1,5 +1,6 @@
 //! What a right file means: defaults, alternatives, the canonical form.
 
+use super::validator::is_valid;
 use super::{BASE, accept, defaults, edited, read};
 use evolution::ALGORITHMS;
 use experiment_file::{
@@ -196,7 +197,7 @@ fn a_file_may_name_its_schema() {
     let text = edited(name, r#""$schema": "experiment.schema.json", "name": "base","#);
     assert_eq!(accept(&text), accept(BASE));
     let file: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert!(jsonschema::is_valid(&json_schema(ALGORITHMS), &file));
+    assert!(is_valid(&json_schema(ALGORITHMS), &file));
 }
 
 #[test]
