@@ -1,7 +1,6 @@
 //! The neural network's structure: what is the same for all genotypes.
 
 pub(crate) mod connections;
-mod ctrnn;
 pub(crate) mod decoding;
 pub(crate) mod dynamics;
 mod json;

@@ -1,13 +1,15 @@
 //! Networks at work: which implementation each neuron model has.
 //!
 //! To add a model: describe it in `experiment-file` (its module `neuron`), implement
-//! [`Dynamics`] in a file beside `ctrnn`, and add an arm to [`compile`].
+//! [`Dynamics`] in a module beside `ctrnn`, and add an arm to [`compile`].
+
+mod ctrnn;
 
 use std::fmt;
 
-use super::ctrnn::Ctrnn;
 use super::{Network, Phenotype};
 use crate::lanes::Lanes;
+use ctrnn::Ctrnn;
 use experiment_file::NeuronModel;
 use numeric::Isa;
 

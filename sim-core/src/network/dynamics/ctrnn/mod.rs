@@ -20,10 +20,10 @@
 mod kernel;
 mod squash;
 
-use super::connections::Source;
-use super::dynamics::Dynamics;
-use super::{Network, Phenotype};
+use super::Dynamics;
 use crate::lanes::Lanes;
+use crate::network::connections::Source;
+use crate::network::{Network, Phenotype};
 use experiment_file::Activation;
 use kernel::{Chunk, Coupling, Kernel, Pair};
 use numeric::Isa;
