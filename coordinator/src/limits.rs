@@ -6,7 +6,7 @@
 
 use std::time::Duration;
 
-use swarm_proto::ITEMS_PER_SLOT_MAX;
+use swarm_proto::{ITEMS_PER_SLOT_MAX, SLOTS_MAX};
 
 /// Connections at the same time: every worker and every call of a client on one
 /// of its own. More wait in the system's queue.
@@ -39,10 +39,6 @@ pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 
 /// Time for a new worker's stream to say `Hello`.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-/// Slots of one worker.
-pub const SLOTS_MAX: u32 = 4096;
-/// Bytes of a worker's name, and of its version.
-pub const NAME_LEN_MAX: usize = 128;
 /// Results in one message: as many as the largest worker can hold items. On the
 /// wire an empty result takes two bytes, in memory fifty.
 pub const RESULTS_PER_MESSAGE_MAX: usize = ITEMS_PER_SLOT_MAX * SLOTS_MAX as usize;

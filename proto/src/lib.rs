@@ -1,4 +1,5 @@
-//! The wire protocol: generated from `swarm/v1/*.proto`, and nothing else.
+//! The wire protocol: generated from `swarm/v1/*.proto`, and the
+//! limits that both sides keep.
 
 /// Package `swarm.v1`.
 // Generated code keeps its own style.
@@ -13,6 +14,12 @@ pub const PROTOCOL_VERSION: u32 = v1::ProtocolVersion::Current as u32;
 
 /// Most items per slot that a worker is given before it has answered any.
 pub const ITEMS_PER_SLOT_MAX: usize = 16;
+
+/// Most slots of a worker.
+pub const SLOTS_MAX: u32 = 4096;
+
+/// Most bytes of a worker's name, and of its version.
+pub const WORKER_NAME_LEN_MAX: usize = 128;
 
 /// The encoded descriptors of the package, for gRPC reflection.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/swarm.v1.bin"));

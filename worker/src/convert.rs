@@ -12,9 +12,9 @@ use swarm_proto::{
 
 use crate::{
     WorkerConfig,
-    activity::Activity,
     assignment::{Assignment, ItemResult, JobId},
     pool::Evaluator,
+    stats::Stats,
 };
 
 /// Numbers in one message of several results: 4 MiB.
@@ -22,8 +22,8 @@ const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 
 /// Makes a specification computable. It is compiled once, by the slot that computes
 /// its first assignment; a specification that does not compile fails each of them.
-/// `activity`: where robots' steps are counted.
-pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) -> Evaluator {
+/// `stats`: where robots' steps are counted.
+pub(crate) fn evaluator(config_json: String, isa: Isa, stats: Arc<Stats>) -> Evaluator {
     let compiled = OnceLock::new();
     Arc::new(move |assignment: &Assignment, keep_going: &dyn Fn() -> bool| {
         let simulation: &SpecifiedSimulation = compiled
@@ -34,7 +34,7 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, activity: Arc<Activity>) 
         let computed =
             simulation.compute(genotype, *trial_set, trials.clone(), *output, keep_going)?;
         let n_episodes = computed.as_ref().map_or(0, |_| trials.len()) as u64;
-        activity.add_robot_steps(n_episodes * simulation.robot_steps_per_episode());
+        stats.add_robot_steps(n_episodes * simulation.robot_steps_per_episode());
         Ok(computed)
     })
 }

@@ -3,7 +3,6 @@
 //!
 //! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
 
-mod activity;
 mod assignment;
 mod backoff;
 mod convert;
@@ -11,18 +10,20 @@ pub mod metrics;
 mod pool;
 mod session;
 mod session_file;
+mod stats;
 
 use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use sim_core::Isa;
+use swarm_proto::{SLOTS_MAX, WORKER_NAME_LEN_MAX};
 use swarm_transport::{Credentials, Link, LinkError};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
 pub use crate::{
-    activity::{Activity, ActivityFigures},
     backoff::Backoff,
     session_file::{Unhealthy, health_check},
+    stats::{Stats, StatsSnapshot},
 };
 use crate::{
     pool::{Evaluator, Pool},
@@ -30,18 +31,12 @@ use crate::{
     session_file::SessionFile,
 };
 
-/// Most items that a worker computes at the same time.
-pub const SLOTS_MAX: usize = 4096;
-
-/// Longest name of a worker, in bytes.
-pub const NAME_BYTES_MAX: usize = 128;
-
 /// How to be a worker, and whose.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
     /// Where the coordinator listens, such as `http://127.0.0.1:7700`.
     pub coordinator: String,
-    /// Name for logs, 1 to [`NAME_BYTES_MAX`] bytes.
+    /// Name for logs, 1 to [`WORKER_NAME_LEN_MAX`] bytes.
     pub name: String,
     /// Number of items computed at the same time, each on a thread of its own,
     /// 1 to [`SLOTS_MAX`].
@@ -55,8 +50,8 @@ pub struct WorkerConfig {
     pub credentials: Credentials,
     /// Vector instructions to compute with. They decide how fast it is, and no bit.
     pub isa: Isa,
-    /// Where what it does can be seen.
-    pub activity: Arc<Activity>,
+    /// Counts what it does.
+    pub stats: Arc<Stats>,
     /// Where [`health_check`] looks whether there is a session with the coordinator.
     pub session_file: Option<PathBuf>,
 }
@@ -72,7 +67,7 @@ impl WorkerConfig {
             retry_delay_max: Duration::from_secs(10),
             credentials: Credentials::default(),
             isa: Isa::best(),
-            activity: Arc::default(),
+            stats: Arc::default(),
             session_file: None,
         }
     }
@@ -87,7 +82,7 @@ pub enum WorkerError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// A name that the protocol cannot carry. Fix the input.
-    #[error("a worker's name has 1 to {NAME_BYTES_MAX} bytes, this one has {0}")]
+    #[error("a worker's name has 1 to {WORKER_NAME_LEN_MAX} bytes, this one has {0}")]
     Name(usize),
     /// A number of slots that the protocol does not allow. Fix the input.
     #[error("a worker has 1 to {SLOTS_MAX} slots, not {0}")]
@@ -141,8 +136,8 @@ impl WorkerError {
 /// A coordinator that is not up, or goes away, is tried again without end, after
 /// random delays that grow.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
-    let (isa, activity) = (config.isa, Arc::clone(&config.activity));
-    let evaluator = move |config_json| convert::evaluator(config_json, isa, Arc::clone(&activity));
+    let (isa, stats) = (config.isa, Arc::clone(&config.stats));
+    let evaluator = move |config_json| convert::evaluator(config_json, isa, Arc::clone(&stats));
     run_with(config, shutdown, evaluator).await
 }
 
@@ -154,8 +149,8 @@ async fn run_with(
 ) -> Result<(), WorkerError> {
     let link = link(&config)?;
     let session_file = session_file(&config)?;
-    let activity = &config.activity;
-    let pool = Pool::start(config.slots, Arc::clone(activity))?;
+    let stats = &config.stats;
+    let pool = Pool::start(config.slots, Arc::clone(stats))?;
     // 0 means that it is not known.
     let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
@@ -167,7 +162,7 @@ async fn run_with(
         };
         let (what, reason) = match opened {
             Ok(session) => {
-                activity.on_connected();
+                stats.on_connected();
                 info!(
                     coordinator = config.coordinator,
                     name = config.name,
@@ -184,7 +179,7 @@ async fn run_with(
                         file.during(&who, session).await
                     }
                 };
-                activity.on_disconnected();
+                stats.on_disconnected();
                 // What is left was assigned on this stream: it is not ours any more.
                 pool.cancel(|_| true);
                 match ended {
@@ -204,11 +199,11 @@ async fn run_with(
                 return Err(WorkerError::Denied { address: config.coordinator, refusal });
             }
             Err(OpenError::Refused(reason)) => {
-                activity.on_connection_failed();
+                stats.on_connection_failed();
                 ("refused", reason)
             }
             Err(OpenError::Unreachable(reason)) => {
-                activity.on_connection_failed();
+                stats.on_connection_failed();
                 ("cannot connect", reason)
             }
         };
@@ -238,10 +233,10 @@ fn session_file(config: &WorkerConfig) -> Result<Option<SessionFile>, WorkerErro
 
 /// Checks the configuration and describes the connection.
 fn link(config: &WorkerConfig) -> Result<Link, WorkerError> {
-    if !(1..=NAME_BYTES_MAX).contains(&config.name.len()) {
+    if !(1..=WORKER_NAME_LEN_MAX).contains(&config.name.len()) {
         return Err(WorkerError::Name(config.name.len()));
     }
-    if !(1..=SLOTS_MAX).contains(&config.slots) {
+    if !(1..=SLOTS_MAX as usize).contains(&config.slots) {
         return Err(WorkerError::Slots(config.slots));
     }
     let mut link = Link::new(&config.coordinator, &config.credentials)?;

@@ -116,8 +116,8 @@ async fn main() -> ExitCode {
             }
         };
         let identity = metrics::Identity { name: config.name.clone(), slots, isa };
-        let activity = Arc::clone(&config.activity);
-        let scrape = move || ready(Some(metrics::scrape(&identity, &activity.figures())));
+        let stats = Arc::clone(&config.stats);
+        let scrape = move || ready(Some(metrics::scrape(&identity, &stats.snapshot())));
         tokio::spawn(endpoint.serve(scrape));
     }
     match worker::run(config, shutdown).await {

@@ -4,7 +4,7 @@
 use sim_core::Isa;
 use swarm_telemetry::{Metric, Scrape, metrics};
 
-use crate::activity::ActivityFigures;
+use crate::stats::StatsSnapshot;
 
 metrics! {
     BUILD = Gauge "swarm_worker_build_info" ["version", "fingerprint", "isa"]
@@ -45,28 +45,28 @@ pub struct Identity {
 }
 
 /// All values in Prometheus' text format.
-pub fn scrape(identity: &Identity, figures: &ActivityFigures) -> String {
+pub fn scrape(identity: &Identity, snapshot: &StatsSnapshot) -> String {
     let mut scrape = Scrape::default();
     let isa = identity.isa.to_string();
     scrape.put(&BUILD, &[env!("CARGO_PKG_VERSION"), sim_core::FINGERPRINT, &isa], 1.0);
     scrape.put(&NAME, &[&identity.name], 1.0);
     for (outcome, n_items) in [
-        ("computed", figures.n_items_computed),
-        ("failed", figures.n_items_failed),
-        ("dropped", figures.n_items_dropped),
+        ("computed", snapshot.n_items_computed),
+        ("failed", snapshot.n_items_failed),
+        ("dropped", snapshot.n_items_dropped),
     ] {
         scrape.put(&ITEMS, &[outcome], n_items as f64);
     }
     let values: [(&Metric, f64); 9] = [
-        (&CONNECTED, if figures.is_connected { 1.0 } else { 0.0 }),
-        (&CONNECTIONS, figures.n_connections as f64),
-        (&CONNECTIONS_FAILED, figures.n_connections_failed as f64),
+        (&CONNECTED, if snapshot.is_connected { 1.0 } else { 0.0 }),
+        (&CONNECTIONS, snapshot.n_connections as f64),
+        (&CONNECTIONS_FAILED, snapshot.n_connections_failed as f64),
         (&SLOTS, identity.slots as f64),
-        (&SLOTS_BUSY, figures.n_slots_busy as f64),
-        (&ITEMS_QUEUED, figures.n_items_queued as f64),
-        (&EPISODES, figures.n_episodes as f64),
-        (&ROBOT_STEPS, figures.n_robot_steps as f64),
-        (&BUSY, figures.busy.as_secs_f64()),
+        (&SLOTS_BUSY, snapshot.n_slots_busy as f64),
+        (&ITEMS_QUEUED, snapshot.n_items_queued as f64),
+        (&EPISODES, snapshot.n_episodes as f64),
+        (&ROBOT_STEPS, snapshot.n_robot_steps as f64),
+        (&BUSY, snapshot.busy.as_secs_f64()),
     ];
     for (metric, value) in values {
         scrape.put(metric, &[], value);

@@ -17,8 +17,8 @@ use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
 
 use crate::{
-    activity::{Activity, Made},
     assignment::{Assignment, ItemResult},
+    stats::{Made, Stats},
 };
 
 /// Computes the numbers of an assignment, or says why it cannot. Asks now and then
@@ -47,7 +47,7 @@ pub(crate) struct Pool {
 struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
-    activity: Arc<Activity>,
+    stats: Arc<Stats>,
 }
 
 #[derive(Default)]
@@ -74,10 +74,10 @@ impl fmt::Debug for Queue {
 
 impl Pool {
     /// Starts `slots` threads; the queue holds as many assignments as the coordinator may
-    /// send ahead. `activity`: where they are counted.
-    pub(crate) fn start(slots: usize, activity: Arc<Activity>) -> io::Result<Self> {
+    /// send ahead. `stats`: where they are counted.
+    pub(crate) fn start(slots: usize, stats: Arc<Stats>) -> io::Result<Self> {
         let (queue, changed) = (Mutex::default(), Condvar::new());
-        let shared = Arc::new(Shared { queue, changed, activity });
+        let shared = Arc::new(Shared { queue, changed, stats });
         // Built first, so that the threads that did start end if one does not.
         let pool = Self { shared, capacity: ITEMS_PER_SLOT_MAX * slots };
         for slot in 0..slots {
@@ -143,13 +143,13 @@ impl Shared {
 
     /// The queue has changed.
     fn report(&self, queue: &Queue) {
-        self.activity.on_queue(queue.waiting.len(), queue.running.len());
+        self.stats.on_queue(queue.waiting.len(), queue.running.len());
     }
 
     /// A slot's life.
     fn work(&self) {
         while let Some((running, evaluator, reply)) = self.next() {
-            let result = compute(&running, &evaluator, &self.activity);
+            let result = compute(&running, &evaluator, &self.stats);
             let mut queue = self.lock();
             queue.running.retain(|other| !Arc::ptr_eq(other, &running));
             self.report(&queue);
@@ -185,7 +185,7 @@ impl Shared {
 fn compute(
     Running { assignment, cancelled }: &Running,
     evaluator: &Evaluator,
-    activity: &Activity,
+    stats: &Stats,
 ) -> Option<ItemResult> {
     let started = Instant::now();
     let keep_going = || !cancelled.load(Relaxed);
@@ -196,7 +196,7 @@ fn compute(
         Ok(None) => Made::Nothing,
         Err(_) => Made::Failure,
     };
-    activity.on_item(made, duration);
+    stats.on_item(made, duration);
     let &Assignment { id: assignment_id, output, .. } = assignment;
     Some(ItemResult { assignment_id, output, outcome: outcome.transpose()?, duration })
 }
@@ -329,16 +329,16 @@ mod tests {
 
     #[test]
     fn what_becomes_of_items_is_counted() {
-        let activity = Arc::new(Activity::default());
-        let pool = Pool::start(1, Arc::clone(&activity)).unwrap();
+        let stats = Arc::new(Stats::default());
+        let pool = Pool::start(1, Arc::clone(&stats)).unwrap();
         let (reply, results) = mpsc::channel(4);
         let (evaluator, starts, permit) = gated();
         submit(&pool, queued(0, &evaluator, &reply));
         assert_eq!(starts.recv(), Ok(0));
         submit(&pool, queued(1, &evaluator, &reply));
         submit(&pool, queued(2, &evaluator, &reply));
-        let figures = activity.figures();
-        assert_eq!((figures.n_slots_busy, figures.n_items_queued), (1, 2));
+        let snapshot = stats.snapshot();
+        assert_eq!((snapshot.n_slots_busy, snapshot.n_items_queued), (1, 2));
         pool.cancel(|assignment| assignment.job == JobId::Experiment(0));
         let failing: Evaluator = Arc::new(|_, _| Err("no such robot".into()));
         submit(&pool, queued(3, &failing, &reply));
@@ -346,13 +346,13 @@ mod tests {
         permit.send(()).unwrap();
         drop(reply);
         assert_eq!(collect(results).len(), 2);
-        let figures = activity.figures();
-        assert_eq!(figures.n_items_computed, 1);
-        assert_eq!(figures.n_items_failed, 1);
-        assert_eq!(figures.n_items_dropped, 1, "of two, one had not begun");
-        assert_eq!(figures.n_episodes, 1);
-        assert_eq!((figures.n_slots_busy, figures.n_items_queued), (0, 0));
-        assert!(figures.busy > Duration::ZERO);
+        let snapshot = stats.snapshot();
+        assert_eq!(snapshot.n_items_computed, 1);
+        assert_eq!(snapshot.n_items_failed, 1);
+        assert_eq!(snapshot.n_items_dropped, 1, "of two, one had not begun");
+        assert_eq!(snapshot.n_episodes, 1);
+        assert_eq!((snapshot.n_slots_busy, snapshot.n_items_queued), (0, 0));
+        assert!(snapshot.busy > Duration::ZERO);
     }
 
     #[test]

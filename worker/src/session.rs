@@ -88,13 +88,13 @@ impl Session {
         let client = WorkerServiceClient::with_interceptor(channel, link.bearer.clone())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        timeout(WELCOME_TIMEOUT, Self::greet(client, config, process_id))
+        timeout(WELCOME_TIMEOUT, Self::introduce(client, config, process_id))
             .await
-            .map_err(|_| OpenError::Refused("no answer to the greeting".into()))?
+            .map_err(|_| OpenError::Refused("no answer to Hello".into()))?
             .map_err(|status| refusal(&status, link))
     }
 
-    async fn greet(
+    async fn introduce(
         mut client: WorkerServiceClient<InterceptedService<Channel, Bearer>>,
         config: &WorkerConfig,
         process_id: u64,
@@ -195,7 +195,7 @@ impl Session {
 
 const STOPPED_READING: &str = "the coordinator stopped reading";
 
-/// What a session knows: specifications, and results to be sent.
+/// The state of a session: specifications, and results to be sent.
 struct SessionState<'a> {
     pool: &'a Pool,
     evaluator: &'a (dyn Fn(String) -> Evaluator + Sync),

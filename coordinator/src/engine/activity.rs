@@ -1,5 +1,4 @@
-//! What becomes of an experiment's work at a moment: for whoever wonders why
-//! nothing happens.
+//! What a job is doing at a moment, and what it waits for.
 
 use std::time::{Duration, Instant};
 
@@ -9,46 +8,47 @@ use crate::ids::{JobId, WorkerId};
 
 use super::{Engine, batch::BatchInProgress};
 
-/// What the engine knows of an experiment and of who could compute it.
+/// What a job is doing, and which workers could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JobActivity {
-    /// What is being judged; none between rounds, and once it has ended.
+    /// The batch that is being computed; none between batches, and once the job has
+    /// ended.
     pub batch: Option<BatchActivity>,
     /// Connected workers.
     pub n_workers: usize,
     /// Those that are given work.
     pub n_workers_available: usize,
-    /// Other experiments with items that no worker has.
+    /// Other jobs with items that no worker has.
     pub rivals: Vec<JobId>,
 }
 
-/// A generation, or held-out trials, being judged.
+/// A batch that is being computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchActivity {
     /// Which worlds and noise its trials meet.
     pub trial_set: TrialSet,
     /// Trials, over all individuals.
     pub n_episodes: usize,
-    /// Those whose fitness is not known.
+    /// Trials without a result.
     pub n_episodes_left: usize,
     /// Items that no worker has.
     pub n_items_queued: usize,
     /// Individuals that failed, or took a worker down.
     pub n_individuals_failing: usize,
-    /// Who has the other items.
+    /// The workers that have the other items.
     pub held: Vec<HeldItems>,
     /// Time since it began.
     pub running_for: Duration,
 }
 
-/// Items of a round in a worker's hands.
+/// Items of a batch that a worker has.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldItems {
-    /// Whose.
+    /// The worker.
     pub worker: WorkerId,
     /// What it calls itself.
     pub name: String,
-    /// How many.
+    /// Number of items.
     pub n_items: usize,
     /// Time since it was given the oldest of them.
     pub held_for: Duration,
@@ -57,7 +57,7 @@ pub struct HeldItems {
 }
 
 impl Engine {
-    /// What becomes of an experiment's work.
+    /// What a job is doing; without a batch if the engine does not know it.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
         let batch = self.jobs.get(&id).and_then(|work| work.batch.as_ref());
         let rivals = self.jobs.iter().filter(|(other, work)| **other != id && work.is_ready());

@@ -1,5 +1,5 @@
-//! A generation that is being judged: what is known, who computes the rest, what
-//! waits.
+//! A batch that is being computed: the results so far, who computes the rest, and
+//! what waits.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -19,7 +19,7 @@ use super::{
 
 /// Copies of a trial that are computed at the same time, at most.
 const COPIES_MAX: usize = 3;
-/// Who judged a trial that nobody has judged.
+/// Stands for the worker of a trial without a result.
 const NOBODY: WorkerId = WorkerId(0);
 
 /// Numbers of one item of measures, half a MiB: results travel in messages of
@@ -37,7 +37,7 @@ fn trials_per_item(batch: &Batch) -> u32 {
     n_trials.max(1)
 }
 
-/// Somebody who computes a task.
+/// A worker that computes an item.
 #[derive(Debug, Clone)]
 struct Holder {
     assignment_id: AssignmentId,
@@ -49,37 +49,39 @@ struct Holder {
 /// Two workers' results for the same trial differ.
 #[derive(Debug, Clone)]
 pub struct Disagreement {
-    /// Whose result came first.
+    /// The worker whose result came first.
     pub first: WorkerId,
     /// Its name.
     pub first_name: Arc<str>,
-    /// About which trial.
+    /// The trial.
     pub trial: u32,
-    /// What the first said, and the second.
+    /// A number of the first result, and the number at its place in the second.
     pub values: (f64, f64),
 }
 
-/// A generation that is being judged.
+/// A batch that is being computed.
 #[derive(Debug)]
 pub struct BatchInProgress {
     batch: Batch,
     /// What no worker has been given, in the order in which it will be.
     queue: VecDeque<Item>,
     n_trials_queued: usize,
-    /// By individual.
+    /// The workers that compute items, by individual.
     holders: BTreeMap<u32, Vec<Holder>>,
-    /// Running work that nobody duplicates, by when it should be done.
+    /// Assignments that are not duplicated yet, by when they should be done.
     pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
-    /// Work that takes workers down.
+    /// Items that failed, or took workers down.
     pub failures: FailureRecord,
-    /// Per individual and trial, [`Shape::n_values`] each; meaningless until judged.
+    /// Per individual the numbers of all trials, [`Batch::values_per_trial`] each;
+    /// meaningless for trials without a result.
     values: Vec<Vec<f64>>,
-    /// Whose result it is; per individual and trial, in one row.
+    /// The worker that computed each trial, or [`NOBODY`]: one row of all individuals
+    /// with all their trials.
     evaluated_by: Vec<WorkerId>,
-    /// Of everybody among `judges`.
+    /// The names of all workers in `evaluated_by`.
     names: BTreeMap<WorkerId, Arc<str>>,
     n_trials_left: usize,
-    /// Work that another worker has to confirm, by the name of the first.
+    /// Items that another worker has to confirm, by the name of the first.
     audits: BTreeMap<Arc<str>, VecDeque<Item>>,
     n_audits_in_flight: usize,
     n_audited: usize,
@@ -138,7 +140,7 @@ impl BatchInProgress {
         SharedGenotype { population: Arc::clone(&self.batch.genotypes), individual }
     }
 
-    /// Queues all that is not judged; nobody computes anything any more.
+    /// Queues everything without a result, as no worker computes it any more.
     pub fn requeue_all(&mut self) {
         self.holders.clear();
         self.n_audits_in_flight = 0;
@@ -153,7 +155,7 @@ impl BatchInProgress {
         }
     }
 
-    /// Forgets all results: whoever gave them cannot be trusted.
+    /// Forgets all results: those who gave them cannot be trusted.
     pub fn start_over(&mut self) {
         self.evaluated_by.fill(NOBODY);
         self.names.clear();
@@ -171,8 +173,8 @@ impl BatchInProgress {
         self.evaluated_by[self.index(individual, trial)] != NOBODY
     }
 
-    /// The parts of a task that are neither judged, nor computed by anybody, nor
-    /// held back.
+    /// The parts of an item that have no result, that no worker computes, and that
+    /// are not held back.
     pub fn unclaimed(&self, item: &Item) -> Vec<Item> {
         self.parts(item, |trial| {
             !self.is_known(item.individual, trial)
@@ -181,7 +183,7 @@ impl BatchInProgress {
         })
     }
 
-    /// The part of a task that may be computed once more.
+    /// The first part of an item that may be given to another worker as well.
     pub fn duplicable(&self, item: &Item) -> Option<Item> {
         let parts = self.parts(item, |trial| {
             !self.is_known(item.individual, trial)
@@ -195,7 +197,7 @@ impl BatchInProgress {
         holders.filter(|holder| !holder.is_audit && holder.trials.contains(&trial)).count()
     }
 
-    /// The contiguous parts of a task whose trials satisfy a condition.
+    /// The contiguous parts of an item whose trials satisfy a condition.
     fn parts(&self, item: &Item, is_in: impl Fn(u32) -> bool) -> Vec<Item> {
         let individual = item.individual;
         let mut parts: Vec<Item> = Vec::new();
@@ -208,13 +210,13 @@ impl BatchInProgress {
         parts
     }
 
-    /// Queues work before all other.
+    /// Queues an item before all others.
     pub fn push_front(&mut self, item: Item) {
         self.n_trials_queued += item.trials.len();
         self.queue.push_front(item);
     }
 
-    /// Takes the first `n_trials` trials at most of the first task in the queue.
+    /// Takes at most `n_trials` trials, the first ones, of the first item in the queue.
     pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
         let mut item = self.queue.pop_front()?;
         self.n_trials_queued -= item.trials.len();
@@ -236,12 +238,12 @@ impl BatchInProgress {
         n_trials * self.batch.values_per_trial
     }
 
-    /// Tasks that wait.
+    /// Items in the queue.
     pub fn n_queued(&self) -> usize {
         self.queue.len()
     }
 
-    /// Items that wait: tasks, and audits.
+    /// Items that wait for a worker, audits included.
     pub fn n_waiting(&self) -> usize {
         self.queue.len() + self.audits.values().map(VecDeque::len).sum::<usize>()
     }
@@ -282,7 +284,7 @@ impl BatchInProgress {
         !self.queue.is_empty() || !self.audits.is_empty()
     }
 
-    /// A worker has been given a task.
+    /// An item has been given to a worker.
     pub fn add_holder(
         &mut self,
         assignment_id: AssignmentId,
@@ -295,7 +297,7 @@ impl BatchInProgress {
         self.holders.entry(item.individual).or_default().push(holder);
     }
 
-    /// A worker has a task no more. An audit that is not over waits again.
+    /// A worker does not compute an item any more.
     pub fn remove_holder(&mut self, assignment_id: AssignmentId, individual: u32) {
         let Some(holders) = self.holders.get_mut(&individual) else { return };
         let Some(index) = holders.iter().position(|holder| holder.assignment_id == assignment_id)
@@ -309,7 +311,7 @@ impl BatchInProgress {
         self.n_audits_in_flight -= usize::from(holder.is_audit);
     }
 
-    /// Everybody who computes parts of an individual, apart from audits.
+    /// The workers that compute parts of an individual, apart from audits.
     pub fn holders(&self, individual: u32) -> impl Iterator<Item = (WorkerId, AssignmentId)> {
         let holders = self.holders.get(&individual).into_iter().flatten();
         holders
@@ -350,7 +352,8 @@ impl BatchInProgress {
         first..first + self.batch.values_per_trial
     }
 
-    /// Records those values of a task that are not known; returns their number.
+    /// Records the results of those trials of an item that have none; returns their
+    /// number.
     pub fn accept(&mut self, worker: WorkerId, name: &str, item: &Item, fitness: &[f64]) -> usize {
         let mut n_new = 0;
         for (trial, values) in
@@ -375,8 +378,7 @@ impl BatchInProgress {
         self.n_audited += 1;
     }
 
-    /// Who computes parts of an individual whose results are all known, apart from
-    /// audits.
+    /// Assignments of an individual, apart from audits, whose results are all known.
     pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, AssignmentId)> {
         let holders = self.holders.get(&individual).into_iter().flatten();
         holders
@@ -391,7 +393,7 @@ impl BatchInProgress {
         self.evaluated_by.len()
     }
 
-    /// Those whose fitness is not known.
+    /// Trials without a result.
     pub fn n_episodes_left(&self) -> usize {
         self.n_trials_left
     }
@@ -465,7 +467,7 @@ impl BatchInProgress {
         for ((_, assignment_id), worker) in &self.uncovered {
             assert_eq!(in_flight[assignment_id].0, *worker);
         }
-        // Every trial is judged, queued or being computed, possibly by several, or
+        // Every trial has a result, is queued or is being computed, possibly by several, or
         // held back; and it is queued only if it is nothing else.
         let mut claims = vec![0_u32; self.evaluated_by.len()];
         for item in &self.queue {

@@ -1,8 +1,8 @@
 //! Who gets what next.
 //!
-//! First, queued work: the experiment that has had least, for its priority, gives
-//! its next task to the least loaded worker. A task is split by trial when slots
-//! would stay empty otherwise, and towards the end of a generation.
+//! First, queued items: the job with the least virtual time gives its next item to
+//! the least loaded worker. An item is split by trial when slots would stay empty
+//! otherwise, and towards the end of a batch.
 //!
 //! Then, while slots are idle: what waits in a worker behind other items moves to
 //! them; and what others compute is computed by them as well, if they should be
@@ -69,11 +69,11 @@ impl Engine {
             let item = if is_audit {
                 let name = self.workers[&worker].name().to_owned();
                 let audit = self.batch_mut(job).pop_audit_for(&name);
-                audit.expect("the turn was an audit's")
+                audit.expect("the audit was just seen")
             } else {
                 let n_trials = self.n_trials_per_item(job, self.workers[&worker].pace);
                 let batch = self.batch_mut(job);
-                batch.pop_front(n_trials).expect("who has a turn has queued work")
+                batch.pop_front(n_trials).expect("the item was just seen")
             };
             let pace = self.workers[&worker].pace;
             let work = self.jobs.get_mut(&job).expect("just seen");
@@ -88,9 +88,9 @@ impl Engine {
         }
     }
 
-    /// Who is served next, by whom, and whether with an audit. An experiment that
-    /// waits for a free slot keeps its turn: if others went on handing out ahead,
-    /// no slot would ever be free.
+    /// The job whose item is next, the worker that gets it, and whether it is an
+    /// audit. A job that waits for a free slot keeps its place: if others went on
+    /// handing out ahead, no slot would ever be free.
     fn next_item(&self) -> Option<(JobId, WorkerId, bool)> {
         let available = &self.load_index.available;
         let &(load, _, first) = available.first()?;
@@ -111,15 +111,15 @@ impl Engine {
         None
     }
 
-    /// Slots among which an experiment's work is divided: experiments with turns get
+    /// Slots among which a job's items are divided: the jobs in the ready queue get
     /// about equal parts of them.
     fn n_slots_each(&self, n_slots: usize) -> usize {
         n_slots / self.ready_queue.len().max(1)
     }
 
-    /// Whether workers whose slots are full get an experiment's items, too. Not
-    /// near the end of a generation, when whoever is free first should have what
-    /// is left; except items so short that they take no longer than their way.
+    /// Whether workers whose slots are full get a job's items, too. Not near the end
+    /// of a batch, when the worker that is free first should have what is left;
+    /// except items so short that they take no longer than a round trip.
     fn hands_out_ahead(&self, id: JobId) -> bool {
         let work = &self.jobs[&id];
         let Some(batch) = &work.batch else { return false };
@@ -128,9 +128,9 @@ impl Engine {
         !self.config.split || batch.n_trials_queued() > n_left || is_short()
     }
 
-    /// How many trials of the next task an item gets for a worker of a pace: all of
-    /// them, unless slots would stay empty, or the generation is near its end, when
-    /// the worker's share of what is left is smaller than a task.
+    /// How many trials of the next item a worker of a pace is given: all of them,
+    /// unless slots would stay empty, or the batch is near its end, when the worker's
+    /// share of what is left is smaller than an item.
     fn n_trials_per_item(&self, id: JobId, pace: f64) -> usize {
         let Some(batch) = &self.jobs[&id].batch else { return usize::MAX };
         if !self.config.split {
@@ -196,7 +196,7 @@ impl Engine {
         idle.map(|&(.., id)| id).find(|&id| Some(id) != holder)
     }
 
-    /// Assigns a task to a worker.
+    /// Assigns an item to a worker.
     fn give(
         &mut self,
         now: Instant,

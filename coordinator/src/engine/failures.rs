@@ -1,9 +1,10 @@
-//! Which work takes workers down, or fails wherever it is tried.
+//! Which items take workers down, or fail wherever they are tried.
 //!
 //! A worker whose stream broke while it computed something may have been taken
 //! down by it, or only cut off. If the same process comes back, it was cut off,
-//! and nothing is held against the work. So a verdict that rests on lost workers
-//! waits for a while; the work is held back meanwhile, and takes nobody else down.
+//! and nothing is held against the item. So a decision that rests on lost workers
+//! waits for a while; the item is held back meanwhile, and takes no other worker
+//! down.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,38 +15,38 @@ use std::{
 
 use super::{MAX_ATTEMPTS, item::Item};
 
-/// What is held against the work of a generation.
+/// The failed attempts at the items of a batch.
 #[derive(Debug, Default)]
 pub struct FailureRecord {
-    /// By individual and trial; only where there is something. A process that may
-    /// come back, or none.
+    /// Failures by individual and trial, where there are any: of each the process
+    /// that was lost, whose return takes it back, if one was.
     by_trial: BTreeMap<(u32, u32), Vec<Option<NonZeroU64>>>,
     held_back: Vec<HeldBack>,
 }
 
-/// Work that nobody is given until it is clear what happened.
+/// An item that no worker is given until it is clear what happened.
 #[derive(Debug)]
 struct HeldBack {
     item: Item,
     until: Instant,
-    /// What happened last.
+    /// What happened last, for people.
     failure: String,
 }
 
-/// What is to be done with work that has failed.
+/// What is done with an item that has failed.
 #[derive(Debug, PartialEq, Eq)]
 pub enum RetryDecision {
-    /// Try it again.
+    /// It is tried again.
     Retry,
-    /// Wait: see [`Blames::on_process_joined`] and [`Blames::overdue`].
+    /// It waits: see [`FailureRecord::on_process_joined`] and [`FailureRecord::overdue`].
     HoldBack,
-    /// Give up.
+    /// It was tried [`MAX_ATTEMPTS`] times: its job fails.
     Fail,
 }
 
 impl FailureRecord {
-    /// Holds an attempt against a task. `process`: which came back if this was no
-    /// fault of the task's.
+    /// Records a failed attempt at an item. `process`: the worker's, if it was lost; its
+    /// return clears this failure. `until`: how long to wait for that.
     pub fn add(
         &mut self,
         item: &Item,
@@ -78,14 +79,14 @@ impl FailureRecord {
         failures.max().unwrap_or(0) as u32
     }
 
-    /// Individuals with something held against them.
+    /// Individuals with failed attempts.
     pub fn n_individuals(&self) -> usize {
         let individuals: BTreeSet<u32> = self.by_trial.keys().map(|&(i, _)| i).collect();
         individuals.len()
     }
 
-    /// A process is here, so that nothing has taken it down; returns what may be
-    /// tried again.
+    /// A process is back, so that nothing has taken it down: clears the failures that
+    /// rested on its loss, and returns the items that may be tried again.
     pub fn on_process_joined(&mut self, process: NonZeroU64) -> Vec<Item> {
         self.by_trial.retain(|_, failures| {
             failures.retain(|failure| *failure != Some(process));
@@ -98,7 +99,7 @@ impl FailureRecord {
         released.into_iter().map(|released| released.item).collect()
     }
 
-    /// Work that has been held back for long enough, and what happened to it.
+    /// An item that has been held back for long enough, and what happened to it.
     pub fn overdue(&self, now: Instant) -> Option<(&Item, &str)> {
         let overdue = self.held_back.iter().find(|held_back| held_back.until <= now)?;
         Some((&overdue.item, &overdue.failure))
@@ -109,7 +110,7 @@ impl FailureRecord {
         self.held_back.iter_mut().for_each(|held_back| held_back.until += pause);
     }
 
-    /// Whether a trial waits for a verdict.
+    /// Whether a trial is held back.
     pub fn is_held_back(&self, individual: u32, trial: u32) -> bool {
         let mut items = self.held_back.iter().map(|held_back| &held_back.item);
         items.any(|item| item.individual == individual && item.trials.contains(&trial))

@@ -1,4 +1,4 @@
-//! What the engine knows of an experiment, and its share of the fleet.
+//! What the engine knows of a job, and the job's share of the fleet.
 
 use std::{
     sync::Arc,
@@ -15,19 +15,19 @@ const CALL_OVERHEAD: f64 = 0.4;
 /// What a trial is taken to cost before one has been seen.
 const UNKNOWN_TRIAL: Duration = Duration::from_millis(10);
 
-/// An experiment that has not ended.
+/// A job that has not ended.
 #[derive(Debug)]
 pub struct JobWork {
     /// Opaque to the engine; every worker gets it once.
     pub spec: Arc<str>,
     /// Whether it waits to be resumed.
     pub is_paused: bool,
-    /// What is being judged.
+    /// The batch that is being computed.
     pub batch: Option<BatchInProgress>,
-    /// Its share.
+    /// Decides its share of the fleet.
     pub priority: Priority,
-    /// Workers' time that it was given, divided by its priority, in ns: who has
-    /// least is served next.
+    /// Workers' time that it was given, divided by its priority, in ns: the job with
+    /// the least is next.
     pub virtual_time: u128,
     /// Trials whose fitness became known.
     pub n_episodes: u64,
@@ -37,7 +37,7 @@ pub struct JobWork {
 }
 
 impl JobWork {
-    /// An experiment without work.
+    /// A job without a batch.
     pub fn new(spec: Arc<str>, priority: Priority) -> Self {
         Self {
             spec,
@@ -68,7 +68,7 @@ impl JobWork {
         self.expected(n_trials, pace).unwrap_or(UNKNOWN_TRIAL * n_trials as u32)
     }
 
-    /// Learns from a task that took a worker of a pace so long.
+    /// Learns from an item that took a worker of a pace `busy`.
     pub fn learn(&mut self, item: &Item, busy: Duration, pace: f64) {
         let trial_s = busy.as_secs_f64() / (item.trials.len() as f64 + CALL_OVERHEAD) / pace;
         let smoothed = self.trial_s.get_or_insert(trial_s);

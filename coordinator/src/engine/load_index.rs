@@ -1,4 +1,4 @@
-//! Who could take work, and who has too much of it.
+//! Which workers can take items, and which have items that wait.
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use crate::ids::WorkerId;
 
 use super::worker::{FULL_LOAD, Worker};
 
-/// The workers, sorted by what they can take.
+/// The workers, sorted by load.
 #[derive(Debug, Default)]
 pub struct WorkerLoadIndex {
     /// Workers with credit, least loaded first, and among those the fastest.

@@ -5,31 +5,38 @@
 //! an argument; there is no I/O, no clock and no randomness, so a test can drive
 //! any fleet through any history.
 //!
+//! A *job* is an experiment or an evaluation. It has at most one *batch* at a time:
+//! genotypes times trials of one trial set. A batch is computed as *items*, each one
+//! genotype and a range of trials; an item given to a worker is an *assignment*.
+//!
 //! The rules:
-//! - An *item* is one genotype and a range of trials, assigned to one worker.
-//!   A worker holds one per slot, and as many ahead as it computes in some tens
-//!   of milliseconds.
-//! - Experiments with work to hand out share the workers' time in proportion to
-//!   their priorities. Time that one does not want, such as at its barrier, goes
-//!   to the others and is not made up for.
-//! - Near the end of a generation, and when slots would be idle, items are split
-//!   by trial; when nothing is left to hand out, running items are duplicated if
-//!   idle workers should be done sooner. The first result wins, and the others
-//!   are told to drop the item.
-//! - Work returns to the front of the queue when its worker leaves or falls
+//! - A worker holds one assignment per slot, and as many ahead as it computes in
+//!   some tens of milliseconds.
+//! - Jobs with items to hand out share the workers' time in proportion to their
+//!   priorities, by stride scheduling (Waldspurger & Weihl, "Stride Scheduling:
+//!   Deterministic Proportional-Share Resource Management", MIT/LCS/TM-528, 1995):
+//!   a job's *virtual time* grows by the workers' time that it gets, divided by its
+//!   priority, and the job with the least virtual time comes first. A job that had
+//!   nothing to hand out starts again at the present virtual time, so that nobody
+//!   saves up time.
+//! - Near the end of a batch, and when slots would be idle, items are split by
+//!   trial; when nothing is left to hand out, assigned items are duplicated if idle
+//!   workers should be done sooner. The first result counts, and the other workers
+//!   are told to drop the assignment.
+//! - An item returns to the front of the queue when its worker leaves or falls
 //!   silent, never because it takes long.
-//! - A result counts by its place in the generation, not by its arrival, and the
-//!   first one for each place is kept. So who computes what, and how often,
-//!   cannot change a generation's fitness.
+//! - A result counts by its place in the batch, not by its arrival, and the first
+//!   one for each place is kept. So who computes what, and how often, cannot change
+//!   the results of a batch.
 //! - Two results for the same place whose bits differ mean a faulty worker. The
-//!   generation's results are thrown away, both workers get nothing more, and the
-//!   experiment is paused with a reason that names them: nothing that was
-//!   committed is lost, nothing doubtful is committed, and somebody decides. To
-//!   find such workers, a share of the individuals can be audited: computed by a
-//!   second worker, too, if there is one.
-//! - Work that fails, or that takes its worker down, [`MAX_ATTEMPTS`] times
-//!   fails its experiment, and the fleet goes on with the others. A worker whose
-//!   process comes back was not taken down.
+//!   batch's results are thrown away, both workers get nothing more, and the job is
+//!   paused with a reason that names them: nothing that was committed is lost,
+//!   nothing doubtful is committed, and the owner decides. To find such workers, a
+//!   share of the individuals can be audited: computed by a second worker, too, if
+//!   there is one.
+//! - An item that fails, or that takes its worker down, [`MAX_ATTEMPTS`] times fails
+//!   its job; other jobs continue. A worker whose process comes back was not taken
+//!   down.
 
 mod activity;
 mod batch;
@@ -73,13 +80,13 @@ pub use messages::{
 pub use stats::{Counters, FleetStats, JobStats};
 use worker::Worker;
 
-/// Times that work is tried before its experiment is given up.
+/// Times that an item is tried before its job fails.
 pub const MAX_ATTEMPTS: u32 = 3;
 
 /// How an engine decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EngineConfig {
-    /// A worker that is silent for so long loses its items.
+    /// A worker that is silent for this long loses its assignments.
     pub lease: Duration,
     /// Share of the individuals, 0 to 1, that two workers compute.
     pub audit_fraction: f64,
@@ -106,10 +113,10 @@ pub struct Engine {
     workers: BTreeMap<WorkerId, Worker>,
     load_index: WorkerLoadIndex,
     jobs: BTreeMap<JobId, JobWork>,
-    /// Experiments with something to hand out, by what they were served.
+    /// Jobs with something to hand out, by virtual time.
     ready_queue: BTreeSet<(u128, JobId)>,
-    /// What the experiment that was served last had been served: who comes back
-    /// from waiting begins there, so that nobody saves up turns.
+    /// The present virtual time: that of the job that was given workers last. A job
+    /// that comes back from waiting starts here, so that nobody saves up time.
     virtual_now: u128,
     outgoing: Outgoing,
     commands: VecDeque<Command>,
@@ -169,8 +176,7 @@ impl Engine {
         id
     }
 
-    /// A worker's stream has ended. Its work goes to others; returns how many
-    /// items that are.
+    /// A worker's stream has ended. Its items go to others; returns their number.
     pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
         let n_items_requeued = self.forget_worker(now, id, Some("was lost"));
         self.assign(now);
@@ -202,7 +208,7 @@ impl Engine {
         self.assign(now);
     }
 
-    /// An experiment exists; workers will need its specification.
+    /// A job exists. `spec`: what workers need beside its items.
     pub fn on_job_started(&mut self, id: JobId, spec: Arc<str>, priority: Priority) {
         self.jobs.insert(id, JobWork::new(spec, priority));
     }
@@ -217,14 +223,14 @@ impl Engine {
         self.assign(now);
     }
 
-    /// An experiment waits until it is resumed. Its work is taken back; what has
-    /// been judged is kept.
+    /// A job waits until it is resumed. Its assignments are taken back; results are
+    /// kept.
     pub fn on_job_paused(&mut self, now: Instant, id: JobId) {
         self.pause(id);
         self.assign(now);
     }
 
-    /// A paused experiment goes on.
+    /// A paused job is resumed.
     pub fn on_job_resumed(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         work.is_paused = false;
@@ -233,14 +239,14 @@ impl Engine {
         self.assign(now);
     }
 
-    /// An experiment's share of the fleet is another from now on.
+    /// A job's share of the fleet changes.
     pub fn on_priority_set(&mut self, id: JobId, priority: Priority) {
         if let Some(work) = self.jobs.get_mut(&id) {
             work.priority = priority;
         }
     }
 
-    /// An experiment is over, for whatever reason.
+    /// A job is over, for whatever reason.
     pub fn on_job_ended(&mut self, now: Instant, id: JobId) {
         self.forget_job(id);
         self.assign(now);
@@ -273,7 +279,7 @@ impl Engine {
         self.assign(now);
     }
 
-    /// Lets an experiment take turns, if it has something to hand out.
+    /// Puts a job into the ready queue, if it has something to hand out.
     fn make_ready(&mut self, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         if work.is_ready() && !self.ready_queue.contains(&(work.virtual_time, id)) {
@@ -323,7 +329,7 @@ impl Engine {
         }
     }
 
-    /// Fails experiments whose work has taken too many workers down for good.
+    /// Fails jobs one of whose items has taken too many workers down for good.
     fn give_up_overdue(&mut self, now: Instant) {
         let overdue: Vec<(JobId, Item, String)> = self
             .jobs
@@ -346,8 +352,8 @@ impl Engine {
         self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
     }
 
-    /// `blame`: what happened to it that the items it was computing may have
-    /// caused, if they may.
+    /// `failure`: what happened to the worker, if the items that it was computing
+    /// may have caused it.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, failure: Option<&str>) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
         match worker.is_draining {
@@ -387,7 +393,7 @@ impl Engine {
         }
     }
 
-    /// Takes an experiment away from all workers; its work waits again.
+    /// Takes a job away from all workers; its items wait again.
     fn withdraw(&mut self, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         self.ready_queue.remove(&(work.virtual_time, id));

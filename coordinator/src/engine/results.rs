@@ -122,10 +122,9 @@ impl Engine {
         }
     }
 
-    /// Two workers differ about the same trial, so one of them is faulty, and
-    /// nobody knows which. Neither gets work any more. What else they judged may be
-    /// wrong as well: the generation starts over, when somebody who has been told
-    /// says so. What is committed stays as it is.
+    /// Two workers differ about the same trial, so one of them is faulty, and nobody
+    /// knows which. Neither gets work any more. Their other results may be wrong as
+    /// well: the batch starts over when the job is resumed. What is committed stays.
     fn on_disagreement(
         &mut self,
         now: Instant,
@@ -168,7 +167,7 @@ impl Engine {
         self.finish_waived(now);
     }
 
-    /// Concludes generations whose last audits nobody can do any more.
+    /// Finishes batches whose last audits no worker can do any more.
     pub(super) fn finish_waived(&mut self, now: Instant) {
         let known = |batch: &BatchInProgress| batch.is_known_throughout();
         let waiting: Vec<JobId> = self
@@ -182,7 +181,7 @@ impl Engine {
         }
     }
 
-    /// Reports a generation in which nothing is left to do. An audit for which
+    /// Reports a batch of which nothing is left to do. An audit for which
     /// there is no second worker is waived, and counted as such.
     fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
@@ -202,8 +201,8 @@ impl Engine {
         self.commands.push_back(Command::FinishBatch { job: id, evaluated });
     }
 
-    /// Queues work again that gave no result. `blame`: what counts against it, if
-    /// anything, and whose return would take that back.
+    /// Queues an item again that gave no result. `failure`: what counts against it, if
+    /// anything, and the process whose return would take that back.
     pub(super) fn retry(
         &mut self,
         now: Instant,
@@ -231,7 +230,7 @@ impl Engine {
         self.requeue(id, &item);
     }
 
-    /// Queues what nobody else computes of a task, before all other work, and lets
+    /// Queues what no other worker computes of an item, before all others, and lets
     /// what others compute of it be duplicated again.
     pub(super) fn requeue(&mut self, id: JobId, item: &Item) {
         let work = self.jobs.get_mut(&id).expect("the caller has seen it");

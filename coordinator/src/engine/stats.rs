@@ -49,7 +49,7 @@ pub struct FleetStats {
     pub busy_time_s: f64,
 }
 
-/// An experiment's work in numbers.
+/// A job's work in numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct JobStats {
     /// Whether it waits to be resumed.
@@ -58,7 +58,7 @@ pub struct JobStats {
     pub n_items_queued: usize,
     /// Items that workers have; an item that several compute counts as many times.
     pub n_items_in_flight: usize,
-    /// Trials whose fitness became known since the engine has known the experiment.
+    /// Trials whose results became known since the engine has known the job.
     pub n_episodes: u64,
 }
 
@@ -80,7 +80,7 @@ impl Engine {
         }
     }
 
-    /// An experiment's work in numbers; zeros if it has ended.
+    /// A job's work in numbers; zeros if it has ended.
     pub fn job_stats(&self, id: JobId) -> JobStats {
         let Some(work) = self.jobs.get(&id) else { return JobStats::default() };
         let count = |of: fn(&BatchInProgress) -> usize| work.batch.as_ref().map_or(0, of);

@@ -29,7 +29,7 @@ pub struct Worker {
     pub is_draining: bool,
     /// Why it must not be given items.
     pub distrusted: Option<String>,
-    /// Experiments whose specification it has.
+    /// Jobs whose specification it has.
     pub known_jobs: BTreeSet<JobId>,
     /// What it has been given and has not answered; oldest first, as ids grow.
     pub in_flight: BTreeMap<AssignmentId, AssignedItem>,
@@ -44,14 +44,14 @@ pub struct Worker {
     n_learnt: u32,
 }
 
-/// Work in a worker's hands.
+/// An item that a worker has.
 #[derive(Debug, Clone)]
 pub struct AssignedItem {
-    /// Whose work.
+    /// The job that it is of.
     pub job: JobId,
-    /// Of which of its generations.
+    /// The trial set of the batch that it is of.
     pub trial_set: TrialSet,
-    /// Which work.
+    /// The item.
     pub item: Item,
     /// Whether it is computed only to be compared.
     pub is_audit: bool,
@@ -59,7 +59,7 @@ pub struct AssignedItem {
     pub assigned: Instant,
     /// When it should be done.
     pub expected: Instant,
-    /// What the experiment was charged for it.
+    /// Time that the job was charged for it.
     pub charge: Duration,
 }
 

@@ -3,7 +3,7 @@
 use std::{num::NonZeroU64, pin::Pin};
 
 use swarm_proto::{
-    ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION,
+    ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION, SLOTS_MAX, WORKER_NAME_LEN_MAX,
     v1::{
         Hello, WorkRequest, WorkResponse, work_request::Message,
         worker_service_server::WorkerService,
@@ -19,9 +19,7 @@ use crate::{
     driver::{Event, EventSender, WorkerLink, WorkerMessage},
     engine::Introduction,
     ids::WorkerId,
-    limits::{
-        HELLO_TIMEOUT, NAME_LEN_MAX, RESULTS_PER_MESSAGE_MAX, SLOTS_MAX, WORKER_OUTBOX_SLACK,
-    },
+    limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
     listener::Peer,
 };
 
@@ -149,11 +147,13 @@ fn check_hello(hello: &Hello) -> Result<(), Status> {
             hello.slots
         )));
     }
-    if hello.name.len() > NAME_LEN_MAX {
-        return Err(Status::invalid_argument(format!("name is longer than {NAME_LEN_MAX} bytes")));
+    if hello.name.len() > WORKER_NAME_LEN_MAX {
+        return Err(Status::invalid_argument(format!(
+            "name is longer than {WORKER_NAME_LEN_MAX} bytes"
+        )));
     }
-    if hello.version.len() > NAME_LEN_MAX {
-        let message = format!("version is longer than {NAME_LEN_MAX} bytes");
+    if hello.version.len() > WORKER_NAME_LEN_MAX {
+        let message = format!("version is longer than {WORKER_NAME_LEN_MAX} bytes");
         return Err(Status::invalid_argument(message));
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! What a worker does, for whoever wants to see it from outside; it decides nothing.
+//! What a worker has done and is doing, in numbers; nothing depends on them.
 
 use std::{
     sync::atomic::{
@@ -11,7 +11,7 @@ use std::{
 /// What a worker has done since it began, and what it is doing. Counted where it
 /// happens, read at any time.
 #[derive(Debug, Default)]
-pub struct Activity {
+pub struct Stats {
     is_connected: AtomicBool,
     n_connections: AtomicU64,
     n_connections_failed: AtomicU64,
@@ -25,33 +25,33 @@ pub struct Activity {
     n_slots_busy: AtomicUsize,
 }
 
-/// What a slot made of an item.
+/// What came of an assignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Made {
-    /// So many episodes.
+    /// Results of so many episodes.
     Fitness { n_episodes: u64 },
     /// It cannot be computed.
     Failure,
-    /// Nobody wanted it any more.
+    /// It was cancelled.
     Nothing,
 }
 
-/// [`Activity`] at a moment.
+/// [`Stats`] at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct ActivityFigures {
+pub struct StatsSnapshot {
     /// Whether the coordinator has welcomed it and the stream goes on.
     pub is_connected: bool,
     /// Streams that the coordinator welcomed.
     pub n_connections: u64,
-    /// Attempts that came to nothing.
+    /// Attempts to connect that failed.
     pub n_connections_failed: u64,
-    /// Items that gave fitness.
+    /// Items that gave results.
     pub n_items_computed: u64,
-    /// Items that gave none.
+    /// Items that could not be computed.
     pub n_items_failed: u64,
     /// Items that the coordinator took back while they were computed.
     pub n_items_dropped: u64,
-    /// Episodes of all items that gave fitness.
+    /// Episodes of all items that gave results.
     pub n_episodes: u64,
     /// Environment steps of those, summed over robots.
     pub n_robot_steps: u64,
@@ -63,10 +63,10 @@ pub struct ActivityFigures {
     pub n_slots_busy: usize,
 }
 
-impl Activity {
-    /// As it is now.
-    pub fn figures(&self) -> ActivityFigures {
-        ActivityFigures {
+impl Stats {
+    /// The numbers as they are now.
+    pub fn snapshot(&self) -> StatsSnapshot {
+        StatsSnapshot {
             is_connected: self.is_connected.load(SeqCst),
             n_connections: self.n_connections.load(Relaxed),
             n_connections_failed: self.n_connections_failed.load(Relaxed),
