@@ -58,7 +58,7 @@ pub const SYNAPSES: u64 = 1_000_000;
 /// Robots of all objects together.
 pub const ROBOTS: u32 = 10_000;
 /// Lights and ground areas, of all objects together.
-pub const FIXTURES: u32 = 1_000;
+pub const STATIC_OBJECTS: u32 = 1_000;
 /// Sectors of a sensor.
 pub const SECTORS: u32 = 360;
 /// Components of a message.

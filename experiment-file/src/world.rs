@@ -100,7 +100,7 @@ pub enum Initializer {
 )]
 pub struct LightSourceConfig {
     /// Number of lights.
-    #[schemars(range(min = 1, max = limits::FIXTURES))]
+    #[schemars(range(min = 1, max = limits::STATIC_OBJECTS))]
     pub num_instances: u32,
     /// How they move.
     pub controller: LightController,
@@ -166,7 +166,7 @@ impl Default for LightParams {
 )]
 pub struct GroundAreaConfig {
     /// Number of discs.
-    #[schemars(range(min = 1, max = limits::FIXTURES))]
+    #[schemars(range(min = 1, max = limits::STATIC_OBJECTS))]
     pub num_instances: u32,
     /// Where they are.
     pub initializers: PositionInitializers,

@@ -1,14 +1,16 @@
 //! Episodes: all trials of one genotype, step by step and side by side, so that
 //! their networks share one pass over the weights.
 
-use std::ops::Range;
+mod recorder;
 
-use indexmap::IndexMap;
+pub(crate) use recorder::{AllMeasures, FitnessOnly, Recorder, Viewer};
+
+use std::ops::Range;
 
 use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
-use crate::record::{EpisodeSummary, StepRecord};
+use crate::record::StepRecord;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::Trial;
 use experiment_file::RobotController;
@@ -18,65 +20,31 @@ use numeric::random::TrialSet;
 /// to stay in the cache.
 const MAX_LANES: usize = 256;
 
-/// Simulates one episode per trial and returns their fitness, in order; none if
-/// `keep_going`, asked before every step, has said no.
+/// Simulates one episode per trial and shows each of its steps to `recorder`.
+/// `keep_going` is asked before every step; false if it has said no.
 pub(crate) fn run(
     simulation: &Simulation,
     phenotype: &Phenotype,
     trial_set: TrialSet,
     trials: Range<u32>,
     keep_going: &dyn Fn() -> bool,
-) -> Result<Option<Vec<f64>>, EvaluateError> {
-    let mut fitness = Vec::with_capacity(trials.len());
+    recorder: &mut impl Recorder,
+) -> Result<bool, EvaluateError> {
+    let first = trials.start;
     for trials in side_by_side(simulation, trials) {
+        let first = (trials.start - first) as usize;
         let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials)?;
         for step in 0..simulation.n_steps {
             if !keep_going() {
-                return Ok(None);
+                return Ok(false);
             }
-            episodes.step(step, |_, _, _| {})?;
+            episodes.step(step, first, recorder)?;
         }
-        fitness.extend(episodes.trials.iter().map(Trial::fitness));
-    }
-    Ok(Some(fitness))
-}
-
-/// As [`run`], and measures every step: per trial its fitness, and then step by step
-/// all measures, NaN where there is none.
-pub(crate) fn measure(
-    simulation: &Simulation,
-    phenotype: &Phenotype,
-    trial_set: TrialSet,
-    trials: Range<u32>,
-    keep_going: &dyn Fn() -> bool,
-) -> Result<Option<Vec<f64>>, EvaluateError> {
-    let names = simulation.metric_names();
-    let n_values = simulation.values_per_trial();
-    let mut values = Vec::with_capacity(trials.len() * n_values);
-    for trials in side_by_side(simulation, trials) {
-        let first = values.len();
-        values.resize(first + trials.len() * n_values, f64::NAN);
-        let rows = &mut values[first..];
-        let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials)?;
-        for step in 0..simulation.n_steps {
-            if !keep_going() {
-                return Ok(None);
-            }
-            let mut rows = rows.chunks_exact_mut(n_values);
-            let start = 1 + step as usize * names.len();
-            episodes.step(step, |trial, _, _| {
-                let metrics = trial.metrics(step);
-                let row = rows.next().expect("a row per trial");
-                for (value, name) in row[start..].iter_mut().zip(names) {
-                    *value = metrics.get(name).copied().unwrap_or(f64::NAN);
-                }
-            })?;
-        }
-        for (row, trial) in rows.chunks_exact_mut(n_values).zip(&episodes.trials) {
-            row[0] = trial.fitness();
+        for (episode, trial) in (first..).zip(&episodes.trials) {
+            recorder.end(episode, trial);
         }
     }
-    Ok(Some(values))
+    Ok(true)
 }
 
 /// Parts of the trials that are simulated at once.
@@ -88,39 +56,11 @@ fn side_by_side(simulation: &Simulation, trials: Range<u32>) -> impl Iterator<It
         .map(move |first| first..end.min(first.saturating_add(n_at_once as u32)))
 }
 
-/// Simulates the episode of one trial and shows each of its steps to `observe`.
-pub(crate) fn watch(
-    simulation: &Simulation,
-    phenotype: &Phenotype,
-    trial_set: TrialSet,
-    trial: u32,
-    observe: &mut dyn FnMut(StepRecord),
-) -> Result<EpisodeSummary, EvaluateError> {
-    let mut episodes = Episodes::new(simulation, phenotype, trial_set, trial..trial + 1)?;
-    let mut sums: IndexMap<&'static str, (f64, u32)> = IndexMap::new();
-    for step in 0..simulation.n_steps {
-        episodes.step(step, |trial, brains, fitness| {
-            let mut record = trial.record(step, fitness);
-            for brain in brains {
-                brain.record(&mut record);
-            }
-            for (name, value) in &record.metrics {
-                let (sum, n) = sums.entry(name).or_default();
-                *sum += value;
-                *n += 1;
-            }
-            observe(record);
-        })?;
-    }
-    let means = sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n)));
-    Ok(EpisodeSummary { fitness: episodes.trials[0].fitness(), metrics: means.collect() })
-}
-
 /// Trials that share a phenotype.
 struct Episodes<'a> {
     trials: Vec<Trial<'a>>,
     /// Per group of robots.
-    brains: Vec<Brain<'a>>,
+    controllers: Vec<GroupController<'a>>,
 }
 
 impl<'a> Episodes<'a> {
@@ -133,26 +73,27 @@ impl<'a> Episodes<'a> {
         let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
         let groups = 0..simulation.world.groups.len();
-        let brain = |group| Brain::new(simulation, group, phenotype, trials.len());
-        let brains = groups.map(brain).collect();
-        Ok(Self { trials, brains })
+        let controller = |group| GroupController::new(simulation, group, phenotype, trials.len());
+        let controllers = groups.map(controller).collect();
+        Ok(Self { trials, controllers })
     }
 
-    /// One environment step; `see` gets each trial when its step has been judged.
+    /// One environment step; the first of these episodes has the number `first`.
     fn step(
         &mut self,
         step: u32,
-        mut see: impl FnMut(&Trial<'_>, &[Brain<'_>], Option<f64>),
+        first: usize,
+        recorder: &mut impl Recorder,
     ) -> Result<(), EvaluateError> {
         for trial in &mut self.trials {
             trial.sense(step)?;
         }
-        for brain in &mut self.brains {
-            brain.decide(&mut self.trials);
+        for controller in &mut self.controllers {
+            controller.decide(&mut self.trials);
         }
-        for trial in &mut self.trials {
+        for (episode, trial) in (first..).zip(&mut self.trials) {
             let fitness = trial.act(step);
-            see(trial, &self.brains, fitness);
+            recorder.step(episode, step, trial, &self.controllers, fitness);
             trial.move_lights(step);
         }
         Ok(())
@@ -161,14 +102,14 @@ impl<'a> Episodes<'a> {
 
 /// The controller of a group of robots, and its stimuli; one lane per trial and
 /// robot, trial by trial.
-struct Brain<'a> {
+pub(crate) struct GroupController<'a> {
     group: usize,
     robots: Range<usize>,
     controller: Box<dyn Controller + 'a>,
     stimuli: Lanes,
 }
 
-impl<'a> Brain<'a> {
+impl<'a> GroupController<'a> {
     fn new(
         simulation: &'a Simulation,
         group_index: usize,

@@ -2,7 +2,7 @@
 //!
 //! All robots of all trials of a genotype share one network, so that a weight is
 //! read once and applied to every lane. Rows are padded to whole vectors; the
-//! padding holds values like any other, and nobody reads them.
+//! padding holds values like any other, and no result depends on them.
 
 /// Lanes per row are a multiple of this: one 512-bit vector of f32.
 const PADDING: usize = 16;

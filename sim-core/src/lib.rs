@@ -4,15 +4,71 @@
 //! No I/O, no threads, no clock, no ambient randomness, no platform libm: the
 //! same inputs give the same bits on every machine.
 //!
-//! Where things are: `experiment` compiles a configuration into a `network`, a
-//! codec of genotypes (`genotype`) and a `world`; `episode` steps the trials of a
-//! genotype side by side, `trial` has the phases of a step, and `swarm` the state
-//! of its robots. A phase is a module each: `senses` and `sensors`,
-//! `communication`, `controllers`, `perturbations`, `drive`, `lights`, `fitness`.
-//! Below everything lie `random` and `torus`, `neighbours` (who is in reach of whom)
-//! and the arithmetic on vectors of robots: `isa` picks the instruction set, `lanes`
-//! are the vectors, `exp2` is what activations are made of. `bench` opens the kernel
-//! to the benchmarks.
+//! # Example
+//!
+//! Five robots that turn light into the speed of their wheels, by a network whose
+//! weights are the genotype:
+//!
+//! ```
+//! use experiment_file::ExperimentConfig;
+//! use sim_core::{Simulation, TrialSet};
+//!
+//! let text = r#"{
+//!   "topology": {
+//!     "stimuli": {"light": {"n": 4, "sensor": "light_sensor"}},
+//!     "ensembles": {"OUT": {"n": 2, "activation": "tanh"}},
+//!     "synapses": {"in": {"pre": "light", "post": "OUT"}},
+//!     "outputs": {"wheels": {"ensemble": "OUT", "actuator": "wheel_actuator"}},
+//!     "decoding": {"wheels": {"scheme": "IdentityDecoding"}}
+//!   },
+//!   "algorithm": {
+//!     "name": "SNES", "evolvable_object": "robot", "fitness_function": "goto_light",
+//!     "population_size": 20, "generations": 10, "evaluation_steps": 50, "num_evaluations": 2,
+//!     "populations": {
+//!       "all": {"objects": ["synapses:weights:all"], "min_vals": -3, "max_vals": 3}
+//!     }
+//!   },
+//!   "world": {"objects": {
+//!     "robot": {
+//!       "type": "robot", "num_instances": 5, "controller": "neural_controller",
+//!       "sensors": {"light_sensor": {"n_sectors": 4}}, "actuators": {"wheel_actuator": {}},
+//!       "initializers": {"positions": {"name": "random_uniform"}}
+//!     },
+//!     "lamp": {
+//!       "type": "light_source", "num_instances": 1,
+//!       "initializers": {"positions": {"name": "fixed", "params": {"values": [[500, 500]]}}}
+//!     }
+//!   }}
+//! }"#;
+//! let (config, _warnings) = ExperimentConfig::from_json(text, "example", evolution::ALGORITHMS)?;
+//! let simulation = Simulation::compile(&config)?;
+//! assert_eq!(simulation.genotype_len(), 8);
+//!
+//! // The fitness of a genotype in two trials: the same bits wherever it is computed.
+//! let genotype = [0.5; 8];
+//! let fitness = simulation.evaluate(&genotype, TrialSet::Generation(0), 0..2)?;
+//!
+//! // The first of these episodes, step by step.
+//! let mut positions = Vec::new();
+//! let summary = simulation.simulate(&genotype, TrialSet::Generation(0), 0, &mut |step| {
+//!     positions.push(step.robots[0].position);
+//! })?;
+//! assert_eq!(positions.len(), 50);
+//! assert_eq!(summary.fitness, fitness[0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Where things are
+//!
+//! [`Simulation::compile`] turns a configuration into a `network`, a codec of
+//! genotypes (`genotype`) and a `world` of `objects`. `episode` steps the trials of
+//! a genotype side by side and shows them to a recorder; `trial` has the phases of a
+//! step, and `swarm` the state of its robots. A phase is a module each: `senses` and
+//! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
+//! `fitness`. Below everything lie `numeric`'s random streams, `torus`, `neighbours`
+//! (which robots are within reach of each other), and the arithmetic on vectors of
+//! robots: `lanes` are the vectors, `exp2` is what activations are made of. `bench`
+//! opens the kernel to the benchmarks.
 
 mod alpha_shape;
 #[doc(hidden)]
@@ -50,7 +106,7 @@ mod world;
 pub use communication::Mode;
 pub use numeric::{Isa, UnknownIsa, random::TrialSet};
 pub use output::Output;
-pub use record::{EpisodeSummary, Metrics, ReceivedFrame, RobotRecord, StepRecord};
+pub use record::{EpisodeSummary, Measures, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};
 pub use specified::{SpecifiedSimulation, panic_to_failure};
 pub use torus::Vec2;

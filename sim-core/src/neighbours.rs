@@ -41,7 +41,7 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Nobody is anywhere yet.
+    /// Before the first [`update`](Self::update): no robot has a neighbour.
     pub fn new(reach: f64, n_robots: usize) -> Self {
         Self { reach, of: vec![Vec::new(); n_robots], cells: Vec::new() }
     }
@@ -55,7 +55,7 @@ impl Neighbours {
     pub fn update(&mut self, torus: &Torus, positions: &[Vec2]) {
         self.of.iter_mut().for_each(Vec::clear);
         if self.reach == 0.0 {
-            return; // nobody senses anybody
+            return; // no robot senses another one
         }
         let n_columns = n_cells(torus.width, self.reach);
         let n_rows = n_cells(torus.height, self.reach);

@@ -7,18 +7,10 @@ use serde::Serialize;
 use crate::communication::Mode;
 use crate::torus::Vec2;
 
-/// Named measures of a task, beside its fitness:
-///
-/// | task | measures |
-/// |---|---|
-/// | leader | `leaders`: robots with the LED on; `one_leader`: 1 if that is exactly one, else 0 |
-/// | borderline | `true_positive_rate`, `true_negative_rate`, `precision`, `accuracy` of the LEDs |
-/// | orientation, alignment | `misalignment`: mean distance to the circular mean heading, radians (Eq. 6.2); `turning`: mean action of the wheels, without its sign |
-/// | light | `light_distance_*`, `near_light_*`, `center_distance_*`: mean distance to the nearest light, share within 80 cm of it, and mean distance to the swarm's centre of mass, cm, of the `photosensitive` robots and of the `others` |
-/// | grouping | `center_distance`: mean distance to the centre of mass, cm |
-///
-/// A measure of nobody (no light, no photosensitive robot, no LED on) is absent.
-pub type Metrics = IndexMap<&'static str, f64>;
+/// Named measures of a task, beside its fitness; `docs/evaluation.md` lists them
+/// with their units. A measure that does not exist in a step (of distances to a
+/// light without lights, of robots with the LED on when there are none) is absent.
+pub type Measures = IndexMap<&'static str, f64>;
 
 /// The result of an episode that was watched.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,7 +18,8 @@ pub struct EpisodeSummary {
     /// The same as [`Simulation::evaluate`](crate::Simulation::evaluate) gives.
     pub fitness: f64,
     /// Means over the steps.
-    pub metrics: Metrics,
+    #[serde(rename = "metrics")]
+    pub measures: Measures,
 }
 
 /// One environment step of a trial.
@@ -37,7 +30,8 @@ pub struct StepRecord {
     /// Fitness of the step; none if it does not count.
     pub fitness: Option<f64>,
     /// Measures of the step.
-    pub metrics: Metrics,
+    #[serde(rename = "metrics")]
+    pub measures: Measures,
     /// All robots, in the order of the objects of the world.
     pub robots: Vec<RobotRecord>,
     /// Positions of all lights during the step.

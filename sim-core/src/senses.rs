@@ -151,7 +151,7 @@ impl Senses {
                     if *is_wanted {
                         add_noise(reading, deviation, stream);
                     } else if *n_sensors > 1 {
-                        // Nobody gets the reading, but the next noise in the stream is
+                        // The reading is not used, but the next noise in the stream is
                         // another sensor's.
                         stream.skip(*reading_len);
                     }

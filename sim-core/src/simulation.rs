@@ -2,17 +2,17 @@
 
 use std::ops::Range;
 
-use crate::episode;
-use crate::fitness;
+use crate::episode::{self, AllMeasures, FitnessOnly, Viewer};
+use crate::fitness::{self, Definition};
 use crate::genotype::Codec;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 #[cfg(doc)]
-use crate::record::Metrics;
+use crate::record::Measures;
 use crate::record::{EpisodeSummary, StepRecord};
 use crate::trial::Trial;
 use crate::world::World;
-use experiment_file::{ConfigError, ExperimentConfig, FitnessFunction, limits};
+use experiment_file::{ConfigError, ExperimentConfig, limits};
 use numeric::{Isa, random::TrialSet};
 
 /// Trials whose start is tried out when an experiment is compiled.
@@ -25,7 +25,7 @@ pub struct Simulation {
     pub(crate) seed: u64,
     pub(crate) n_steps: u32,
     n_trials: u32,
-    pub(crate) fitness: FitnessFunction,
+    pub(crate) fitness: &'static Definition,
     pub(crate) network: Network,
     codec: Codec,
     pub(crate) world: World,
@@ -91,7 +91,7 @@ impl Simulation {
             seed: config.seed,
             n_steps: algorithm.evaluation_steps,
             n_trials: algorithm.num_evaluations,
-            fitness: algorithm.fitness_function,
+            fitness: fitness::definition(algorithm.fitness_function),
             network,
             codec,
             world: world.expect("a world without problems is one"),
@@ -160,12 +160,15 @@ impl Simulation {
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
-        episode::run(self, &phenotype, trial_set.into(), trials, keep_going)
+        let mut recorder = FitnessOnly::default();
+        let done =
+            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        Ok(done.then_some(recorder.fitness))
     }
 
-    /// Names of the measures of the task, in their order; see [`Metrics`].
-    pub fn metric_names(&self) -> &'static [&'static str] {
-        fitness::metric_names(self.fitness)
+    /// Names of the measures of the task, in their order; see [`Measures`].
+    pub fn measure_names(&self) -> &'static [&'static str] {
+        self.fitness.measures
     }
 
     /// Environment steps of an episode.
@@ -175,13 +178,13 @@ impl Simulation {
 
     /// Numbers that [`measure_while`](Self::measure_while) gives per trial.
     pub fn values_per_trial(&self) -> usize {
-        1 + self.n_steps as usize * self.metric_names().len()
+        1 + self.n_steps as usize * self.measure_names().len()
     }
 
     /// As [`evaluate_while`](Self::evaluate_while), and measures every step. For
     /// each trial there are [`values_per_trial`](Self::values_per_trial) numbers: its
     /// fitness, the same bits as always, and then step by step the value of every
-    /// measure in [`metric_names`](Self::metric_names), NaN where there is none.
+    /// measure in [`measure_names`](Self::measure_names), NaN where there is none.
     pub fn measure_while(
         &self,
         genotype: &[f64],
@@ -191,7 +194,10 @@ impl Simulation {
     ) -> Result<Option<Vec<f64>>, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         self.check_trials(&trials)?;
-        episode::measure(self, &phenotype, trial_set.into(), trials, keep_going)
+        let mut recorder = AllMeasures::new(self, trials.len());
+        let done =
+            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        Ok(done.then_some(recorder.values))
     }
 
     /// Simulates the episode of one trial and shows each of its steps to
@@ -205,8 +211,11 @@ impl Simulation {
         observe: &mut dyn FnMut(StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
-        self.check_trials(&(trial..trial.saturating_add(1)))?;
-        episode::watch(self, &phenotype, trial_set.into(), trial, observe)
+        let trials = trial..trial.saturating_add(1);
+        self.check_trials(&trials)?;
+        let mut recorder = Viewer::new(observe);
+        episode::run(self, &phenotype, trial_set.into(), trials, &|| true, &mut recorder)?;
+        Ok(recorder.summary())
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with
@@ -276,7 +285,7 @@ mod tests {
         }
         assert_eq!(measure(31..33), together[31 * n_values..33 * n_values]);
         let mut watched = Vec::new();
-        let observe = &mut |step: StepRecord| watched.extend(step.metrics.into_values());
+        let observe = &mut |step: StepRecord| watched.extend(step.measures.into_values());
         simulation.simulate(&genotype, trial_set, 31, observe).unwrap();
         assert_eq!(watched, together[31 * n_values + 1..32 * n_values]);
         let stopped = simulation.measure_while(&genotype, trial_set, 0..1, &|| false);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::communication::{Mode, Origin};
+use crate::communication::{FrameOrigin, Mode};
 use crate::controllers::Action;
 use crate::record::{ReceivedFrame, RobotRecord};
 use crate::torus::Vec2;
@@ -10,7 +10,7 @@ use crate::torus::Vec2;
 /// Where robots are, what they do, and what they heard.
 #[derive(Debug, Clone)]
 pub(crate) struct Swarm {
-    /// Positions.
+    /// Positions, cm.
     pub positions: Vec<Vec2>,
     /// Headings, in \[0, 2 pi).
     pub headings: Vec<f64>,
@@ -46,7 +46,7 @@ pub(crate) struct Received {
     /// (cos, sin) of the receiving sector in the receiver's own frame.
     pub receiving_direction: Vec2,
     /// Where it comes from, the sending direction filled in.
-    pub origin: Origin,
+    pub origin: FrameOrigin,
 }
 
 impl Swarm {

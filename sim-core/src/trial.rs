@@ -5,13 +5,13 @@ use std::mem;
 
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
-use crate::fitness::{self, Fitness, Moment};
+use crate::fitness::{Fitness, Moment};
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::objects::{Site, StaticObjects};
 use crate::perturbations::Perturbations;
-use crate::record::{Metrics, StepRecord};
+use crate::record::{Measures, StepRecord};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
@@ -42,7 +42,7 @@ pub(crate) struct Trial<'a> {
     decoding: Vec<Stream>,
     fitness: Box<dyn Fitness>,
     fitness_sum: f64,
-    n_judged_steps: u32,
+    n_scored_steps: u32,
 }
 
 /// What belongs to a group of robots.
@@ -165,9 +165,9 @@ impl<'a> Trial<'a> {
             areas,
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
-            fitness: fitness::new(simulation.fitness, world),
+            fitness: (simulation.fitness.start)(world),
             fitness_sum: 0.0,
-            n_judged_steps: 0,
+            n_scored_steps: 0,
         })
     }
 
@@ -186,8 +186,8 @@ impl<'a> Trial<'a> {
                 moved = true;
             }
         }
-        // Who is near whom changes only when somebody moves, and who hears whom
-        // when somebody moves or turns.
+        // Neighbours change only when a robot moves, and who hears whom when a
+        // robot moves or turns.
         if moved {
             self.neighbours.update(&self.world.torus, &self.swarm.positions);
         }
@@ -233,7 +233,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Actions take effect and are judged: fitness of the step, none if it does not
+    /// Actions take effect and are scored: fitness of the step, none if it does not
     /// count.
     pub fn act(&mut self, step: u32) -> Option<f64> {
         let world = self.world;
@@ -251,11 +251,11 @@ impl<'a> Trial<'a> {
         for group in &world.groups {
             self.radio.emit(self.isa, world, &mut self.swarm, group);
         }
-        // The step is judged.
+        // The step is scored.
         let fitness = self.fitness.step(&Moment::new(world, &self.swarm, &self.lights, step));
         if let Some(fitness) = fitness {
             self.fitness_sum += fitness;
-            self.n_judged_steps += 1;
+            self.n_scored_steps += 1;
         }
         fitness
     }
@@ -267,27 +267,33 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Measures of the step that was judged last.
-    pub fn metrics(&self, step: u32) -> Metrics {
-        let mut metrics = Metrics::new();
+    /// Measures of the step that was scored last.
+    pub fn measures(&self, step: u32) -> Measures {
+        let mut measures = Measures::new();
         let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
-        self.fitness.measure(&moment, &mut metrics);
-        metrics
+        self.fitness.measure(&moment, &mut measures);
+        measures
     }
 
-    /// The step that was judged last, without stimuli, which controllers keep.
+    /// The step that was scored last, without stimuli, which controllers keep.
     pub fn record(&self, step: u32, fitness: Option<f64>) -> StepRecord {
-        let metrics = self.metrics(step);
+        let measures = self.measures(step);
         let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
-        StepRecord { step, fitness, metrics, robots: robots.collect(), lights: self.lights.clone() }
+        StepRecord {
+            step,
+            fitness,
+            measures,
+            robots: robots.collect(),
+            lights: self.lights.clone(),
+        }
     }
 
     /// Mean fitness over the steps that count; 0 without any.
     pub fn fitness(&self) -> f64 {
-        if self.n_judged_steps == 0 {
+        if self.n_scored_steps == 0 {
             0.0
         } else {
-            self.fitness_sum / f64::from(self.n_judged_steps)
+            self.fitness_sum / f64::from(self.n_scored_steps)
         }
     }
 
@@ -310,7 +316,7 @@ impl<'a> Trial<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::communication::Origin;
+    use crate::communication::FrameOrigin;
     use crate::testing::{experiment_a, robot};
     use experiment_file::{ExperimentConfig, Initializer};
 
@@ -355,8 +361,11 @@ mod tests {
                 continue;
             }
             let received = trial.swarm.received[hop].unwrap();
-            let origin =
-                Origin { originator: 0, hops: hop as u32, sending_direction: Vec2::new(1.0, 0.0) };
+            let origin = FrameOrigin {
+                originator: 0,
+                hops: hop as u32,
+                sending_direction: Vec2::new(1.0, 0.0),
+            };
             assert_eq!(received.origin, origin);
             assert_eq!(received.sector, 2);
             assert!((received.receiving_direction.x + 1.0).abs() < 1e-15);

@@ -54,7 +54,7 @@ pub(crate) struct RobotGroup {
     pub stimuli: Vec<(SensorQuery, Range<usize>)>,
     /// Sensors beside the radio, in the order in which they draw noise.
     pub sensors: Vec<MountedSensor>,
-    /// Wheels.
+    /// Their wheels; none: they stand.
     pub drive: Option<Drive>,
     /// What quantises their messages.
     pub quantiser: Option<Quantiser>,

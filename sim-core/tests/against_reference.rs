@@ -1,7 +1,7 @@
 //! The simulator agrees with a naive second transcription of the equations.
 //!
 //! Every test also looks at what happened in its episodes: agreement says
-//! nothing about a radio on which nobody speaks.
+//! nothing about a radio on which no robot sends.
 
 mod cases;
 mod configs;

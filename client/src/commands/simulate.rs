@@ -7,7 +7,7 @@ mod trace;
 use std::{borrow::Cow, path::Path};
 
 use serde::Serialize;
-use sim_core::{EpisodeSummary, EvaluateError, Metrics};
+use sim_core::{EpisodeSummary, EvaluateError, Measures};
 
 use crate::{
     error::Error,
@@ -98,9 +98,9 @@ impl SimulationReport<'_> {
         let mut lines = vec![format!(
             "{name}: {genotype}, seed {seed}, generation {generation}, {steps} steps per trial"
         )];
-        let names: Vec<&str> = self.mean.metrics.keys().copied().collect();
+        let names: Vec<&str> = self.mean.measures.keys().copied().collect();
         let row = |name: &str, summary: &EpisodeSummary| -> Vec<String> {
-            let metrics = names.iter().map(|name| summary.metrics.get(name).copied());
+            let metrics = names.iter().map(|name| summary.measures.get(name).copied());
             let numbers = std::iter::once(Some(summary.fitness)).chain(metrics);
             let cells = numbers.map(|n| n.map_or("-".into(), |n| format!("{n:.6}")));
             std::iter::once(name.to_owned()).chain(cells).collect()
@@ -125,13 +125,16 @@ fn mean(trials: &[Trial]) -> EpisodeSummary {
         let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
         sum / n
     };
-    let measures = || trials.iter().flat_map(|trial| &trial.summary.metrics);
+    let measures = || trials.iter().flat_map(|trial| &trial.summary.measures);
     let names: Vec<&'static str> = measures().map(|(name, _)| *name).collect();
-    let metrics: Metrics = names
+    let means: Measures = names
         .into_iter()
         .map(|name| (name, mean(&mut measures().filter(|m| *m.0 == name).map(|m| *m.1))))
         .collect();
-    EpisodeSummary { fitness: mean(&mut trials.iter().map(|trial| trial.summary.fitness)), metrics }
+    EpisodeSummary {
+        fitness: mean(&mut trials.iter().map(|trial| trial.summary.fitness)),
+        measures: means,
+    }
 }
 
 #[cfg(test)]

@@ -120,7 +120,7 @@ impl Checked {
                  {TRIAL_VALUES_MAX} and {EVALUATION_VALUES_MAX}; take fewer steps or trials"
             )));
         }
-        let metrics = experiment.metric_names().iter().map(ToString::to_string).collect();
+        let metrics = experiment.measure_names().iter().map(ToString::to_string).collect();
         Ok(Self {
             spec: config.to_canonical_json().into(),
             genotype,

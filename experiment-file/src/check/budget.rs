@@ -108,10 +108,17 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let count = |object: &ObjectConfig| u64::from(object.num_instances());
     let objects = config.world.objects.values();
     let n_robots: u64 = objects.clone().filter(is_robot).map(count).sum();
-    let n_fixtures: u64 = objects.filter(|object| !is_robot(object)).map(count).sum();
+    let n_static_objects: u64 = objects.filter(|object| !is_robot(object)).map(count).sum();
     let n_steps = u64::from(config.algorithm.evaluation_steps);
     limit(n_robots, limits::ROBOTS.into(), "robots", &path, &[], report);
-    limit(n_fixtures, limits::FIXTURES.into(), "lights and ground areas", &path, &[], report);
+    limit(
+        n_static_objects,
+        limits::STATIC_OBJECTS.into(),
+        "lights and ground areas",
+        &path,
+        &[],
+        report,
+    );
 
     let states = n_robots * (network.n_inputs + network.n_states);
     let what = "inputs and neurons of all robots";
@@ -121,7 +128,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let what = "steps of all robots per trial";
     limit(n_robots * n_steps, limits::ROBOT_STEPS, what, &steps_path, &[&path], report);
 
-    let n_sensed = n_robots + n_fixtures;
+    let n_sensed = n_robots + n_static_objects;
     let of_robot = |robot: &RobotConfig| {
         let substep = network.n_synapses + network.n_neuron_operations;
         let think = match robot.controller {

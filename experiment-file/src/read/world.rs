@@ -45,7 +45,7 @@ fn object(o: &mut Object<'_>, center: [f64; 2]) -> ObjectConfig {
 fn light_source(o: &mut Object<'_>, center: [f64; 2]) -> LightSourceConfig {
     let default = LightParams::default();
     LightSourceConfig {
-        num_instances: o.required("num_instances").u32(1..=limits::FIXTURES),
+        num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
         controller: o.or("controller", LightController::Static {}, light_controller),
         initializers: position_initializers(o, center),
         params: o.inner("params", |o| {
@@ -86,7 +86,7 @@ fn ground_area(o: &mut Object<'_>, center: [f64; 2]) -> GroundAreaConfig {
         controller.problem("a ground area has no controller; expected null or no such key");
     }
     GroundAreaConfig {
-        num_instances: o.required("num_instances").u32(1..=limits::FIXTURES),
+        num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
         initializers: position_initializers(o, center),
         params: o.inner("params", |o| GroundAreaParams {
             range: o.or("range", default.range, Node::positive),

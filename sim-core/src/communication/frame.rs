@@ -3,9 +3,9 @@
 use crate::torus::Vec2;
 
 /// Where a frame's message comes from. A frame without an origin is one that a
-/// robot emitted which had nothing to relay: nobody accepts it.
+/// robot emitted which had nothing to relay: no receiver accepts it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Origin {
+pub(crate) struct FrameOrigin {
     /// The robot whose message it is.
     pub originator: usize,
     /// Emissions so far, from 1.
@@ -16,17 +16,17 @@ pub(crate) struct Origin {
 }
 
 /// All frames on the air. Frame r is robot r's; before the first step there is
-/// none, which nobody can tell from frames without origin.
+/// none, which for receivers is the same as frames without origin.
 #[derive(Debug, Clone)]
 pub(crate) struct Ether {
-    origins: Vec<Option<Origin>>,
+    origins: Vec<Option<FrameOrigin>>,
     /// `[robot][component]`
     messages: Vec<f64>,
     message_len: usize,
 }
 
 impl Ether {
-    /// Silence.
+    /// No frame is on the air.
     pub fn new(n_robots: usize, message_len: usize) -> Self {
         Self {
             origins: vec![None; n_robots],
@@ -35,8 +35,8 @@ impl Ether {
         }
     }
 
-    /// Origin of a robot's frame.
-    pub fn origin(&self, emitter: usize) -> Option<&Origin> {
+    /// FrameOrigin of a robot's frame.
+    pub fn origin(&self, emitter: usize) -> Option<&FrameOrigin> {
         self.origins[emitter].as_ref()
     }
 
@@ -46,7 +46,7 @@ impl Ether {
     }
 
     /// Puts a robot's frame on the air, in place of its last one.
-    pub fn emit(&mut self, emitter: usize, origin: Option<Origin>, message: &[f64]) {
+    pub fn emit(&mut self, emitter: usize, origin: Option<FrameOrigin>, message: &[f64]) {
         self.origins[emitter] = origin;
         self.messages[emitter * self.message_len..][..self.message_len].copy_from_slice(message);
     }

@@ -58,7 +58,7 @@ pub(crate) struct Hearing {
 }
 
 impl Hearing {
-    /// Nobody hears anyone yet.
+    /// Before the first [`update`](Self::update): no robot hears another one.
     pub fn new(antennas: &[Antenna]) -> Self {
         let mut first = vec![0];
         let mut angles = Vec::new();

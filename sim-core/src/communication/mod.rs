@@ -5,7 +5,7 @@ mod hearing;
 mod quantisation;
 mod radio;
 
-pub(crate) use frame::Origin;
+pub(crate) use frame::FrameOrigin;
 pub(crate) use hearing::{Antenna, Receiver};
 pub(crate) use quantisation::Quantiser;
 pub(crate) use radio::Radio;

@@ -2,7 +2,7 @@
 //! chance decides.
 
 use super::Mode;
-use super::frame::{Ether, Origin};
+use super::frame::{Ether, FrameOrigin};
 use super::hearing::Hearing;
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
@@ -27,7 +27,7 @@ pub(crate) struct Radio {
 }
 
 impl Radio {
-    /// Silence. One stream per robot for each purpose.
+    /// No frame is on the air. One stream per robot for each purpose.
     pub fn new(world: &World, reception: Vec<Stream>, quantisation: Vec<Stream>) -> Self {
         Self {
             ether: Ether::new(world.n_robots(), world.message_len),
@@ -50,8 +50,9 @@ impl Radio {
         for (robot, antenna) in world.antennas.iter().enumerate() {
             let Some(receiver) = antenna.receiver else { continue };
             let ether = &self.ether;
-            let accepted =
-                |origin: &&Origin| origin.originator != robot && origin.hops < receiver.max_hops;
+            let accepted = |origin: &&FrameOrigin| {
+                origin.originator != robot && origin.hops < receiver.max_hops
+            };
             let sectors = self.hearing.of(robot).iter().enumerate();
             let mut valid = sectors.filter_map(|(sector, heard)| {
                 let heard = heard.as_ref()?;
@@ -79,7 +80,7 @@ impl Radio {
                 sector,
                 signal: heard.strength(receiver.decay),
                 receiving_direction: self.hearing.direction(robot, sector),
-                origin: Origin { sending_direction, ..*origin },
+                origin: FrameOrigin { sending_direction, ..*origin },
             });
         }
     }
@@ -109,12 +110,12 @@ impl Radio {
         match swarm.modes[robot] {
             Mode::Send => {
                 let origin =
-                    Origin { originator: robot, hops: 1, sending_direction: Vec2::default() };
+                    FrameOrigin { originator: robot, hops: 1, sending_direction: Vec2::default() };
                 self.ether.emit(robot, Some(origin), &swarm.messages[message]);
             }
             Mode::Relay => {
                 let origin = swarm.received[robot]
-                    .map(|Received { origin, .. }| Origin { hops: origin.hops + 1, ..origin });
+                    .map(|Received { origin, .. }| FrameOrigin { hops: origin.hops + 1, ..origin });
                 self.ether.emit(robot, origin, &swarm.received_messages[message]);
             }
         }

@@ -90,8 +90,8 @@ fn fitness_is_the_mean_of_the_steps_that_count() {
         let counted: Vec<f64> = steps.iter().filter_map(|step| step.fitness).collect();
         let mean = counted.iter().sum::<f64>() / counted.len() as f64;
         assert!((summary.fitness - mean).abs() < 1e-12);
-        for (name, mean) in &summary.metrics {
-            let sum: f64 = steps.iter().map(|step| step.metrics[name]).sum();
+        for (name, mean) in &summary.measures {
+            let sum: f64 = steps.iter().map(|step| step.measures[name]).sum();
             assert!((sum / steps.len() as f64 - mean).abs() < 1e-9, "{name}");
         }
     }
@@ -112,7 +112,7 @@ fn everything_is_finite_and_in_range() {
                     assert!(robot.stimuli.iter().all(|value| (-1.0..=1.0).contains(value)));
                 }
                 assert!(step.fitness.unwrap_or(0.0).is_finite());
-                assert!(step.metrics.values().all(|value| value.is_finite()));
+                assert!(step.measures.values().all(|value| value.is_finite()));
             };
             let summary = simulation.simulate(&genes, 0, 0, &mut check).unwrap();
             assert!((0.0..=5.0).contains(&summary.fitness));
@@ -215,7 +215,7 @@ fn inhibited_light_is_exactly_zero_for_eight_of_ten() {
     let light = inputs(&config, SensorQuery::Light);
     let photosensitive = |trial| {
         let (steps, summary) = watch(&config, 0, trial);
-        assert_eq!(summary.metrics.len(), 6);
+        assert_eq!(summary.measures.len(), 6);
         let sees = |robot: usize| {
             let mut stimuli = steps.iter().flat_map(|s| &s.robots[robot].stimuli[light.clone()]);
             stimuli.any(|&value| value != 0.0)
@@ -261,7 +261,7 @@ fn a_switch_of_topology_draws_new_places_and_new_targets() {
     for (k, step) in steps.iter().enumerate() {
         let border = crate::border::of_swarm(&TORUS, &positions(k), 100.0);
         let right = border.iter().zip(&step.robots).filter(|(at, robot)| **at == (robot.led > 0));
-        assert_eq!(step.metrics["accuracy"], right.count() as f64 / 20.0, "step {k}");
+        assert_eq!(step.measures["accuracy"], right.count() as f64 / 20.0, "step {k}");
     }
 }
 
@@ -361,7 +361,7 @@ fn vehicles_come_to_the_light() {
 }
 
 #[test]
-fn objects_share_one_ether_but_not_the_judgement() {
+fn objects_share_one_ether_but_one_of_them_is_evaluated() {
     let config = with_followers();
     let (steps, _) = watch(&config, 0, 0);
     let between = |from: std::ops::Range<usize>, to: std::ops::Range<usize>| {
@@ -381,7 +381,7 @@ fn objects_share_one_ether_but_not_the_judgement() {
 }
 
 #[test]
-fn lights_are_judged_where_they_were_during_the_step() {
+fn lights_count_where_they_were_during_the_step() {
     let (steps, _) = watch(&experiment_d(), 0, 0);
     let center = Vec2::new(500.0, 500.0);
     assert!(TORUS.distance(steps[0].lights[0], center) < 1.0 + 1e-9, "not moved yet");

@@ -1,13 +1,17 @@
 //! `identify_borderline` (Eq. 5.4): robots at the swarm's border, and only they,
 //! have their LED on.
 
-use super::{Fitness, Moment};
+use super::{Definition, Fitness, Moment};
 use crate::border;
-use crate::record::Metrics;
+use crate::record::Measures;
+use experiment_file::FitnessFunction;
 
-/// What is measured beside the fitness.
-pub(super) const METRICS: &[&str] =
-    &["true_positive_rate", "true_negative_rate", "precision", "accuracy"];
+/// The function of this file.
+pub(super) const DEFINITIONS: &[Definition] = &[Definition {
+    function: FitnessFunction::IdentifyBorderline,
+    measures: &["true_positive_rate", "true_negative_rate", "precision", "accuracy"],
+    start: |world| Box::new(IdentifyBorderline::new(world.communication_range())),
+}];
 
 /// f = TPR * TNR; just TPR if no robot is in the interior.
 #[derive(Debug)]
@@ -33,14 +37,14 @@ impl Fitness for IdentifyBorderline {
         Some(rates.true_positive * rates.true_negative)
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let rates = Rates::new(&self.targets, moment.leds);
-        metrics.insert("true_positive_rate", rates.true_positive);
-        metrics.insert("true_negative_rate", rates.true_negative);
+        measures.insert("true_positive_rate", rates.true_positive);
+        measures.insert("true_negative_rate", rates.true_negative);
         if let Some(precision) = rates.precision {
-            metrics.insert("precision", precision);
+            measures.insert("precision", precision);
         }
-        metrics.insert("accuracy", rates.accuracy);
+        measures.insert("accuracy", rates.accuracy);
     }
 }
 
@@ -85,7 +89,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fitness::metrics;
+    use crate::fitness::measures;
     use crate::torus::Vec2;
 
     const SQUARE: [Vec2; 5] = [
@@ -170,6 +174,6 @@ mod tests {
             ("precision", 1.0),
             ("accuracy", 0.6),
         ];
-        assert_eq!(metrics(&mut IdentifyBorderline::new(100.0), &moment), expected);
+        assert_eq!(measures(&mut IdentifyBorderline::new(100.0), &moment), expected);
     }
 }

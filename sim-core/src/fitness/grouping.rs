@@ -1,15 +1,20 @@
 //! `grouping`: robots gather, but not on top of each other.
 
-use super::{Fitness, Moment, mean};
-use crate::record::Metrics;
+use super::{Definition, Fitness, Moment, mean};
+use crate::record::Measures;
+use experiment_file::FitnessFunction;
 
 /// Distance to the centroid at which a robot earns nothing, cm.
 const FAR: f64 = 100.0;
 /// Robots that are not farther apart than this spoil the step, cm.
 const CROWDED: f64 = 20.0;
 
-/// What is measured beside the fitness.
-pub(super) const METRICS: &[&str] = &["center_distance"];
+/// The function of this file.
+pub(super) const DEFINITIONS: &[Definition] = &[Definition {
+    function: FitnessFunction::Grouping,
+    measures: &["center_distance"],
+    start: |_| Box::new(Grouping),
+}];
 
 /// f = mean clip(1 - distance to centroid / 100, 0, 1), or 0 if two robots are
 /// within 20 cm of each other.
@@ -29,18 +34,18 @@ impl Fitness for Grouping {
         Some(mean(moment.positions.iter().map(nearness)))
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let centroid = moment.torus.centroid(moment.positions);
         let distances =
             moment.positions.iter().map(|&robot| moment.torus.distance(robot, centroid));
-        metrics.insert("center_distance", mean(distances));
+        measures.insert("center_distance", mean(distances));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fitness::metrics;
+    use crate::fitness::measures;
     use crate::torus::Vec2;
 
     fn fitness(positions: &[(f64, f64)]) -> f64 {
@@ -73,6 +78,6 @@ mod tests {
     fn the_distance_to_the_centre_is_measured() {
         let positions = [Vec2::new(990.0, 0.0), Vec2::new(10.0, 0.0)];
         let moment = Moment { positions: &positions, ..Moment::EMPTY };
-        assert_eq!(metrics(&mut Grouping, &moment), [("center_distance", 10.0)]);
+        assert_eq!(measures(&mut Grouping, &moment), [("center_distance", 10.0)]);
     }
 }

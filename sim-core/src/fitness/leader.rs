@@ -1,16 +1,21 @@
 //! `identify_leader` (Eq. 5.2 and 5.3): one robot, and the same one, leads.
 
-use super::{Fitness, Moment};
+use super::{Definition, Fitness, Moment};
 use crate::leadership::Leadership;
-use crate::record::Metrics;
+use crate::record::Measures;
+use experiment_file::FitnessFunction;
 
 /// Weight of a leader's experience per step.
 const WEIGHT: f64 = 0.1;
 /// Largest fitness of a step.
 const MAX: f64 = 5.0;
 
-/// What is measured beside the fitness.
-pub(super) const METRICS: &[&str] = &["leaders", "one_leader"];
+/// The function of this file.
+pub(super) const DEFINITIONS: &[Definition] = &[Definition {
+    function: FitnessFunction::IdentifyLeader,
+    measures: &["leaders", "one_leader"],
+    start: |_| Box::new(IdentifyLeader::default()),
+}];
 
 /// f = min(0.1 c, 5) with exactly one leader, c the number of steps before this
 /// one in which it has been sole leader without interruption; else 0.
@@ -25,17 +30,17 @@ impl Fitness for IdentifyLeader {
         Some(leader.map_or(0.0, |leader| (WEIGHT * f64::from(leader.n_steps - 1)).min(MAX)))
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let n_leaders = moment.leds.iter().filter(|&&led| led > 0).count();
-        metrics.insert("leaders", n_leaders as f64);
-        metrics.insert("one_leader", f64::from(self.leadership.has_leader()));
+        measures.insert("leaders", n_leaders as f64);
+        measures.insert("one_leader", f64::from(self.leadership.has_leader()));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fitness::metrics;
+    use crate::fitness::measures;
 
     fn mean(steps: impl Iterator<Item = [u32; 3]>) -> f64 {
         let mut fitness = IdentifyLeader::default();
@@ -71,7 +76,7 @@ mod tests {
         {
             let moment = Moment { leds: &leds, ..Moment::EMPTY };
             let expected = [("leaders", n), ("one_leader", expected)];
-            assert_eq!(metrics(&mut fitness, &moment), expected);
+            assert_eq!(measures(&mut fitness, &moment), expected);
         }
     }
 }

@@ -1,14 +1,21 @@
 //! `goto_light`: robots are near the light.
 
-use super::{Fitness, Moment, mean};
-use crate::record::Metrics;
+use super::{Definition, Fitness, Moment, mean};
+use crate::record::Measures;
 use crate::torus::Vec2;
+use experiment_file::FitnessFunction;
 
 /// Distance to the light that counts as near, cm.
 const NEAR: f64 = 80.0;
 
-/// What is measured beside the fitness.
-pub(super) const METRICS: &[&str] = &[
+/// The function of this file.
+pub(super) const DEFINITIONS: &[Definition] = &[Definition {
+    function: FitnessFunction::GotoLight,
+    measures: MEASURES,
+    start: |_| Box::new(GotoLight),
+}];
+
+const MEASURES: &[&str] = &[
     "light_distance_photosensitive",
     "near_light_photosensitive",
     "center_distance_photosensitive",
@@ -30,12 +37,12 @@ impl Fitness for GotoLight {
         Some(mean(near))
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let torus = moment.torus;
         let centroid = torus.centroid(moment.positions);
         for (photosensitive, [light_distance, near_light, center_distance]) in [
-            (true, [METRICS[0], METRICS[1], METRICS[2]]),
-            (false, [METRICS[3], METRICS[4], METRICS[5]]),
+            (true, [MEASURES[0], MEASURES[1], MEASURES[2]]),
+            (false, [MEASURES[3], MEASURES[4], MEASURES[5]]),
         ] {
             let robots = moment.positions.iter().zip(moment.photosensitive);
             let robots: Vec<Vec2> = robots
@@ -50,12 +57,12 @@ impl Fitness for GotoLight {
                     let distances = moment.lights.iter().map(|&light| torus.distance(robot, light));
                     distances.fold(f64::INFINITY, f64::min)
                 };
-                metrics.insert(light_distance, mean(robots.iter().map(to_light)));
+                measures.insert(light_distance, mean(robots.iter().map(to_light)));
                 let near = |robot| f64::from(to_light(robot) <= NEAR);
-                metrics.insert(near_light, mean(robots.iter().map(near)));
+                measures.insert(near_light, mean(robots.iter().map(near)));
             }
             let to_center = |&robot: &Vec2| torus.distance(robot, centroid);
-            metrics.insert(center_distance, mean(robots.iter().map(to_center)));
+            measures.insert(center_distance, mean(robots.iter().map(to_center)));
         }
     }
 }
@@ -63,7 +70,7 @@ impl Fitness for GotoLight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fitness::metrics;
+    use crate::fitness::measures;
 
     #[test]
     fn fitness_is_the_share_of_robots_near_the_light() {
@@ -96,10 +103,10 @@ mod tests {
             ("near_light_others", 1.0),
             ("center_distance_others", 30.0),
         ];
-        assert_eq!(metrics(&mut GotoLight, &moment), expected);
+        assert_eq!(measures(&mut GotoLight, &moment), expected);
         let far = Moment { lights: &[Vec2::new(940.0, 0.0)], ..moment };
-        assert_eq!(metrics(&mut GotoLight, &far)[4], ("near_light_others", 0.5));
+        assert_eq!(measures(&mut GotoLight, &far)[4], ("near_light_others", 0.5));
         let blind = Moment { photosensitive: &[false; 3], lights: &[], ..moment };
-        assert_eq!(metrics(&mut GotoLight, &blind), [("center_distance_others", 20.0)]);
+        assert_eq!(measures(&mut GotoLight, &blind), [("center_distance_others", 20.0)]);
     }
 }

@@ -1,4 +1,8 @@
 //! How well a swarm does its task (chapter 5 of the thesis).
+//!
+//! A fitness function is a row in `experiment-file`'s `fitness`, which says what it
+//! is called and what it needs, and a [`Definition`] beside its code, here. Each
+//! file has the functions of one subject.
 
 mod borderline;
 mod grouping;
@@ -6,14 +10,14 @@ mod leader;
 mod light;
 mod orientation;
 
-use crate::record::Metrics;
+use crate::record::Measures;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
 use experiment_file::FitnessFunction;
 
-/// What a fitness function sees of a step: the robots that are judged, as they
-/// acted and after they moved, and the lights before they move.
+/// What a fitness function sees of a step: the robots that are evaluated, as
+/// they acted and after they moved, and the lights before they move.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment<'a> {
     /// The plane.
@@ -60,33 +64,34 @@ pub(crate) trait Fitness {
     /// Fitness of a step; none if it does not count.
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64>;
 
-    /// Adds the measures of the step that was judged last.
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics);
+    /// Adds the measures of the step that was scored last.
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures);
 }
 
-/// All measures that a fitness function may give, in their order.
-pub(crate) fn metric_names(function: FitnessFunction) -> &'static [&'static str] {
-    match function {
-        FitnessFunction::IdentifyLeader => leader::METRICS,
-        FitnessFunction::IdentifyBorderline => borderline::METRICS,
-        FitnessFunction::OrientationConsensus | FitnessFunction::Alignment => orientation::METRICS,
-        FitnessFunction::GotoLight => light::METRICS,
-        FitnessFunction::Grouping => grouping::METRICS,
-    }
+/// A fitness function as far as it is the same for all trials.
+#[derive(Debug)]
+pub(crate) struct Definition {
+    /// Its name in experiment files.
+    pub function: FitnessFunction,
+    /// All measures that it may give, in their order.
+    pub measures: &'static [&'static str],
+    /// Itself at the start of a trial.
+    pub start: fn(&World) -> Box<dyn Fitness>,
 }
 
-/// The named fitness function at the start of a trial.
-pub(crate) fn new(function: FitnessFunction, world: &World) -> Box<dyn Fitness> {
-    match function {
-        FitnessFunction::IdentifyLeader => Box::new(leader::IdentifyLeader::default()),
-        FitnessFunction::IdentifyBorderline => {
-            Box::new(borderline::IdentifyBorderline::new(world.communication_range()))
-        }
-        FitnessFunction::OrientationConsensus => Box::new(orientation::OrientationConsensus),
-        FitnessFunction::Alignment => Box::new(orientation::Alignment),
-        FitnessFunction::GotoLight => Box::new(light::GotoLight),
-        FitnessFunction::Grouping => Box::new(grouping::Grouping),
-    }
+/// The definition of a fitness function.
+pub(crate) fn definition(function: FitnessFunction) -> &'static Definition {
+    [
+        leader::DEFINITIONS,
+        borderline::DEFINITIONS,
+        orientation::DEFINITIONS,
+        light::DEFINITIONS,
+        grouping::DEFINITIONS,
+    ]
+    .into_iter()
+    .flatten()
+    .find(|definition| definition.function == function)
+    .expect("every fitness function is defined: a test goes through them")
 }
 
 /// Mean of values of a number of robots; 0 without any.
@@ -98,16 +103,23 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 /// What a step is measured as.
 #[cfg(test)]
-fn metrics(fitness: &mut dyn Fitness, moment: &Moment<'_>) -> Vec<(&'static str, f64)> {
-    let mut metrics = Metrics::new();
+fn measures(fitness: &mut dyn Fitness, moment: &Moment<'_>) -> Vec<(&'static str, f64)> {
+    let mut measures = Measures::new();
     fitness.step(moment);
-    fitness.measure(moment, &mut metrics);
-    metrics.into_iter().collect()
+    fitness.measure(moment, &mut measures);
+    measures.into_iter().collect()
+}
+
+#[test]
+fn every_fitness_function_is_defined() {
+    for &function in FitnessFunction::ALL {
+        assert_eq!(definition(function).function, function);
+    }
 }
 
 #[cfg(test)]
 impl Moment<'static> {
-    /// Nobody, in a world of 1000 x 1000 cm.
+    /// No robots, in a world of 1000 x 1000 cm.
     pub const EMPTY: Self = Self {
         torus: &Torus { width: 1000.0, height: 1000.0 },
         step: 0,

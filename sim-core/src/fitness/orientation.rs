@@ -2,14 +2,24 @@
 
 use std::f64::consts::PI;
 
-use super::{Fitness, Moment, mean};
-use crate::record::Metrics;
+use super::{Definition, Fitness, Moment, mean};
+use crate::record::Measures;
 use crate::torus::{Vec2, angular_difference, wrap_angle};
+use experiment_file::{ALIGNMENT_SETTLING_STEPS, FitnessFunction};
 
-/// Steps that `alignment` does not judge.
-const N_FIRST_STEPS: u32 = 100;
-/// What is measured beside the fitness.
-pub(super) const METRICS: &[&str] = &["misalignment", "turning"];
+/// The functions of this file, which share their measures.
+pub(super) const DEFINITIONS: &[Definition] = &[
+    Definition {
+        function: FitnessFunction::OrientationConsensus,
+        measures: &["misalignment", "turning"],
+        start: |_| Box::new(OrientationConsensus),
+    },
+    Definition {
+        function: FitnessFunction::Alignment,
+        measures: &["misalignment", "turning"],
+        start: |_| Box::new(Alignment),
+    },
+];
 
 /// Spread of headings at which `alignment` is 0, radians.
 const MAX_SPREAD: f64 = 0.4 * PI;
@@ -25,14 +35,14 @@ impl Fitness for OrientationConsensus {
         Some((1.0 - misalignment(moment.headings) / PI) * calm)
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
-        measure(moment, metrics);
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
+        measure(moment, measures);
     }
 }
 
-fn measure(moment: &Moment<'_>, metrics: &mut Metrics) {
-    metrics.insert("misalignment", misalignment(moment.headings));
-    metrics.insert("turning", turning(moment.wheels));
+fn measure(moment: &Moment<'_>, measures: &mut Measures) {
+    measures.insert("misalignment", misalignment(moment.headings));
+    measures.insert("turning", turning(moment.wheels));
 }
 
 /// Mean |right wheel|: robots whose only output turns them.
@@ -58,7 +68,7 @@ pub(super) struct Alignment;
 
 impl Fitness for Alignment {
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
-        if moment.step < N_FIRST_STEPS {
+        if moment.step < ALIGNMENT_SETTLING_STEPS {
             return None;
         }
         let aligned = (1.0 - spread(moment.headings) / MAX_SPREAD).clamp(0.0, 1.0);
@@ -66,8 +76,8 @@ impl Fitness for Alignment {
         Some(aligned * calm)
     }
 
-    fn measure(&self, moment: &Moment<'_>, metrics: &mut Metrics) {
-        measure(moment, metrics);
+    fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
+        measure(moment, measures);
     }
 }
 
@@ -96,7 +106,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fitness::metrics;
+    use crate::fitness::measures;
 
     fn moment<'a>(headings: &'a [f64], wheels: &'a [[f64; 2]], step: u32) -> Moment<'a> {
         Moment { headings, wheels, step, ..Moment::EMPTY }
@@ -123,11 +133,11 @@ mod tests {
     fn misalignment_is_measured_from_the_first_step_on() {
         let moment = moment(&[0.0, PI / 2.0], &[[0.5, -0.5], [-0.3, 0.3]], 0);
         for fitness in [&mut OrientationConsensus as &mut dyn Fitness, &mut Alignment] {
-            let metrics = metrics(fitness, &moment);
-            assert_eq!(metrics.len(), 2);
-            assert_eq!(metrics[0].0, "misalignment");
-            assert!((metrics[0].1 - PI / 4.0).abs() < 1e-12);
-            assert_eq!(metrics[1], ("turning", 0.4));
+            let measures = measures(fitness, &moment);
+            assert_eq!(measures.len(), 2);
+            assert_eq!(measures[0].0, "misalignment");
+            assert!((measures[0].1 - PI / 4.0).abs() < 1e-12);
+            assert_eq!(measures[1], ("turning", 0.4));
         }
     }
 
@@ -151,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn alignment_does_not_judge_the_first_steps() {
+    fn alignment_does_not_count_the_first_steps() {
         assert_eq!(Alignment.step(&moment(&[0.0], &[[0.0; 2]], 99)), None);
     }
 

@@ -44,7 +44,7 @@ pub(crate) trait Sensor: Debug + Send + Sync {
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]);
 
     /// Fills in the readings of a group, `[robot][value]`, without noise; those of
-    /// robots whose reading nobody wants are left as they are. It is one virtual
+    /// robots whose reading is not wanted are left as they are. It is one virtual
     /// call per group and step, in which `sense` is none; not to be overridden.
     fn sense_group(
         &self,

@@ -13,8 +13,8 @@ use crate::{assert_agreement, random_genotype, spread};
 /// turn their LEDs on and off.
 const LIVELY: [u64; 4] = [517, 175, 66, 1374];
 
-/// Experiment A, judged like B: every LED of every step counts.
-fn judged_by_every_led() -> ExperimentConfig {
+/// Experiment A, scored like B: every LED of every step counts.
+fn scored_by_every_led() -> ExperimentConfig {
     let mut config = experiment_a();
     config.algorithm.fitness_function = FitnessFunction::IdentifyBorderline;
     config
@@ -58,7 +58,7 @@ fn swarms_of_every_size_agree() {
 
 #[test]
 fn generations_trials_and_seeds_of_the_experiment_are_told_apart() {
-    let mut config = judged_by_every_led();
+    let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 50;
     let genotype = random_genotype(&config, 66);
     let mut fitness = Vec::new();
@@ -77,7 +77,7 @@ fn generations_trials_and_seeds_of_the_experiment_are_told_apart() {
 #[test]
 fn message_lengths_and_alphabets_agree() {
     for (msg_length, n_symbols) in [(1, 16), (2, 16), (3, 16), (1, 2), (2, 4), (3, 64), (4, 81)] {
-        let mut config = judged_by_every_led();
+        let mut config = scored_by_every_led();
         config.algorithm.evaluation_steps = 60;
         set_msg_length(&mut config, msg_length);
         transmitter_mut(&mut config).n_symbols = n_symbols;
@@ -90,7 +90,7 @@ fn message_lengths_and_alphabets_agree() {
 
 #[test]
 fn messages_without_quantisation_agree() {
-    let mut config = judged_by_every_led();
+    let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 100;
     let quantised: Vec<f64> =
         assert_lively_agreement(&config).iter().map(|episode| episode.fitness).collect();
@@ -102,7 +102,7 @@ fn messages_without_quantisation_agree() {
 
 #[test]
 fn messages_outside_the_lattice_agree() {
-    let mut config = judged_by_every_led();
+    let mut config = scored_by_every_led();
     config.algorithm.evaluation_steps = 100;
     config.topology.ensembles["OUT_COMM"].activation = Some(Activation::Tanh);
     // So warm that a message left at -1 would choose other symbols than one at 0.
@@ -122,7 +122,7 @@ fn receivers_and_transmitters_of_every_kind_agree() {
         (4, 100.0, 30.0, 10, 0.05, 1.0),
         (4, 100.0, 100.0, 1, 0.05, 1.0),
     ] {
-        let mut config = judged_by_every_led();
+        let mut config = scored_by_every_led();
         config.algorithm.evaluation_steps = 60;
         transmitter_mut(&mut config).range = sent;
         let receiver = receiver_mut(&mut config);
@@ -153,7 +153,7 @@ fn decoders_of_every_kind_agree() {
         (stochastic, (stochastic, 1), (softmax, 2)),
         (deterministic, (softmax, 4), (stochastic, 1)),
     ] {
-        let mut config = judged_by_every_led();
+        let mut config = scored_by_every_led();
         config.algorithm.evaluation_steps = 100;
         let topology = &mut config.topology;
         topology.ensembles["OUT_LED"].n = n_led;
@@ -171,7 +171,7 @@ fn decoders_of_every_kind_agree() {
 
 #[test]
 fn an_activity_of_one_half_is_over_the_threshold() {
-    let mut config = judged_by_every_led();
+    let mut config = scored_by_every_led();
     config.topology.decoding["outB"] = DecodingConfig::ThresholdDecoding { stochastic: false };
     swarm_mut(&mut config).num_instances = 3;
     let genotype = vec![0.5; random_genotype(&config, 0).len()];
@@ -183,7 +183,7 @@ fn an_activity_of_one_half_is_over_the_threshold() {
 #[test]
 fn robots_without_mode_or_message_agree() {
     for (actuator, output) in [(ActuatorQuery::Mode, "outC"), (ActuatorQuery::Message, "outA")] {
-        let mut config = judged_by_every_led();
+        let mut config = scored_by_every_led();
         config.algorithm.evaluation_steps = 100;
         config.topology.outputs.shift_remove(output);
         config.topology.decoding.shift_remove(output);
@@ -217,8 +217,8 @@ fn leaders_that_fail_agree() {
         swarm.perturbations.leader_failure = Some(LeaderFailureConfig { time_to_failure });
         let mut n_faults = 0;
         let mut fitness = Vec::new();
-        for judge in [FitnessFunction::IdentifyLeader, FitnessFunction::IdentifyBorderline] {
-            config.algorithm.fitness_function = judge;
+        for function in [FitnessFunction::IdentifyLeader, FitnessFunction::IdentifyBorderline] {
+            config.algorithm.fitness_function = function;
             let episodes = assert_lively_agreement(&config);
             n_faults += episodes.iter().map(|episode| episode.witness.n_faults).sum::<usize>();
             fitness.extend(episodes.iter().map(|episode| episode.fitness));

@@ -11,7 +11,7 @@ use crate::assert_varied_agreement;
 use crate::configs::{experiment_d, swarm_mut};
 use crate::reference::Episode;
 
-/// Experiment D with every sensor and without its perturbation, judged by all
+/// Experiment D with every sensor and without its perturbation, scored by all
 /// headings and wheels.
 fn all_sensors() -> ExperimentConfig {
     let mut config = experiment_d();

@@ -1,4 +1,4 @@
-//! The world and the order of one step: sense, control, act, judge, move lights.
+//! The world and the order of one step: sense, control, act, score, move lights.
 
 use experiment_file::{
     ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams, Initializer,
@@ -365,11 +365,11 @@ impl<'a> Simulation<'a> {
     /// Counts the steps of a sole leader; after `time_to_failure` of them it is
     /// faulty from the next step on.
     fn observe_leader(&mut self) {
-        let judged = self.judged_robots();
-        let leds: Vec<u32> = self.robots[judged.clone()].iter().map(|robot| robot.led).collect();
+        let evaluated = self.evaluated_robots();
+        let leds: Vec<u32> = self.robots[evaluated.clone()].iter().map(|robot| robot.led).collect();
         self.leader.observe(&leds);
         let Some(leader) = self.leader.robot else { return };
-        let robot = &mut self.robots[judged][leader];
+        let robot = &mut self.robots[evaluated][leader];
         if let Some(config) = &robot.config.perturbations.leader_failure
             && self.leader.n_steps >= config.time_to_failure
         {
@@ -379,17 +379,17 @@ impl<'a> Simulation<'a> {
     }
 
     /// The robots that evolve: fitness is about them alone.
-    fn judged_robots(&self) -> std::ops::Range<usize> {
+    fn evaluated_robots(&self) -> std::ops::Range<usize> {
         let evolvable = &self.config.algorithm.evolvable_object;
         let object_idx = self.config.world.objects.get_index_of(evolvable);
-        let is_judged = |robot: &Robot<'_>| Some(robot.object_idx) == object_idx;
-        let first = self.robots.iter().take_while(|robot| !is_judged(robot)).count();
-        first..first + self.robots.iter().filter(|robot| is_judged(robot)).count()
+        let is_evaluated = |robot: &Robot<'_>| Some(robot.object_idx) == object_idx;
+        let first = self.robots.iter().take_while(|robot| !is_evaluated(robot)).count();
+        first..first + self.robots.iter().filter(|robot| is_evaluated(robot)).count()
     }
 
     /// Fitness of the step, from its actions and from positions after moving.
     fn fitness(&mut self) -> f64 {
-        let robots = &self.robots[self.judged_robots()];
+        let robots = &self.robots[self.evaluated_robots()];
         match self.config.algorithm.fitness_function {
             FitnessFunction::IdentifyLeader => fitness::identify_leader(&self.leader),
             FitnessFunction::IdentifyBorderline => {

@@ -107,7 +107,7 @@ impl<W: io::Write> Rows<W> {
             row.extend(stimuli);
             row.extend(record.lights.iter().flat_map(|light| [number(light.x), number(light.y)]));
             row.push(record.fitness.map(number).unwrap_or_default());
-            row.extend(record.metrics.values().copied().map(number));
+            row.extend(record.measures.values().copied().map(number));
             writeln!(self.out, "{}", row.join(","))?;
             self.n_rows += 1;
         }
@@ -129,7 +129,7 @@ impl<W: io::Write> Rows<W> {
         let light = |i| [format!("light_{i}_x_cm"), format!("light_{i}_y_cm")];
         heading.extend((0..record.lights.len()).flat_map(light));
         heading.push("step_fitness".into());
-        heading.extend(record.metrics.keys().map(|name| format!("metric_{name}")));
+        heading.extend(record.measures.keys().map(|name| format!("metric_{name}")));
         heading
     }
 }

@@ -55,7 +55,7 @@ fn every_robot_has_a_row_in_every_step_and_numbers_read_back_exactly() {
         n_received += usize::from(record.received.is_some());
         let fitness = records[step].fitness.map(number).unwrap_or_default();
         assert_eq!(text("step_fitness"), fitness);
-        assert_eq!(bits("metric_one_leader"), records[step].metrics["one_leader"].to_bits());
+        assert_eq!(bits("metric_one_leader"), records[step].measures["one_leader"].to_bits());
     }
     assert!(n_received > 0);
 }

@@ -1,0 +1,134 @@
+//! What is kept of the steps of episodes.
+
+use indexmap::IndexMap;
+
+use super::GroupController;
+use crate::record::{EpisodeSummary, StepRecord};
+use crate::simulation::Simulation;
+use crate::trial::Trial;
+
+/// Sees every step of a number of episodes, numbered from 0.
+pub(crate) trait Recorder {
+    /// Environment step `step` of an episode was simulated, and its lights have
+    /// not moved yet. `fitness`: of the step; none if it does not count.
+    fn step(
+        &mut self,
+        episode: usize,
+        step: u32,
+        trial: &Trial<'_>,
+        controllers: &[GroupController<'_>],
+        fitness: Option<f64>,
+    );
+
+    /// The last step of an episode was simulated. Episodes end in their order.
+    fn end(&mut self, episode: usize, trial: &Trial<'_>);
+}
+
+/// Keeps nothing but the fitness of each episode.
+#[derive(Debug, Default)]
+pub(crate) struct FitnessOnly {
+    /// Per episode.
+    pub fitness: Vec<f64>,
+}
+
+impl Recorder for FitnessOnly {
+    fn step(&mut self, _: usize, _: u32, _: &Trial<'_>, _: &[GroupController<'_>], _: Option<f64>) {
+    }
+
+    fn end(&mut self, _: usize, trial: &Trial<'_>) {
+        self.fitness.push(trial.fitness());
+    }
+}
+
+/// Keeps the fitness of each episode and, step by step, all measures, NaN where
+/// there is none.
+#[derive(Debug)]
+pub(crate) struct AllMeasures {
+    names: &'static [&'static str],
+    /// Numbers per episode.
+    n_values: usize,
+    /// `[episode][value]`, the fitness first.
+    pub values: Vec<f64>,
+}
+
+impl AllMeasures {
+    /// Of so many episodes.
+    pub fn new(simulation: &Simulation, n_episodes: usize) -> Self {
+        let n_values = simulation.values_per_trial();
+        let values = vec![f64::NAN; n_episodes * n_values];
+        Self { names: simulation.measure_names(), n_values, values }
+    }
+
+    fn row(&mut self, episode: usize) -> &mut [f64] {
+        &mut self.values[episode * self.n_values..][..self.n_values]
+    }
+}
+
+impl Recorder for AllMeasures {
+    fn step(
+        &mut self,
+        episode: usize,
+        step: u32,
+        trial: &Trial<'_>,
+        _: &[GroupController<'_>],
+        _: Option<f64>,
+    ) {
+        let measures = trial.measures(step);
+        let names = self.names;
+        let start = 1 + step as usize * names.len();
+        for (value, name) in self.row(episode)[start..].iter_mut().zip(names) {
+            *value = measures.get(name).copied().unwrap_or(f64::NAN);
+        }
+    }
+
+    fn end(&mut self, episode: usize, trial: &Trial<'_>) {
+        self.row(episode)[0] = trial.fitness();
+    }
+}
+
+/// Hands a record of every step of one episode to a function.
+pub(crate) struct Viewer<'a> {
+    observe: &'a mut dyn FnMut(StepRecord),
+    /// Per measure its sum, and over how many steps.
+    sums: IndexMap<&'static str, (f64, u32)>,
+    fitness: f64,
+}
+
+impl<'a> Viewer<'a> {
+    /// Before the first step.
+    pub fn new(observe: &'a mut dyn FnMut(StepRecord)) -> Self {
+        Self { observe, sums: IndexMap::new(), fitness: 0.0 }
+    }
+
+    /// The whole episode.
+    pub fn summary(self) -> EpisodeSummary {
+        let means = self.sums.into_iter().map(|(name, (sum, n))| (name, sum / f64::from(n)));
+        EpisodeSummary { fitness: self.fitness, measures: means.collect() }
+    }
+}
+
+impl Recorder for Viewer<'_> {
+    fn step(
+        &mut self,
+        _: usize,
+        step: u32,
+        trial: &Trial<'_>,
+        controllers: &[GroupController<'_>],
+        fitness: Option<f64>,
+    ) {
+        let mut record = trial.record(step, fitness);
+        for controller in controllers {
+            controller.record(&mut record);
+        }
+        for (name, value) in &record.measures {
+            let (sum, n) = self.sums.entry(name).or_default();
+            *sum += value;
+            *n += 1;
+        }
+        (self.observe)(record);
+    }
+
+    fn end(&mut self, _: usize, trial: &Trial<'_>) {
+        self.fitness = trial.fitness();
+    }
+}
