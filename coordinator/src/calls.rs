@@ -2,18 +2,15 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    convert::Infallible,
-    pin::Pin,
     sync::{Arc, Mutex, PoisonError},
-    task::{Context, Poll},
 };
 
-use http::{HeaderMap, Request, Response};
-use http_body_util::BodyExt as _;
+use http::{HeaderMap, Request};
 use prost::Message as _;
 use prost_types::FileDescriptorSet;
 use tonic::{Code, Status, body::Body};
-use tower::{Layer, Service};
+
+use crate::around::{Guard, Watch};
 
 /// Method of a call that no service has: callers choose their paths.
 const UNKNOWN: &str = "unknown";
@@ -26,15 +23,8 @@ pub struct Calls {
     ended: Arc<Mutex<BTreeMap<(String, &'static str), u64>>>,
 }
 
-/// Services whose calls are counted.
-#[derive(Debug, Clone)]
-pub struct Counted<S> {
-    calls: Calls,
-    services: S,
-}
-
 /// A call that has not ended.
-struct Call {
+pub struct Call {
     calls: Calls,
     method: String,
     /// As answered; a call that is given up before has none.
@@ -61,17 +51,23 @@ impl Calls {
     pub fn ended(&self) -> BTreeMap<(String, &'static str), u64> {
         self.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
+}
 
-    fn begin(&self, path: &str) -> Call {
+impl Guard for Calls {
+    type Call = Call;
+
+    fn begin(&self, request: &mut Request<Body>) -> Result<Call, Status> {
+        let path = request.uri().path();
         let method = path.strip_prefix('/').filter(|path| self.methods.contains(*path));
-        Call { calls: self.clone(), method: method.unwrap_or(UNKNOWN).to_owned(), code: None }
+        let method = method.unwrap_or(UNKNOWN).to_owned();
+        Ok(Call { calls: self.clone(), method, code: None })
     }
 }
 
-impl Call {
+impl Watch for Call {
     /// Reads the status, which is in the trailers, or in the headers of an answer
     /// without content.
-    fn look_for_status(&mut self, headers: &HeaderMap) {
+    fn on_headers(&mut self, headers: &HeaderMap) {
         if let Some(code) = headers.get(Status::GRPC_STATUS) {
             self.code = Some(Code::from_bytes(code.as_bytes()));
         }
@@ -83,46 +79,6 @@ impl Drop for Call {
         let key = (std::mem::take(&mut self.method), name(self.code.unwrap_or(Code::Cancelled)));
         let mut ended = self.calls.ended.lock().unwrap_or_else(PoisonError::into_inner);
         *ended.entry(key).or_default() += 1;
-    }
-}
-
-impl<S> Layer<S> for Calls {
-    type Service = Counted<S>;
-
-    fn layer(&self, services: S) -> Counted<S> {
-        Counted { calls: self.clone(), services }
-    }
-}
-
-impl<S> Service<Request<Body>> for Counted<S>
-where
-    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible>,
-    S::Future: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = Infallible;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<Body>) -> Self::Future {
-        let mut call = self.calls.begin(request.uri().path());
-        let response = self.services.call(request);
-        Box::pin(async move {
-            let response = response.await?;
-            call.look_for_status(response.headers());
-            // It ends when its answer has been read, or given up.
-            let until_read = move |body: Body| {
-                Body::new(body.inspect_frame(move |frame| {
-                    if let Some(trailers) = frame.trailers_ref() {
-                        call.look_for_status(trailers);
-                    }
-                }))
-            };
-            Ok(response.map(until_read))
-        })
     }
 }
 
@@ -166,34 +122,25 @@ fn name(code: Code) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use std::future::{Ready, ready};
+    use std::{convert::Infallible, future::ready};
 
+    use http::Response;
     use http_body_util::Full;
+    use tower::{Layer as _, Service as _, service_fn};
 
     use super::*;
+    use crate::around::Around;
 
-    /// Answers with a status in the headers, or without any.
-    #[derive(Clone)]
-    struct Answer(Option<Code>);
-
-    impl Service<Request<Body>> for Answer {
-        type Response = Response<Body>;
-        type Error = Infallible;
-        type Future = Ready<Result<Response<Body>, Infallible>>;
-        fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-            Poll::Ready(Ok(()))
-        }
-        fn call(&mut self, _: Request<Body>) -> Self::Future {
-            ready(Ok(match self.0 {
+    /// Calls a method that answers with a status in the headers, or without any.
+    async fn call(calls: &Calls, path: &str, code: Option<Code>) -> Response<Body> {
+        let request = Request::builder().uri(path).body(Body::empty()).unwrap();
+        let answer = service_fn(|_: Request<Body>| {
+            ready(Ok::<_, Infallible>(match code {
                 Some(code) => Status::new(code, "").into_http(),
                 None => Response::new(Body::new(Full::from("content"))),
             }))
-        }
-    }
-
-    async fn call(calls: &Calls, path: &str, code: Option<Code>) -> Response<Body> {
-        let request = Request::builder().uri(path).body(Body::empty()).unwrap();
-        calls.layer(Answer(code)).call(request).await.unwrap()
+        });
+        Around(calls.clone()).layer(answer).call(request).await.unwrap()
     }
 
     #[tokio::test]

@@ -1,25 +1,18 @@
 //! Stands before all services: lets in who knows the right token, and not too many.
 
-use std::{
-    convert::Infallible,
-    future::{Future, ready},
-    pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
-    task::{Context, Poll},
-};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use http::{Request, Response, header::AUTHORIZATION};
-use http_body_util::BodyExt as _;
+use http::{Request, header::AUTHORIZATION};
 use swarm_proto::v1::worker_service_server;
 use swarm_transport::BEARER;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Status, body::Body, transport::server::TlsConnectInfo};
 use tonic_health::pb::health_server;
-use tower::{Layer, Service};
 use tracing::warn;
 
 use crate::{
     access::{Role, Tokens},
+    around::{Guard, Watch},
     clock,
     limits::{CLIENT_CALLS_MAX, WORKERS_MAX},
     listener::Peer,
@@ -35,12 +28,14 @@ pub struct Gate {
     log: Arc<Mutex<Throttle>>,
 }
 
-/// Services behind a gate.
-#[derive(Debug, Clone)]
-pub struct Guarded<S> {
-    gate: Gate,
-    services: S,
+/// A call that was let in, and its place among those at the same time. Probes take
+/// none.
+#[derive(Debug)]
+pub struct Admitted {
+    _place: Option<OwnedSemaphorePermit>,
 }
+
+impl Watch for Admitted {}
 
 impl Gate {
     /// Asks for tokens, if there are any.
@@ -113,69 +108,41 @@ fn bearer_token(authorization: &[u8]) -> Option<&[u8]> {
     scheme.eq_ignore_ascii_case(BEARER.as_bytes()).then_some(token)
 }
 
-impl<S> Layer<S> for Gate {
-    type Service = Guarded<S>;
+impl Guard for Gate {
+    type Call = Admitted;
 
-    fn layer(&self, services: S) -> Guarded<S> {
-        Guarded { gate: self.clone(), services }
-    }
-}
-
-impl<S> Service<Request<Body>> for Guarded<S>
-where
-    S: Service<Request<Body>, Response = Response<Body>, Error = Infallible>,
-    S::Future: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = Infallible;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, Infallible>> + Send>>;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
-        let Some(role) = role_for(request.uri().path()) else {
-            return Box::pin(self.services.call(request));
-        };
+    fn begin(&self, request: &mut Request<Body>) -> Result<Admitted, Status> {
+        let path = request.uri().path();
+        let Some(role) = role_for(path) else { return Ok(Admitted { _place: None }) };
         let extensions = request.extensions();
         let encrypted = || extensions.get::<TlsConnectInfo<Peer>>().map(TlsConnectInfo::get_ref);
         let peer = extensions.get::<Peer>().or_else(encrypted).cloned();
         let authorization = request.headers().get(AUTHORIZATION).map(|value| value.as_bytes());
-        let permit = match self.gate.admit(role, authorization) {
-            Ok(permit) => permit,
-            Err(status) => {
-                self.gate.log_refusal(peer.as_ref(), request.uri().path(), &status);
-                return Box::pin(ready(Ok(status.into_http())));
-            }
-        };
+        let place = self
+            .admit(role, authorization)
+            .inspect_err(|status| self.log_refusal(peer.as_ref(), path, status))?;
         // What was checked is not needed any more, and must not be seen any more.
         request.headers_mut().remove(AUTHORIZATION);
         if let Some(peer) = peer {
             peer.admit();
             request.extensions_mut().insert(peer);
         }
-        let response = self.services.call(request);
-        Box::pin(async move {
-            // A call lasts until its answer has been read, or given up.
-            let until_read = move |body: Body| {
-                Body::new(body.map_err(move |status| {
-                    let _held = &permit;
-                    status
-                }))
-            };
-            Ok(response.await?.map(until_read))
-        })
+        Ok(Admitted { _place: Some(place) })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::{convert::Infallible, future::ready};
+
+    use http::Response;
     use http_body_util::Full;
     use swarm_transport::Token;
     use tonic::Code;
+    use tower::{Layer as _, Service as _, service_fn};
 
     use super::*;
+    use crate::around::Around;
 
     fn gate() -> Gate {
         let token = |letter: &str| Token::parse(&letter.repeat(32)).unwrap();
@@ -240,21 +207,12 @@ mod tests {
 
     #[tokio::test]
     async fn a_call_counts_until_its_answer_is_dropped() {
-        #[derive(Clone)]
-        struct Answer;
-        impl Service<Request<Body>> for Answer {
-            type Response = Response<Body>;
-            type Error = Infallible;
-            type Future = std::future::Ready<Result<Response<Body>, Infallible>>;
-            fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
-                Poll::Ready(Ok(()))
-            }
-            fn call(&mut self, _: Request<Body>) -> Self::Future {
-                ready(Ok(Response::new(Body::new(Full::from("answer")))))
-            }
-        }
+        let answer = service_fn(|_: Request<Body>| {
+            ready(Ok::<_, Infallible>(Response::new(Body::new(Full::from("answer")))))
+        });
         let gate = Gate::new(None);
-        let response = gate.layer(Answer).call(Request::new(Body::empty())).await.unwrap();
+        let mut guarded = Around(gate.clone()).layer(answer);
+        let response = guarded.call(Request::new(Body::empty())).await.unwrap();
         assert_eq!(gate.client_calls.available_permits(), CLIENT_CALLS_MAX - 1);
         drop(response);
         assert_eq!(gate.client_calls.available_permits(), CLIENT_CALLS_MAX);

@@ -4,17 +4,23 @@
 //! - the crate `evolution`: which genotypes to evaluate next (pure)
 //! - [`engine`]: which worker computes what (pure, synchronous)
 //! - [`store`]: SQLite, one transaction per generation
-//! - `driver`: the loop that connects the three with the network
-//! - `rpc`: gRPC services, translation only
-//! - `listener`, `gate`: who gets as far as the services
+//! - `runs`: what an experiment does next, from its submission to its end (pure,
+//!   synchronous)
+//! - `driver`: the loop that carries out what engine and runs decide
+//! - `control`: what clients can have a running coordinator do
+//! - `queries`: what can be read of experiments; works on the store alone
+//! - `rpc`: gRPC services, which only translate
+//! - `listener`, `gate`: which connections and calls get as far as the services
 //! - `health_check`: asks another process's coordinator how it is
 //! - [`referee`]: evaluates single items, in a process of its own
 //! - [`metrics`]: what can be scraped
 //! - [`limits`]: every bound on what the network can ask for
 
 mod access;
+mod around;
 mod calls;
 mod clock;
+mod control;
 mod driver;
 pub mod engine;
 mod failpoint;
@@ -25,12 +31,15 @@ pub mod limits;
 mod listener;
 pub mod metrics;
 pub mod priority;
+mod queries;
 pub mod referee;
 mod rpc;
+mod runs;
 mod server;
 mod shared_store;
 pub mod store;
 mod submission;
+mod text;
 mod throttle;
 
 pub use access::{Access, AccessError, Role, Tls, Tokens};

@@ -6,7 +6,9 @@ use tokio::sync::oneshot;
 
 use crate::{
     calls::Calls,
-    driver::{Event, EventSender, ExperimentFigures, Figures},
+    driver::{DriverEvent, EventSender, StatsSnapshot},
+    engine::JobStats,
+    runs::RunStats,
     shared_store::SharedStore,
 };
 
@@ -104,9 +106,9 @@ pub struct Source {
 impl Source {
     /// All values in Prometheus' text format; none while the coordinator stops.
     pub async fn scrape(self) -> Option<String> {
-        let (reply, figures) = oneshot::channel();
-        self.events.send(Event::FiguresRequested(reply)).await.ok()?;
-        let Figures { fleet, experiments } = figures.await.ok()?;
+        let (reply, stats) = oneshot::channel();
+        self.events.send(DriverEvent::StatsRequested(reply)).await.ok()?;
+        let StatsSnapshot { fleet, runs } = stats.await.ok()?;
         let mut scrape = Scrape::default();
         let version = env!("CARGO_PKG_VERSION");
         scrape.put(&BUILD, &[version, sim_core::FINGERPRINT], 1.0);
@@ -139,14 +141,14 @@ impl Source {
         for ((method, code), n_calls) in self.instruments.calls.ended() {
             scrape.put(&CALLS, &[&method, code], n_calls as f64);
         }
-        experiments.iter().for_each(|experiment| put_experiment(&mut scrape, experiment));
+        runs.iter().for_each(|(run, work)| put_run(&mut scrape, run, work));
         Some(scrape.into_text())
     }
 }
 
-fn put_experiment(scrape: &mut Scrape, experiment: &ExperimentFigures) {
-    let ExperimentFigures { id, name, generations_wanted, latest, work } = experiment;
-    let labels = [&id.to_string(), name.as_str()];
+fn put_run(scrape: &mut Scrape, run: &RunStats, work: &JobStats) {
+    let RunStats { experiment, name, generations_wanted, latest } = run;
+    let labels = [&experiment.to_string(), name.as_str()];
     let state = if work.is_paused { "paused" } else { "running" };
     scrape.put(&STATE, &[labels[0], labels[1], state], 1.0);
     let mut put = |metric: &Metric, value: f64| scrape.put(metric, &labels, value);

@@ -73,9 +73,9 @@ impl SharedStore {
     /// Reads.
     pub async fn read<T: Send + 'static>(
         &self,
-        query: impl FnOnce(&mut Store) -> Result<T, StoreError> + Send + 'static,
-    ) -> Result<T, StoreError> {
-        self.call(query).await
+        query: impl FnOnce(&Store) -> T + Send + 'static,
+    ) -> T {
+        self.call(|store| query(store)).await
     }
 
     /// Writes once; the caller handles failure.
@@ -95,8 +95,8 @@ impl SharedStore {
 
     async fn call<T: Send + 'static>(
         &self,
-        operation: impl FnOnce(&mut Store) -> Result<T, StoreError> + Send + 'static,
-    ) -> Result<T, StoreError> {
+        operation: impl FnOnce(&mut Store) -> T + Send + 'static,
+    ) -> T {
         let store = Arc::clone(&self.store);
         task::spawn_blocking(move || {
             // A panic inside rolls its transaction back: the store is still good.

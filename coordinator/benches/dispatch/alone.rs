@@ -8,7 +8,7 @@ use std::{
 
 use coordinator::{
     priority::Priority,
-    store::{Generation, GenerationCommit, NewExperiment, Store},
+    store::{GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
 use evolution::{Digest, Evolution};
 use experiment_file::ExperimentConfig;
@@ -58,7 +58,7 @@ pub fn measure(file: &str) -> Alone {
         asked = evolution.ask();
         evolutions.push(ms(since(started)));
 
-        let generation = Generation {
+        let generation = GenerationRecord {
             generation: record.generation,
             statistics: record.statistics,
             digest: record.digest.to_string(),

@@ -1,20 +1,19 @@
-//! The loop that connects the engine, evolution and the store with the network.
+//! The loop that connects the engine and the life of runs with the network and the
+//! store.
 //!
-//! It decides nothing: everything that happens becomes an [`Event`], the engine
-//! answers with commands, and the loop carries them out. What may take long
-//! (evolution's arithmetic, the disk) runs beside it.
+//! It decides nothing: everything that happens becomes a [`DriverEvent`] or the end of
+//! a task, the two state machines ([`Engine`]: who computes what; [`Runs`]: what an
+//! experiment does next) answer with commands, and the loop carries them out. What
+//! may take long runs beside it, in [`tasks`].
 
-mod advance;
-mod evaluations;
-mod figures;
-mod ledger;
-mod requests;
-mod round;
+mod events;
+mod stats;
+mod tasks;
+mod workers;
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, time::Duration};
 
-use experiment_file::ExperimentConfig;
-use sim_core::{Output, TrialSet};
+use swarm_telemetry::Histogram;
 use tokio::{
     sync::{mpsc, oneshot},
     task::JoinSet,
@@ -25,233 +24,66 @@ use tracing::{debug, error, info, warn};
 
 use crate::{
     clock,
-    engine::{
-        Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
-        JobActivity, WorkerStatus,
-    },
+    engine::{self, Engine, EngineConfig, EvaluatedBatch},
     failpoint,
-    ids::{AssignmentId, EvaluationId, ExperimentId, JobId, WorkerId},
-    metrics::Instruments,
-    priority::Priority,
+    ids::{EvaluationId, ExperimentId, JobId},
+    runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
-    store::{ExperimentState, Generation},
-    submission::Runnable,
+    store::ExperimentState,
 };
 
-use advance::{Advanced, RunId, Step};
-pub use evaluations::Evaluation;
-use evaluations::Reply;
-pub use figures::{ExperimentFigures, Figures};
-use ledger::{Change, Entry, Ledger};
-pub use round::Round;
-use round::{Complete, Next};
+pub use events::{
+    DriverEvent, EvaluationReply, EventSender, ToWorker, WorkerLink, WorkerMessage, channel,
+};
+pub use stats::StatsSnapshot;
+use tasks::{Disk, Done};
+use workers::ConnectedWorkers;
 
-/// Events that wait for the loop; whoever sends more waits.
-const EVENT_QUEUE_LEN: usize = 1024;
 /// How soon late work is noticed.
 const TICK_INTERVAL_MAX: Duration = Duration::from_millis(100);
 /// Genotypes of about this many bytes travel in one message.
-const BATCH_LEN: usize = 1 << 20;
-
-/// Everything that can happen.
-#[derive(Debug)]
-pub enum Event {
-    /// A worker has introduced itself and its versions agree.
-    WorkerJoined {
-        /// Who it is.
-        introduction: Introduction,
-        /// The way to it.
-        link: WorkerLink,
-        /// Gets its id.
-        reply: oneshot::Sender<WorkerId>,
-    },
-    /// A worker has sent something.
-    WorkerSpoke(WorkerId, WorkerMessage),
-    /// A worker's stream has ended.
-    WorkerLeft {
-        /// Whose.
-        worker: WorkerId,
-        /// How, for the log.
-        reason: String,
-    },
-    /// A stored experiment is to run.
-    ExperimentReady(Box<Runnable>),
-    /// A client wants something of an unfinished experiment.
-    Requested {
-        /// Of which.
-        experiment: ExperimentId,
-        /// What.
-        request: Request,
-        /// Answered when it is stored.
-        reply: oneshot::Sender<()>,
-    },
-    /// A client wants to see the workers.
-    WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
-    /// A client wants a genotype evaluated.
-    EvaluationRequested(Box<Evaluation>),
-    /// A client wonders what becomes of an experiment.
-    ActivityRequested(ExperimentId, oneshot::Sender<JobActivity>),
-    /// Somebody scrapes metrics.
-    FiguresRequested(oneshot::Sender<Figures>),
-}
-
-/// What a client may want of an unfinished experiment.
-#[derive(Debug, Clone)]
-pub enum Request {
-    /// That it ends.
-    Cancel,
-    /// That it waits to be resumed; why.
-    Pause(String),
-    /// That it goes on.
-    Resume,
-    /// Another share of the fleet.
-    SetPriority(Priority),
-}
-
-/// What a worker says after its introduction.
-#[derive(Debug)]
-pub enum WorkerMessage {
-    /// It is alive.
-    Heartbeat,
-    /// It has computed items.
-    Results(Vec<ItemResult>),
-    /// It wants no more items.
-    Draining,
-}
-
-/// The way to a connected worker.
-#[derive(Debug)]
-pub struct WorkerLink {
-    /// Bounded; a worker that lets it fill up does not read and is dropped.
-    pub outbox: mpsc::Sender<ToWorker>,
-    /// Cancelled when the coordinator has dropped the worker.
-    pub dropped: CancellationToken,
-}
-
-/// What a worker is told.
-#[derive(Debug)]
-pub enum ToWorker {
-    /// It is welcome under this id.
-    Welcome(WorkerId),
-    /// A job's specification.
-    Spec(JobId, Arc<str>),
-    /// Items of a job's batch.
-    Assignments {
-        /// The job whose batch it is.
-        job: JobId,
-        /// Which worlds and noise the trials meet.
-        trial_set: TrialSet,
-        /// What is returned for a trial.
-        output: Output,
-        /// At least one.
-        assignments: Vec<Assignment>,
-    },
-    /// Assignments whose results are not wanted any more.
-    Drop(Vec<AssignmentId>),
-    /// A job is over, or paused.
-    End(JobId),
-    /// It is dropped; why.
-    Dropped(String),
-}
-
-/// Sends events to the loop.
-pub type EventSender = mpsc::Sender<Event>;
-
-/// A channel to a loop that is yet to run.
-pub fn channel() -> (EventSender, mpsc::Receiver<Event>) {
-    mpsc::channel(EVENT_QUEUE_LEN)
-}
+const ITEMS_LEN_MAX: usize = 1 << 20;
 
 /// The loop's state.
 pub struct Driver {
     engine: Engine,
-    store: SharedStore,
-    events: mpsc::Receiver<Event>,
+    runs: Runs,
+    disk: Disk,
+    events: mpsc::Receiver<DriverEvent>,
     shutdown: CancellationToken,
-    instruments: Instruments,
     tick_interval: Duration,
-    workers: BTreeMap<WorkerId, ConnectedWorker>,
-    experiments: BTreeMap<ExperimentId, Running>,
-    n_started: u64,
-    /// Who waits for which evaluation.
-    evaluations: BTreeMap<EvaluationId, Reply>,
-    n_evaluations: u64,
-    /// Judged rounds whose conclusions are being drawn and stored.
-    advancing: JoinSet<Advanced>,
-    /// Everything else that is being stored.
-    ledger: Ledger,
-}
-
-struct ConnectedWorker {
-    name: String,
-    link: WorkerLink,
-    is_draining: bool,
-}
-
-/// An experiment that has not ended. A generation is stored while the next one is
-/// judged; one that is complete before waits, so that they are stored in order.
-struct Running {
-    config: Arc<ExperimentConfig>,
-    /// Tells this run of the experiment from one before more generations were
-    /// asked for.
-    incarnation: u64,
-    /// What is being judged; none while conclusions are drawn, or wait.
-    round: Option<Round>,
-    /// The latest generation that is on disk.
-    latest: Option<Generation>,
-    /// What is to be stored next.
-    complete: Option<Box<Complete>>,
-    is_storing: bool,
-    /// How it ends, as soon as what is being stored is stored.
-    end: Option<(ExperimentState, String)>,
-    /// Who waits for it to end.
-    cancellations: Vec<oneshot::Sender<()>>,
-}
-
-impl Running {
-    fn new(config: ExperimentConfig, incarnation: u64) -> Self {
-        Self {
-            config: Arc::new(config),
-            incarnation,
-            round: None,
-            latest: None,
-            complete: None,
-            is_storing: false,
-            end: None,
-            cancellations: Vec::new(),
-        }
-    }
+    workers: ConnectedWorkers,
+    /// The clients that wait for a change to be stored.
+    requests: BTreeMap<RequestId, oneshot::Sender<()>>,
+    n_requests: u64,
+    /// The clients that wait for an evaluation.
+    evaluations: BTreeMap<EvaluationId, EvaluationReply>,
+    tasks: JoinSet<Done>,
 }
 
 impl Driver {
-    /// A loop without workers or experiments.
+    /// A loop without workers or experiments. `commit_duration` measures how long
+    /// commits take, in s.
     pub fn new(
         store: SharedStore,
-        events: mpsc::Receiver<Event>,
+        events: mpsc::Receiver<DriverEvent>,
         config: EngineConfig,
         shutdown: CancellationToken,
+        commit_duration: Histogram,
     ) -> Self {
         Self {
             engine: Engine::new(clock::now(), config),
-            ledger: Ledger::new(store.clone(), shutdown.clone()),
-            store,
+            runs: Runs::default(),
+            disk: Disk { store, shutdown: shutdown.clone(), commit_duration },
             events,
             shutdown,
-            instruments: Instruments::default(),
             tick_interval: TICK_INTERVAL_MAX.min(config.lease / 8),
             workers: BTreeMap::new(),
-            experiments: BTreeMap::new(),
-            n_started: 0,
+            requests: BTreeMap::new(),
+            n_requests: 0,
             evaluations: BTreeMap::new(),
-            n_evaluations: 0,
-            advancing: JoinSet::new(),
+            tasks: JoinSet::new(),
         }
-    }
-
-    /// The same loop, which measures what it does with these.
-    #[must_use]
-    pub fn measured_by(self, instruments: Instruments) -> Self {
-        Self { instruments, ..self }
     }
 
     /// Runs until shutdown, and then finishes what is being stored.
@@ -262,105 +94,153 @@ impl Driver {
             tokio::select! {
                 () = self.shutdown.cancelled() => break,
                 Some(event) = self.events.recv() => self.on_event(event),
-                Some(advanced) = self.advancing.join_next() => match advanced {
-                    Ok(advanced) => self.on_advanced(advanced),
-                    // Its experiment would wait for ever. At the next start it goes on
-                    // from its last commit.
-                    Err(error) => panic!("storing a generation: {error}"),
-                },
-                Some(()) = self.ledger.advance() => {}
+                Some(done) = self.tasks.join_next() => self.on_task_done(done),
                 _ = ticks.tick() => {
                     self.drop_abandoned_evaluations();
                     self.engine.on_tick(clock::now());
                 }
             }
-            while let Some(command) = self.engine.poll_command() {
-                self.carry_out(command);
-            }
+            self.carry_out_all();
         }
         // Dropping the links ends the workers' streams.
         self.workers.clear();
-        while self.advancing.join_next().await.is_some() {}
-        while self.ledger.advance().await.is_some() {}
+        self.runs.on_shutdown();
+        while let Some(done) = self.tasks.join_next().await {
+            self.on_task_done(done);
+            self.carry_out_all();
+        }
     }
 
-    fn on_event(&mut self, event: Event) {
+    fn on_event(&mut self, event: DriverEvent) {
         failpoint::reached("event");
         let now = clock::now();
         match event {
-            Event::WorkerJoined { introduction, link, reply } => {
-                let Introduction { name, version, n_slots, .. } = introduction.clone();
-                let id = self.engine.on_worker_joined(now, introduction);
-                // The worker is welcomed before it is sent work: commands are
-                // carried out after this.
-                self.workers
-                    .insert(id, ConnectedWorker { name: name.clone(), link, is_draining: false });
-                self.send(id, ToWorker::Welcome(id));
-                let fleet = self.engine.fleet_size();
-                info!(
-                    worker = %id, name, version, slots = n_slots,
-                    workers = fleet.n_workers, total_slots = fleet.n_slots,
-                    "worker joined"
-                );
-                // If the stream is gone already, its end will be reported.
-                let _ = reply.send(id);
+            DriverEvent::WorkerJoined { introduction, link, reply } => {
+                self.on_worker_joined(introduction, link, reply);
             }
-            Event::WorkerSpoke(id, message) => match message {
+            DriverEvent::WorkerSpoke(id, message) => match message {
                 WorkerMessage::Heartbeat => self.engine.on_heartbeat(now, id),
                 WorkerMessage::Results(results) => self.engine.on_results(now, id, results),
-                WorkerMessage::Draining => {
-                    if let Some(worker) = self.workers.get_mut(&id) {
-                        worker.is_draining = true;
-                        info!(worker = %id, name = worker.name, "worker is draining");
-                    }
-                    self.engine.on_draining(now, id);
-                }
+                WorkerMessage::Draining => self.on_worker_draining(id),
             },
-            Event::WorkerLeft { worker, reason } => self.on_worker_left(worker, &reason),
-            Event::ExperimentReady(runnable) => self.start(*runnable),
-            Event::EvaluationRequested(evaluation) => self.evaluate(*evaluation),
-            Event::Requested { experiment, request, reply } => {
-                self.on_request(experiment, request, reply);
+            DriverEvent::WorkerLeft { worker, reason } => self.on_worker_left(worker, &reason),
+            DriverEvent::ExperimentReady(runnable) => self.start(*runnable),
+            DriverEvent::EvaluationRequested(evaluation, reply) => {
+                self.evaluate(*evaluation, reply);
+            }
+            DriverEvent::Requested { experiment, request, reply } => {
+                log_request(experiment, &request);
+                self.n_requests += 1;
+                let request_id = RequestId(self.n_requests);
+                self.requests.insert(request_id, reply);
+                self.runs.on_request(experiment, request, request_id);
             }
             // If the client is gone it need not be told.
-            Event::WorkersRequested(reply) => drop(reply.send(self.engine.worker_status(now))),
-            Event::ActivityRequested(id, reply) => {
+            DriverEvent::WorkersRequested(reply) => {
+                drop(reply.send(self.engine.worker_status(now)));
+            }
+            DriverEvent::ActivityRequested(id, reply) => {
                 drop(reply.send(self.engine.activity(now, id.into())));
             }
-            Event::FiguresRequested(reply) => drop(reply.send(self.figures())),
+            DriverEvent::StatsRequested(reply) => drop(reply.send(self.stats())),
         }
     }
 
     fn start(&mut self, runnable: Runnable) {
-        let id = runnable.id;
         let generations = runnable.config.algorithm.generations;
         info!(
-            experiment = %id, name = runnable.config.name, seed = runnable.config.seed,
+            experiment = %runnable.id, name = runnable.config.name, seed = runnable.config.seed,
             generation = runnable.round.trial_set().generation(), generations,
             "experiment starts"
         );
-        self.engine.on_job_started(id.into(), runnable.spec, runnable.priority);
         if runnable.is_paused {
-            info!(experiment = %id, "experiment is paused");
-            self.engine.on_job_paused(clock::now(), id.into());
+            info!(experiment = %runnable.id, "experiment is paused");
         }
-        self.n_started += 1;
-        let running =
-            Running { latest: runnable.latest, ..Running::new(runnable.config, self.n_started) };
-        self.experiments.insert(id, running);
-        self.judge(id, runnable.round);
+        self.runs.on_submitted(runnable);
     }
 
-    /// Has the fleet judge a round.
-    fn judge(&mut self, id: ExperimentId, round: Round) {
-        let Some(running) = self.experiments.get_mut(&id) else { return };
-        let n_trials = round.n_trials(&running.config);
-        let batch = Batch::fitness(round.trial_set(), round.genotypes(), n_trials);
-        running.round = Some(round);
-        self.engine.on_batch_requested(clock::now(), id.into(), batch);
+    fn evaluate(&mut self, evaluation: Evaluation, reply: EvaluationReply) {
+        let trials = evaluation.n_trials;
+        let id = self.runs.on_evaluation_requested(evaluation);
+        debug!(evaluation = %id, trials, "evaluation starts");
+        self.evaluations.insert(id, reply);
     }
 
-    fn carry_out(&mut self, command: Command) {
+    /// Ends evaluations whose clients have gone.
+    fn drop_abandoned_evaluations(&mut self) {
+        for (id, _) in self.evaluations.extract_if(.., |_, reply| reply.is_closed()) {
+            info!(evaluation = %id, "evaluation dropped: its client has gone");
+            self.runs.on_evaluation_abandoned(id);
+        }
+    }
+
+    fn on_task_done(&mut self, done: Result<Done, tokio::task::JoinError>) {
+        match done {
+            Ok(Done::Concluded(run, conclusion)) => self.runs.on_concluded(run, conclusion),
+            Ok(Done::Committed(run, outcome)) => self.runs.on_committed(run, outcome),
+            Ok(Done::ChangeWritten(id, is_stored)) => self.runs.on_change_written(id, is_stored),
+            // Its run, or its client, would wait for ever. At the next start every
+            // experiment goes on from its last commit.
+            Err(error) => panic!("storing a generation or a change: {error}"),
+        }
+    }
+
+    /// Carries out commands until neither state machine has more.
+    fn carry_out_all(&mut self) {
+        loop {
+            if let Some(command) = self.runs.poll_command() {
+                self.carry_out(command);
+            } else if let Some(command) = self.engine.poll_command() {
+                self.carry_out_for_engine(command);
+            } else {
+                return;
+            }
+        }
+    }
+
+    fn carry_out(&mut self, command: runs::Command) {
+        use runs::Command;
+        let now = clock::now();
+        match command {
+            Command::StartJob { job, spec, priority, is_paused } => {
+                self.engine.on_job_started(job, spec, priority);
+                if is_paused {
+                    self.engine.on_job_paused(now, job);
+                }
+            }
+            Command::Evaluate { job, batch } => self.engine.on_batch_requested(now, job, batch),
+            Command::PauseJob { job } => self.engine.on_job_paused(now, job),
+            Command::ResumeJob { job } => self.engine.on_job_resumed(now, job),
+            Command::SetPriority { job, priority } => self.engine.on_priority_set(job, priority),
+            Command::EndJob { job } => self.engine.on_job_ended(now, job),
+            Command::Conclude { run, config, round, evaluated } => {
+                self.tasks.spawn(tasks::conclude(run, config, round, evaluated));
+            }
+            Command::Commit { run, config, ready } => {
+                self.tasks.spawn(tasks::commit(run, config, *ready, self.disk.clone()));
+            }
+            Command::WriteChange { experiment, change } => {
+                self.tasks.spawn(tasks::write_change(experiment, change, self.disk.clone()));
+            }
+            Command::Answer { request, is_stored } => {
+                let reply = self.requests.remove(&request).filter(|_| is_stored);
+                // A client that has stopped waiting need not be told.
+                reply.map(|reply| reply.send(()));
+            }
+            Command::PublishEnd { experiment, state, reason } => match state {
+                ExperimentState::Failed => error!(%experiment, reason, "experiment failed"),
+                _ => info!(%experiment, reason, "experiment {}", state.name()),
+            },
+            Command::AnswerEvaluation { evaluation, result } => {
+                let reply = self.evaluations.remove(&evaluation);
+                // A client that has gone meanwhile need not be told.
+                reply.map(|reply| reply.send(result));
+            }
+        }
+    }
+
+    fn carry_out_for_engine(&mut self, command: engine::Command) {
+        use engine::Command;
         match command {
             Command::SendSpec { worker, job, spec } => self.send(worker, ToWorker::Spec(job, spec)),
             Command::SendAssignments { worker, job, trial_set, output, assignments } => {
@@ -369,7 +249,7 @@ impl Driver {
                     items = assignments.len(), "items assigned"
                 );
                 let genotype_len = size_of_val(assignments[0].genotype.as_slice()).max(1);
-                for assignments in assignments.chunks((BATCH_LEN / genotype_len).max(1)) {
+                for assignments in assignments.chunks((ITEMS_LEN_MAX / genotype_len).max(1)) {
                     let assignments = assignments.to_vec();
                     let message = ToWorker::Assignments { job, trial_set, output, assignments };
                     self.send(worker, message);
@@ -384,16 +264,14 @@ impl Driver {
                 self.forget_worker(worker, &reason, n_items_requeued);
             }
             Command::FinishBatch { job: JobId::Evaluation(id), mut evaluated } => {
-                self.finish_evaluation(id, Ok(evaluated.values.swap_remove(0)));
+                self.runs.on_evaluation_finished(id, Ok(evaluated.values.swap_remove(0)));
             }
             Command::FailJob { job: JobId::Evaluation(id), reason }
             | Command::PauseJob { job: JobId::Evaluation(id), reason } => {
                 error!(evaluation = %id, reason, "evaluation failed");
-                self.finish_evaluation(id, Err(reason));
+                self.runs.on_evaluation_finished(id, Err(reason));
             }
             Command::FinishBatch { job: JobId::Experiment(experiment), evaluated } => {
-                let Some(running) = self.experiments.get_mut(&experiment) else { return };
-                let Some(round) = running.round.take() else { return };
                 let EvaluatedBatch { trial_set, n_audited, n_unaudited, .. } = evaluated;
                 let (generation, trials) = (trial_set.generation(), trial_set.kind());
                 debug!(%experiment, generation, trials, n_audited, "batch evaluated");
@@ -403,105 +281,27 @@ impl Driver {
                         "there was no second worker to audit results"
                     );
                 }
-                let run = RunId { id: experiment, incarnation: running.incarnation };
-                let config = Arc::clone(&running.config);
-                self.advancing.spawn(advance::conclude(run, config, round, evaluated));
+                self.runs.on_batch_evaluated(experiment, evaluated);
             }
             Command::FailJob { job: JobId::Experiment(experiment), reason } => {
-                self.end(experiment, ExperimentState::Failed, reason);
+                self.runs.on_job_failed(experiment, reason);
             }
             Command::PauseJob { job: JobId::Experiment(experiment), reason } => {
                 error!(%experiment, reason, "experiment paused");
-                let paused = Change::State(ExperimentState::Paused, reason.clone());
-                for change in [Change::Notice(reason), paused] {
-                    self.ledger.push(Entry { experiment, change, replies: Vec::new() });
-                }
+                self.runs.on_job_suspended(experiment, reason);
             }
         }
     }
+}
 
-    fn on_advanced(&mut self, Advanced { run, step }: Advanced) {
-        let id = run.id;
-        let Some(running) = self.experiments.get_mut(&id) else { return };
-        if running.incarnation != run.incarnation {
-            return;
-        }
-        match step {
-            Step::Concluded(Next::Judge(round)) => self.judge(id, *round),
-            Step::Concluded(Next::Commit(complete)) => {
-                running.complete = Some(complete);
-                self.store_next(id);
-            }
-            Step::Stored(generation) => {
-                running.is_storing = false;
-                running.latest = Some(generation);
-                match running.end.take() {
-                    Some((state, reason)) => self.end(id, state, reason),
-                    None => self.store_next(id),
-                }
-            }
-            Step::Ended => {
-                running.is_storing = false;
-                if let Some((state, reason)) = running.end.take() {
-                    self.end(id, state, reason);
-                } else {
-                    self.experiments.remove(&id);
-                    self.engine.on_job_ended(clock::now(), id.into());
-                }
-            }
-            Step::Failed(reason) => self.end(id, ExperimentState::Failed, reason),
-            Step::NotStored(reason) => {
-                running.is_storing = false;
-                let failed = (ExperimentState::Failed, reason);
-                let (state, reason) = running.end.take().unwrap_or(failed);
-                self.end(id, state, reason);
-            }
-        }
-    }
-
-    /// Stores a complete generation, unless the one before is still being stored,
-    /// and has the next one judged meanwhile. If the coordinator dies before the
-    /// first is stored, both are judged again, to the same bits.
-    fn store_next(&mut self, id: ExperimentId) {
-        let Some(running) = self.experiments.get_mut(&id) else { return };
-        if running.is_storing {
-            return;
-        }
-        let Some(mut complete) = running.complete.take() else { return };
-        running.is_storing = true;
-        let next = complete.next.take();
-        let run = RunId { id, incarnation: running.incarnation };
-        let (config, store) = (Arc::clone(&running.config), self.store.clone());
-        let shutdown = self.shutdown.clone();
-        let duration = self.instruments.commit_duration.clone();
-        self.advancing.spawn(advance::commit(run, config, store, shutdown, duration, *complete));
-        if let Some(round) = next {
-            self.judge(id, round);
-        }
-    }
-
-    fn send(&mut self, id: WorkerId, message: ToWorker) {
-        let Some(worker) = self.workers.get(&id) else { return };
-        if worker.link.outbox.try_send(message).is_err() {
-            self.on_worker_left(id, "it does not read what it is sent");
-        }
-    }
-
-    fn on_worker_left(&mut self, id: WorkerId, reason: &str) {
-        let n_items_requeued = self.engine.on_worker_left(clock::now(), id);
-        self.forget_worker(id, reason, n_items_requeued);
-    }
-
-    fn forget_worker(&mut self, id: WorkerId, reason: &str, items_requeued: usize) {
-        let Some(ConnectedWorker { name, link, is_draining }) = self.workers.remove(&id) else {
-            return;
-        };
-        link.dropped.cancel();
-        let workers = self.engine.fleet_size().n_workers;
-        if is_draining {
-            info!(worker = %id, name, items_requeued, workers, "worker left");
-        } else {
-            warn!(worker = %id, name, reason, items_requeued, workers, "worker lost");
+fn log_request(experiment: ExperimentId, request: &Request) {
+    match request {
+        // Its end is logged.
+        Request::Cancel => {}
+        Request::Pause(reason) => info!(%experiment, reason, "experiment paused"),
+        Request::Resume => info!(%experiment, "experiment resumed"),
+        Request::SetPriority(priority) => {
+            info!(%experiment, priority = priority.weight(), "experiment reprioritised");
         }
     }
 }

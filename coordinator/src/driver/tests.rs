@@ -1,70 +1,17 @@
-//! What the loop does with what comes too late, or at the same time.
+//! The loop with a real store, and with a worker that answers at once.
 
 use std::fs;
 
 use crate::{
-    store::{Experiment, Store},
-    submission::{Checked, Submission},
+    engine::{Introduction, ItemResult},
+    ids::WorkerId,
+    store::{ExperimentRecord, Store},
+    submission::{CheckedSubmission, Submission},
 };
 
 use super::*;
 
 const ID: ExperimentId = ExperimentId(1);
-
-fn checked() -> Checked {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
-    let config_json = fs::read_to_string(path).unwrap();
-    Submission { config_json, ..Submission::default() }.check().unwrap()
-}
-
-fn runnable() -> Runnable {
-    let Checked { new, evolution, .. } = checked();
-    Runnable::new(ID, new.config, evolution, new.priority)
-}
-
-#[tokio::test]
-async fn the_stale_end_of_a_reopened_run_does_not_end_it() {
-    let directory = tempfile::tempdir().unwrap();
-    let store = SharedStore::new(Store::open(directory.path()).unwrap());
-    let (_events, queue) = channel();
-    let config = EngineConfig::new(Duration::from_secs(10));
-    let mut driver = Driver::new(store, queue, config, CancellationToken::new());
-
-    // The last generation of a run is being stored.
-    let Runnable { config, .. } = runnable();
-    driver.n_started = 1;
-    driver.experiments.insert(ID, Running::new(config, 1));
-    // It is stored, a client asks for more generations, and only then does the
-    // driver hear of the end of what was asked for before.
-    driver.on_event(Event::ExperimentReady(Box::new(runnable())));
-    driver.on_advanced(Advanced { run: RunId { id: ID, incarnation: 1 }, step: Step::Ended });
-
-    assert!(driver.experiments[&ID].round.is_some(), "it runs");
-    let (outbox, mut inbox) = mpsc::channel(16);
-    let (reply, _id) = oneshot::channel();
-    let link = WorkerLink { outbox, dropped: CancellationToken::new() };
-    let introduction =
-        Introduction { name: "w".to_owned(), version: String::new(), n_slots: 1, process: None };
-    driver.on_event(Event::WorkerJoined { introduction, link, reply });
-    while let Some(command) = driver.engine.poll_command() {
-        driver.carry_out(command);
-    }
-    let mut has_work = false;
-    while let Ok(message) = inbox.try_recv() {
-        has_work |= matches!(
-            message,
-            ToWorker::Assignments {
-                job: JobId::Experiment(ID),
-                trial_set: TrialSet::Generation(0),
-                ..
-            }
-        );
-    }
-    assert!(has_work, "and workers get its items");
-
-    driver.on_advanced(Advanced { run: RunId { id: ID, incarnation: 2 }, step: Step::Ended });
-    assert!(driver.experiments.is_empty(), "its own end ends it");
-}
 
 /// A driver with a database, one worker, and one experiment, submitted to both.
 struct Rig {
@@ -78,12 +25,19 @@ impl Rig {
     async fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
         let mut store = Store::open(directory.path()).unwrap();
-        let Checked { new, evolution, .. } = checked();
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
+        let config_json = fs::read_to_string(path).unwrap();
+        let submission = Submission { config_json, ..Submission::default() };
+        let CheckedSubmission { new, evolution, .. } = submission.check().unwrap();
         store.create(&new, 0).unwrap();
         let (_events, queue) = channel();
-        let config = EngineConfig::new(Duration::from_secs(10));
-        let shutdown = CancellationToken::new();
-        let mut driver = Driver::new(SharedStore::new(store), queue, config, shutdown);
+        let mut driver = Driver::new(
+            SharedStore::new(store),
+            queue,
+            EngineConfig::new(Duration::from_secs(10)),
+            CancellationToken::new(),
+            crate::metrics::Instruments::default().commit_duration,
+        );
         let (outbox, inbox) = mpsc::channel(1024);
         let (reply, id) = oneshot::channel();
         let link = WorkerLink { outbox, dropped: CancellationToken::new() };
@@ -93,9 +47,9 @@ impl Rig {
             n_slots: 1000,
             process: None,
         };
-        driver.on_event(Event::WorkerJoined { introduction, link, reply });
+        driver.on_event(DriverEvent::WorkerJoined { introduction, link, reply });
         let runnable = Runnable::new(ID, new.config, evolution, new.priority);
-        driver.on_event(Event::ExperimentReady(Box::new(runnable)));
+        driver.on_event(DriverEvent::ExperimentReady(Box::new(runnable)));
         Self { driver, inbox, worker: id.await.unwrap(), _directory: directory }
     }
 
@@ -104,9 +58,7 @@ impl Rig {
     fn answer(&mut self) -> Option<u64> {
         let mut answered = None;
         loop {
-            while let Some(command) = self.driver.engine.poll_command() {
-                self.driver.carry_out(command);
-            }
+            self.driver.carry_out_all();
             let Ok(message) = self.inbox.try_recv() else { return answered };
             let ToWorker::Assignments { trial_set, assignments, .. } = message else { continue };
             answered = trial_set.generation();
@@ -116,29 +68,29 @@ impl Rig {
                 compute_time: Duration::from_millis(1),
             });
             let spoke = WorkerMessage::Results(results.collect());
-            self.driver.on_event(Event::WorkerSpoke(self.worker, spoke));
+            self.driver.on_event(DriverEvent::WorkerSpoke(self.worker, spoke));
         }
     }
 
-    /// Waits for the next step of the experiment.
+    /// Waits for a task to end.
     async fn advance(&mut self) {
-        let advanced = self.driver.advancing.join_next().await.unwrap().unwrap();
-        self.driver.on_advanced(advanced);
+        let done = self.driver.tasks.join_next().await.unwrap();
+        self.driver.on_task_done(done);
+        self.driver.carry_out_all();
     }
 
-    async fn stored(&self) -> Experiment {
-        self.driver.store.read(|store| store.experiment(ID)).await.unwrap().unwrap()
+    async fn stored(&self) -> ExperimentRecord {
+        self.driver.disk.store.read(|store| store.experiment(ID)).await.unwrap().unwrap()
     }
 }
 
 #[tokio::test]
-async fn a_generation_is_judged_while_the_one_before_is_stored() {
+async fn generations_are_evaluated_and_stored() {
     let mut rig = Rig::new().await;
     assert_eq!(rig.answer(), Some(0));
     rig.advance().await;
-    assert!(rig.driver.experiments[&ID].is_storing);
     assert_eq!(rig.answer(), Some(1), "before generation 0 is known to be stored");
-    // In whatever order it hears that 0 is stored and what 1 teaches, 2 is judged
+    // In whatever order it hears that 0 is stored and what 1 teaches, 2 is evaluated
     // only when 0 is stored, and they are stored in order.
     rig.advance().await;
     rig.advance().await;
@@ -147,18 +99,42 @@ async fn a_generation_is_judged_while_the_one_before_is_stored() {
 }
 
 #[tokio::test]
-async fn what_is_being_stored_when_an_experiment_is_cancelled_is_stored_first() {
+async fn a_client_that_cancels_is_told_when_the_end_is_stored() {
     let mut rig = Rig::new().await;
     rig.answer();
     rig.advance().await;
     let (reply, cancelled) = oneshot::channel();
-    rig.driver.on_event(Event::Requested { experiment: ID, request: Request::Cancel, reply });
-    assert_eq!(rig.answer(), Some(1), "its items are on their way");
-    rig.advance().await;
-    while rig.driver.ledger.advance().await.is_some() {}
+    rig.driver.on_event(DriverEvent::Requested { experiment: ID, request: Request::Cancel, reply });
+    rig.driver.carry_out_all();
+    while !rig.driver.tasks.is_empty() {
+        rig.advance().await;
+    }
     cancelled.await.expect("the client is told");
-    assert!(rig.driver.experiments.is_empty() && rig.driver.advancing.is_empty());
     let stored = rig.stored().await;
     assert_eq!(stored.state, ExperimentState::Cancelled);
     assert_eq!(stored.latest.unwrap().generation, 0);
+    assert_eq!(rig.driver.stats().runs.len(), 0);
+}
+
+#[tokio::test]
+async fn an_evaluation_whose_client_has_gone_is_dropped() {
+    let mut rig = Rig::new().await;
+    let evaluation = Box::new(Evaluation {
+        spec: "{}".into(),
+        genotype: vec![0.5],
+        n_trials: 1,
+        n_values: 1,
+        priority: crate::priority::Priority::default(),
+    });
+    let (reply, result) = oneshot::channel();
+    rig.driver.on_event(DriverEvent::EvaluationRequested(evaluation, reply));
+    drop(result);
+    rig.driver.drop_abandoned_evaluations();
+    rig.driver.carry_out_all();
+    assert!(rig.driver.evaluations.is_empty());
+    let mut is_told = false;
+    while let Ok(message) = rig.inbox.try_recv() {
+        is_told |= matches!(message, ToWorker::End(JobId::Evaluation(_)));
+    }
+    assert!(is_told, "the worker drops it");
 }

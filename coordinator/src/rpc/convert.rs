@@ -12,10 +12,12 @@ use crate::{
     driver::ToWorker,
     engine::{Assignment, ItemResult, WorkerStatus},
     ids::{AssignmentId, JobId},
-    limits::TEXT_LEN_MAX,
-    store::{Event, EventKind, Experiment, ExperimentState, Generation},
+    priority::Priority,
+    queries::ChampionReport,
+    store::{Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord},
+    text::printable,
 };
-use evolution::HeldOut;
+use evolution::{ChampionSource, HeldOut};
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]
@@ -122,20 +124,8 @@ pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
     }
 }
 
-/// Text from the network, fit for a log and a terminal: bounded, on one line, and
-/// in the order in which it is read.
-pub fn printable(text: &str) -> String {
-    let end = text.floor_char_boundary(TEXT_LEN_MAX);
-    let is_unfit = |c: char| {
-        // Line and paragraph separators; marks that change the direction of text.
-        c.is_control()
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    text[..end].chars().map(|c| if is_unfit(c) { ' ' } else { c }).collect()
-}
-
 /// An experiment for clients.
-pub fn experiment(experiment: Experiment) -> v1::Experiment {
+pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
     let summary = ConfigSummary::of(&experiment.config_json);
     v1::Experiment {
         id: experiment.id.0,
@@ -188,8 +178,32 @@ impl ConfigSummary {
     }
 }
 
-/// Held-out fitness for clients.
-pub fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
+/// A priority from a client; INVALID_ARGUMENT beyond its range.
+pub fn priority(weight: u32) -> Result<Priority, Status> {
+    Priority::new(weight).ok_or_else(|| {
+        Status::invalid_argument(format!("priority is {weight}, not within 1..={}", Priority::MAX))
+    })
+}
+
+/// A champion for clients.
+pub fn champion(report: ChampionReport) -> v1::GetChampionResponse {
+    let ChampionReport { experiment, champion, network_json } = report;
+    v1::GetChampionResponse {
+        experiment_id: experiment.0,
+        generation: champion.generation,
+        individual: match champion.source {
+            ChampionSource::Individual(individual) => Some(individual),
+            ChampionSource::Mean => None,
+        },
+        fitness: champion.fitness(),
+        held_out: champion.held_out.map(held_out),
+        trial_fitness: champion.trial_fitness,
+        genotype: champion.genotype,
+        network_json,
+    }
+}
+
+fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
     v1::HeldOutFitness {
         mean: held_out.mean,
         ci95: held_out.ci95,
@@ -212,12 +226,12 @@ pub fn event(event: Event) -> v1::Event {
 
 /// A completed generation for clients.
 pub fn completed_generation(
-    (completed_at_ms, completed): (u64, Generation),
+    (completed_at_ms, completed): (u64, GenerationRecord),
 ) -> v1::CompletedGeneration {
     v1::CompletedGeneration { summary: Some(generation(completed)), completed_at_ms }
 }
 
-fn generation(generation: Generation) -> v1::GenerationSummary {
+fn generation(generation: GenerationRecord) -> v1::GenerationSummary {
     v1::GenerationSummary {
         generation: generation.generation,
         best: generation.statistics.best,

@@ -1,73 +1,28 @@
-//! What an experiment is doing, or waits for: gathered from the driver and the
-//! store.
+//! What an experiment is doing, as a message.
 
 use std::time::Duration;
 
 use sim_core::TrialSet;
 use swarm_proto::v1::{ExplainExperimentResponse, HeldItems, Round};
-use tokio::sync::oneshot;
-use tonic::Status;
 
-use crate::{
-    driver::{Event, EventSender},
-    engine::BatchActivity,
-    ids::JobId,
-    shared_store::SharedStore,
-    store::{EventKind, Experiment},
-};
+use crate::{control::Explanation, engine::BatchActivity, ids::JobId};
 
-use super::{convert, shutting_down, store_status};
+use super::convert;
 
-/// Events among which notices are looked for.
-const EVENTS_MAX: u32 = 100;
-/// Notices that are shown.
-const NOTICES_MAX: usize = 10;
-
-/// Says what an experiment is doing.
-pub async fn explain(
-    events: &EventSender,
-    store: &SharedStore,
-    experiment: Experiment,
-) -> Result<ExplainExperimentResponse, Status> {
-    let (reply, activity) = oneshot::channel();
-    let request = Event::ActivityRequested(experiment.id, reply);
-    events.send(request).await.map_err(|_| shutting_down())?;
-    let activity = activity.await.map_err(|_| shutting_down())?;
-    let incompatible = if experiment.fingerprint == sim_core::FINGERPRINT {
-        String::new()
-    } else {
-        format!(
-            "it was started with \"{}\", this coordinator is \"{}\"",
-            experiment.fingerprint,
-            sim_core::FINGERPRINT
-        )
-    };
+/// An explanation for clients.
+pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
+    let Explanation { experiment, activity, notices, store_trouble, incompatible } = explanation;
     let rivals = activity.rivals.into_iter().filter_map(JobId::experiment);
-    Ok(ExplainExperimentResponse {
-        notices: notices(store, &experiment).await?,
+    ExplainExperimentResponse {
         experiment: Some(convert::experiment(experiment)),
         round: activity.batch.and_then(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
         rivals: rivals.map(|id| id.0).collect(),
-        store_trouble: store.trouble().unwrap_or_default(),
-        incompatible,
-    })
-}
-
-async fn notices(
-    store: &SharedStore,
-    experiment: &Experiment,
-) -> Result<Vec<swarm_proto::v1::Event>, Status> {
-    let id = experiment.id;
-    let from_sequence = (experiment.last_sequence + 1).saturating_sub(EVENTS_MAX.into());
-    let mut notices = store
-        .read(move |store| store.events(id, from_sequence, EVENTS_MAX))
-        .await
-        .map_err(store_status)?;
-    notices.retain(|event| matches!(event.kind, EventKind::Notice(_)));
-    let latest = notices.split_off(notices.len().saturating_sub(NOTICES_MAX));
-    Ok(latest.into_iter().map(convert::event).collect())
+        notices: notices.into_iter().map(convert::event).collect(),
+        store_trouble: store_trouble.unwrap_or_default(),
+        incompatible: incompatible.unwrap_or_default(),
+    }
 }
 
 /// A batch of an experiment; none if it is an evaluation's.

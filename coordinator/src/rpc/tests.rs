@@ -13,9 +13,11 @@ use tonic::{Code, Request, Status};
 
 use super::*;
 use crate::{
+    control::Control,
     driver::{self, Driver},
     engine::EngineConfig,
     limits::{WATCH_PATIENCE, WATCH_QUEUE_LEN},
+    metrics::Instruments,
     shared_store::SharedStore,
     store::Store,
 };
@@ -28,8 +30,9 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     let (events, queue) = driver::channel();
     let shutdown = CancellationToken::new();
     let config = EngineConfig::new(Duration::from_secs(10));
-    tokio::spawn(Driver::new(store.clone(), queue, config, shutdown.clone()).run());
-    let service = Experiments { events, store, shutdown };
+    let duration = Instruments::default().commit_duration;
+    tokio::spawn(Driver::new(store.clone(), queue, config, shutdown.clone(), duration).run());
+    let service = Experiments { control: Control::new(events, store.clone()), store, shutdown };
     let config_json = include_str!("../../../configs/quickstart.json").to_owned();
     let request = SubmitExperimentRequest { config_json, ..Default::default() };
     service.submit_experiment(Request::new(request)).await.unwrap();

@@ -16,11 +16,12 @@ use tonic::{Request, Response, Status, Streaming};
 use tracing::warn;
 
 use crate::{
-    driver::{Event, EventSender, WorkerLink, WorkerMessage},
+    driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
     engine::Introduction,
     ids::WorkerId,
     limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
     listener::Peer,
+    text::printable,
 };
 
 use super::{
@@ -58,7 +59,7 @@ impl WorkerService for Workers {
             _ => return Err(Status::invalid_argument("the first message must be Hello")),
         };
         check_hello(&hello).inspect_err(|status| {
-            let name = convert::printable(&hello.name);
+            let name = printable(&hello.name);
             warn!(name, address, reason = status.message(), "worker refused");
         })?;
 
@@ -68,12 +69,12 @@ impl WorkerService for Workers {
         let dropped = link.dropped.clone();
         let (reply, id) = oneshot::channel();
         let introduction = Introduction {
-            name: convert::printable(&hello.name),
-            version: convert::printable(&hello.version),
+            name: printable(&hello.name),
+            version: printable(&hello.version),
             n_slots,
             process: NonZeroU64::new(hello.process_id),
         };
-        let joined = Event::WorkerJoined { introduction, link, reply };
+        let joined = DriverEvent::WorkerJoined { introduction, link, reply };
         self.events.send(joined).await.map_err(|_| shutting_down())?;
         let id = id.await.map_err(|_| shutting_down())?;
         tokio::spawn(listen(id, inbound, self.events.clone(), dropped));
@@ -103,7 +104,7 @@ async fn listen(
             Ok(Some(WorkRequest { message: None })) => continue,
             Ok(None) => break "it closed its stream".to_owned(),
             Err(status) => {
-                break format!("its stream broke: {}", convert::printable(status.message()));
+                break format!("its stream broke: {}", printable(status.message()));
             }
         };
         let message = match message {
@@ -117,12 +118,12 @@ async fn listen(
             ),
             Message::Hello(_) => break "it said Hello twice".to_owned(),
         };
-        if events.send(Event::WorkerSpoke(id, message)).await.is_err() {
+        if events.send(DriverEvent::WorkerSpoke(id, message)).await.is_err() {
             return;
         }
     };
     // If the driver is gone, so are all workers.
-    let _ = events.send(Event::WorkerLeft { worker: id, reason }).await;
+    let _ = events.send(DriverEvent::WorkerLeft { worker: id, reason }).await;
 }
 
 fn check_hello(hello: &Hello) -> Result<(), Status> {
@@ -137,7 +138,7 @@ fn check_hello(hello: &Hello) -> Result<(), Status> {
         return Err(Status::failed_precondition(format!(
             "the worker simulates with \"{}\", the coordinator with \"{}\"; \
              run the same release on both sides",
-            convert::printable(&hello.sim_core_fingerprint),
+            printable(&hello.sim_core_fingerprint),
             sim_core::FINGERPRINT
         )));
     }

@@ -24,14 +24,11 @@ fn new_experiment() -> NewExperiment {
 }
 
 async fn n_experiments(store: &SharedStore) -> usize {
-    store.read(|store| Ok(store.experiments()?.len())).await.unwrap()
+    store.read(|store| store.experiments()).await.unwrap().len()
 }
 
 async fn pragma(store: &SharedStore, name: &'static str, value: u32) {
-    store
-        .read(move |store| Ok(store.connection().pragma_update(None, name, value)?))
-        .await
-        .unwrap();
+    store.read(move |store| store.connection().pragma_update(None, name, value)).await.unwrap();
 }
 
 /// While the pragma has the bad value, a write waits; with the good one, it

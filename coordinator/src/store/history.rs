@@ -5,7 +5,7 @@ use rusqlite::{Row, params};
 use crate::ids::ExperimentId;
 use evolution::Statistics;
 
-use super::{Event, EventKind, ExperimentState, Generation, Result, Store, StoreError};
+use super::{Event, EventKind, ExperimentState, GenerationRecord, Result, Store, StoreError};
 
 impl Store {
     /// At most `limit` events from `from_sequence` on.
@@ -48,7 +48,7 @@ impl Store {
         id: ExperimentId,
         from_generation: u64,
         limit: u32,
-    ) -> Result<Vec<(u64, Generation)>> {
+    ) -> Result<Vec<(u64, GenerationRecord)>> {
         // Events begin with the submission, and every generation has one: those of
         // earlier generations need not be looked at.
         let mut statement = self.connection.prepare_cached(
@@ -76,9 +76,9 @@ impl Store {
 
 /// Reads the columns of `generations`, in the schema's order, from `first` on;
 /// none if an outer join found no row.
-pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<Generation>> {
+pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<GenerationRecord>> {
     let Some(generation) = row.get(first)? else { return Ok(None) };
-    Ok(Some(Generation {
+    Ok(Some(GenerationRecord {
         generation,
         statistics: Statistics {
             best: row.get(first + 1)?,

@@ -21,7 +21,10 @@ use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 use crate::{failpoint, ids::ExperimentId, priority::Priority};
 use evolution::Champion;
 
-pub use records::{Event, EventKind, Experiment, ExperimentState, Generation, NewExperiment};
+pub use records::{
+    Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
+    checkpoint_json,
+};
 
 /// The open database of one data directory.
 #[derive(Debug)]
@@ -112,7 +115,7 @@ type Result<T> = std::result::Result<T, StoreError>;
 #[derive(Debug, Clone)]
 pub struct GenerationCommit<'a> {
     /// History row.
-    pub generation: &'a Generation,
+    pub generation: &'a GenerationRecord,
     /// Evolution after it, as JSON.
     pub checkpoint: &'a str,
     /// The champion so far.
@@ -291,7 +294,7 @@ impl Store {
     }
 
     /// Reads one experiment.
-    pub fn experiment(&self, id: ExperimentId) -> Result<Option<Experiment>> {
+    pub fn experiment(&self, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
         if i64::try_from(id.0).is_err() {
             return Ok(None); // SQLite's integers are signed.
         }
@@ -301,7 +304,7 @@ impl Store {
     }
 
     /// Reads all experiments, oldest first.
-    pub fn experiments(&self) -> Result<Vec<Experiment>> {
+    pub fn experiments(&self) -> Result<Vec<ExperimentRecord>> {
         let mut statement =
             self.connection.prepare_cached(&format!("{SELECT_EXPERIMENT} ORDER BY e.id"))?;
         let rows = statement.query_map([], read_experiment)?;
@@ -333,7 +336,7 @@ const SELECT_EXPERIMENT: &str =
      LEFT JOIN generations g ON g.experiment_id = e.id AND g.generation =
                (SELECT max(generation) FROM generations WHERE experiment_id = e.id)";
 
-fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
+fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> {
     let id = ExperimentId(row.get(0)?);
     let state: String = row.get(5)?;
     let Some(state) = ExperimentState::from_name(&state) else {
@@ -348,7 +351,7 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<Experiment>> {
         (None, Some(trial_fitness)) => champions::mean(&trial_fitness),
         (None, None) => None,
     };
-    Ok(Ok(Experiment {
+    Ok(Ok(ExperimentRecord {
         id,
         config_json: row.get(1)?,
         config_digest: row.get(2)?,

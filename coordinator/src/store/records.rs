@@ -3,7 +3,7 @@
 use experiment_file::ExperimentConfig;
 
 use crate::{ids::ExperimentId, priority::Priority};
-use evolution::{Digest, Statistics};
+use evolution::{Digest, Evolution, Statistics};
 
 /// Where an experiment stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub struct NewExperiment {
 
 /// An experiment as it stands.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub struct ExperimentRecord {
     /// Its id.
     pub id: ExperimentId,
     /// Canonical configuration, as JSON.
@@ -82,7 +82,7 @@ pub struct Experiment {
     /// Milliseconds since 1970 UTC.
     pub submitted_at_ms: u64,
     /// Latest completed generation.
-    pub latest: Option<Generation>,
+    pub latest: Option<GenerationRecord>,
     /// The link that the latest generation ended with, of the re-evaluations'
     /// digest chain or the generations'; empty before the first.
     pub digest: String,
@@ -97,7 +97,7 @@ pub struct Experiment {
 
 /// A completed generation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Generation {
+pub struct GenerationRecord {
     /// From 0.
     pub generation: u64,
     /// Of the individuals' mean fitness.
@@ -129,7 +129,7 @@ pub struct Event {
 #[derive(Debug, Clone, PartialEq)]
 pub enum EventKind {
     /// A generation was completed.
-    Generation(Generation),
+    Generation(GenerationRecord),
     /// The state changed.
     State {
         /// The new state.
@@ -139,4 +139,9 @@ pub enum EventKind {
     },
     /// Something worth a line in a log.
     Notice(String),
+}
+
+/// Evolution as the store keeps it: a checkpoint.
+pub fn checkpoint_json(evolution: &Evolution) -> String {
+    serde_json::to_string(evolution).expect("numbers and lists serialise")
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::submission::{Submission, checkpoint_json};
+use crate::submission::Submission;
 use evolution::{Champion, ChampionSource, Evolution, HeldOut, Statistics};
 
 use super::*;
@@ -19,8 +19,8 @@ fn new_experiment(request_id: Option<&str>) -> NewExperiment {
     submission.check().unwrap().new
 }
 
-fn generation(generation: u64) -> Generation {
-    Generation {
+fn generation(generation: u64) -> GenerationRecord {
+    GenerationRecord {
         generation,
         statistics: Statistics {
             best: 0.1 + 0.2,

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use crate::ids::WorkerId;
+use tokio::sync::mpsc;
+
+use crate::{ids::WorkerId, store::Store, submission::Submission};
 
 use super::*;
 
@@ -12,24 +14,23 @@ async fn what_is_stored_runs_although_its_client_is_gone() {
     let store = SharedStore::new(Store::open(directory.path()).unwrap());
     // There is no room on the way to the driver.
     let (events, mut queue) = mpsc::channel(1);
-    let filler = Event::WorkerLeft { worker: WorkerId(0), reason: String::new() };
+    let filler = DriverEvent::WorkerLeft { worker: WorkerId(0), reason: String::new() };
     events.send(filler).await.unwrap();
 
     let mut news = store.news();
-    let service = Experiments { events, store, shutdown: CancellationToken::new() };
+    let control = Control::new(events, store);
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
     let config_json = fs::read_to_string(path).unwrap();
-    let request = SubmitExperimentRequest { config_json, ..Default::default() };
-    let client =
-        tokio::spawn(async move { service.submit_experiment(Request::new(request)).await });
+    let submission = Submission { config_json, ..Submission::default() };
+    let client = tokio::spawn(async move { control.submit(submission, false).await });
     news.changed().await.unwrap();
     // Stored, and not yet with the driver.
     client.abort();
     assert!(client.await.unwrap_err().is_cancelled());
 
-    assert!(matches!(queue.recv().await, Some(Event::WorkerLeft { .. })));
+    assert!(matches!(queue.recv().await, Some(DriverEvent::WorkerLeft { .. })));
     match queue.recv().await {
-        Some(Event::ExperimentReady(runnable)) => assert_eq!(runnable.id, ExperimentId(1)),
+        Some(DriverEvent::ExperimentReady(runnable)) => assert_eq!(runnable.id, ExperimentId(1)),
         other => panic!("{other:?}"),
     }
 }

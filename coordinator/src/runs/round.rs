@@ -1,56 +1,58 @@
-//! What the fleet is judging for an experiment, and what comes of it: a
-//! generation, and from time to time the champion and who challenges it.
+//! What the fleet evaluates for a run at once, and what comes of it: a generation,
+//! and from time to time candidates for the champion on held-out trials.
 
 use std::sync::Arc;
 
 use experiment_file::ExperimentConfig;
 use sim_core::TrialSet;
 
-use crate::{engine::EvaluatedBatch, store::Generation};
+use crate::{engine::EvaluatedBatch, store::GenerationRecord};
 use evolution::{Champion, ChampionSource, Evolution, EvolutionError, Population, Reevaluation};
 
-/// What the fleet judges at once.
+/// A batch that the fleet evaluates, and what it is for.
 #[derive(Debug)]
 pub enum Round {
     /// The next generation.
     Generation(Arc<Evolution>, evolution::Generation),
-    /// Candidates on held-out trials, after a generation that has been learnt
-    /// from and is not committed yet.
-    Reevaluation(Box<Learnt>, Reevaluation),
+    /// Candidates on held-out trials, after a generation from which evolution has
+    /// updated and which is not committed yet.
+    Reevaluation(Box<UpdatedEvolution>, Reevaluation),
 }
 
 /// What comes after a round.
+#[derive(Debug)]
 pub enum Next {
     /// Another round, before anything is committed.
-    Judge(Box<Round>),
+    Evaluate(Box<Round>),
     /// The generation is complete.
-    Commit(Box<Complete>),
+    Commit(Box<ReadyToCommit>),
 }
 
-/// A generation that has been learnt from.
+/// Evolution after it has learnt from a generation.
 #[derive(Debug, Clone)]
-pub struct Learnt {
+pub struct UpdatedEvolution {
     evolution: Evolution,
-    generation: Generation,
+    generation: GenerationRecord,
     notices: Vec<String>,
-    /// Why evolution is over, if it is.
-    over: Option<String>,
+    /// Why evolution is over, if it is; empty: all generations are done.
+    completed: Option<String>,
 }
 
 /// A generation that can be committed.
-pub struct Complete {
-    /// For the history.
-    pub generation: Generation,
-    /// For whoever resumes.
+#[derive(Debug)]
+pub struct ReadyToCommit {
+    /// Its row of the history.
+    pub generation: GenerationRecord,
+    /// Evolution after it: the checkpoint.
     pub evolution: Arc<Evolution>,
     /// The champion so far.
     pub champion: Option<Champion>,
-    /// The last link of the digest chain that covers everything so far.
+    /// The last link of the digest chain that covers everything so far, hexadecimal.
     pub digest: String,
-    /// For the log.
+    /// Lines for the log and the experiment's events.
     pub notices: Vec<String>,
-    /// Why evolution is over, if it is.
-    pub over: Option<String>,
+    /// Why evolution is over, if it is; empty: all generations are done.
+    pub completed: Option<String>,
     /// The next round, unless evolution is over.
     pub next: Option<Round>,
 }
@@ -59,29 +61,29 @@ impl Round {
     /// The next generation of an evolution.
     pub fn generation(evolution: impl Into<Arc<Evolution>>) -> Self {
         let evolution = evolution.into();
-        let asked = evolution.ask();
-        Self::Generation(evolution, asked)
+        let generation = evolution.ask();
+        Self::Generation(evolution, generation)
     }
 
-    /// Which worlds and noise its trials meet.
+    /// Which worlds and noise.
     pub fn trial_set(&self) -> TrialSet {
         match self {
-            Self::Generation(_, asked) => TrialSet::Generation(asked.index),
+            Self::Generation(_, generation) => TrialSet::Generation(generation.index),
             Self::Reevaluation(_, reevaluation) => TrialSet::HeldOut(reevaluation.generation),
         }
     }
 
-    /// Who is evaluated.
+    /// The genotypes to be evaluated.
     pub fn genotypes(&self) -> Population {
         match self {
-            Self::Generation(_, asked) => Arc::clone(&asked.genotypes),
+            Self::Generation(_, generation) => Arc::clone(&generation.genotypes),
             Self::Reevaluation(_, Reevaluation { candidates, .. }) => {
                 candidates.iter().map(|candidate| candidate.genotype.clone()).collect()
             }
         }
     }
 
-    /// On how many trials.
+    /// Trials of each genotype.
     pub fn n_trials(&self, config: &ExperimentConfig) -> u32 {
         match self {
             Self::Generation(..) => config.algorithm.num_evaluations,
@@ -89,61 +91,64 @@ impl Round {
         }
     }
 
-    /// Draws the conclusions.
+    /// Draws conclusions from the fitness of the batch. Fails if evolution cannot
+    /// go on.
     pub fn conclude(
         self,
         config: &ExperimentConfig,
         evaluated: &EvaluatedBatch,
     ) -> Result<Next, EvolutionError> {
         match self {
-            Self::Generation(evolution, asked) => {
+            Self::Generation(evolution, generation) => {
                 // By now, the generation before is usually stored, and nothing is copied.
                 let evolution = Arc::unwrap_or_clone(evolution);
-                let learnt = learn(config, evolution, asked, evaluated)?;
-                Ok(match learnt.evolution.reevaluation() {
-                    Some(candidates) if learnt.over.is_some() || learnt.is_scheduled(config) => {
-                        Next::Judge(Box::new(Self::Reevaluation(Box::new(learnt), candidates)))
+                let updated = learn(config, evolution, generation, evaluated)?;
+                Ok(match updated.evolution.reevaluation() {
+                    Some(candidates)
+                        if updated.completed.is_some() || updated.is_scheduled(config) =>
+                    {
+                        Next::Evaluate(Box::new(Self::Reevaluation(Box::new(updated), candidates)))
                     }
-                    _ => Next::Commit(Box::new(learnt.complete(None))),
+                    _ => Next::Commit(Box::new(updated.into_ready(None))),
                 })
             }
-            Self::Reevaluation(mut learnt, candidates) => {
-                let mut crowned = learnt.evolution.clone();
-                crowned.set_champion(&candidates, &evaluated.values);
-                learnt.notices.extend(crowned.champion().map(describe));
-                if learnt.is_scheduled(config) {
-                    learnt.evolution = crowned.clone();
+            Self::Reevaluation(mut updated, candidates) => {
+                let mut with_champion = updated.evolution.clone();
+                with_champion.set_champion(&candidates, &evaluated.values);
+                updated.notices.extend(with_champion.champion().map(describe));
+                if updated.is_scheduled(config) {
+                    updated.evolution = with_champion.clone();
                 }
-                Ok(Next::Commit(Box::new(learnt.complete(Some(crowned)))))
+                Ok(Next::Commit(Box::new(updated.into_ready(Some(with_champion)))))
             }
         }
     }
 }
 
-impl Learnt {
+impl UpdatedEvolution {
     fn is_scheduled(&self, config: &ExperimentConfig) -> bool {
         self.evolution.n_generations().is_multiple_of(config.algorithm.champion_every)
     }
 
-    /// `crowned`: evolution after a re-evaluation. If that was an extra one, at
+    /// `with_champion`: evolution after a re-evaluation. If that was an extra one, at
     /// the end, it is not what a longer run goes on from: more generations must
     /// give the same bits as if they had been asked for at once.
-    fn complete(self, crowned: Option<Evolution>) -> Complete {
-        let Self { evolution, generation, notices, over } = self;
-        let digest = match &crowned {
-            Some(crowned) => crowned.champion_digest(),
+    fn into_ready(self, with_champion: Option<Evolution>) -> ReadyToCommit {
+        let Self { evolution, generation, notices, completed } = self;
+        let digest = match &with_champion {
+            Some(with_champion) => with_champion.champion_digest(),
             None => evolution.digest(),
         };
-        let champion = crowned.as_ref().unwrap_or(&evolution).champion().cloned();
+        let champion = with_champion.as_ref().unwrap_or(&evolution).champion().cloned();
         let evolution = Arc::new(evolution);
-        Complete {
+        ReadyToCommit {
             generation,
             champion,
             digest: digest.to_string(),
             notices,
-            next: over.is_none().then(|| Round::generation(Arc::clone(&evolution))),
+            next: completed.is_none().then(|| Round::generation(Arc::clone(&evolution))),
             evolution,
-            over,
+            completed,
         }
     }
 }
@@ -151,11 +156,11 @@ impl Learnt {
 fn learn(
     config: &ExperimentConfig,
     mut evolution: Evolution,
-    asked: evolution::Generation,
+    generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
-) -> Result<Learnt, EvolutionError> {
-    let record = evolution.tell(asked, &evaluated.values)?;
-    let generation = Generation {
+) -> Result<UpdatedEvolution, EvolutionError> {
+    let record = evolution.tell(generation, &evaluated.values)?;
+    let generation = GenerationRecord {
         generation: record.generation,
         statistics: record.statistics,
         digest: record.digest.to_string(),
@@ -173,12 +178,12 @@ fn learn(
     }
     let algorithm = &config.algorithm;
     let mean = record.statistics.mean;
-    let over = if algorithm.target_fitness.is_some_and(|target| mean >= target) {
+    let completed = if algorithm.target_fitness.is_some_and(|target| mean >= target) {
         Some(format!("the mean fitness {mean} has reached the target"))
     } else {
         (evolution.n_generations() >= algorithm.generations).then(String::new)
     };
-    Ok(Learnt { evolution, generation, notices, over })
+    Ok(UpdatedEvolution { evolution, generation, notices, completed })
 }
 
 /// A champion after its re-evaluation, for the log.

@@ -1,0 +1,115 @@
+//! Evaluates a genotype on the fleet: many trials, every step measured.
+
+use std::sync::Arc;
+
+use evolution::{ALGORITHMS, Genotype};
+use experiment_file::{ExperimentConfig, limits};
+use sim_core::Simulation;
+use tokio::{sync::OwnedSemaphorePermit, task};
+
+use crate::{
+    driver::DriverEvent,
+    limits::{EVALUATION_VALUES_MAX, TRIAL_VALUES_MAX},
+    priority::Priority,
+    runs::Evaluation,
+};
+
+use super::{Control, ControlError};
+
+/// What a client wants evaluated.
+#[derive(Debug)]
+pub struct EvaluationOrder {
+    /// The experiment file.
+    pub config_json: String,
+    /// Genes in \[0, 1\].
+    pub genotype: Genotype,
+    /// Trials, from trial 0.
+    pub n_trials: u32,
+    /// Its share of the fleet.
+    pub priority: Priority,
+}
+
+/// An order that has passed all checks.
+#[derive(Debug)]
+pub struct CheckedEvaluation {
+    /// For the driver.
+    evaluation: Evaluation,
+    /// Names of the measures of the task.
+    pub measures: Vec<String>,
+    /// Steps of an episode.
+    pub n_steps: u32,
+}
+
+/// An evaluated genotype. Counts as being computed until it is dropped, so that the
+/// numbers of few are held in memory.
+#[derive(Debug)]
+pub struct Evaluated {
+    /// The numbers of all trials, one trial after the other.
+    values: Vec<f64>,
+    /// Numbers per trial.
+    n_values: usize,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl EvaluationOrder {
+    /// Checks everything about an order; work for a CPU.
+    pub fn check(self) -> Result<CheckedEvaluation, ControlError> {
+        let Self { config_json, genotype, n_trials, priority } = self;
+        if n_trials == 0 || n_trials > limits::TRIALS {
+            let message = format!("trial_count is {n_trials}, not within 1..={}", limits::TRIALS);
+            return Err(ControlError::Invalid(message));
+        }
+        let (config, _) = ExperimentConfig::from_json(&config_json, "", ALGORITHMS)?;
+        let simulation = Simulation::compile(&config)?;
+        simulation
+            .check_genotype(&genotype)
+            .map_err(|error| ControlError::Invalid(error.to_string()))?;
+        let n_values = simulation.values_per_trial();
+        let n_all = n_values * n_trials as usize;
+        if n_values > TRIAL_VALUES_MAX || n_all > EVALUATION_VALUES_MAX {
+            return Err(ControlError::Invalid(format!(
+                "{n_values} numbers per trial and {n_all} together are more than the limits of \
+                 {TRIAL_VALUES_MAX} and {EVALUATION_VALUES_MAX}; take fewer steps or trials"
+            )));
+        }
+        let spec: Arc<str> = config.to_canonical_json().into();
+        Ok(CheckedEvaluation {
+            measures: simulation.measure_names().iter().map(ToString::to_string).collect(),
+            n_steps: simulation.n_steps(),
+            evaluation: Evaluation { spec, genotype, n_trials, n_values, priority },
+        })
+    }
+}
+
+impl Evaluated {
+    /// Per trial its fitness, and the measures of all steps.
+    pub fn trials(&self) -> impl Iterator<Item = (f64, &[f64])> {
+        self.values.chunks_exact(self.n_values).map(|values| (values[0], &values[1..]))
+    }
+}
+
+impl Control {
+    /// Checks everything about an order.
+    pub async fn check_evaluation(
+        &self,
+        order: EvaluationOrder,
+    ) -> Result<CheckedEvaluation, ControlError> {
+        // Compiling is work for a CPU, not for the I/O threads.
+        task::spawn_blocking(move || order.check())
+            .await
+            .map_err(|_| ControlError::Panicked("checking the configuration"))?
+    }
+
+    /// Has the fleet evaluate a genotype, once few enough others are evaluated.
+    /// Dropping the future tells the driver that nobody waits.
+    pub async fn evaluate(&self, checked: CheckedEvaluation) -> Result<Evaluated, ControlError> {
+        let evaluation = checked.evaluation;
+        let n_values = evaluation.n_values;
+        let permits = Arc::clone(&self.evaluations);
+        let permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
+        let result =
+            self.ask(|reply| DriverEvent::EvaluationRequested(Box::new(evaluation), reply));
+        let values = result.await?.map_err(ControlError::EvaluationFailed)?;
+        Ok(Evaluated { values, n_values, _permit: permit })
+    }
+}

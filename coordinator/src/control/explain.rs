@@ -1,0 +1,47 @@
+//! What an experiment is doing, or waits for: gathered from the engine and the store.
+
+use crate::{
+    driver::DriverEvent,
+    engine::JobActivity,
+    ids::ExperimentId,
+    queries::{self, QueryError},
+    store::{Event, ExperimentRecord},
+};
+
+use super::{Control, ControlError};
+
+/// What an experiment is doing, or waits for.
+#[derive(Debug)]
+pub struct Explanation {
+    /// The experiment.
+    pub experiment: ExperimentRecord,
+    /// What the fleet does for it.
+    pub activity: JobActivity,
+    /// Its latest notices, oldest first.
+    pub notices: Vec<Event>,
+    /// Why the latest write did not reach the disk, if it did not.
+    pub store_trouble: Option<String>,
+    /// Why this program cannot compute it, if it cannot.
+    pub incompatible: Option<String>,
+}
+
+impl Control {
+    /// Says what an experiment is doing.
+    pub async fn explain(&self, id: ExperimentId) -> Result<Explanation, ControlError> {
+        self.find(id).await?;
+        let activity = self.ask(|reply| DriverEvent::ActivityRequested(id, reply)).await?;
+        let read = self.store.read(move |store| {
+            let experiment = queries::experiment(store, id)?;
+            let notices = queries::latest_notices(store, &experiment)?;
+            Ok::<_, QueryError>((experiment, notices))
+        });
+        let (experiment, notices) = read.await?;
+        Ok(Explanation {
+            incompatible: queries::incompatibility(&experiment),
+            store_trouble: self.store.trouble(),
+            experiment,
+            activity,
+            notices,
+        })
+    }
+}

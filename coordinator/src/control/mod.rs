@@ -1,0 +1,106 @@
+//! What clients can have a running coordinator do: submit and steer experiments,
+//! evaluate genotypes, ask what the fleet does.
+//!
+//! Works on core types. What is only read is in [`queries`](crate::queries).
+
+mod evaluate;
+mod explain;
+mod placement;
+mod restart;
+mod steer;
+mod submit;
+
+use std::sync::Arc;
+
+use experiment_file::ConfigError;
+use tokio::sync::{Semaphore, oneshot};
+
+use crate::{
+    driver::{DriverEvent, EventSender},
+    engine::WorkerStatus,
+    ids::ExperimentId,
+    limits::{EVALUATIONS_MAX, UNFINISHED_MAX},
+    queries::{self, QueryError},
+    shared_store::SharedStore,
+    store::{ExperimentRecord, StoreError},
+};
+
+pub use evaluate::{CheckedEvaluation, EvaluationOrder};
+pub use explain::Explanation;
+pub use submit::Submitted;
+
+/// The way to a running coordinator.
+#[derive(Debug, Clone)]
+pub struct Control {
+    events: EventSender,
+    store: SharedStore,
+    /// One for each evaluation that is computed.
+    evaluations: Arc<Semaphore>,
+}
+
+/// Why something is not done.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlError {
+    /// The client's mistake.
+    #[error("{0}")]
+    Invalid(String),
+    /// The experiment file has mistakes.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Too much is going on already.
+    #[error("{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some")]
+    TooManyUnfinished,
+    /// A change is not stored in time; it will be.
+    #[error(
+        "the database does not take it that experiment {0} is changed; \
+         the coordinator tries again, and its log says why"
+    )]
+    NotStoredYet(ExperimentId),
+    /// The fleet could not evaluate a genotype.
+    #[error("{0}")]
+    EvaluationFailed(String),
+    /// A query without an answer.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+    /// The coordinator stops.
+    #[error("the coordinator is shutting down")]
+    ShuttingDown,
+    /// A bug.
+    #[error("{0} panicked; please report this")]
+    Panicked(&'static str),
+}
+
+impl From<StoreError> for ControlError {
+    fn from(error: StoreError) -> Self {
+        Self::Query(error.into())
+    }
+}
+
+impl Control {
+    /// The way to the coordinator with this driver and store.
+    pub fn new(events: EventSender, store: SharedStore) -> Self {
+        Self { events, store, evaluations: Arc::new(Semaphore::new(EVALUATIONS_MAX)) }
+    }
+
+    /// The connected workers, in the order in which they joined.
+    pub async fn workers(&self) -> Result<Vec<WorkerStatus>, ControlError> {
+        self.ask(DriverEvent::WorkersRequested).await
+    }
+
+    /// Asks the driver something.
+    async fn ask<T>(
+        &self,
+        question: impl FnOnce(oneshot::Sender<T>) -> DriverEvent,
+    ) -> Result<T, ControlError> {
+        let (reply, answer) = oneshot::channel();
+        self.events.send(question(reply)).await.map_err(|_| ControlError::ShuttingDown)?;
+        answer.await.map_err(|_| ControlError::ShuttingDown)
+    }
+
+    async fn find(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
+        Ok(self.store.read(move |store| queries::experiment(store, id)).await?)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+//! Decides which experiment a submission leads to: a new one, the one of the same
+//! request, or one of the same bits that can go on.
+
+use evolution::{ALGORITHMS, Evolution};
+use experiment_file::ExperimentConfig;
+
+use crate::{
+    clock,
+    ids::ExperimentId,
+    limits::UNFINISHED_MAX,
+    runs::Runnable,
+    store::{ExperimentRecord, ExperimentState, NewExperiment, Store, StoreError},
+};
+
+/// Where a submission ends up.
+pub enum Placement {
+    /// The driver has to run it.
+    Runs(Box<Runnable>),
+    /// The driver knows it, or it has ended.
+    RunsAlready(ExperimentId),
+    /// Too many experiments are unfinished.
+    TooMany,
+}
+
+/// Stores a submission, or finds the experiment that it stands for: the one of the same
+/// request, or, if `resume_unfinished`, one of the same bits.
+pub fn place(
+    store: &mut Store,
+    new: NewExperiment,
+    evolution: Evolution,
+    resume_unfinished: bool,
+) -> Result<Placement, StoreError> {
+    if let Some(request_id) = &new.request_id
+        && let Some(id) = store.experiment_of_request(request_id)?
+    {
+        return Ok(Placement::RunsAlready(id));
+    }
+    let experiments = store.experiments()?;
+    if resume_unfinished && let Some(placement) = resume(store, &experiments, &new)? {
+        return Ok(placement);
+    }
+    let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
+    if experiments.iter().filter(is_unfinished).count() >= UNFINISHED_MAX {
+        return Ok(Placement::TooMany);
+    }
+    let (id, is_new) = store.create(&new, clock::unix_ms())?;
+    Ok(if is_new {
+        Placement::Runs(Box::new(Runnable::new(id, new.config, evolution, new.priority)))
+    } else {
+        Placement::RunsAlready(id)
+    })
+}
+
+/// Looks for an experiment of the same bits that can go on: one that is
+/// unfinished, or one that was asked for fewer generations.
+fn resume(
+    store: &mut Store,
+    experiments: &[ExperimentRecord],
+    new: &NewExperiment,
+) -> Result<Option<Placement>, StoreError> {
+    let config_json = new.config.to_canonical_json();
+    // The digest tells versions of the simulation apart.
+    let config_digest = new.config_digest.to_string();
+    let same_bits = experiments.iter().rev().filter(|e| e.config_digest == config_digest);
+    let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
+    let mut unfinished = same_bits.clone().filter(is_unfinished);
+    if let Some(same) = unfinished.find(|e| e.config_json == config_json) {
+        return Ok(Some(Placement::RunsAlready(same.id)));
+    }
+    for experiment in same_bits {
+        let n_done = experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+        let can_go_on = experiment.state == ExperimentState::Completed
+            && experiment.reason.is_empty()
+            && n_done < new.config.algorithm.generations
+            && differs_in_generations_only(&experiment.config_json, &new.config);
+        if can_go_on && let Some(checkpoint) = store.checkpoint(experiment.id)? {
+            let reopened =
+                ExperimentRecord { config_json: config_json.clone(), ..experiment.clone() };
+            let runnable = Runnable::restore(&reopened, &checkpoint)?;
+            store.reopen(experiment.id, &config_json, clock::unix_ms())?;
+            return Ok(Some(Placement::Runs(Box::new(runnable))));
+        }
+    }
+    Ok(None)
+}
+
+fn differs_in_generations_only(config_json: &str, config: &ExperimentConfig) -> bool {
+    ExperimentConfig::from_json(config_json, "", ALGORITHMS).is_ok_and(|(mut other, _)| {
+        other.algorithm.generations = config.algorithm.generations;
+        other == *config
+    })
+}

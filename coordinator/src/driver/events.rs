@@ -1,0 +1,118 @@
+//! What the driver is told, and what it tells workers.
+
+use std::sync::Arc;
+
+use sim_core::{Output, TrialSet};
+use tokio::sync::{mpsc, oneshot};
+use tokio_util::sync::CancellationToken;
+
+use crate::{
+    engine::{Assignment, Introduction, ItemResult, JobActivity, WorkerStatus},
+    ids::{AssignmentId, ExperimentId, JobId, WorkerId},
+    runs::{Evaluation, Request, Runnable},
+};
+
+use super::StatsSnapshot;
+
+/// Events that wait for the driver; a sender of more waits.
+const EVENT_QUEUE_LEN: usize = 1024;
+
+/// Everything that can happen.
+#[derive(Debug)]
+pub enum DriverEvent {
+    /// A worker has introduced itself and its versions agree.
+    WorkerJoined {
+        /// Its name, version and slots.
+        introduction: Introduction,
+        /// The way to it.
+        link: WorkerLink,
+        /// Gets its id.
+        reply: oneshot::Sender<WorkerId>,
+    },
+    /// A worker has sent a message.
+    WorkerSpoke(WorkerId, WorkerMessage),
+    /// A worker's stream has ended.
+    WorkerLeft {
+        /// The worker.
+        worker: WorkerId,
+        /// How its stream ended, for the log.
+        reason: String,
+    },
+    /// A stored experiment is to run.
+    ExperimentReady(Box<Runnable>),
+    /// A client wants something of an unfinished experiment.
+    Requested {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// What the client wants.
+        request: Request,
+        /// Answered when it is stored; dropped if it is not going to be.
+        reply: oneshot::Sender<()>,
+    },
+    /// A client wants to see the workers.
+    WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// A client wants a genotype evaluated.
+    EvaluationRequested(Box<Evaluation>, EvaluationReply),
+    /// A client wants to know what the fleet does for an experiment.
+    ActivityRequested(ExperimentId, oneshot::Sender<JobActivity>),
+    /// A metrics endpoint wants the numbers of all.
+    StatsRequested(oneshot::Sender<StatsSnapshot>),
+}
+
+/// Gets the numbers of all trials, one trial after the other, or why there are none.
+/// A dropped receiver ends the evaluation.
+pub type EvaluationReply = oneshot::Sender<Result<Vec<f64>, String>>;
+
+/// What a worker says after its introduction.
+#[derive(Debug)]
+pub enum WorkerMessage {
+    /// It is alive.
+    Heartbeat,
+    /// It has computed items.
+    Results(Vec<ItemResult>),
+    /// It wants no more items.
+    Draining,
+}
+
+/// The way to a connected worker.
+#[derive(Debug)]
+pub struct WorkerLink {
+    /// Bounded; a worker that lets it fill up does not read and is dropped.
+    pub outbox: mpsc::Sender<ToWorker>,
+    /// Cancelled when the coordinator has dropped the worker.
+    pub dropped: CancellationToken,
+}
+
+/// What a worker is told.
+#[derive(Debug)]
+pub enum ToWorker {
+    /// It is welcome under this id.
+    Welcome(WorkerId),
+    /// A job's specification.
+    Spec(JobId, Arc<str>),
+    /// Items of a job's batch.
+    Assignments {
+        /// The job whose batch it is.
+        job: JobId,
+        /// Which worlds and noise the trials meet.
+        trial_set: TrialSet,
+        /// What is returned for a trial.
+        output: Output,
+        /// At least one.
+        assignments: Vec<Assignment>,
+    },
+    /// Assignments whose results are not wanted any more.
+    Drop(Vec<AssignmentId>),
+    /// A job is over, or paused.
+    End(JobId),
+    /// It is dropped; the text says why.
+    Dropped(String),
+}
+
+/// Sends events to the driver.
+pub type EventSender = mpsc::Sender<DriverEvent>;
+
+/// A channel to a driver that is yet to run.
+pub fn channel() -> (EventSender, mpsc::Receiver<DriverEvent>) {
+    mpsc::channel(EVENT_QUEUE_LEN)
+}

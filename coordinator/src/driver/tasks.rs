@@ -1,0 +1,156 @@
+//! What may take long and so runs beside the loop: evolution's arithmetic and the
+//! disk.
+
+use std::sync::Arc;
+
+use experiment_file::ExperimentConfig;
+use swarm_telemetry::Histogram;
+use tokio::task;
+use tokio_util::sync::CancellationToken;
+use tracing::info;
+
+use crate::{
+    clock,
+    engine::EvaluatedBatch,
+    failpoint,
+    ids::ExperimentId,
+    runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId},
+    shared_store::{Retry, SharedStore, Written},
+    store::{GenerationCommit, GenerationRecord, checkpoint_json},
+};
+
+/// The outcome of a task.
+pub enum Done {
+    /// Conclusions are drawn, or cannot be.
+    Concluded(RunId, Result<Next, String>),
+    /// A commit is over.
+    Committed(RunId, CommitOutcome),
+    /// The write of a change is over; whether it is stored.
+    ChangeWritten(ExperimentId, bool),
+}
+
+/// What writing tasks need.
+#[derive(Clone)]
+pub struct Disk {
+    /// The store.
+    pub store: SharedStore,
+    /// Ends attempts to write to a store that cannot be written.
+    pub shutdown: CancellationToken,
+    /// Measures the time per commit, s.
+    pub commit_duration: Histogram,
+}
+
+/// Draws conclusions from an evaluated batch.
+pub async fn conclude(
+    run: RunId,
+    config: Arc<ExperimentConfig>,
+    round: Round,
+    evaluated: EvaluatedBatch,
+) -> Done {
+    let concluding = task::spawn_blocking(move || round.conclude(&config, &evaluated));
+    let conclusion = match concluding.await {
+        Ok(conclusion) => conclusion.map_err(|error| error.to_string()),
+        Err(panic) => Err(format!("evolution panicked ({panic}); please report this")),
+    };
+    Done::Concluded(run, conclusion)
+}
+
+/// Commits a generation.
+pub async fn commit(
+    run: RunId,
+    config: Arc<ExperimentConfig>,
+    ready: ReadyToCommit,
+    disk: Disk,
+) -> Done {
+    let ReadyToCommit { generation, evolution, champion, digest, notices, completed, next: _ } =
+        ready;
+    let id = run.experiment;
+    let started = clock::now();
+    let (row, remarks, reason, link) =
+        (generation.clone(), notices.clone(), completed.clone(), digest.clone());
+    let what = format!("generation {} of experiment {id}", generation.generation);
+    let checkpoint = task::spawn_blocking(move || checkpoint_json(&evolution))
+        .await
+        .expect("numbers and lists serialise");
+    failpoint::reached("before commit");
+    let written = disk
+        .store
+        .write(&disk.shutdown, &what, Retry::WhileUnavailable, move |store| {
+            store.commit_generation(
+                id,
+                clock::unix_ms(),
+                &GenerationCommit {
+                    generation: &row,
+                    checkpoint: &checkpoint,
+                    champion: champion.as_ref(),
+                    digest: &link,
+                    notices: &remarks,
+                    completed: reason.as_deref(),
+                },
+            )
+        })
+        .await;
+    match written {
+        Written::Yes => {
+            failpoint::reached("committed");
+            disk.commit_duration.observe((clock::now() - started).as_secs_f64());
+        }
+        Written::NotWanted => return Done::Committed(run, CommitOutcome::NotWanted),
+        Written::Never(error) => {
+            return Done::Committed(run, CommitOutcome::Failed(error.to_string()));
+        }
+    }
+    log_generation(id, &config, &generation);
+    for notice in notices {
+        info!(experiment = %id, "{notice}");
+    }
+    if let Some(reason) = completed {
+        info!(experiment = %id, digest, reason, "experiment completed");
+    }
+    Done::Committed(run, CommitOutcome::Stored)
+}
+
+/// Writes a change.
+pub async fn write_change(id: ExperimentId, change: Change, disk: Disk) -> Done {
+    let now_ms = clock::unix_ms();
+    failpoint::reached("before change");
+    let what = format!("the {} of experiment {id}", change.name());
+    // If the coordinator stops before it is written, the experiment is at the next
+    // start as it was before, and can be changed again.
+    let written = disk
+        .store
+        .write(&disk.shutdown, &what, Retry::Always, move |store| change.write(store, id, now_ms))
+        .await;
+    let is_stored = matches!(written, Written::Yes);
+    if is_stored {
+        failpoint::reached("changed");
+    }
+    Done::ChangeWritten(id, is_stored)
+}
+
+/// The line by which people follow a run.
+fn log_generation(id: ExperimentId, config: &ExperimentConfig, generation: &GenerationRecord) {
+    let seconds = generation.duration_ms.max(1) as f64 / 1000.0;
+    let n_done = generation.generation + 1;
+    let n_left = config.algorithm.generations.saturating_sub(n_done);
+    info!(
+        experiment = %id,
+        name = config.name,
+        generation = generation.generation,
+        generations = config.algorithm.generations,
+        best = readable(generation.statistics.best),
+        mean = readable(generation.statistics.mean),
+        min = readable(generation.statistics.min),
+        episodes_per_s = (generation.episodes as f64 / seconds).round(),
+        workers = generation.workers,
+        idle_percent = (generation.idle_share * 1000.0).round() / 10.0,
+        eta_s = (n_left as f64 * seconds).round(),
+        digest = &generation.digest[..16],
+        "generation"
+    );
+}
+
+/// Six decimals: the store has all of them.
+fn readable(fitness: f64) -> f64 {
+    (fitness * 1e6).round() / 1e6
+}

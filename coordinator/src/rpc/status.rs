@@ -1,0 +1,88 @@
+//! What went wrong, as gRPC statuses.
+
+use experiment_file::ConfigError;
+use tonic::Status;
+
+use crate::{
+    control::ControlError,
+    limits::PROBLEMS_LEN_MAX,
+    queries::{QueryError, WatchError},
+    store::StoreError,
+};
+
+/// For clients and workers that are connected, or connect, while the coordinator
+/// stops.
+pub fn shutting_down() -> Status {
+    ControlError::ShuttingDown.into()
+}
+
+impl From<StoreError> for Status {
+    fn from(error: StoreError) -> Self {
+        let text = error.to_string();
+        match error {
+            // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
+            StoreError::Unavailable(_) => Self::resource_exhausted(text),
+            StoreError::Ended(_) => Self::failed_precondition(text),
+            StoreError::Corrupt(_) => Self::data_loss(text),
+            _ => Self::internal(text),
+        }
+    }
+}
+
+impl From<QueryError> for Status {
+    fn from(error: QueryError) -> Self {
+        let text = error.to_string();
+        match error {
+            QueryError::NotFound(_) => Self::not_found(text),
+            QueryError::NoChampion(_) | QueryError::OtherSimulation { .. } => {
+                Self::failed_precondition(text)
+            }
+            QueryError::Undecodable(_) => Self::data_loss(text),
+            QueryError::Store(error) => error.into(),
+        }
+    }
+}
+
+impl From<WatchError> for Status {
+    fn from(error: WatchError) -> Self {
+        let text = error.to_string();
+        match error {
+            WatchError::TooSlow { .. } => Self::aborted(text),
+            WatchError::ShuttingDown => Self::unavailable(text),
+            WatchError::Store(error) => error.into(),
+        }
+    }
+}
+
+impl From<ControlError> for Status {
+    fn from(error: ControlError) -> Self {
+        let text = error.to_string();
+        match error {
+            ControlError::Invalid(_) => Self::invalid_argument(text),
+            ControlError::Config(error) => Self::invalid_argument(problems(&error)),
+            ControlError::TooManyUnfinished | ControlError::NotStoredYet(_) => {
+                Self::resource_exhausted(text)
+            }
+            ControlError::EvaluationFailed(_) | ControlError::Panicked(_) => Self::internal(text),
+            ControlError::Query(error) => error.into(),
+            ControlError::ShuttingDown => Self::unavailable(text),
+        }
+    }
+}
+
+/// All problems, one per line, as far as there is room.
+fn problems(error: &ConfigError) -> String {
+    let mut text = String::new();
+    for (i, problem) in error.problems.iter().enumerate() {
+        let line = problem.to_string();
+        if i > 0 && text.len() + line.len() > PROBLEMS_LEN_MAX {
+            text += &format!("\n... and {} more", error.problems.len() - i);
+            break;
+        }
+        if i > 0 {
+            text.push('\n');
+        }
+        text += &line[..line.floor_char_boundary(PROBLEMS_LEN_MAX)];
+    }
+    text
+}

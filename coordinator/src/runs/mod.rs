@@ -1,0 +1,310 @@
+//! The life of runs: a synchronous state machine.
+//!
+//! A *run* is an experiment on its way through generations, from its submission
+//! (or the coordinator's start) to its end. The driver calls a handler for
+//! everything that happens and then carries out the [`Command`]s that it collects
+//! with [`Runs::poll_command`]. There is no I/O and no clock, so a test can take
+//! runs through any history.
+//!
+//! The rules:
+//! - A run goes round: the fleet evaluates a batch, conclusions are drawn from it,
+//!   and the generation is committed while the next batch is evaluated. One
+//!   generation per run is committed at a time; one that is complete before waits,
+//!   and nothing after it is evaluated. So generations are stored in order.
+//! - If the coordinator dies before a generation is stored, it and the one after it
+//!   are evaluated again, to the same bits.
+//! - A run ends when its last generation is stored, when a client cancels it or when
+//!   it cannot go on. The fleet drops its work at once. A generation that is being
+//!   committed at that moment is stored first, then the end; one that only waits is
+//!   not stored.
+//! - Everything else that clients and the engine change about an experiment goes
+//!   through the [`ChangeQueue`]: one write at a time per experiment, in the order
+//!   in which things happened. Each client is answered once its change is stored.
+//! - An experiment can be reopened before the end of its former run is reported
+//!   here. Each run has an epoch of its own, and what belongs to another is ignored.
+//! - After [`Runs::on_shutdown`] nothing new is begun; what is being stored is
+//!   stored.
+//! - Evaluations, which nobody stores, only pass through: a batch and an answer.
+
+mod change_queue;
+mod evaluations;
+mod messages;
+mod round;
+mod run;
+mod runnable;
+mod stats;
+
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    sync::Arc,
+};
+
+use crate::{
+    engine::{Batch, EvaluatedBatch},
+    ids::{EvaluationId, ExperimentId},
+    store::ExperimentState,
+};
+
+pub use change_queue::{Change, PendingChange};
+pub use evaluations::Evaluation;
+pub use messages::{Command, CommitOutcome, Request, RequestId, RunId};
+pub use round::{Next, ReadyToCommit, Round};
+pub use runnable::Runnable;
+pub use stats::RunStats;
+
+use change_queue::ChangeQueue;
+use run::{Committing, End, Run, Stage};
+
+/// Why an experiment is over that a client cancelled.
+const CANCELLED: &str = "cancelled by a client";
+
+/// The state machine.
+#[derive(Debug, Default)]
+pub struct Runs {
+    runs: BTreeMap<ExperimentId, Run>,
+    /// Runs begun so far; also the epoch of the latest.
+    n_begun: u64,
+    /// Evaluations in progress.
+    evaluations: BTreeSet<EvaluationId>,
+    n_evaluations: u64,
+    changes: ChangeQueue,
+    commands: VecDeque<Command>,
+    is_stopping: bool,
+}
+
+impl Runs {
+    /// The next thing to do, if any. Call until there is none after every handler.
+    pub fn poll_command(&mut self) -> Option<Command> {
+        self.commands.pop_front()
+    }
+
+    /// A stored, unfinished experiment is to run: it is new, or has been reopened, or
+    /// the coordinator has started.
+    pub fn on_submitted(&mut self, runnable: Runnable) {
+        let Runnable { id, config, spec, latest, round, priority, is_paused } = runnable;
+        if self.is_stopping {
+            return;
+        }
+        self.n_begun += 1;
+        let run = Run::new(config, self.n_begun, latest);
+        let former = self.runs.insert(id, run);
+        self.commands.push_back(Command::StartJob { job: id.into(), spec, priority, is_paused });
+        self.evaluate(id, round);
+        self.apply_former_requests(id, former);
+    }
+
+    /// An experiment can be reopened while changes that were asked of its former run
+    /// are still on their way to the store. They hold for the new run, too.
+    fn apply_former_requests(&mut self, id: ExperimentId, former: Option<Run>) {
+        let mut end = None;
+        for change in self.changes.pending(id) {
+            match change {
+                Change::State(ExperimentState::Running, _) => {
+                    self.commands.push_back(Command::ResumeJob { job: id.into() });
+                }
+                Change::State(ExperimentState::Paused, _) => {
+                    self.commands.push_back(Command::PauseJob { job: id.into() });
+                }
+                Change::State(state, reason) => {
+                    end = Some(End { state: *state, reason: reason.clone() });
+                }
+                &Change::Priority(priority) => {
+                    self.commands.push_back(Command::SetPriority { job: id.into(), priority });
+                }
+                Change::Notice(_) => {}
+            }
+        }
+        for request in former.into_iter().flat_map(|former| former.cancellations) {
+            self.on_request(id, Request::Cancel, request);
+        }
+        if let Some(end) = end {
+            self.end(id, end);
+        }
+    }
+
+    /// The fleet has evaluated a run's batch.
+    pub fn on_batch_evaluated(&mut self, id: ExperimentId, evaluated: EvaluatedBatch) {
+        if self.is_stopping {
+            return;
+        }
+        let Some(run) = self.runs.get_mut(&id).filter(|run| run.end.is_none()) else { return };
+        let Some(round) = run.take_round() else { return };
+        let (config, run) = (Arc::clone(&run.config), run.id(id));
+        self.commands.push_back(Command::Conclude { run, config, round, evaluated });
+    }
+
+    /// Conclusions have been drawn from a batch; or why that is not possible.
+    pub fn on_concluded(&mut self, run_id: RunId, conclusion: Result<Next, String>) {
+        if self.is_stopping {
+            return;
+        }
+        let Some(run) = self.find(run_id).filter(|run| run.end.is_none()) else { return };
+        match conclusion {
+            Ok(Next::Evaluate(round)) => self.evaluate(run_id.experiment, *round),
+            Ok(Next::Commit(ready)) => {
+                run.stage = Stage::ReadyToCommit(ready);
+                self.commit_next(run_id.experiment);
+            }
+            Err(reason) => {
+                self.end(run_id.experiment, End { state: ExperimentState::Failed, reason });
+            }
+        }
+    }
+
+    /// A commit is over.
+    pub fn on_committed(&mut self, run_id: RunId, outcome: CommitOutcome) {
+        let id = run_id.experiment;
+        let Some(run) = self.find(run_id) else { return };
+        let Some(Committing { generation, is_last }) = run.committing.take() else { return };
+        let is_stored = matches!(outcome, CommitOutcome::Stored);
+        if is_stored {
+            run.latest = Some(generation);
+        }
+        if let Some(end) = run.end.take() {
+            return self.finish(id, end);
+        }
+        match outcome {
+            CommitOutcome::Stored if !is_last => self.commit_next(id),
+            // The store knows all there is to know.
+            CommitOutcome::Stored | CommitOutcome::NotWanted => {
+                self.runs.remove(&id);
+                self.commands.push_back(Command::EndJob { job: id.into() });
+            }
+            CommitOutcome::Failed(reason) => {
+                self.end(id, End { state: ExperimentState::Failed, reason });
+            }
+        }
+    }
+
+    /// The fleet cannot compute a run's batch; the engine has ended the job.
+    pub fn on_job_failed(&mut self, id: ExperimentId, reason: String) {
+        if self.runs.contains_key(&id) {
+            self.end(id, End { state: ExperimentState::Failed, reason });
+        }
+    }
+
+    /// Somebody has to look at a run before it goes on; the engine has paused the job.
+    pub fn on_job_suspended(&mut self, id: ExperimentId, reason: String) {
+        let paused = Change::State(ExperimentState::Paused, reason.clone());
+        for change in [Change::Notice(reason), paused] {
+            self.change(PendingChange { experiment: id, change, requests: Vec::new() });
+        }
+    }
+
+    /// A client wants something of an experiment. One without a run has ended, or
+    /// waits for another version of the program; only the store is concerned.
+    pub fn on_request(&mut self, id: ExperimentId, request: Request, request_id: RequestId) {
+        let run = self.runs.get_mut(&id);
+        let is_active = run.as_ref().is_some_and(|run| run.end.is_none());
+        let (change, command) = match request {
+            Request::Cancel => {
+                let end = End { state: ExperimentState::Cancelled, reason: CANCELLED.to_owned() };
+                if let Some(run) = run {
+                    run.cancellations.push(request_id);
+                    return self.end(id, end);
+                }
+                (Change::State(end.state, end.reason), None)
+            }
+            Request::Pause(reason) => {
+                let command = Command::PauseJob { job: id.into() };
+                (Change::State(ExperimentState::Paused, reason), Some(command))
+            }
+            Request::Resume => {
+                let command = Command::ResumeJob { job: id.into() };
+                (Change::State(ExperimentState::Running, String::new()), Some(command))
+            }
+            Request::SetPriority(priority) => {
+                let command = Command::SetPriority { job: id.into(), priority };
+                (Change::Priority(priority), Some(command))
+            }
+        };
+        self.commands.extend(command.filter(|_| is_active));
+        self.change(PendingChange { experiment: id, change, requests: vec![request_id] });
+    }
+
+    /// The write of a change is over. `is_stored`: false if the coordinator stops
+    /// before the store takes it.
+    pub fn on_change_written(&mut self, id: ExperimentId, is_stored: bool) {
+        let (requests, next) = self.changes.on_written(id);
+        for request in requests {
+            self.commands.push_back(Command::Answer { request, is_stored });
+        }
+        self.write(id, next);
+    }
+
+    /// The coordinator stops: nothing new is begun.
+    pub fn on_shutdown(&mut self) {
+        self.is_stopping = true;
+    }
+
+    fn find(&mut self, RunId { experiment, run_epoch }: RunId) -> Option<&mut Run> {
+        self.runs.get_mut(&experiment).filter(|run| run.run_epoch == run_epoch)
+    }
+
+    /// Has the fleet evaluate a batch for a run.
+    fn evaluate(&mut self, id: ExperimentId, round: Round) {
+        let Some(run) = self.runs.get_mut(&id) else { return };
+        let n_trials = round.n_trials(&run.config);
+        let batch = Batch::fitness(round.trial_set(), round.genotypes(), n_trials);
+        self.commands.push_back(Command::Evaluate { job: id.into(), batch });
+        run.stage = Stage::Evaluating(round);
+    }
+
+    /// Commits the generation that is ready, if there is one and the one before is
+    /// stored, and has the next one evaluated meanwhile.
+    fn commit_next(&mut self, id: ExperimentId) {
+        let is_stopping = self.is_stopping;
+        let Some(run) = self.runs.get_mut(&id) else { return };
+        if run.committing.is_some() || is_stopping {
+            return;
+        }
+        let Some(mut ready) = run.take_ready() else { return };
+        run.committing = Some(Committing {
+            generation: ready.generation.clone(),
+            is_last: ready.completed.is_some(),
+        });
+        let next = ready.next.take();
+        let (config, run) = (Arc::clone(&run.config), run.id(id));
+        self.commands.push_back(Command::Commit { run, config, ready });
+        if let Some(round) = next {
+            self.evaluate(id, round);
+        }
+    }
+
+    /// Ends a run; a generation that is being committed is stored first.
+    fn end(&mut self, id: ExperimentId, end: End) {
+        let Some(run) = self.runs.get_mut(&id) else { return };
+        if run.end.is_none() {
+            self.commands.push_back(Command::EndJob { job: id.into() });
+        }
+        if run.committing.is_some() {
+            run.end.get_or_insert(end);
+        } else {
+            self.finish(id, end);
+        }
+    }
+
+    /// Forgets a run and has its end stored. If its last generation has been stored
+    /// meanwhile, the experiment is completed, and the store keeps that.
+    fn finish(&mut self, id: ExperimentId, End { state, reason }: End) {
+        let Some(run) = self.runs.remove(&id) else { return };
+        let (experiment, requests) = (id, run.cancellations);
+        self.commands.push_back(Command::PublishEnd { experiment, state, reason: reason.clone() });
+        let change = Change::State(state, reason);
+        self.change(PendingChange { experiment, change, requests });
+    }
+
+    /// Has a change stored after all that came before it.
+    fn change(&mut self, pending: PendingChange) {
+        let id = pending.experiment;
+        let to_write = self.changes.push(pending);
+        self.write(id, to_write);
+    }
+
+    fn write(&mut self, experiment: ExperimentId, change: Option<Change>) {
+        self.commands.extend(change.map(|change| Command::WriteChange { experiment, change }));
+    }
+}
+
+#[cfg(test)]
+mod tests;

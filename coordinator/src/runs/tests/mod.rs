@@ -1,0 +1,190 @@
+//! What becomes of runs when things happen too late, or at the same time.
+
+mod histories;
+mod world;
+
+use super::*;
+use world::World;
+
+/// A world with one run that commits generation 0 and evaluates generation 1.
+fn committing() -> (World, ExperimentId) {
+    let mut world = World::new();
+    let id = world.submit(4);
+    world.finish_batch(id);
+    world.finish_conclusion(0);
+    assert_eq!(world.commits.len(), 1);
+    (world, id)
+}
+
+#[test]
+fn a_run_is_completed_and_forgotten() {
+    let mut world = World::new();
+    let id = world.submit(4);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Completed);
+    assert_eq!(world.store[&id].n_done(), 4);
+}
+
+#[test]
+fn a_generation_is_evaluated_while_the_one_before_is_stored() {
+    let (mut world, id) = committing();
+    assert!(world.finish_batch(id).is_some(), "before generation 0 is known to be stored");
+    world.finish_conclusion(0);
+    // Generation 1 comes with a re-evaluation.
+    assert!(world.finish_batch(id).is_some());
+    world.finish_conclusion(0);
+    assert_eq!(world.commits.len(), 1, "generation 1 waits for generation 0");
+    assert!(world.finish_batch(id).is_none(), "and generation 2 for the commit of 1");
+    world.write_commit(0);
+    world.report_commit(0);
+    assert_eq!(world.commits.len(), 1);
+    assert_eq!(world.commits[0].ready.generation.generation, 1);
+    assert!(world.finish_batch(id).is_some());
+}
+
+#[test]
+fn what_is_being_stored_when_an_experiment_is_cancelled_is_stored_first() {
+    let (mut world, id) = committing();
+    let request = world.request(id, Request::Cancel);
+    assert!(world.jobs.is_empty(), "the fleet drops it at once");
+    assert!(world.changes.is_empty(), "its end waits");
+    world.write_commit(0);
+    world.report_commit(0);
+    assert_eq!(world.answers[&request], None, "the end is not stored yet");
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.answers[&request], Some(true));
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+    assert_eq!(world.store[&id].n_done(), 1);
+}
+
+#[test]
+fn conclusions_that_come_after_the_end_are_not_heeded() {
+    let (mut world, id) = committing();
+    world.finish_batch(id);
+    world.request(id, Request::Cancel);
+    world.finish_conclusion(0);
+    assert!(world.jobs.is_empty() && world.commits.len() == 1);
+    world.settle();
+    world.check_settled();
+}
+
+#[test]
+fn two_clients_cancel_and_both_are_answered() {
+    let (mut world, id) = committing();
+    let requests = [world.request(id, Request::Cancel), world.request(id, Request::Cancel)];
+    world.settle();
+    for request in requests {
+        assert_eq!(world.answers[&request], Some(true));
+    }
+}
+
+/// A world whose only run has its last generation stored, and does not know it.
+fn completed_unnoticed() -> (World, ExperimentId) {
+    let mut world = World::new();
+    let id = world.submit(1);
+    world.finish_batch(id);
+    world.finish_conclusion(0);
+    world.finish_batch(id);
+    world.finish_conclusion(0);
+    world.write_commit(0);
+    assert_eq!(world.store[&id].state, ExperimentState::Completed);
+    (world, id)
+}
+
+#[test]
+fn the_stale_end_of_a_reopened_run_does_not_end_it() {
+    let (mut world, id) = completed_unnoticed();
+    world.reopen(id);
+    world.report_commit(0);
+    assert!(world.jobs[&id].batch.is_some(), "it runs");
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].n_done(), 3);
+}
+
+#[test]
+fn a_client_that_cancels_a_run_while_another_reopens_it_is_answered() {
+    let (mut world, id) = completed_unnoticed();
+    let request = world.request(id, Request::Cancel);
+    world.reopen(id);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.answers[&request], Some(true));
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+}
+
+#[test]
+fn a_change_that_is_on_its_way_holds_for_a_reopened_run() {
+    let (mut world, id) = completed_unnoticed();
+    world.request(id, Request::Cancel);
+    world.report_commit(0);
+    assert!(world.runs.runs.is_empty());
+    // The database is slow.
+    world.reopen(id);
+    assert!(world.jobs.is_empty(), "nothing is evaluated in vain");
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+}
+
+#[test]
+fn an_experiment_whose_generation_cannot_be_stored_fails() {
+    let (mut world, id) = committing();
+    world.fail_commit(0, CommitOutcome::Failed("a bad page".to_owned()));
+    world.report_commit(0);
+    assert!(world.jobs.is_empty());
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Failed);
+}
+
+#[test]
+fn at_shutdown_a_cancelled_run_is_stored_and_then_its_end() {
+    let (mut world, id) = committing();
+    let request = world.request(id, Request::Cancel);
+    world.stop(true);
+    assert_eq!(world.answers[&request], Some(true));
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+    assert_eq!(world.store[&id].n_done(), 1);
+}
+
+#[test]
+fn changes_are_written_one_after_the_other() {
+    let (mut world, id) = committing();
+    let pause = world.request(id, Request::Pause("lunch".to_owned()));
+    let resume = world.request(id, Request::Resume);
+    assert_eq!(world.changes.len(), 1);
+    world.write_change(0);
+    world.report_change(0);
+    assert_eq!((world.answers[&pause], world.answers[&resume]), (Some(true), None));
+    assert_eq!(world.store[&id].state, ExperimentState::Paused);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Completed);
+}
+
+#[test]
+fn an_abandoned_evaluation_is_dropped_and_a_finished_one_answered() {
+    let mut runs = Runs::default();
+    let evaluation = || Evaluation {
+        spec: "{}".into(),
+        genotype: vec![0.5],
+        n_trials: 1,
+        n_values: 2,
+        priority: crate::priority::Priority::default(),
+    };
+    let abandoned = runs.on_evaluation_requested(evaluation());
+    let finished = runs.on_evaluation_requested(evaluation());
+    while runs.poll_command().is_some() {}
+    runs.on_evaluation_abandoned(abandoned);
+    assert!(
+        matches!(runs.poll_command(), Some(Command::EndJob { job }) if job == abandoned.into())
+    );
+    runs.on_evaluation_finished(abandoned, Ok(vec![1.0, 2.0]));
+    assert!(runs.poll_command().is_none());
+    runs.on_evaluation_finished(finished, Ok(vec![1.0, 2.0]));
+    assert!(matches!(runs.poll_command(), Some(Command::EndJob { job }) if job == finished.into()));
+    assert!(matches!(runs.poll_command(), Some(Command::AnswerEvaluation { result: Ok(_), .. })));
+}

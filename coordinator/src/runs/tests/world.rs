@@ -1,0 +1,410 @@
+//! A world for runs to live in: a store, a fleet and clients, each as slow as a test
+//! wants. Whatever the runs do with it is checked against the rules.
+
+use std::{collections::BTreeMap, time::Duration};
+
+use evolution::{Evolution, Population};
+use experiment_file::ExperimentConfig;
+use sim_core::TrialSet;
+
+use super::super::*;
+use crate::{ids::JobId, priority::Priority, store::GenerationRecord};
+
+/// Runs, and all that is around them.
+pub struct World {
+    pub runs: Runs,
+    pub store: BTreeMap<ExperimentId, Stored>,
+    /// What the engine knows.
+    pub jobs: BTreeMap<ExperimentId, Job>,
+    pub conclusions: Vec<(RunId, Arc<ExperimentConfig>, Round, EvaluatedBatch)>,
+    pub commits: Vec<CommitTask>,
+    pub changes: Vec<ChangeTask>,
+    /// All requests; answered: whether what they wanted is stored.
+    pub answers: BTreeMap<RequestId, Option<bool>>,
+}
+
+/// An experiment as the store has it.
+pub struct Stored {
+    pub config: ExperimentConfig,
+    pub state: ExperimentState,
+    pub evolution: Evolution,
+    pub latest: Option<GenerationRecord>,
+    pub priority: Priority,
+}
+
+/// A job of the engine.
+pub struct Job {
+    pub is_paused: bool,
+    pub batch: Option<(Population, u32)>,
+}
+
+/// A commit under way.
+pub struct CommitTask {
+    pub run: RunId,
+    pub ready: Box<ReadyToCommit>,
+    /// None as long as the disk is busy with it.
+    pub outcome: Option<CommitOutcome>,
+}
+
+/// The write of a change under way.
+pub struct ChangeTask {
+    pub experiment: ExperimentId,
+    pub change: Change,
+    /// None as long as the disk is busy with it; then whether it is stored.
+    pub outcome: Option<bool>,
+}
+
+impl Stored {
+    /// Completed generations.
+    pub fn n_done(&self) -> u64 {
+        self.latest.as_ref().map_or(0, |latest| latest.generation + 1)
+    }
+}
+
+/// A small experiment: four individuals of three genes, re-evaluations after every
+/// other generation.
+pub fn config(seed: u64, generations: u64) -> ExperimentConfig {
+    let file = include_str!("../../../../configs/quickstart.json");
+    let (mut config, _) = ExperimentConfig::from_json(file, "", evolution::ALGORITHMS).unwrap();
+    config.seed = seed;
+    config.algorithm.generations = generations;
+    config.algorithm.population_size = 4;
+    config.algorithm.num_evaluations = 1;
+    config.algorithm.champion_every = 2;
+    config.algorithm.champion_trials = 2;
+    config
+}
+
+/// Evolution before its first generation.
+pub fn evolution(config: &ExperimentConfig) -> Evolution {
+    Evolution::new(config, &[0..3], "test")
+}
+
+/// What the fleet makes of a batch: always the same.
+pub fn evaluated(genotypes: &[Vec<f64>], n_trials: u32) -> EvaluatedBatch {
+    let fitness = |genes: &Vec<f64>| {
+        (0..n_trials).map(|trial| genes.iter().sum::<f64>() + f64::from(trial)).collect()
+    };
+    EvaluatedBatch {
+        trial_set: TrialSet::Generation(0),
+        values: genotypes.iter().map(fitness).collect(),
+        duration: Duration::from_millis(1),
+        n_workers: 1,
+        idle_share: 0.0,
+        n_audited: 0,
+        n_unaudited: 0,
+    }
+}
+
+/// Evolution after so many generations that nothing has disturbed.
+pub fn undisturbed(config: &ExperimentConfig, n_generations: u64) -> Evolution {
+    let mut current = evolution(config);
+    let mut longer = config.clone();
+    longer.algorithm.generations = u64::MAX;
+    while current.n_generations() < n_generations {
+        let mut round = Round::generation(current.clone());
+        current = loop {
+            let fitness = evaluated(&round.genotypes(), round.n_trials(&longer));
+            match round.conclude(&longer, &fitness).unwrap() {
+                Next::Evaluate(next) => round = *next,
+                Next::Commit(ready) => break Arc::unwrap_or_clone(ready.evolution),
+            }
+        };
+    }
+    current
+}
+
+fn experiment(job: JobId) -> ExperimentId {
+    job.experiment().expect("nobody wants an evaluation")
+}
+
+impl World {
+    pub fn new() -> Self {
+        Self {
+            runs: Runs::default(),
+            store: BTreeMap::new(),
+            jobs: BTreeMap::new(),
+            conclusions: Vec::new(),
+            commits: Vec::new(),
+            changes: Vec::new(),
+            answers: BTreeMap::new(),
+        }
+    }
+
+    /// A client submits an experiment, which is stored and then runs.
+    pub fn submit(&mut self, generations: u64) -> ExperimentId {
+        let id = ExperimentId(self.store.len() as u64 + 1);
+        let config = config(id.0, generations);
+        let stored = Stored {
+            state: ExperimentState::Running,
+            evolution: evolution(&config),
+            latest: None,
+            priority: Priority::default(),
+            config,
+        };
+        self.store.insert(id, stored);
+        self.run(id);
+        id
+    }
+
+    /// A client asks for more generations of a completed experiment.
+    pub fn reopen(&mut self, id: ExperimentId) {
+        let stored = self.store.get_mut(&id).unwrap();
+        assert_eq!(stored.state, ExperimentState::Completed);
+        stored.state = ExperimentState::Running;
+        stored.config.algorithm.generations += 2;
+        self.run(id);
+    }
+
+    fn run(&mut self, id: ExperimentId) {
+        let Stored { config, state, evolution, latest, priority } = &self.store[&id];
+        let runnable = Runnable {
+            latest: latest.clone(),
+            is_paused: *state == ExperimentState::Paused,
+            ..Runnable::new(id, config.clone(), evolution.clone(), *priority)
+        };
+        self.runs.on_submitted(runnable);
+        self.carry_out();
+    }
+
+    pub fn request(&mut self, id: ExperimentId, request: Request) -> RequestId {
+        let request_id = RequestId(self.answers.len() as u64);
+        self.answers.insert(request_id, None);
+        self.runs.on_request(id, request, request_id);
+        self.carry_out();
+        request_id
+    }
+
+    /// The fleet finishes a job's batch. Returns of how many genotypes.
+    pub fn finish_batch(&mut self, id: ExperimentId) -> Option<usize> {
+        let (genotypes, n_trials) = self.jobs.get_mut(&id)?.batch.take()?;
+        self.runs.on_batch_evaluated(id, evaluated(&genotypes, n_trials));
+        self.carry_out();
+        Some(genotypes.len())
+    }
+
+    /// Conclusions are drawn.
+    pub fn finish_conclusion(&mut self, i: usize) {
+        let (run, config, round, evaluated) = self.conclusions.remove(i);
+        let conclusion = round.conclude(&config, &evaluated).map_err(|error| error.to_string());
+        self.runs.on_concluded(run, conclusion);
+        self.carry_out();
+    }
+
+    /// The disk is done with a commit; the driver does not know yet.
+    pub fn write_commit(&mut self, i: usize) {
+        let CommitTask { run, ready, outcome } = &mut self.commits[i];
+        if outcome.is_some() {
+            return;
+        }
+        let stored = self.store.get_mut(&run.experiment).unwrap();
+        assert!(stored.state.is_unfinished(), "nothing is committed after the end");
+        assert_eq!(ready.generation.generation, stored.n_done(), "in order, and once");
+        stored.latest = Some(ready.generation.clone());
+        stored.evolution = (*ready.evolution).clone();
+        if ready.completed.is_some() {
+            stored.state = ExperimentState::Completed;
+        }
+        *outcome = Some(CommitOutcome::Stored);
+    }
+
+    /// The disk does not take a commit.
+    pub fn fail_commit(&mut self, i: usize, failure: CommitOutcome) {
+        self.commits[i].outcome.get_or_insert(failure);
+    }
+
+    /// The driver learns of a commit's outcome, if there is one.
+    pub fn report_commit(&mut self, i: usize) {
+        if self.commits[i].outcome.is_some() {
+            let CommitTask { run, outcome, .. } = self.commits.remove(i);
+            self.runs.on_committed(run, outcome.unwrap());
+            self.carry_out();
+        }
+    }
+
+    /// The disk is done with a change; the driver does not know yet.
+    pub fn write_change(&mut self, i: usize) {
+        let ChangeTask { experiment, change, outcome } = &mut self.changes[i];
+        if outcome.is_some() {
+            return;
+        }
+        let stored = self.store.get_mut(experiment).unwrap();
+        match change {
+            Change::State(state, _) if stored.state.is_unfinished() => stored.state = *state,
+            Change::Priority(priority) if stored.state.is_unfinished() => {
+                stored.priority = *priority;
+            }
+            _ => {}
+        }
+        *outcome = Some(true);
+    }
+
+    /// The driver learns that a change is stored, if it is.
+    pub fn report_change(&mut self, i: usize) {
+        if let Some(is_stored) = self.changes[i].outcome {
+            let ChangeTask { experiment, .. } = self.changes.remove(i);
+            self.runs.on_change_written(experiment, is_stored);
+            self.carry_out();
+        }
+    }
+
+    /// The engine gives a job up.
+    pub fn fail_job(&mut self, id: ExperimentId) {
+        if self.jobs.get(&id).is_some_and(|job| job.batch.is_some()) {
+            self.jobs.remove(&id);
+            self.runs.on_job_failed(id, "its items fail".to_owned());
+            self.carry_out();
+        }
+    }
+
+    /// The engine pauses a job.
+    pub fn suspend_job(&mut self, id: ExperimentId) {
+        let Some(job) = self.jobs.get_mut(&id).filter(|job| job.batch.is_some()) else { return };
+        job.is_paused = true;
+        self.runs.on_job_suspended(id, "two workers differ".to_owned());
+        self.carry_out();
+    }
+
+    /// The coordinator is killed and started again. What is written is there.
+    pub fn crash(&mut self) {
+        self.runs = Runs::default();
+        self.jobs.clear();
+        self.conclusions.clear();
+        self.commits.clear();
+        self.changes.clear();
+        // Their connections break.
+        for answer in self.answers.values_mut() {
+            answer.get_or_insert(false);
+        }
+        let unfinished = self.store.iter().filter(|(_, stored)| stored.state.is_unfinished());
+        for id in unfinished.map(|(&id, _)| id).collect::<Vec<_>>() {
+            self.run(id);
+        }
+    }
+
+    /// The coordinator is stopped and started again. `is_disk_good`: whether what is
+    /// under way can still be written.
+    pub fn stop(&mut self, is_disk_good: bool) {
+        self.runs.on_shutdown();
+        while !self.commits.is_empty() || !self.changes.is_empty() {
+            if !self.commits.is_empty() {
+                if is_disk_good {
+                    self.write_commit(0);
+                }
+                self.fail_commit(0, CommitOutcome::NotWanted);
+                self.report_commit(0);
+            }
+            if !self.changes.is_empty() {
+                if is_disk_good {
+                    self.write_change(0);
+                }
+                self.changes[0].outcome.get_or_insert(false);
+                self.report_change(0);
+            }
+        }
+        assert!(self.answers.values().all(Option::is_some), "nobody waits for ever");
+        self.crash();
+    }
+
+    /// All that is under way comes to its end, except work of paused jobs.
+    pub fn settle(&mut self) {
+        loop {
+            let mut jobs = self.jobs.iter().filter(|(_, job)| !job.is_paused);
+            let busy = jobs.find(|(_, job)| job.batch.is_some()).map(|(&id, _)| id);
+            if !self.conclusions.is_empty() {
+                self.finish_conclusion(0);
+            } else if !self.commits.is_empty() {
+                self.write_commit(0);
+                self.report_commit(0);
+            } else if !self.changes.is_empty() {
+                self.write_change(0);
+                self.report_change(0);
+            } else if let Some(id) = busy {
+                self.finish_batch(id);
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// What must hold when nothing is under way.
+    pub fn check_settled(&self) {
+        assert!(self.answers.values().all(Option::is_some), "every client is answered");
+        let unfinished = self.store.iter().filter(|(_, stored)| stored.state.is_unfinished());
+        let unfinished: Vec<_> = unfinished.map(|(&id, _)| id).collect();
+        assert_eq!(self.runs.runs.keys().copied().collect::<Vec<_>>(), unfinished);
+        assert_eq!(self.jobs.keys().copied().collect::<Vec<_>>(), unfinished);
+        for (id, stored) in &self.store {
+            let is_paused = stored.state == ExperimentState::Paused;
+            if let Some(job) = self.jobs.get(id) {
+                assert!(is_paused && job.is_paused, "what could go on has gone on");
+            }
+            assert_eq!(
+                stored.evolution,
+                undisturbed(&stored.config, stored.n_done()),
+                "whatever has happened, experiment {id} is where it would be otherwise"
+            );
+        }
+    }
+
+    /// Carries out commands, and checks each.
+    fn carry_out(&mut self) {
+        while let Some(command) = self.runs.poll_command() {
+            self.carry_out_one(command);
+        }
+    }
+
+    fn carry_out_one(&mut self, command: Command) {
+        match command {
+            Command::StartJob { job, is_paused, .. } => {
+                self.jobs.insert(experiment(job), Job { is_paused, batch: None });
+            }
+            Command::Evaluate { job, batch: Batch { genotypes, n_trials, .. } } => {
+                let id = experiment(job);
+                assert!(self.store[&id].state.is_unfinished(), "it has not ended");
+                let job = self.jobs.get_mut(&id).expect("the engine knows it");
+                assert!(job.batch.is_none(), "one batch at a time");
+                job.batch = Some((genotypes, n_trials));
+            }
+            Command::PauseJob { job } => {
+                self.jobs.get_mut(&experiment(job)).unwrap().is_paused = true
+            }
+            Command::ResumeJob { job } => {
+                self.jobs.get_mut(&experiment(job)).unwrap().is_paused = false
+            }
+            Command::SetPriority { job, .. } => assert!(self.jobs.contains_key(&experiment(job))),
+            Command::EndJob { job } => drop(self.jobs.remove(&experiment(job))),
+            Command::Conclude { run, config, round, evaluated } => {
+                self.conclusions.push((run, config, round, evaluated));
+            }
+            Command::Commit { run, ready, .. } => {
+                let mut others = self.commits.iter().map(|task| task.run);
+                assert!(!others.any(|other| other == run), "one commit at a time");
+                let stored = &self.store[&run.experiment];
+                assert!(stored.state.is_unfinished(), "nothing is committed after the end");
+                assert_eq!(ready.generation.generation, stored.n_done(), "in order, and once");
+                self.commits.push(CommitTask { run, ready, outcome: None });
+            }
+            Command::WriteChange { experiment: id, change } => {
+                let mut others = self.changes.iter().map(|task| task.experiment);
+                assert!(!others.any(|other| other == id), "one change at a time");
+                if let Change::State(state, _) = &change
+                    && !state.is_unfinished()
+                {
+                    let busy = |task: &CommitTask| task.outcome.is_none();
+                    let mut commits = self.commits.iter().filter(|task| busy(task));
+                    let is_first = !commits.any(|task| task.run.experiment == id);
+                    assert!(is_first, "what is being stored comes first");
+                    assert!(!self.jobs.contains_key(&id), "the fleet has dropped it");
+                }
+                self.changes.push(ChangeTask { experiment: id, change, outcome: None });
+            }
+            Command::Answer { request, is_stored } => {
+                let answer = self.answers.get_mut(&request).expect("somebody asked");
+                assert!(answer.replace(is_stored).is_none(), "one answer each");
+            }
+            Command::PublishEnd { state, .. } => assert!(!state.is_unfinished()),
+            Command::AnswerEvaluation { .. } => unreachable!("nobody wants an evaluation"),
+        }
+    }
+}

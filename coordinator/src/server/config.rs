@@ -1,0 +1,89 @@
+//! How to run a coordinator, and why it does not start or does not go on.
+
+use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
+
+use swarm_telemetry::ListenError;
+
+use crate::{
+    access::{Access, AccessError},
+    store::StoreError,
+};
+
+/// How to run a coordinator.
+#[derive(Debug, Clone)]
+pub struct CoordinatorConfig {
+    /// Address to listen on; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Directory of the database.
+    pub data_dir: PathBuf,
+    /// How often workers give a sign of life.
+    pub heartbeat_interval: Duration,
+    /// Silence after which a worker loses its items.
+    pub lease: Duration,
+    /// Share of the individuals, 0 to 1, that two workers compute, so that a faulty
+    /// one is found.
+    pub audit_fraction: f64,
+    /// Who may connect.
+    pub access: Access,
+    /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
+    pub metrics_listen: Option<SocketAddr>,
+}
+
+impl CoordinatorConfig {
+    /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits, no metrics.
+    /// Access is open, and so for loopback only.
+    pub fn new(listen: SocketAddr, data_dir: PathBuf) -> Self {
+        Self {
+            listen,
+            data_dir,
+            heartbeat_interval: Duration::from_secs(2),
+            lease: Duration::from_secs(10),
+            audit_fraction: 0.0,
+            access: Access::default(),
+            metrics_listen: None,
+        }
+    }
+}
+
+/// Why a coordinator does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The address is open to more than this machine, and access to everybody.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// The certificate, its key or the authorities cannot be used.
+    #[error("the TLS files cannot be used: {0}")]
+    Tls(String),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address}: {source}; is another coordinator running there?")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Metrics cannot be served.
+    #[error(transparent)]
+    Metrics(#[from] ListenError),
+    /// The store cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A thread ended that must not.
+    #[error("opening the store panicked; please report this")]
+    Panicked,
+}
+
+/// Why a running coordinator cannot go on. What it has committed is safe; started
+/// again, it goes on from there.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A bug.
+    #[error(
+        "the driver ended ({0}); please report this. \
+         Started again, the coordinator goes on from the last completed generation"
+    )]
+    Driver(String),
+    /// Connections are no longer accepted.
+    #[error("the server ended ({0}); start the coordinator again")]
+    Server(String),
+}

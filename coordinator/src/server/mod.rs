@@ -1,0 +1,162 @@
+//! A running coordinator: store, driver and gRPC server together.
+
+mod config;
+mod services;
+
+use std::{convert::Infallible, net::SocketAddr, path::PathBuf};
+
+use swarm_telemetry::Endpoint;
+use swarm_transport::tls_diagnosis;
+use tokio::{net::TcpListener, task::JoinSet};
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Server;
+use tracing::{error, info, warn};
+
+use crate::{
+    access::{Access, Tls},
+    control::Control,
+    driver::{self, Driver},
+    engine::EngineConfig,
+    gate::Gate,
+    limits::SHUTDOWN_GRACE,
+    metrics::{Instruments, Source},
+    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
+    shared_store::SharedStore,
+    store::Store,
+};
+
+pub use config::{CoordinatorConfig, RunError, StartError};
+
+use services::Services;
+
+/// A coordinator that runs in the background.
+#[derive(Debug)]
+pub struct Coordinator {
+    local_addr: SocketAddr,
+    shutdown: CancellationToken,
+    /// One task; none once its end is known. So is `server`.
+    driver: JoinSet<()>,
+    server: JoinSet<Result<(), tonic::transport::Error>>,
+    /// Ends when it is dropped.
+    _metrics: JoinSet<Infallible>,
+}
+
+impl Coordinator {
+    /// Opens the store, goes on with unfinished experiments, listens.
+    pub async fn start(config: CoordinatorConfig) -> Result<Self, StartError> {
+        let Access { tokens, tls, .. } = config.access.clone();
+        config.access.check(config.listen)?;
+        let (is_encrypted, has_tokens) = (tls.is_some(), tokens.is_some());
+        let builder = with_tls(services::builder(), tls)?;
+        let (listener, local_addr) = listen(config.listen).await?;
+        let metrics_endpoint = match config.metrics_listen {
+            Some(address) => Some(Endpoint::listen(address).await?),
+            None => None,
+        };
+        let store = open(config.data_dir.clone()).await?;
+
+        let shutdown = CancellationToken::new();
+        let (events, event_queue) = driver::channel();
+        let instruments = Instruments::default();
+        let engine = EngineConfig {
+            audit_fraction: config.audit_fraction,
+            ..EngineConfig::new(config.lease)
+        };
+        let commit_duration = instruments.commit_duration.clone();
+        let loop_ =
+            Driver::new(store.clone(), event_queue, engine, shutdown.clone(), commit_duration);
+        let mut driver = JoinSet::new();
+        driver.spawn(loop_.run());
+        let control = Control::new(events.clone(), store.clone());
+        control.run_unfinished().await?;
+
+        let calls = instruments.calls.clone();
+        let mut metrics = JoinSet::new();
+        if let Some(endpoint) = metrics_endpoint {
+            let source = Source { events: events.clone(), store: store.clone(), instruments };
+            metrics.spawn(endpoint.serve(move || source.clone().scrape()));
+        }
+        let times =
+            WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
+        let services = Services {
+            workers: Workers { events, times, shutdown: shutdown.clone() },
+            fleet: Fleet { control: control.clone() },
+            evaluations: Evaluations { control: control.clone(), shutdown: shutdown.clone() },
+            experiments: Experiments { control, store, shutdown: shutdown.clone() },
+        };
+        let mut server = JoinSet::new();
+        let gate = Gate::new(tokens);
+        server.spawn(services.serve(builder, listener, calls, gate, shutdown.clone()));
+        info!(
+            address = %local_addr, data_dir = %config.data_dir.display(),
+            tls = is_encrypted, tokens = has_tokens,
+            "coordinator listens"
+        );
+        if !is_encrypted && !local_addr.ip().to_canonical().is_loopback() {
+            warn!("there is no TLS: every member of the network can read all traffic, tokens too");
+        }
+        Ok(Self { local_addr, shutdown, driver, server, _metrics: metrics })
+    }
+
+    /// The address it listens on.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.local_addr
+    }
+
+    /// Waits for a part of it to end, which none does before [`Self::shutdown`].
+    pub async fn failure(&mut self) -> RunError {
+        tokio::select! {
+            Some(ended) = self.driver.join_next() => RunError::Driver(match ended {
+                Ok(()) => "nobody asked it to".to_owned(),
+                Err(error) => error.to_string(),
+            }),
+            Some(ended) = self.server.join_next() => RunError::Server(match ended {
+                Ok(Ok(())) => "nobody asked it to".to_owned(),
+                Ok(Err(error)) => error.to_string(),
+                Err(error) => error.to_string(),
+            }),
+            else => std::future::pending().await,
+        }
+    }
+
+    /// Stops: what is being stored is stored, streams are ended. Nothing that
+    /// was committed is lost; generations that were being judged are judged
+    /// again at the next start.
+    pub async fn shutdown(mut self) {
+        self.shutdown.cancel();
+        if let Some(Err(error)) = self.driver.join_next().await {
+            error!("the driver panicked: {error}; please report this");
+        }
+        // If that takes too long, dropping the task ends it.
+        let _ = tokio::time::timeout(SHUTDOWN_GRACE, self.server.join_next()).await;
+    }
+}
+
+fn with_tls(server: Server, tls: Option<Tls>) -> Result<Server, StartError> {
+    match tls {
+        Some(tls) => {
+            server.tls_config(tls.to_tonic()).map_err(|error| StartError::Tls(cause(&error)))
+        }
+        None => Ok(server),
+    }
+}
+
+async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
+    let listen_error = |source| StartError::Listen { address, source };
+    let listener = TcpListener::bind(address).await.map_err(listen_error)?;
+    let local_addr = listener.local_addr().map_err(listen_error)?;
+    Ok((listener, local_addr))
+}
+
+async fn open(data_dir: PathBuf) -> Result<SharedStore, StartError> {
+    let store = tokio::task::spawn_blocking(move || Store::open(&data_dir))
+        .await
+        .map_err(|_| StartError::Panicked)??;
+    Ok(SharedStore::new(store))
+}
+
+/// What is wrong with the TLS files.
+fn cause(error: &tonic::transport::Error) -> String {
+    let source = || std::error::Error::source(error).map(ToString::to_string);
+    tls_diagnosis(error).or_else(source).unwrap_or_else(|| error.to_string())
+}

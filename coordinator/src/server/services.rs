@@ -1,0 +1,112 @@
+//! The gRPC server: all services, behind what every call has to pass.
+
+use swarm_proto::{
+    FILE_DESCRIPTOR_SET,
+    v1::{
+        evaluation_service_server::EvaluationServiceServer,
+        experiment_service_server::ExperimentServiceServer,
+        fleet_service_server::FleetServiceServer, worker_service_server::WorkerServiceServer,
+    },
+};
+use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX};
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tonic::transport::{Error, Server};
+use tonic_health::{
+    pb::health_server::{Health, HealthServer},
+    server::health_reporter,
+};
+
+use tonic_reflection::pb::{
+    v1::server_reflection_server as v1, v1alpha::server_reflection_server as v1alpha,
+};
+
+use crate::{
+    around::Around,
+    calls::Calls,
+    gate::Gate,
+    limits::{CALLS_PER_CONNECTION_MAX, CONNECTIONS_MAX, HEADERS_LEN_MAX, KEEPALIVE},
+    listener,
+    rpc::{Evaluations, Experiments, Fleet, Workers},
+};
+
+/// All services of the coordinator.
+pub struct Services {
+    pub workers: Workers,
+    pub fleet: Fleet,
+    pub experiments: Experiments,
+    pub evaluations: Evaluations,
+}
+
+/// A service with limits on the length of messages.
+macro_rules! limited {
+    ($server:ident, $service:expr) => {
+        $server::new($service)
+            .max_decoding_message_size(TO_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(FROM_COORDINATOR_LEN_MAX)
+    };
+}
+
+/// A server with limits on connections and headers; TLS is the caller's.
+pub fn builder() -> Server {
+    Server::builder()
+        .http2_keepalive_interval(Some(KEEPALIVE))
+        .http2_keepalive_timeout(Some(KEEPALIVE))
+        .http2_max_header_list_size(HEADERS_LEN_MAX)
+        .max_concurrent_streams(CALLS_PER_CONNECTION_MAX)
+}
+
+impl Services {
+    /// Serves until shutdown. Every call is counted, and then has to pass the gate.
+    pub async fn serve(
+        self,
+        server: Server,
+        listener: TcpListener,
+        calls: Calls,
+        gate: Gate,
+        shutdown: CancellationToken,
+    ) -> Result<(), Error> {
+        let Self { workers, fleet, experiments, evaluations } = self;
+        let (reflection_v1, reflection_v1alpha) = reflection();
+        server
+            .layer(Around(calls))
+            .layer(Around(gate))
+            .add_service(health().await)
+            .add_service(reflection_v1)
+            .add_service(reflection_v1alpha)
+            .add_service(limited!(WorkerServiceServer, workers))
+            .add_service(limited!(FleetServiceServer, fleet))
+            .add_service(limited!(ExperimentServiceServer, experiments))
+            .add_service(limited!(EvaluationServiceServer, evaluations))
+            .serve_with_incoming_shutdown(
+                listener::accept(listener, CONNECTIONS_MAX, shutdown.clone()),
+                shutdown.cancelled_owned(),
+            )
+            .await
+    }
+}
+
+/// Says of every service that it serves.
+async fn health() -> HealthServer<impl Health> {
+    let (reporter, health) = health_reporter();
+    reporter.set_serving::<EvaluationServiceServer<Evaluations>>().await;
+    reporter.set_serving::<ExperimentServiceServer<Experiments>>().await;
+    reporter.set_serving::<FleetServiceServer<Fleet>>().await;
+    reporter.set_serving::<WorkerServiceServer<Workers>>().await;
+    health
+}
+
+/// Describes the services, also under the former name, which some tools still ask
+/// for: Evans, older grpcurl.
+fn reflection() -> (
+    v1::ServerReflectionServer<impl v1::ServerReflection>,
+    v1alpha::ServerReflectionServer<impl v1alpha::ServerReflection>,
+) {
+    const VALID: &str = "the descriptors come from the build";
+    let builder = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(FILE_DESCRIPTOR_SET)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    (builder().build_v1().expect(VALID), builder().build_v1alpha().expect(VALID))
+}
