@@ -2,7 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    io,
+    env, io,
     os::unix::process::ExitStatusExt as _,
     process::{ExitStatus, Stdio},
     sync::Arc,
@@ -57,6 +57,13 @@ impl Process {
         let mut command = Command::new(&program.path);
         command.args(&program.args);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        // The coordinator's settings: some are secrets, and one that is invalid, but
+        // replaced by an option, would keep the process from starting.
+        for (variable, _) in env::vars_os() {
+            if variable.to_string_lossy().starts_with("SWARM_") {
+                command.env_remove(variable);
+            }
+        }
         command.kill_on_drop(true);
         // Ctrl-C in the coordinator's terminal is for the coordinator.
         command.process_group(0);
