@@ -3,7 +3,7 @@
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
-        Assignments, Hello, ItemResult, ItemResults, JobId, TrialFitness, TrialSet, WorkRequest,
+        Assignments, Hello, ItemResult, ItemResults, JobId, TrialFitness, WorkRequest,
         WorkResponse, item_result::Outcome, job_id::Job, trial_set, work_request, work_response,
         worker_service_client::WorkerServiceClient,
     },
@@ -31,16 +31,17 @@ pub fn experiment_of(job: Option<JobId>) -> u64 {
     }
 }
 
-/// The experiment, and the generation of it, that assignments are of. Panics if they
-/// are of neither an experiment nor the trials by which a generation is selected.
-pub fn generation_of(assignments: &Assignments) -> (u64, u64) {
-    let set = assignments.trial_set.and_then(|TrialSet { trial_set }| trial_set);
-    match set {
+/// The experiment and the trial set that assignments are of. Panics if they are of no
+/// experiment.
+pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
+    let trial_set = match assignments.trial_set.and_then(|set| set.trial_set) {
         Some(trial_set::TrialSet::Generation(generation)) => {
-            (experiment_of(assignments.job), generation)
+            sim_core::TrialSet::Generation(generation)
         }
-        other => panic!("no generation: {other:?}"),
-    }
+        Some(trial_set::TrialSet::HeldOut(generation)) => sim_core::TrialSet::HeldOut(generation),
+        other => panic!("no trial set of an experiment: {other:?}"),
+    };
+    (experiment_of(assignments.job), trial_set)
 }
 
 /// The stream of a worker. It says nothing by itself, not even heartbeats.

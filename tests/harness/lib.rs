@@ -18,7 +18,7 @@ mod skip;
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
 pub use fleet::{CoordinatorProcess, Finished, Watch, WorkerProcess, run_coordinator, undisturbed};
-pub use hand_worker::{HandWorker, experiment_of, generation_of, hello};
+pub use hand_worker::{HandWorker, experiment_of, hello, trial_set_of};
 pub use metrics::{Samples, http_get, metrics_address};
 pub use mount::SmallDisk;
 pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};

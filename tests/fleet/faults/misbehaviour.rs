@@ -9,9 +9,10 @@ use std::{
 
 use experiment_file::ExperimentConfig;
 use harness::{
-    CoordinatorProcess, Experiment, HandWorker, WorkerProcess, experiment_of, generation_of, hello,
+    CoordinatorProcess, Experiment, HandWorker, WorkerProcess, experiment_of, hello, trial_set_of,
     undisturbed,
 };
+use sim_core::TrialSet;
 use swarm_proto::v1::{
     Assignment, Draining, Heartbeat, Hello, ItemResult, ItemResults, JobSpec,
     SubmitExperimentRequest, TrialFitness, WorkRequest, WorkResponse, item_result::Outcome,
@@ -30,7 +31,7 @@ const GENERATIONS: u64 = 6;
 struct Intruder {
     worker: HandWorker,
     experiment: sim_core::Simulation,
-    generation: u64,
+    trial_set: TrialSet,
     assignments: Vec<Assignment>,
 }
 
@@ -44,13 +45,13 @@ impl Intruder {
             }
         };
         let batch = worker.receive_assignments().await.unwrap();
-        let (_, generation) = generation_of(&batch);
-        Self { worker, experiment, generation, assignments: batch.assignments }
+        let (_, trial_set) = trial_set_of(&batch);
+        Self { worker, experiment, trial_set, assignments: batch.assignments }
     }
 
     /// What the first of its items is worth.
     fn honest_fitness(&self) -> Vec<f64> {
-        evaluate(&self.experiment, self.generation, &self.assignments[0])
+        evaluate(&self.experiment, self.trial_set, &self.assignments[0])
     }
 
     /// Computes honestly until its generation is complete, and leaves.
@@ -58,11 +59,11 @@ impl Intruder {
         let mut assignments = std::mem::take(&mut self.assignments);
         loop {
             for assignment in &assignments {
-                let values = evaluate(&self.experiment, self.generation, assignment);
+                let values = evaluate(&self.experiment, self.trial_set, assignment);
                 self.worker.answer_fitness(assignment.assignment_id, values).await;
             }
             let batch = self.worker.receive_assignments().await.unwrap();
-            if generation_of(&batch).1 != self.generation {
+            if trial_set_of(&batch).1 != self.trial_set {
                 return self.leave(coordinator, name).await;
             }
             assignments = batch.assignments;
@@ -87,11 +88,11 @@ fn compile(spec: &JobSpec) -> sim_core::Simulation {
 
 fn evaluate(
     experiment: &sim_core::Simulation,
-    generation: u64,
+    trial_set: TrialSet,
     assignment: &Assignment,
 ) -> Vec<f64> {
     let trials = assignment.first_trial..assignment.first_trial + assignment.trial_count;
-    experiment.evaluate(&assignment.genotype, generation, trials).unwrap()
+    experiment.evaluate(&assignment.genotype, trial_set, trials).unwrap()
 }
 
 fn fitness(assignment_id: u64, values: Vec<f64>) -> ItemResult {
@@ -207,7 +208,7 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
 }
 
 /// The first experiment, its second generation.
-const POISONED: (u64, u64) = (1, 1);
+const POISONED: (u64, TrialSet) = (1, TrialSet::Generation(1));
 
 /// A worker that computes honestly, and dies whenever it gets to the genotype that
 /// was the first of [`POISONED`].
@@ -232,14 +233,14 @@ async fn serve_until_poisoned(worker: &mut HandWorker, poison: &OnceLock<Vec<f64
             work_response::Message::Assignments(batch) => batch,
             _ => continue,
         };
-        let (experiment, generation) = generation_of(&batch);
+        let (experiment, trial_set) = trial_set_of(&batch);
         for assignment in &batch.assignments {
-            if (experiment, generation) == POISONED
+            if (experiment, trial_set) == POISONED
                 && *poison.get_or_init(|| assignment.genotype.clone()) == assignment.genotype
             {
                 return;
             }
-            let values = evaluate(&experiments[&experiment], generation, assignment);
+            let values = evaluate(&experiments[&experiment], trial_set, assignment);
             worker.answer_fitness(assignment.assignment_id, values).await;
         }
     }
