@@ -103,7 +103,7 @@ fn one_process_one_worker_and_workers_that_are_killed_give_the_same_files() {
             let (_, assigned) = coordinator
                 .process
                 .find(0, "an assignment", |line| line["message"] == "items assigned");
-            assert!(assigned["experiment"].as_str().unwrap().starts_with("evaluation"));
+            assert_eq!(assigned["trials"], "evaluation", "{assigned}");
             worker.process.kill();
             coordinator.process.wait_for("loss", |line| {
                 line["message"] == "worker lost" && line["name"] == *worker.name

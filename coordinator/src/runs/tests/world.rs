@@ -77,7 +77,7 @@ pub fn config(seed: u64, generations: u64) -> ExperimentConfig {
 
 /// Evolution before its first generation.
 pub fn evolution(config: &ExperimentConfig) -> Evolution {
-    Evolution::new(config, &[0..3], "test")
+    Evolution::new(config, std::slice::from_ref(&(0..3)), "test")
 }
 
 /// What the fleet makes of a batch: always the same.
