@@ -207,7 +207,7 @@ impl Soak {
         self.keep_busy();
         if matches!(fault, Fault::WorkerKilled | Fault::NetworkCut) {
             // What is lost with three workers in a row is given up, by design: let
-            // it be judged before the next worker is taken from it. Workers that hear
+            // it be evaluated before the next worker is taken from it. Workers that hear
             // nothing would hold it up.
             self.pause();
             self.places.iter_mut().for_each(Place::heal);

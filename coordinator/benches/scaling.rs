@@ -99,8 +99,8 @@ fn efficiency(config: EngineConfig, population_size: usize, n_workers: usize, st
             let id = ids[(uniform(place) * ids.len() as f64) as usize];
             fleet.stall(id, Duration::from_secs(30));
         }
-        let n_judged = generation as usize + 1;
-        let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_judged;
+        let n_evaluated = generation as usize + 1;
+        let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_evaluated;
         assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
     }
     let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;

@@ -87,7 +87,7 @@ impl InstantWorkers {
 
 impl Round {
     /// From the first item to the last answer.
-    pub fn judging(&self) -> Duration {
+    pub fn evaluating(&self) -> Duration {
         self.ended - self.started
     }
 }

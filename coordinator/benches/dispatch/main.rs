@@ -33,8 +33,8 @@ async fn main() {
         for _ in 0..N_REPEATS {
             runs.push(items_per_s().await);
         }
-        let (judging, overall): (Vec<f64>, Vec<f64>) = runs.into_iter().unzip();
-        line("items/s while a generation is judged", 20_000.0, 100_000.0, judging);
+        let (evaluating, overall): (Vec<f64>, Vec<f64>) = runs.into_iter().unzip();
+        line("items/s while a generation is evaluated", 20_000.0, 100_000.0, evaluating);
         line("items/s with evolution and commits", f64::NAN, f64::NAN, overall);
     }
     for (name, file) in [("SNES", SNES), ("GA", GA)] {
@@ -103,17 +103,18 @@ fn experiment(file: &str, population_size: u32, generations: u64) -> String {
 }
 
 /// With two workers of eight slots and a large population: while a generation is
-/// judged, and altogether.
+/// evaluated, and altogether.
 async fn items_per_s() -> (f64, f64) {
     const POPULATION_SIZE: u32 = 10_000;
     let coordinator = CoordinatorProcess::start();
     let workers = InstantWorkers::start(&coordinator, 2, 8);
     coordinator.submit(&experiment(SNES, POPULATION_SIZE, FOREVER)).await;
     let rounds = workers.rounds(1, 11).await;
-    let judging: Vec<f64> = rounds.iter().map(|round| round.judging().as_secs_f64()).collect();
+    let evaluating: Vec<f64> =
+        rounds.iter().map(|round| round.evaluating().as_secs_f64()).collect();
     let overall = rounds[10].started - rounds[0].started;
     let n_items = f64::from(POPULATION_SIZE);
-    (n_items / median(&judging), 10.0 * n_items / overall.as_secs_f64())
+    (n_items / median(&evaluating), 10.0 * n_items / overall.as_secs_f64())
 }
 
 /// Medians, ms.

@@ -120,7 +120,7 @@ impl Coordinator {
     }
 
     /// Stops: what is being stored is stored, streams are ended. Nothing that
-    /// was committed is lost; generations that were being judged are judged
+    /// was committed is lost; generations that were being evaluated are evaluated
     /// again at the next start.
     pub async fn shutdown(mut self) {
         self.shutdown.cancel();

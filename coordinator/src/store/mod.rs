@@ -179,7 +179,7 @@ impl Store {
 
     /// Commits a generation with everything that belongs to it;
     /// [`StoreError::Ended`] if the experiment has ended. One that was paused after
-    /// its generation had been judged keeps the generation, and stays paused.
+    /// its generation had been evaluated keeps the generation, and stays paused.
     pub fn commit_generation(
         &mut self,
         id: ExperimentId,

@@ -273,7 +273,7 @@ fn a_coordinator_killed_while_it_creates_the_database_creates_it_again() {
 }
 
 #[test]
-fn a_pause_is_kept_with_its_reason_and_takes_a_judged_generation() {
+fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
     let (directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     store.set_state(id, 6, ExperimentState::Paused, "for lunch").unwrap();

@@ -61,7 +61,7 @@ fn generation_time(config: EngineConfig, speeds: &[f64], n_individuals: usize) -
 }
 
 #[test]
-fn ten_thousand_workers_come_and_go_and_a_hundred_thousand_individuals_are_judged() {
+fn ten_thousand_workers_come_and_go_and_a_hundred_thousand_individuals_are_evaluated() {
     let model = FleetModel { checks: false, trial: SECOND, ..MODEL };
     let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));
     for worker in 0..10_000 {
@@ -324,7 +324,7 @@ proptest! {
     /// contradicts itself (it is checked after every event), and what a worker
     /// holds is bounded.
     #[test]
-    fn any_history_judges_the_same_fitness(
+    fn any_history_evaluates_the_same_fitness(
         history in prop::collection::vec(happening(), 0..60),
         n_individuals in 1..40usize,
         n_trials in 1..6u32,

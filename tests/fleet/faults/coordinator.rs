@@ -7,7 +7,7 @@ use harness::{CoordinatorProcess, LogLine, WorkerProcess};
 use super::{GENERATIONS, SMALL, n_lost, resumed_at, wait_for_assignment};
 
 #[test]
-fn a_coordinator_killed_within_a_generation_judges_it_again() {
+fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     let mut coordinator = CoordinatorProcess::start();
     let _workers = WorkerProcess::start_many(&coordinator, 2);
     let id = SMALL.submit(&coordinator);
@@ -20,9 +20,12 @@ fn a_coordinator_killed_within_a_generation_judges_it_again() {
     let (n_seen, _) = coordinator.process.find(n_seen, "second assignment", is_later);
     coordinator.process.find(n_seen, "third assignment", is_later);
     coordinator.process.kill();
-    let is_judged =
-        |line: &LogLine| line["message"] == "generation judged" && line["generation"] == 3;
-    assert!(!coordinator.process.lines().iter().any(is_judged), "the kill came within it");
+    let is_evaluated = |line: &LogLine| {
+        line["message"] == "batch evaluated"
+            && line["generation"] == 3
+            && line["trials"] == "selection"
+    };
+    assert!(!coordinator.process.lines().iter().any(is_evaluated), "the kill came within it");
 
     coordinator.restart();
     assert_eq!(resumed_at(&coordinator), 3);
@@ -31,14 +34,14 @@ fn a_coordinator_killed_within_a_generation_judges_it_again() {
 }
 
 #[test]
-fn a_coordinator_killed_while_it_commits_a_generation_judges_it_again() {
+fn a_coordinator_killed_while_it_commits_a_generation_evaluates_it_again() {
     let mut coordinator = CoordinatorProcess::start();
     let _workers = WorkerProcess::start_many(&coordinator, 2);
     let id = SMALL.submit(&coordinator);
     coordinator.wait_for_generation(1);
 
     // Whoever holds the database's write lock keeps the coordinator between two
-    // generations: all judged, nothing in flight, nothing committed.
+    // generations: all evaluated, nothing in flight, nothing committed.
     let database = coordinator.database();
     database.busy_timeout(Duration::from_secs(60)).unwrap();
     database.execute_batch("BEGIN IMMEDIATE").unwrap();
@@ -47,8 +50,10 @@ fn a_coordinator_killed_while_it_commits_a_generation_judges_it_again() {
         .unwrap()
         .unsigned_abs();
     let next = committed + 1;
-    coordinator.process.wait_for("judged generation", |line| {
-        line["message"] == "generation judged" && line["generation"] == next
+    coordinator.process.wait_for("evaluated batch", |line| {
+        line["message"] == "batch evaluated"
+            && line["generation"] == next
+            && line["trials"] == "selection"
     });
     coordinator.process.kill();
     database.execute_batch("ROLLBACK").unwrap();
@@ -61,7 +66,7 @@ fn a_coordinator_killed_while_it_commits_a_generation_judges_it_again() {
 }
 
 #[test]
-fn a_coordinator_killed_after_a_commit_does_not_judge_it_again() {
+fn a_coordinator_killed_after_a_commit_does_not_evaluate_it_again() {
     let mut coordinator = CoordinatorProcess::start();
     let _workers = WorkerProcess::start_many(&coordinator, 2);
     let id = SMALL.submit(&coordinator);

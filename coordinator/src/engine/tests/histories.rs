@@ -1,4 +1,4 @@
-//! Whatever happens to its workers, the engine judges the same.
+//! Whatever happens to its workers, the engine evaluates the same.
 
 use proptest::prelude::*;
 
@@ -28,7 +28,7 @@ proptest! {
     /// twice, and the fitness is that of an undisturbed fleet, unless an item
     /// was blamed too often.
     #[test]
-    fn any_history_judges_the_same_fitness(
+    fn any_history_evaluates_the_same_fitness(
         history in prop::collection::vec(happening(), 0..200),
         n_individuals in 1..40usize,
         n_trials in 1..4u32,
