@@ -26,7 +26,7 @@ use tonic_health::pb::{
 };
 use tower::service_fn;
 
-use crate::access::Tls;
+use crate::server::Tls;
 
 /// Time for the answer.
 const PATIENCE: Duration = Duration::from_secs(5);

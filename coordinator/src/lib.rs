@@ -10,25 +10,20 @@
 //! - `control`: what clients can have a running coordinator do
 //! - `queries`: what can be read of experiments; works on the store alone
 //! - `rpc`: gRPC services, which only translate
-//! - `listener`, `gate`: which connections and calls get as far as the services
+//! - `server`: listening, TLS, tokens, limits on connections and calls
 //! - `health_check`: asks another process's coordinator how it is
 //! - [`referee`]: evaluates single items, in a process of its own
 //! - [`metrics`]: what can be scraped
 //! - [`limits`]: every bound on what the network can ask for
 
-mod access;
-mod around;
-mod calls;
 mod clock;
 mod control;
 mod driver;
 pub mod engine;
 mod failpoint;
-mod gate;
 mod health_check;
 pub mod ids;
 pub mod limits;
-mod listener;
 pub mod metrics;
 pub mod priority;
 mod queries;
@@ -40,8 +35,8 @@ mod shared_store;
 pub mod store;
 mod submission;
 mod text;
-mod throttle;
 
-pub use access::{Access, AccessError, Role, Tls, Tokens};
 pub use health_check::{Unhealthy, health_check};
-pub use server::{Coordinator, CoordinatorConfig, RunError, StartError};
+pub use server::{
+    Access, AccessError, Coordinator, CoordinatorConfig, Role, RunError, StartError, Tls, Tokens,
+};

@@ -5,10 +5,10 @@ use swarm_telemetry::{Histogram, Metric, Scrape, metrics};
 use tokio::sync::oneshot;
 
 use crate::{
-    calls::Calls,
     driver::{DriverEvent, EventSender, StatsSnapshot},
     engine::JobStats,
     runs::RunStats,
+    server::calls::Calls,
     shared_store::SharedStore,
 };
 

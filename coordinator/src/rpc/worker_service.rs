@@ -20,7 +20,7 @@ use crate::{
     engine::Introduction,
     ids::WorkerId,
     limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
-    listener::Peer,
+    server::listener::Peer,
     text::printable,
 };
 

@@ -4,10 +4,8 @@ use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
 
 use swarm_telemetry::ListenError;
 
-use crate::{
-    access::{Access, AccessError},
-    store::StoreError,
-};
+use super::access::{Access, AccessError};
+use crate::store::StoreError;
 
 /// How to run a coordinator.
 #[derive(Debug, Clone)]

@@ -1,7 +1,13 @@
 //! A running coordinator: store, driver and gRPC server together.
 
+mod access;
+mod call_layer;
+pub mod calls;
 mod config;
+mod gate;
+pub mod listener;
 mod services;
+mod throttle;
 
 use std::{convert::Infallible, net::SocketAddr, path::PathBuf};
 
@@ -13,11 +19,9 @@ use tonic::transport::Server;
 use tracing::{error, info, warn};
 
 use crate::{
-    access::{Access, Tls},
     control::Control,
     driver::{self, Driver},
     engine::EngineConfig,
-    gate::Gate,
     limits::SHUTDOWN_GRACE,
     metrics::{Instruments, Source},
     rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
@@ -25,8 +29,10 @@ use crate::{
     store::Store,
 };
 
+pub use access::{Access, AccessError, Role, Tls, Tokens};
 pub use config::{CoordinatorConfig, RunError, StartError};
 
+use gate::Gate;
 use services::Services;
 
 /// A coordinator that runs in the background.

@@ -21,12 +21,9 @@ use tonic_reflection::pb::{
     v1::server_reflection_server as v1, v1alpha::server_reflection_server as v1alpha,
 };
 
+use super::{call_layer::CallLayer, calls::Calls, gate::Gate, listener};
 use crate::{
-    around::Around,
-    calls::Calls,
-    gate::Gate,
     limits::{CALLS_PER_CONNECTION_MAX, CONNECTIONS_MAX, HEADERS_LEN_MAX, KEEPALIVE},
-    listener,
     rpc::{Evaluations, Experiments, Fleet, Workers},
 };
 
@@ -69,8 +66,8 @@ impl Services {
         let Self { workers, fleet, experiments, evaluations } = self;
         let (reflection_v1, reflection_v1alpha) = reflection();
         server
-            .layer(Around(calls))
-            .layer(Around(gate))
+            .layer(CallLayer(calls))
+            .layer(CallLayer(gate))
             .add_service(health().await)
             .add_service(reflection_v1)
             .add_service(reflection_v1alpha)

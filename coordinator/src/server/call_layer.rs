@@ -30,7 +30,7 @@ pub trait Watch {
 
 /// The layer.
 #[derive(Debug, Clone)]
-pub struct Around<G>(pub G);
+pub struct CallLayer<G>(pub G);
 
 /// Services with something around.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ pub struct Guarded<G, S> {
     services: S,
 }
 
-impl<G: Guard, S> Layer<S> for Around<G> {
+impl<G: Guard, S> Layer<S> for CallLayer<G> {
     type Service = Guarded<G, S>;
 
     fn layer(&self, services: S) -> Guarded<G, S> {

@@ -23,10 +23,10 @@ use tokio_util::sync::CancellationToken;
 use tonic::transport::server::Connected;
 use tracing::warn;
 
+use super::throttle::Throttle;
 use crate::{
     clock,
     limits::{ACCEPT_PAUSE, ADMISSION_TIMEOUT},
-    throttle::Throttle,
 };
 
 /// Who is at the other end of a connection.

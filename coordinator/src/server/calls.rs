@@ -10,7 +10,7 @@ use prost::Message as _;
 use prost_types::FileDescriptorSet;
 use tonic::{Code, Status, body::Body};
 
-use crate::around::{Guard, Watch};
+use super::call_layer::{Guard, Watch};
 
 /// Method of a call that no service has: callers choose their paths.
 const UNKNOWN: &str = "unknown";
@@ -129,7 +129,7 @@ mod tests {
     use tower::{Layer as _, Service as _, service_fn};
 
     use super::*;
-    use crate::around::Around;
+    use crate::server::call_layer::CallLayer;
 
     /// Calls a method that answers with a status in the headers, or without any.
     async fn call(calls: &Calls, path: &str, code: Option<Code>) -> Response<Body> {
@@ -140,7 +140,7 @@ mod tests {
                 None => Response::new(Body::new(Full::from("content"))),
             }))
         });
-        Around(calls.clone()).layer(answer).call(request).await.unwrap()
+        CallLayer(calls.clone()).layer(answer).call(request).await.unwrap()
     }
 
     #[tokio::test]

@@ -10,13 +10,15 @@ use tonic::{Status, body::Body, transport::server::TlsConnectInfo};
 use tonic_health::pb::health_server;
 use tracing::warn;
 
-use crate::{
+use super::{
     access::{Role, Tokens},
-    around::{Guard, Watch},
-    clock,
-    limits::{CLIENT_CALLS_MAX, WORKERS_MAX},
+    call_layer::{Guard, Watch},
     listener::Peer,
     throttle::Throttle,
+};
+use crate::{
+    clock,
+    limits::{CLIENT_CALLS_MAX, WORKERS_MAX},
 };
 
 /// Decides who may pass.
@@ -142,7 +144,7 @@ mod tests {
     use tower::{Layer as _, Service as _, service_fn};
 
     use super::*;
-    use crate::around::Around;
+    use crate::server::call_layer::CallLayer;
 
     fn gate() -> Gate {
         let token = |letter: &str| Token::parse(&letter.repeat(32)).unwrap();
@@ -211,7 +213,7 @@ mod tests {
             ready(Ok::<_, Infallible>(Response::new(Body::new(Full::from("answer")))))
         });
         let gate = Gate::new(None);
-        let mut guarded = Around(gate.clone()).layer(answer);
+        let mut guarded = CallLayer(gate.clone()).layer(answer);
         let response = guarded.call(Request::new(Body::empty())).await.unwrap();
         assert_eq!(gate.client_calls.available_permits(), CLIENT_CALLS_MAX - 1);
         drop(response);
