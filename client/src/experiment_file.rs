@@ -6,15 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use coordinator::limits::KEY_LEN_MAX;
 use evolution::ALGORITHMS;
 use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
 use sim_core::Simulation;
 use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::error::{Error, prefix_lines};
-
-/// Longest default name that the protocol allows, in bytes.
-const NAME_BYTES_MAX: usize = 128;
 
 /// The text of an experiment file.
 #[derive(Debug)]
@@ -111,7 +109,7 @@ impl ExperimentFile {
     /// The file's stem, cut to the length that the protocol allows.
     fn default_name(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= NAME_BYTES_MAX;
+        let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= KEY_LEN_MAX;
         stem.char_indices().take_while(fits).map(|(_, c)| c).collect()
     }
 }

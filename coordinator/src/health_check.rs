@@ -60,14 +60,14 @@ pub enum Unhealthy {
         source: io::Error,
     },
     /// The call failed.
-    #[error("the coordinator on {address} does not answer: {reason}; {suspicion}")]
+    #[error("the coordinator on {address} does not answer: {reason}; {hint}")]
     Call {
         /// Where.
         address: SocketAddr,
         /// What is wrong.
         reason: String,
         /// What may be the matter.
-        suspicion: &'static str,
+        hint: &'static str,
     },
     /// It answers, but not for long.
     #[error("the coordinator on {0} does not serve")]
@@ -95,7 +95,7 @@ async fn ask(address: SocketAddr, tls: Option<&Tls>) -> Result<(), Unhealthy> {
     let io = TcpStream::connect(&*reachable(address))
         .await
         .map_err(|source| Unhealthy::Absent { address, source })?;
-    let (channel, suspicion) = match connector {
+    let (channel, hint) = match connector {
         Some(connector) => {
             // The certificate is known, so the name does not matter.
             let name = ServerName::IpAddress(address.ip().into());
@@ -107,7 +107,7 @@ async fn ask(address: SocketAddr, tls: Option<&Tls>) -> Result<(), Unhealthy> {
         }
         None => (channel(io).await, "does it serve TLS? Then pass its --tls-cert and --tls-key"),
     };
-    let broken = |error: &dyn Error| Unhealthy::Call { address, reason: deepest(error), suspicion };
+    let broken = |error: &dyn Error| Unhealthy::Call { address, reason: deepest(error), hint };
     let mut client = HealthClient::new(channel.map_err(|error| broken(&error))?);
     let answer = client
         .check(HealthCheckRequest::default())

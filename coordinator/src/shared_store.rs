@@ -1,5 +1,5 @@
 //! The store as asynchronous code uses it: off the I/O threads, one at a time,
-//! and with word to whoever waits for news.
+//! and with a signal when something has been written.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},

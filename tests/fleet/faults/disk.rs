@@ -43,7 +43,7 @@ fn on_a_full_disk_an_experiment_waits_and_goes_on_by_itself() {
     assert_eq!(list.as_array().unwrap().len(), 1);
     assert_eq!(list[0]["state"], "running");
 
-    // Whoever wonders is told.
+    // `explain` says why.
     let explain = ["explain", &id.to_string()];
     let explained = coordinator.swarmctl(&explain).expect_success().json();
     assert_eq!(explained["findings"][0]["kind"], "store_trouble", "{explained}");

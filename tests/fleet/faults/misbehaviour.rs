@@ -74,9 +74,9 @@ impl Intruder {
     async fn leave(self, coordinator: &CoordinatorProcess, name: &str) {
         self.worker.say(Message::Draining(Draining {})).await;
         self.worker.hang_up().await;
-        coordinator
-            .process
-            .wait_for("farewell", |line| line["message"] == "worker left" && line["name"] == name);
+        coordinator.process.wait_for("end of the worker's stream", |line| {
+            line["message"] == "worker left" && line["name"] == name
+        });
     }
 }
 
@@ -176,8 +176,8 @@ async fn streams_that_are_not_the_protocol_are_ended_and_the_others_go_on() {
     // No gRPC at all. HTTP/2 says goodbye and closes.
     let mut raw = TcpStream::connect(coordinator.address()).unwrap();
     raw.write_all(&[0x5a; 4096]).unwrap();
-    let mut farewell = Vec::new();
-    let _ = raw.read_to_end(&mut farewell);
+    let mut answer = Vec::new();
+    let _ = raw.read_to_end(&mut answer);
 
     // Not this service's messages: what should be an introduction is text.
     let channel = Endpoint::from_shared(url.clone()).unwrap().connect().await.unwrap();

@@ -47,7 +47,9 @@ fn a_worker_told_to_stop_finishes_its_item_and_leaves() {
     coordinator.process.find(n_seen, "another assignment", |l| l["message"] == "items assigned");
     worker.process.signal("TERM");
     assert_eq!(worker.process.wait().code(), Some(0));
-    let left = coordinator.process.wait_for("farewell", |line| line["message"] == "worker left");
+    let left = coordinator
+        .process
+        .wait_for("end of the worker's stream", |line| line["message"] == "worker left");
     assert_eq!(left["name"], "polite");
 
     let _worker = WorkerProcess::start(&coordinator, "next");

@@ -131,7 +131,7 @@ fn take(world: &mut World, step: Step) {
                 let stale = RunId { experiment, run_epoch: 0 };
                 world.runs.on_committed(stale, CommitOutcome::NotWanted);
                 world.runs.on_concluded(stale, Err("of another run".to_owned()));
-                assert!(world.runs.poll_command().is_none(), "nobody heeds it");
+                assert!(world.runs.poll_command().is_none(), "a stale report changes nothing");
             }
         }
         Step::Crash => world.crash(),
