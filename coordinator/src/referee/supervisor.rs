@@ -50,13 +50,14 @@ impl Referee {
         state.idle_timer = JoinSet::new();
         let busy = BusyTime { shared: &self.shared, since: clock::now() };
         // Taken out, so that it is killed if this future is dropped.
-        let process = match state.process.take_if(|process| process.is_alive()) {
-            Some(process) => Ok(process),
-            None => Process::start(program).await,
-        };
-        let (verdict, process) = match process {
-            Ok(process) => process.evaluate(request).await,
-            Err(reason) => (Verdict::Unavailable(reason), None),
+        let (verdict, process) = match state.process.take_if(|process| process.is_alive()) {
+            Some(process) => match process.evaluate(request).await {
+                // It may have been killed just before it was given the item: only the
+                // death of a process that was started for it is the item's.
+                (Verdict::Died(_), _) => evaluate_afresh(program, request).await,
+                evaluated => evaluated,
+            },
+            None => evaluate_afresh(program, request).await,
         };
         drop(busy);
         if process.is_some() {
@@ -71,6 +72,17 @@ impl Referee {
     /// What has been done so far.
     pub fn stats(&self) -> RefereeStats {
         *self.shared.stats()
+    }
+}
+
+/// Has an item evaluated by a process that has not had any other.
+async fn evaluate_afresh(
+    program: &RefereeProgram,
+    request: &RefereeRequest,
+) -> (Verdict, Option<Process>) {
+    match Process::start(program).await {
+        Ok(process) => process.evaluate(request).await,
+        Err(reason) => (Verdict::Unavailable(reason), None),
     }
 }
 

@@ -199,10 +199,16 @@ async fn a_process_that_is_killed_while_it_computes_has_died_and_the_next_item_i
     let traced = Traced::new(LONG);
     assert!(matches!(traced.referee.evaluate(&short()).await, Verdict::Values(_)));
     let item = endless();
+    // A process that had another item before may have died of something else, so a new
+    // one tries; if that dies, too, it is the item's doing.
     let (verdict, id) = tokio::join!(traced.referee.evaluate(&item), async {
-        let id = traced.computing().await;
-        send_signal("-KILL", id);
-        id
+        let first = traced.computing().await;
+        send_signal("-KILL", first);
+        until_ended(first).await;
+        let second = traced.computing().await;
+        send_signal("-KILL", second);
+        assert_ne!(first, second);
+        second
     });
     let words = "took the process that computed it down (signal: 9 (SIGKILL))";
     assert_eq!(verdict, Verdict::Died(words.into()));
