@@ -38,7 +38,7 @@ pub enum Purpose {
     /// Start headings; stream = index of the object.
     Orientations = 2,
     /// Robots affected by a perturbation; stream = its place in
-    /// [`PerturbationsConfig`](crate::config::PerturbationsConfig).
+    /// `PerturbationsConfig` of the experiment file.
     Perturbation = 3,
     /// Which valid frame a receiver takes; stream = robot, one draw per step.
     Reception = 4,
