@@ -6,7 +6,7 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use access_args::{AccessArgs, AccessInputError};
 use clap::{Parser, Subcommand};
-use coordinator::{Coordinator, CoordinatorConfig, StartError, health_check, referee};
+use coordinator::{Coordinator, CoordinatorConfig, RunError, StartError, health_check, referee};
 use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -66,6 +66,7 @@ Exit codes:
   1  internal error; committed generations are safe, the next start continues after them
   2  bad input: address in use, or open to a network without tokens or TLS; token,
      certificate or data directory unusable; wrong arguments
+  3  another coordinator has taken over the data directory, and goes on there
 
 docs/security.md says how to create tokens and certificates.";
 
@@ -106,8 +107,11 @@ async fn run(args: &Args) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error!("{error}");
-            let is_input = error.is::<StartError>() || error.is::<AccessInputError>();
-            ExitCode::from(if is_input { 2 } else { 1 })
+            ExitCode::from(match error.downcast_ref() {
+                Some(RunError::TakenOver) => 3,
+                _ if error.is::<StartError>() || error.is::<AccessInputError>() => 2,
+                _ => 1,
+            })
         }
     }
 }

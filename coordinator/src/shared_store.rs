@@ -33,8 +33,8 @@ pub enum Retry {
 pub enum Written {
     /// It is on disk.
     Yes,
-    /// The experiment has ended, or the coordinator is shutting down: nothing is
-    /// lost.
+    /// The experiment has ended, the coordinator is shutting down, or another one has
+    /// taken over: nothing is lost.
     NotWanted,
     /// It cannot be written, now or later.
     Never(StoreError),
@@ -48,6 +48,8 @@ pub struct SharedStore {
     news: Arc<watch::Sender<u64>>,
     /// Why the latest write did not reach the disk, if it did not.
     trouble: Arc<Mutex<Option<String>>>,
+    /// Cancelled when another coordinator has taken over the database.
+    taken_over: CancellationToken,
 }
 
 impl SharedStore {
@@ -57,7 +59,14 @@ impl SharedStore {
             store: Arc::new(Mutex::new(store)),
             news: Arc::new(watch::Sender::new(0)),
             trouble: Arc::default(),
+            taken_over: CancellationToken::new(),
         }
+    }
+
+    /// Waits until another coordinator has taken over the database, so that nothing can be
+    /// written any more.
+    pub async fn taken_over(&self) {
+        self.taken_over.cancelled().await;
     }
 
     /// Changes whenever something has been written.
@@ -86,6 +95,10 @@ impl SharedStore {
         let result = self.call(operation).await;
         let trouble = match &result {
             Err(error @ StoreError::Unavailable(_)) => Some(error.to_string()),
+            Err(StoreError::TakenOver { .. }) => {
+                self.taken_over.cancel();
+                None
+            }
             _ => None,
         };
         *self.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
@@ -126,7 +139,10 @@ impl SharedStore {
                     return Written::Yes;
                 }
                 Ok(()) => return Written::Yes,
-                Err(StoreError::Ended(_)) => return Written::NotWanted,
+                // The other coordinator computes it, too.
+                Err(StoreError::Ended(_) | StoreError::TakenOver { .. }) => {
+                    return Written::NotWanted;
+                }
                 Err(error)
                     if retry == Retry::Always || matches!(error, StoreError::Unavailable(_)) =>
                 {

@@ -9,6 +9,7 @@ mod commits;
 mod coordinator;
 mod databases;
 mod disk;
+mod integrity;
 mod misbehaviour;
 mod network;
 mod workers;

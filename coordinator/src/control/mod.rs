@@ -10,7 +10,10 @@ mod restart;
 mod steer;
 mod submit;
 
-use std::sync::Arc;
+use std::{
+    collections::BTreeSet,
+    sync::{Arc, Mutex},
+};
 
 use experiment_file::ConfigError;
 use tokio::sync::{Semaphore, oneshot};
@@ -36,6 +39,8 @@ pub struct Control {
     store: SharedStore,
     /// One for each evaluation that is computed.
     evaluations: Arc<Semaphore>,
+    /// Unfinished experiments that are damaged, so that the driver does not know them.
+    set_aside: Arc<Mutex<BTreeSet<ExperimentId>>>,
 }
 
 /// Why something is not done.
@@ -79,7 +84,8 @@ impl From<StoreError> for ControlError {
 impl Control {
     /// The way to the coordinator with this driver and store.
     pub fn new(events: EventSender, store: SharedStore) -> Self {
-        Self { events, store, evaluations: Arc::new(Semaphore::new(EVALUATIONS_MAX)) }
+        let evaluations = Arc::new(Semaphore::new(EVALUATIONS_MAX));
+        Self { events, store, evaluations, set_aside: Arc::default() }
     }
 
     /// The connected workers, in the order in which they joined.

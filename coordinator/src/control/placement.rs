@@ -3,6 +3,7 @@
 
 use evolution::{ALGORITHMS, Evolution};
 use experiment_file::ExperimentConfig;
+use tracing::warn;
 
 use crate::{
     clock,
@@ -73,15 +74,29 @@ fn resume(
             && experiment.reason.is_empty()
             && n_done < new.config.algorithm.generations
             && differs_in_generations_only(&experiment.config_json, &new.config);
-        if can_go_on && let Some(checkpoint) = store.checkpoint(experiment.id)? {
-            let reopened =
-                ExperimentRecord { config_json: config_json.clone(), ..experiment.clone() };
-            let runnable = Runnable::restore(&reopened, &checkpoint)?;
-            store.reopen(experiment.id, &config_json, clock::unix_ms())?;
-            return Ok(Some(Placement::Runs(Box::new(runnable))));
+        if !can_go_on {
+            continue;
+        }
+        match reopened(store, experiment.id, &config_json) {
+            Ok(runnable) => {
+                store.reopen(experiment.id, &config_json, clock::unix_ms())?;
+                return Ok(Some(Placement::Runs(Box::new(runnable))));
+            }
+            // It is computed anew instead.
+            Err(error @ StoreError::Unsound { .. }) => {
+                warn!("{error}; a new experiment begins in its place");
+            }
+            Err(error) => return Err(error),
         }
     }
     Ok(None)
+}
+
+/// A completed experiment under a configuration that asks for more generations.
+fn reopened(store: &Store, id: ExperimentId, config_json: &str) -> Result<Runnable, StoreError> {
+    let (experiment, checkpoint) = store.resumable(id)?;
+    let experiment = ExperimentRecord { config_json: config_json.to_owned(), ..experiment };
+    Runnable::restore(&experiment, &checkpoint).map_err(|what| store.unsound(id, what))
 }
 
 fn differs_in_generations_only(config_json: &str, config: &ExperimentConfig) -> bool {

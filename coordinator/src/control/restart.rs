@@ -1,52 +1,82 @@
 //! Goes on with what is unfinished when the coordinator starts.
 
-use tracing::warn;
+use std::sync::PoisonError;
+
+use tracing::{error, warn};
 
 use crate::{
+    clock,
     driver::DriverEvent,
+    ids::ExperimentId,
     runs::Runnable,
-    store::{ExperimentRecord, Store, StoreError},
+    store::{ExperimentRecord, StoreError},
 };
 
-use super::Control;
+use super::{Control, ControlError};
 
 impl Control {
     /// Hands every unfinished experiment that this program can compute to the driver.
+    /// One that is damaged is paused, and the others go on.
     pub async fn run_unfinished(&self) -> Result<(), StoreError> {
-        for (experiment, checkpoint) in self.store.read(unfinished).await? {
-            let id = experiment.id;
-            if experiment.fingerprint != sim_core::FINGERPRINT {
-                warn!(
-                    experiment = %id,
-                    "experiment waits: it was started with \"{}\", this is \"{}\"; \
-                     finish it with that release, or cancel it and submit it again",
-                    experiment.fingerprint,
-                    sim_core::FINGERPRINT
-                );
-                continue;
+        let mut experiments = self.store.read(|store| store.experiments()).await?;
+        experiments.retain(|experiment| experiment.state.is_unfinished());
+        for ExperimentRecord { id, .. } in experiments {
+            match self.restore(id).await {
+                Ok(Some(runnable)) => self.start(runnable).await,
+                Ok(None) => {}
+                Err(unsound @ StoreError::Unsound { .. }) => self.set_aside(id, &unsound).await?,
+                Err(error) => return Err(error),
             }
-            let checkpoint =
-                checkpoint.ok_or_else(|| StoreError::Corrupt(format!("no checkpoint of {id}")))?;
-            let runnable =
-                tokio::task::spawn_blocking(move || Runnable::restore(&experiment, &checkpoint))
-                    .await
-                    .map_err(|_| {
-                        StoreError::Corrupt(format!("restoring experiment {id} panicked"))
-                    })??;
-            // The driver runs for as long as the coordinator does.
-            let _ = self.events.send(DriverEvent::ExperimentReady(Box::new(runnable))).await;
         }
         Ok(())
     }
-}
 
-/// All unfinished experiments and their checkpoints.
-fn unfinished(store: &Store) -> Result<Vec<(ExperimentRecord, Option<String>)>, StoreError> {
-    let mut experiments = store.experiments()?;
-    experiments.retain(|experiment| experiment.state.is_unfinished());
-    let with_checkpoint = |experiment: ExperimentRecord| {
-        let checkpoint = store.checkpoint(experiment.id)?;
-        Ok((experiment, checkpoint))
-    };
-    experiments.into_iter().map(with_checkpoint).collect()
+    /// Hands an experiment that was set aside to the driver, if it is sound by now.
+    pub async fn take_up(&self, id: ExperimentId) -> Result<(), ControlError> {
+        if !self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).contains(&id) {
+            return Ok(());
+        }
+        let restored = self.restore(id).await?;
+        // Of two requests, one starts it.
+        let is_first = self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        if let (true, Some(runnable)) = (is_first, restored) {
+            self.start(runnable).await;
+        }
+        Ok(())
+    }
+
+    async fn start(&self, runnable: Runnable) {
+        // The driver runs for as long as the coordinator does.
+        let _ = self.events.send(DriverEvent::ExperimentReady(Box::new(runnable))).await;
+    }
+
+    /// An experiment as the store has it; none if it waits for another program.
+    async fn restore(&self, id: ExperimentId) -> Result<Option<Runnable>, StoreError> {
+        let (experiment, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
+        if experiment.fingerprint != sim_core::FINGERPRINT {
+            warn!(
+                experiment = %id,
+                "experiment waits: it was started with \"{}\", this is \"{}\"; \
+                 finish it with that release, or cancel it and submit it again",
+                experiment.fingerprint,
+                sim_core::FINGERPRINT
+            );
+            return Ok(None);
+        }
+        let restoring =
+            tokio::task::spawn_blocking(move || Runnable::restore(&experiment, &checkpoint));
+        match restoring.await.unwrap_or_else(|_| Err("restoring it panicked".to_owned())) {
+            Ok(runnable) => Ok(Some(runnable)),
+            Err(what) => Err(self.store.read(move |store| store.unsound(id, what)).await),
+        }
+    }
+
+    /// Pauses an experiment that is damaged.
+    async fn set_aside(&self, id: ExperimentId, unsound: &StoreError) -> Result<(), StoreError> {
+        let reason = unsound.to_string();
+        error!(experiment = %id, reason, "experiment paused");
+        self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).insert(id);
+        let now_ms = clock::unix_ms();
+        self.store.try_write(move |store| store.set_aside(id, now_ms, &reason)).await
+    }
 }

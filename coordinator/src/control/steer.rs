@@ -44,8 +44,9 @@ impl Control {
         self.change(id, Request::Pause(reason)).await
     }
 
-    /// Lets a paused experiment go on.
+    /// Lets a paused experiment go on, unless it is damaged.
     pub async fn resume(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
+        self.take_up(id).await?;
         self.change(id, Request::Resume).await
     }
 

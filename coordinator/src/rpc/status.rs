@@ -22,7 +22,8 @@ impl From<StoreError> for Status {
         match error {
             // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
             StoreError::Unavailable(_) => Self::resource_exhausted(text),
-            StoreError::Ended(_) => Self::failed_precondition(text),
+            StoreError::Ended(_) | StoreError::Unsound { .. } => Self::failed_precondition(text),
+            StoreError::TakenOver { .. } => Self::unavailable(text),
             StoreError::Corrupt(_) => Self::data_loss(text),
             _ => Self::internal(text),
         }

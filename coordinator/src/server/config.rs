@@ -81,6 +81,12 @@ pub enum RunError {
          Started again, the coordinator goes on from the last completed generation"
     )]
     Driver(String),
+    /// Another coordinator uses the data directory.
+    #[error(
+        "another coordinator has taken over the data directory; this one stops, and nothing is \
+         lost: run one coordinator per data directory"
+    )]
+    TakenOver,
     /// Connections are no longer accepted.
     #[error("the server ended ({0}); start the coordinator again")]
     Server(String),

@@ -39,6 +39,7 @@ use services::Services;
 #[derive(Debug)]
 pub struct Coordinator {
     local_addr: SocketAddr,
+    store: SharedStore,
     shutdown: CancellationToken,
     /// One task; none once its end is known. So is `server`.
     driver: JoinSet<()>,
@@ -88,7 +89,7 @@ impl Coordinator {
             workers: Workers { events, times, shutdown: shutdown.clone() },
             fleet: Fleet { control: control.clone() },
             evaluations: Evaluations { control: control.clone(), shutdown: shutdown.clone() },
-            experiments: Experiments { control, store, shutdown: shutdown.clone() },
+            experiments: Experiments { control, store: store.clone(), shutdown: shutdown.clone() },
         };
         let mut server = JoinSet::new();
         let gate = Gate::new(tokens);
@@ -101,7 +102,7 @@ impl Coordinator {
         if !is_encrypted && !local_addr.ip().to_canonical().is_loopback() {
             warn!("there is no TLS: every member of the network can read all traffic, tokens too");
         }
-        Ok(Self { local_addr, shutdown, driver, server, _metrics: metrics })
+        Ok(Self { local_addr, store, shutdown, driver, server, _metrics: metrics })
     }
 
     /// The address it listens on.
@@ -112,6 +113,7 @@ impl Coordinator {
     /// Waits for a part of it to end, which none does before [`Self::shutdown`].
     pub async fn failure(&mut self) -> RunError {
         tokio::select! {
+            () = self.store.taken_over() => RunError::TakenOver,
             Some(ended) = self.driver.join_next() => RunError::Driver(match ended {
                 Ok(()) => "nobody asked it to".to_owned(),
                 Err(error) => error.to_string(),

@@ -1,15 +1,19 @@
 //! The table of champions.
 
-use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 
 use crate::ids::ExperimentId;
 use evolution::{Champion, ChampionSource, HeldOut};
 
-use super::StoreError;
+use super::{
+    StoreError,
+    seals::{Seal, Sealer},
+};
 
-/// Replaces an experiment's champion.
+/// Replaces an experiment's champion, after its row of the history and its digest.
 pub fn put(
     transaction: &Transaction<'_>,
+    sealer: &Sealer,
     id: ExperimentId,
     champion: &Champion,
 ) -> rusqlite::Result<()> {
@@ -18,7 +22,7 @@ pub fn put(
         ChampionSource::Mean => None,
     };
     transaction.execute(
-        "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, x'')",
         params![
             id.0,
             champion.generation,
@@ -31,45 +35,114 @@ pub fn put(
             champion.held_out.map(|held_out| held_out.generation),
         ],
     )?;
+    seal(transaction, sealer, id)
+}
+
+/// A champion as it is stored.
+struct Stored {
+    /// Without the lists.
+    champion: Champion,
+    trial_fitness: String,
+    genotype: String,
+    seal: Vec<u8>,
+    /// The experiment's latest generation and the digest of everything so far.
+    latest: Option<u64>,
+    digest: String,
+}
+
+impl Stored {
+    fn read(connection: &Connection, id: ExperimentId) -> rusqlite::Result<Option<Self>> {
+        let mut statement = connection.prepare_cached(
+            "SELECT c.generation, individual, trial_fitness, genotype, held_out_mean,
+                    held_out_ci95, held_out_trials, held_out_generation, c.seal, e.digest,
+                    (SELECT max(generation) FROM generations WHERE experiment_id = e.id)
+             FROM champions c JOIN experiments e ON e.id = c.experiment_id
+             WHERE c.experiment_id = ?1",
+        )?;
+        statement.query_row([id.0], Self::from_row).optional()
+    }
+
+    fn from_row(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let individual: Option<u32> = row.get(1)?;
+        let held_out = match row.get(4)? {
+            Some(mean) => Some(HeldOut {
+                mean,
+                ci95: row.get(5)?,
+                n_trials: row.get(6)?,
+                generation: row.get(7)?,
+            }),
+            None => None,
+        };
+        let champion = Champion {
+            generation: row.get(0)?,
+            source: individual.map_or(ChampionSource::Mean, ChampionSource::Individual),
+            genotype: Vec::new(),
+            trial_fitness: Vec::new(),
+            held_out,
+        };
+        Ok(Self {
+            champion,
+            trial_fitness: row.get(2)?,
+            genotype: row.get(3)?,
+            seal: row.get(8)?,
+            digest: row.get(9)?,
+            latest: row.get(10)?,
+        })
+    }
+
+    /// The seal that it should have. It covers the end of the history, too, which has
+    /// no checkpoint any more once the experiment has ended.
+    fn expected_seal(&self, sealer: &Sealer, id: ExperimentId) -> Seal {
+        let Champion { generation, source, held_out, .. } = &self.champion;
+        let mut seal = sealer
+            .begin("champion", id)
+            .number(self.latest.map_or(0, |latest| latest + 1))
+            .text(self.digest.as_bytes())
+            .number(*generation)
+            .text(self.trial_fitness.as_bytes())
+            .text(self.genotype.as_bytes());
+        if let ChampionSource::Individual(individual) = source {
+            seal = seal.text(b"individual").number((*individual).into());
+        }
+        if let Some(HeldOut { mean, ci95, n_trials, generation }) = *held_out {
+            seal = seal.text(b"held out").real(mean).real(ci95);
+            seal = seal.number(n_trials.into()).number(generation);
+        }
+        seal.finish()
+    }
+}
+
+/// Seals a champion as it is stored, if there is one.
+pub fn seal(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+) -> rusqlite::Result<()> {
+    if let Some(stored) = Stored::read(transaction, id)? {
+        let seal = stored.expected_seal(sealer, id);
+        let sql = "UPDATE champions SET seal = ?2 WHERE experiment_id = ?1";
+        transaction.execute(sql, params![id.0, seal])?;
+    }
     Ok(())
 }
 
-/// Reads an experiment's champion.
-pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<Champion>, StoreError> {
-    let mut statement = connection.prepare_cached(
-        "SELECT generation, individual, trial_fitness, genotype,
-                held_out_mean, held_out_ci95, held_out_trials, held_out_generation
-         FROM champions WHERE experiment_id = ?1",
-    )?;
-    let row = statement
-        .query_row([id.0], |row| {
-            let individual: Option<u32> = row.get(1)?;
-            let held_out = match row.get(4)? {
-                Some(mean) => Some(HeldOut {
-                    mean,
-                    ci95: row.get(5)?,
-                    n_trials: row.get(6)?,
-                    generation: row.get(7)?,
-                }),
-                None => None,
-            };
-            let champion = Champion {
-                generation: row.get(0)?,
-                source: individual.map_or(ChampionSource::Mean, ChampionSource::Individual),
-                genotype: Vec::new(),
-                trial_fitness: Vec::new(),
-                held_out,
-            };
-            Ok((champion, row.get::<_, String>(2)?, row.get::<_, String>(3)?))
-        })
-        .optional()?;
-    let Some((champion, trial_fitness, genotype)) = row else { return Ok(None) };
-    let list = |text: &str| {
-        serde_json::from_str(text)
-            .map_err(|error| StoreError::Corrupt(format!("champion of {id}: {error}")))
+/// Reads an experiment's champion; one that is not what was stored is damage.
+/// `sealer`: none if the database has no seals yet.
+pub fn get(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+) -> Result<Option<Champion>, StoreError> {
+    let corrupt = |why: &dyn std::fmt::Display| {
+        StoreError::Corrupt(format!("the champion of experiment {id}: {why}"))
     };
-    let (trial_fitness, genotype) = (list(&trial_fitness)?, list(&genotype)?);
-    Ok(Some(Champion { trial_fitness, genotype, ..champion }))
+    let Some(stored) = Stored::read(connection, id)? else { return Ok(None) };
+    if sealer.is_some_and(|sealer| stored.expected_seal(sealer, id)[..] != stored.seal) {
+        return Err(corrupt(&"it, or the end of the history, is not what was stored"));
+    }
+    let list = |text: &str| serde_json::from_str(text).map_err(|error| corrupt(&error));
+    let (trial_fitness, genotype) = (list(&stored.trial_fitness)?, list(&stored.genotype)?);
+    Ok(Some(Champion { trial_fitness, genotype, ..stored.champion }))
 }
 
 /// Mean of a stored list; none if it is empty or damaged.

@@ -4,49 +4,77 @@
 use std::{
     fs::{self, File, TryLockError},
     io,
-    path::Path,
+    path::{Path, PathBuf},
     time::Duration,
 };
 
 use rusqlite::{Connection, OpenFlags};
 
-use super::{Result, StoreError, schema};
+use super::{Result, StoreError, schema, write_ahead_log};
 
 const DATABASE_FILE: &str = "swarmevo.sqlite3";
-/// What a database is called until its schema is complete.
+/// What a database is called until it is complete.
 const UNFINISHED_FILE: &str = "swarmevo.sqlite3.new";
 const LOCK_FILE: &str = "swarmevo.lock";
 /// How long an operation waits for another program that uses the database.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Opens, and if need be creates, the database in `directory`; the file is the
-/// lock that keeps others out.
-pub fn open(directory: &Path) -> Result<(Connection, File)> {
+/// What keeps other coordinators out, for as long as it is kept.
+#[derive(Debug)]
+pub struct Locks {
+    _files: Vec<File>,
+}
+
+/// The database of a data directory.
+pub fn path_in(directory: &Path) -> PathBuf {
+    directory.join(DATABASE_FILE)
+}
+
+/// What a database is called until it is complete.
+pub fn unfinished_in(directory: &Path) -> PathBuf {
+    directory.join(UNFINISHED_FILE)
+}
+
+/// Opens, and if need be creates, the database in `directory`. Drop the connection
+/// before the locks.
+pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
     fs::create_dir_all(directory).map_err(unusable)?;
     let lock = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
-    lock.try_lock().map_err(|error| match error {
-        TryLockError::WouldBlock => StoreError::Locked { path: directory.to_owned() },
-        TryLockError::Error(source) => unusable(source),
-    })?;
-    let path = directory.join(DATABASE_FILE);
-    if path.try_exists().map_err(unusable)? {
-        check(&path)?;
-    } else {
+    let mut locks = vec![lock_file(lock, directory)?];
+    let path = path_in(directory);
+    if !path.try_exists().map_err(unusable)? {
         create(directory, &path, unusable)?;
     }
-    let mut connection = Connection::open(path)?;
+    // A lock file can be deleted while it is locked; the database itself cannot be
+    // replaced so easily. Elsewhere such a lock may be one and the same as those by which
+    // SQLite lets others read.
+    #[cfg(target_os = "linux")]
+    locks.push(lock_file(File::open(&path).map_err(unusable)?, directory)?);
+    check(&path)?;
+    let mut connection = Connection::open(&path)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
     connection.pragma_update(None, "journal_mode", "WAL")?;
     connection.pragma_update(None, "synchronous", "FULL")?;
-    schema::migrate(&mut connection)?;
-    Ok((connection, lock))
+    write_ahead_log::configure(&connection)?;
+    schema::migrate(&mut connection).map_err(|error| error.at(&path))?;
+    Ok((connection, Locks { _files: locks }))
+}
+
+/// Locks a file of the data directory, or says that another has it.
+fn lock_file(file: File, directory: &Path) -> Result<File> {
+    let path = directory.to_owned();
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
+        Err(TryLockError::Error(source)) => Err(StoreError::Directory { path, source }),
+    }
 }
 
 /// Creates an empty database. Under another name at first, so that an empty file
 /// under the right one is damage, and not a coordinator killed at its first start.
 fn create(directory: &Path, path: &Path, unusable: impl Fn(io::Error) -> StoreError) -> Result<()> {
-    let unfinished = directory.join(UNFINISHED_FILE);
+    let unfinished = unfinished_in(directory);
     match fs::remove_file(&unfinished) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(unusable(error)),
         _ => {}
@@ -61,24 +89,32 @@ fn create(directory: &Path, path: &Path, unusable: impl Fn(io::Error) -> StoreEr
 /// Refuses a database that this program must not write to. Read-only, so that
 /// whoever repairs it finds every byte as it was.
 fn check(path: &Path) -> Result<()> {
-    let damaged =
-        |what: &dyn std::fmt::Display| StoreError::Corrupt(format!("{}: {what}", path.display()));
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let verdict = Connection::open_with_flags(path, flags).and_then(|connection| {
-        connection.busy_timeout(BUSY_TIMEOUT)?;
+    let has_log = write_ahead_log::exists(path);
+    let verdict = open_read_only(path).map_err(StoreError::from).and_then(|connection| {
         let version = schema::version(&connection)?;
+        if version > schema::VERSION {
+            return Err(StoreError::Newer { found: version, supported: schema::VERSION });
+        }
+        if version <= 0 {
+            return Err(StoreError::Corrupt("it has no tables of experiments".to_owned()));
+        }
         let soundness: String =
             connection.query_row("PRAGMA quick_check(1)", [], |row| row.get(0))?;
-        Ok((version, soundness))
-    });
-    match verdict.map_err(StoreError::from) {
-        Ok((..=0, _)) => Err(damaged(&"it has no tables of experiments")),
-        Ok((version, _)) if version > schema::VERSION => {
-            Err(StoreError::Newer { found: version, supported: schema::VERSION })
+        if soundness != "ok" {
+            return Err(StoreError::Corrupt(soundness.replace('\n', " ")));
         }
-        Ok((_, soundness)) if soundness != "ok" => Err(damaged(&soundness.replace('\n', " "))),
-        Ok(_) => Ok(()),
-        Err(StoreError::Corrupt(what)) => Err(damaged(&what)),
-        Err(error) => Err(error),
-    }
+        if !has_log && version >= schema::SEALED && write_ahead_log::is_missed(&connection)? {
+            return Err(StoreError::WithoutLog { path: path.to_owned() });
+        }
+        Ok(())
+    });
+    verdict.map_err(|error| error.at(path))
+}
+
+/// Opens a database to read it, whoever else uses it.
+pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = Connection::open_with_flags(path, flags)?;
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    Ok(connection)
 }

@@ -1,17 +1,20 @@
 //! What has happened to an experiment: its events and its generations.
 
-use rusqlite::{Row, params};
+use rusqlite::{Connection, Row, Transaction, params};
 
 use crate::ids::ExperimentId;
 use evolution::Statistics;
 
-use super::{Event, EventKind, ExperimentState, GenerationRecord, Result, Store, StoreError};
+use super::{
+    Event, EventKind, ExperimentState, GenerationRecord, Result, Store, StoreError, seals::Sealer,
+};
 
 impl Store {
     /// At most `limit` events from `from_sequence` on.
     pub fn events(&self, id: ExperimentId, from_sequence: u64, limit: u32) -> Result<Vec<Event>> {
-        let mut statement = self.connection.prepare_cached(
-            "SELECT v.sequence, v.at_ms, v.kind, v.state, v.message,
+        self.read(|connection| {
+            let mut statement = connection.prepare_cached(
+                "SELECT v.sequence, v.at_ms, v.kind, v.state, v.message,
                     g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
                     g.duration_ms, g.episodes, g.workers, g.idle_share
              FROM events v
@@ -19,26 +22,27 @@ impl Store {
                     ON g.experiment_id = v.experiment_id AND g.generation = v.generation
              WHERE v.experiment_id = ?1 AND v.sequence >= ?2
              ORDER BY v.sequence LIMIT ?3",
-        )?;
-        let from_sequence = i64::try_from(from_sequence).unwrap_or(i64::MAX);
-        let rows = statement.query_map(params![id.0, from_sequence, limit], |row| {
-            let (sequence, at_ms) = (row.get(0)?, row.get(1)?);
-            let message = row.get::<_, Option<String>>(4)?.unwrap_or_default();
-            let kind = match row.get::<_, String>(2)?.as_str() {
-                "generation" => read_generation(row, 5)?.map(EventKind::Generation),
-                "state" => {
-                    let state: Option<String> = row.get(3)?;
-                    state
-                        .and_then(|name| ExperimentState::from_name(&name))
-                        .map(|state| EventKind::State { state, reason: message })
-                }
-                _ => Some(EventKind::Notice(message)),
-            };
-            Ok(kind
-                .map(|kind| Event { sequence, at_ms, kind })
-                .ok_or_else(|| StoreError::Corrupt(format!("event {sequence} of {id}"))))
-        })?;
-        rows.map(|row| row?).collect()
+            )?;
+            let from_sequence = i64::try_from(from_sequence).unwrap_or(i64::MAX);
+            let rows = statement.query_map(params![id.0, from_sequence, limit], |row| {
+                let (sequence, at_ms) = (row.get(0)?, row.get(1)?);
+                let message = row.get::<_, Option<String>>(4)?.unwrap_or_default();
+                let kind = match row.get::<_, String>(2)?.as_str() {
+                    "generation" => read_generation(row, 5)?.map(EventKind::Generation),
+                    "state" => {
+                        let state: Option<String> = row.get(3)?;
+                        state
+                            .and_then(|name| ExperimentState::from_name(&name))
+                            .map(|state| EventKind::State { state, reason: message })
+                    }
+                    _ => Some(EventKind::Notice(message)),
+                };
+                Ok(kind
+                    .map(|kind| Event { sequence, at_ms, kind })
+                    .ok_or_else(|| StoreError::Corrupt(format!("event {sequence} of {id}"))))
+            })?;
+            rows.map(|row| row?).collect()
+        })
     }
 
     /// At most `limit` completed generations from `from_generation` on, and when
@@ -49,9 +53,10 @@ impl Store {
         from_generation: u64,
         limit: u32,
     ) -> Result<Vec<(u64, GenerationRecord)>> {
-        // Events begin with the submission, and every generation has one: those of
-        // earlier generations need not be looked at.
-        let mut statement = self.connection.prepare_cached(
+        self.read(|connection| {
+            // Events begin with the submission, and every generation has one: those of
+            // earlier generations need not be looked at.
+            let mut statement = connection.prepare_cached(
             "SELECT v.at_ms, g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
                     g.duration_ms, g.episodes, g.workers, g.idle_share
              FROM events v
@@ -61,17 +66,77 @@ impl Store {
                    AND v.kind = 'generation'
              ORDER BY v.sequence LIMIT ?3",
         )?;
-        let from_generation = i64::try_from(from_generation).unwrap_or(i64::MAX);
-        let rows = statement.query_map(params![id.0, from_generation, limit], |row| {
-            let missing = || StoreError::Corrupt(format!("a generation of {id}"));
-            Ok((row.get(0)?, read_generation(row, 1)?.ok_or_else(missing)))
-        })?;
-        rows.map(|row| {
-            let (completed_at_ms, generation) = row?;
-            Ok((completed_at_ms, generation?))
+            let from_generation = i64::try_from(from_generation).unwrap_or(i64::MAX);
+            let rows = statement.query_map(params![id.0, from_generation, limit], |row| {
+                let missing = || StoreError::Corrupt(format!("a generation of {id}"));
+                Ok((row.get(0)?, read_generation(row, 1)?.ok_or_else(missing)))
+            })?;
+            rows.map(|row| {
+                let (completed_at_ms, generation) = row?;
+                Ok((completed_at_ms, generation?))
+            })
+            .collect()
         })
-        .collect()
     }
+}
+
+/// Adds a generation to an experiment's history.
+pub fn put(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+    generation: &GenerationRecord,
+) -> rusqlite::Result<()> {
+    let statistics = &generation.statistics;
+    let mut statement = transaction.prepare_cached(
+        "INSERT INTO generations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+    )?;
+    statement.execute(params![
+        id.0,
+        generation.generation,
+        statistics.best,
+        statistics.mean,
+        statistics.min,
+        statistics.standard_deviation,
+        generation.digest,
+        generation.duration_ms,
+        generation.episodes,
+        generation.workers,
+        generation.idle_share,
+        sealer.generation(id, generation),
+    ])?;
+    Ok(())
+}
+
+/// Seals a generation that is stored.
+pub fn seal(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+    generation: &GenerationRecord,
+) -> rusqlite::Result<()> {
+    let mut statement = transaction.prepare_cached(
+        "UPDATE generations SET seal = ?3 WHERE experiment_id = ?1 AND generation = ?2",
+    )?;
+    let seal = sealer.generation(id, generation);
+    statement.execute(params![id.0, generation.generation, seal])?;
+    Ok(())
+}
+
+/// An experiment's history with its seals, in order.
+pub fn read_all(
+    connection: &Connection,
+    id: ExperimentId,
+) -> rusqlite::Result<Vec<(GenerationRecord, Vec<u8>)>> {
+    let mut statement = connection.prepare_cached(
+        "SELECT seal, generation, best, mean, min, standard_deviation, digest,
+                duration_ms, episodes, workers, idle_share
+         FROM generations WHERE experiment_id = ?1 ORDER BY generation",
+    )?;
+    let rows = statement.query_map([id.0], |row| Ok((read_generation(row, 1)?, row.get(0)?)))?;
+    // No outer join: there is a generation in every row.
+    rows.filter_map(|row| row.map(|(generation, seal)| Some((generation?, seal))).transpose())
+        .collect()
 }
 
 /// Reads the columns of `generations`, in the schema's order, from `first` on;

@@ -2,114 +2,49 @@
 //! generation, and from which a killed coordinator goes on.
 //!
 //! Every method that changes something is one transaction, on disk when it
-//! returns.
+//! returns, and refused if another coordinator owns the database by now.
 
 mod champions;
+mod checkpoints;
+mod error;
 mod file;
 mod history;
 mod records;
 mod schema;
+mod seals;
+mod soundness;
+mod write_ahead_log;
 
-use std::{
-    fs::File,
-    io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, TransactionBehavior, params};
 
 use crate::{failpoint, ids::ExperimentId, priority::Priority};
 use evolution::Champion;
 
+pub use error::StoreError;
 pub use records::{
     Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
     checkpoint_json,
 };
 
+use error::Result;
+use file::Locks;
+use seals::Sealer;
+
 /// The open database of one data directory.
 #[derive(Debug)]
 pub struct Store {
     connection: Connection,
-    /// Held for as long as the store is open: one coordinator per directory.
-    _lock: File,
+    /// The database.
+    path: PathBuf,
+    /// Makes the seals of its rows.
+    sealer: Sealer,
+    /// What the database says as long as this coordinator owns it.
+    owner: Vec<u8>,
+    /// Released after the connection.
+    _locks: Locks,
 }
-
-/// What went wrong with the store.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The directory cannot be created or written. Fix its path or permissions.
-    #[error(
-        "cannot use the data directory {}: {source}; let the coordinator's user write there, or \
-         choose another with --data-dir",
-        path.display()
-    )]
-    Directory {
-        /// The directory.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Another coordinator uses the directory.
-    #[error(
-        "the data directory {} is in use by another coordinator; stop it or choose another directory",
-        path.display()
-    )]
-    Locked {
-        /// The directory.
-        path: PathBuf,
-    },
-    /// The database was written by a newer version.
-    #[error(
-        "the database has schema version {found}, this program knows up to {supported}; \
-         use the newer program, or another data directory"
-    )]
-    Newer {
-        /// Version of the database.
-        found: i64,
-        /// Version of this program.
-        supported: i64,
-    },
-    /// The database's content makes no sense.
-    #[error(
-        "the database is damaged: {0}; restore it from a copy, or choose another data directory"
-    )]
-    Corrupt(String),
-    /// The disk is full, or cannot be read or written; try again later.
-    #[error("the database cannot be read or written: {0}; is the disk full, or read-only?")]
-    Unavailable(rusqlite::Error),
-    /// The experiment has ended meanwhile.
-    #[error("experiment {0} has ended")]
-    Ended(ExperimentId),
-    /// Anything else is a bug.
-    #[error("the database refuses an operation: {0}; please report this")]
-    Bug(rusqlite::Error),
-}
-
-impl From<rusqlite::Error> for StoreError {
-    fn from(error: rusqlite::Error) -> Self {
-        use rusqlite::ErrorCode::{
-            CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
-            ReadOnly, SystemIoFailure,
-        };
-        if matches!(
-            error,
-            rusqlite::Error::FromSqlConversionFailure(..)
-                | rusqlite::Error::IntegralValueOutOfRange(..)
-                | rusqlite::Error::InvalidColumnType(..)
-        ) {
-            return Self::Corrupt(error.to_string());
-        }
-        match error.sqlite_error_code() {
-            Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
-            Some(
-                CannotOpen | DatabaseBusy | DatabaseLocked | DiskFull | ReadOnly | SystemIoFailure,
-            ) => Self::Unavailable(error),
-            _ => Self::Bug(error),
-        }
-    }
-}
-
-type Result<T> = std::result::Result<T, StoreError>;
 
 /// A generation to be committed.
 #[derive(Debug, Clone)]
@@ -129,10 +64,15 @@ pub struct GenerationCommit<'a> {
 }
 
 impl Store {
-    /// Opens, and if need be creates, the database in `directory`.
+    /// Opens, and if need be creates, the database in `directory`, and takes it over
+    /// from whoever owned it.
     pub fn open(directory: &Path) -> Result<Self> {
-        let (connection, lock) = file::open(directory)?;
-        Ok(Self { connection, _lock: lock })
+        let (connection, locks) = file::open(directory)?;
+        connection.execute("UPDATE identity SET owner = randomblob(16)", [])?;
+        let owner = owner(&connection)?;
+        write_ahead_log::fold(&connection)?;
+        let sealer = Sealer::of(&connection)?;
+        Ok(Self { connection, path: file::path_in(directory), sealer, owner, _locks: locks })
     }
 
     /// Adds an experiment. If `request_id` has been used before, nothing is
@@ -143,38 +83,38 @@ impl Store {
         {
             return Ok((id, false));
         }
-        let transaction = self.connection.transaction()?;
-        transaction.execute(
-            "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
-                                      genotype_len, state, submitted_at_ms, priority)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8)",
-            params![
-                new.request_id,
-                new.config.name,
-                new.config.to_canonical_json(),
-                new.config_digest.to_string(),
-                sim_core::FINGERPRINT,
-                new.genotype_len,
-                now_ms,
-                new.priority.weight()
-            ],
-        )?;
-        let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
-        transaction.execute(
-            "INSERT INTO checkpoints (experiment_id, state) VALUES (?1, ?2)",
-            params![id.0, new.checkpoint],
-        )?;
-        let state = ExperimentState::Running;
-        add_state_event(&transaction, id, now_ms, state, "submitted")?;
-        transaction.commit()?;
-        Ok((id, true))
+        self.write(|transaction, sealer| {
+            transaction.execute(
+                "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
+                                          genotype_len, state, submitted_at_ms, priority)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8)",
+                params![
+                    new.request_id,
+                    new.config.name,
+                    new.config.to_canonical_json(),
+                    new.config_digest.to_string(),
+                    sim_core::FINGERPRINT,
+                    new.genotype_len,
+                    now_ms,
+                    new.priority.weight()
+                ],
+            )?;
+            let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
+            seals::seal_experiment(transaction, sealer, id)?;
+            let seal = sealer.checkpoint(id, None, new.checkpoint.as_bytes());
+            checkpoints::put(transaction, id, &new.checkpoint, seal)?;
+            add_state_event(transaction, id, now_ms, ExperimentState::Running, "submitted")?;
+            Ok((id, true))
+        })
     }
 
     /// The experiment that was created under a client's key.
     pub fn experiment_of_request(&self, request_id: &str) -> Result<Option<ExperimentId>> {
-        let mut statement =
-            self.connection.prepare_cached("SELECT id FROM experiments WHERE request_id = ?1")?;
-        Ok(statement.query_row([request_id], |row| row.get(0).map(ExperimentId)).optional()?)
+        self.read(|connection| {
+            let mut statement =
+                connection.prepare_cached("SELECT id FROM experiments WHERE request_id = ?1")?;
+            Ok(statement.query_row([request_id], |row| row.get(0).map(ExperimentId)).optional()?)
+        })
     }
 
     /// Commits a generation with everything that belongs to it;
@@ -186,60 +126,45 @@ impl Store {
         now_ms: u64,
         commit: &GenerationCommit<'_>,
     ) -> Result<()> {
-        let transaction = self.connection.transaction()?;
-        let state: String = transaction.query_row(
-            "SELECT state FROM experiments WHERE id = ?1",
-            [id.0],
-            |row| row.get(0),
-        )?;
-        if !ExperimentState::from_name(&state).is_some_and(ExperimentState::is_unfinished) {
-            return Err(StoreError::Ended(id));
-        }
         let generation = commit.generation;
-        let statistics = &generation.statistics;
-        transaction.execute(
-            "INSERT INTO generations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
-            params![
-                id.0,
-                generation.generation,
-                statistics.best,
-                statistics.mean,
-                statistics.min,
-                statistics.standard_deviation,
-                generation.digest,
-                generation.duration_ms,
-                generation.episodes,
-                generation.workers,
-                generation.idle_share
-            ],
-        )?;
-        failpoint::reached("history written");
-        transaction.execute(
-            "UPDATE checkpoints SET state = ?2 WHERE experiment_id = ?1",
-            params![id.0, commit.checkpoint],
-        )?;
-        transaction.execute(
-            "UPDATE experiments SET digest = ?2 WHERE id = ?1",
-            params![id.0, commit.digest],
-        )?;
-        if let Some(champion) = commit.champion {
-            champions::put(&transaction, id, champion)?;
-        }
-        for notice in commit.notices {
-            add_notice(&transaction, id, now_ms, notice)?;
-        }
-        transaction.execute(
-            "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
-             VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
-                     ?2, 'generation', ?3)",
-            params![id.0, now_ms, generation.generation],
-        )?;
-        if let Some(reason) = commit.completed {
-            set_state(&transaction, id, now_ms, ExperimentState::Completed, reason)?;
-        }
-        failpoint::reached("commit prepared");
-        transaction.commit()?;
-        Ok(())
+        // Hashing takes longer than the rest, and needs no transaction.
+        let seal = self.sealer.checkpoint(id, Some(generation), commit.checkpoint.as_bytes());
+        self.write(|transaction, sealer| {
+            let state: String = transaction.query_row(
+                "SELECT state FROM experiments WHERE id = ?1",
+                [id.0],
+                |row| row.get(0),
+            )?;
+            if !ExperimentState::from_name(&state).is_some_and(ExperimentState::is_unfinished) {
+                return Err(StoreError::Ended(id));
+            }
+            history::put(transaction, sealer, id, generation)?;
+            failpoint::reached("history written");
+            checkpoints::put(transaction, id, commit.checkpoint, seal)?;
+            transaction.execute(
+                "UPDATE experiments SET digest = ?2 WHERE id = ?1",
+                params![id.0, commit.digest],
+            )?;
+            match commit.champion {
+                Some(champion) => champions::put(transaction, sealer, id, champion)?,
+                None => champions::seal(transaction, sealer, id)?,
+            }
+            for notice in commit.notices {
+                add_notice(transaction, id, now_ms, notice)?;
+            }
+            transaction.execute(
+                "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
+                 VALUES (?1,
+                         (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
+                         ?2, 'generation', ?3)",
+                params![id.0, now_ms, generation.generation],
+            )?;
+            if let Some(reason) = commit.completed {
+                set_state(transaction, id, now_ms, ExperimentState::Completed, reason)?;
+            }
+            failpoint::reached("commit prepared");
+            Ok(())
+        })
     }
 
     /// Changes the state of an unfinished experiment; one that has ended, or is in
@@ -251,78 +176,111 @@ impl Store {
         state: ExperimentState,
         reason: &str,
     ) -> Result<()> {
-        let transaction = self.connection.transaction()?;
-        set_state(&transaction, id, now_ms, state, reason)?;
-        transaction.commit()?;
-        Ok(())
+        self.write(|transaction, _| Ok(set_state(transaction, id, now_ms, state, reason)?))
     }
 
     /// Changes the priority of an unfinished experiment; one that has ended stays
     /// as it is.
     pub fn set_priority(&mut self, id: ExperimentId, priority: Priority) -> Result<()> {
-        self.connection.execute(
-            "UPDATE experiments SET priority = ?2
-             WHERE id = ?1 AND state IN ('running', 'paused')",
-            params![id.0, priority.weight()],
-        )?;
-        Ok(())
+        self.write(|transaction, _| {
+            transaction.execute(
+                "UPDATE experiments SET priority = ?2
+                 WHERE id = ?1 AND state IN ('running', 'paused')",
+                params![id.0, priority.weight()],
+            )?;
+            Ok(())
+        })
     }
 
     /// Adds a line to an experiment's events.
     pub fn notice(&mut self, id: ExperimentId, now_ms: u64, text: &str) -> Result<()> {
-        let transaction = self.connection.transaction()?;
-        add_notice(&transaction, id, now_ms, text)?;
-        transaction.commit()?;
-        Ok(())
+        self.write(|transaction, _| Ok(add_notice(transaction, id, now_ms, text)?))
     }
 
     /// Lets a completed experiment go on under a configuration that asks for
     /// more generations.
     pub fn reopen(&mut self, id: ExperimentId, config_json: &str, now_ms: u64) -> Result<()> {
-        let transaction = self.connection.transaction()?;
-        let n_changed = transaction.execute(
-            "UPDATE experiments SET state = 'running', reason = '', config = ?2
-             WHERE id = ?1 AND state = 'completed'",
-            params![id.0, config_json],
-        )?;
-        if n_changed > 0 {
-            let state = ExperimentState::Running;
-            add_state_event(&transaction, id, now_ms, state, "more generations")?;
-        }
-        transaction.commit()?;
-        Ok(())
+        self.write(|transaction, sealer| {
+            let n_changed = transaction.execute(
+                "UPDATE experiments SET state = 'running', reason = '', config = ?2
+                 WHERE id = ?1 AND state = 'completed'",
+                params![id.0, config_json],
+            )?;
+            if n_changed > 0 {
+                seals::seal_experiment(transaction, sealer, id)?;
+                let state = ExperimentState::Running;
+                add_state_event(transaction, id, now_ms, state, "more generations")?;
+            }
+            Ok(())
+        })
     }
 
     /// Reads one experiment.
     pub fn experiment(&self, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
-        if i64::try_from(id.0).is_err() {
-            return Ok(None); // SQLite's integers are signed.
-        }
-        let mut statement =
-            self.connection.prepare_cached(&format!("{SELECT_EXPERIMENT} WHERE e.id = ?1"))?;
-        statement.query_row([id.0], read_experiment).optional()?.transpose()
+        self.read(|connection| experiment(connection, id))
     }
 
     /// Reads all experiments, oldest first.
     pub fn experiments(&self) -> Result<Vec<ExperimentRecord>> {
-        let mut statement =
-            self.connection.prepare_cached(&format!("{SELECT_EXPERIMENT} ORDER BY e.id"))?;
-        let rows = statement.query_map([], read_experiment)?;
-        rows.map(|row| row?).collect()
-    }
-
-    /// The state of evolution after the latest generation, as JSON.
-    pub fn checkpoint(&self, id: ExperimentId) -> Result<Option<String>> {
-        let mut statement = self
-            .connection
-            .prepare_cached("SELECT state FROM checkpoints WHERE experiment_id = ?1")?;
-        Ok(statement.query_row([id.0], |row| row.get(0)).optional()?)
+        self.read(|connection| {
+            let mut statement =
+                connection.prepare_cached(&format!("{SELECT_EXPERIMENT} ORDER BY e.id"))?;
+            let rows = statement.query_map([], read_experiment)?;
+            rows.map(|row| row?).collect()
+        })
     }
 
     /// The champion so far; none before the first generation.
     pub fn champion(&self, id: ExperimentId) -> Result<Option<Champion>> {
-        champions::get(&self.connection, id)
+        self.read(|connection| champions::get(connection, Some(&self.sealer), id))
     }
+
+    /// Reads.
+    fn read<T>(&self, query: impl FnOnce(&Connection) -> Result<T>) -> Result<T> {
+        query(&self.connection).map_err(|error| error.at(&self.path))
+    }
+
+    /// Writes in one transaction, if this coordinator still owns the database.
+    fn write<T>(
+        &mut self,
+        operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
+    ) -> Result<T> {
+        let result = self.transact(operation).map_err(|error| error.at(&self.path))?;
+        if write_ahead_log::is_long(&self.path) {
+            // What is written is on disk anyway; the next write tries again.
+            let _ = write_ahead_log::fold(&self.connection);
+        }
+        Ok(result)
+    }
+
+    fn transact<T>(
+        &mut self,
+        operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
+    ) -> Result<T> {
+        let transaction =
+            self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        if owner(&transaction)? != self.owner {
+            let path = self.path.parent().unwrap_or(&self.path).to_owned();
+            return Err(StoreError::TakenOver { path });
+        }
+        let result = operation(&transaction, &self.sealer)?;
+        transaction.commit()?;
+        Ok(result)
+    }
+}
+
+/// The token of the coordinator that owns a database.
+fn owner(connection: &Connection) -> rusqlite::Result<Vec<u8>> {
+    connection.prepare_cached("SELECT owner FROM identity")?.query_row([], |row| row.get(0))
+}
+
+fn experiment(connection: &Connection, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
+    if i64::try_from(id.0).is_err() {
+        return Ok(None); // SQLite's integers are signed.
+    }
+    let mut statement =
+        connection.prepare_cached(&format!("{SELECT_EXPERIMENT} WHERE e.id = ?1"))?;
+    statement.query_row([id.0], read_experiment).optional()?.transpose()
 }
 
 const SELECT_EXPERIMENT: &str =
@@ -382,6 +340,7 @@ fn set_state(
     )?;
     if n_changed > 0 {
         add_state_event(transaction, id, now_ms, state, reason)?;
+        checkpoints::delete_unless_of_use(transaction, id, state, reason)?;
     }
     Ok(())
 }

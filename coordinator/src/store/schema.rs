@@ -2,7 +2,7 @@
 
 use rusqlite::{Connection, TransactionBehavior};
 
-use super::StoreError;
+use super::{StoreError, seals};
 
 /// Statements that lead from version i to version i + 1. Never change an entry
 /// that has been released; add one.
@@ -109,7 +109,34 @@ const MIGRATIONS: &[&str] = &[
     DROP TABLE experiments;
     ALTER TABLE experiments_with_priority RENAME TO experiments;
 ",
+    "
+    -- Of the database itself; one row.
+    CREATE TABLE identity (
+        id INTEGER PRIMARY KEY CHECK (id = 1),
+        -- Key of all seals.
+        seal_key BLOB NOT NULL,
+        -- Token of the coordinator that may write.
+        owner BLOB NOT NULL,
+        -- 1 in a main file that lacks its write-ahead log.
+        needs_log INTEGER NOT NULL
+    ) STRICT;
+    INSERT INTO identity VALUES (1, randomblob(32), randomblob(16), 0);
+
+    -- Keyed digests of the rows.
+    ALTER TABLE experiments ADD COLUMN seal BLOB NOT NULL DEFAULT x'';
+    ALTER TABLE generations ADD COLUMN seal BLOB NOT NULL DEFAULT x'';
+    ALTER TABLE checkpoints ADD COLUMN seal BLOB NOT NULL DEFAULT x'';
+    ALTER TABLE champions ADD COLUMN seal BLOB NOT NULL DEFAULT x'';
+
+    -- From these, nothing can continue.
+    DELETE FROM checkpoints WHERE experiment_id IN (
+        SELECT id FROM experiments
+        WHERE state IN ('failed', 'cancelled') OR (state = 'completed' AND reason <> ''));
+",
 ];
+
+/// The first version with seals.
+pub const SEALED: i64 = 3;
 
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
@@ -128,6 +155,9 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     for (version, statements) in MIGRATIONS.iter().enumerate().skip(found) {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         transaction.execute_batch(statements)?;
+        if version as i64 + 1 == SEALED {
+            seals::seal_all(&transaction)?;
+        }
         let n_dangling: i64 =
             transaction
                 .query_row("SELECT count(*) FROM pragma_foreign_key_check", [], |row| row.get(0))?;
@@ -167,16 +197,16 @@ mod tests {
         let text =
             |sql: &str| connection.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap();
         assert_eq!(text(row), "3keyfailedwhylink100");
-        assert_eq!(text("SELECT state FROM checkpoints WHERE experiment_id = 3"), "checkpoint");
+        assert_eq!(text("SELECT count(*) || '' FROM checkpoints"), "0", "nothing can use it");
         connection.execute("UPDATE experiments SET state = 'paused'", []).unwrap();
         connection
-            .execute("UPDATE checkpoints SET experiment_id = 9", [])
+            .execute("INSERT INTO checkpoints (experiment_id, state) VALUES (9, '')", [])
             .expect_err("references are checked again");
         connection
             .execute(
                 "INSERT INTO experiments SELECT NULL, NULL, name, config, config_digest,
-                      fingerprint, genotype_len, state, reason, submitted_at_ms, digest, priority
-                      FROM experiments",
+                      fingerprint, genotype_len, state, reason, submitted_at_ms, digest, priority,
+                      seal FROM experiments",
                 [],
             )
             .unwrap();

@@ -7,7 +7,7 @@ use evolution::{Champion, ChampionSource, Evolution, HeldOut, Statistics};
 
 use super::*;
 
-fn new_experiment(request_id: Option<&str>) -> NewExperiment {
+pub fn new_experiment(request_id: Option<&str>) -> NewExperiment {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
     let submission = Submission {
         request_id: request_id.map(str::to_owned),
@@ -36,7 +36,12 @@ fn generation(generation: u64) -> GenerationRecord {
     }
 }
 
-fn commit(store: &mut Store, id: ExperimentId, number: u64, completed: Option<&str>) -> Result<()> {
+pub fn commit(
+    store: &mut Store,
+    id: ExperimentId,
+    number: u64,
+    completed: Option<&str>,
+) -> Result<()> {
     let champion = Champion {
         generation: number,
         source: ChampionSource::Individual(3),
@@ -81,7 +86,7 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
     assert_eq!(experiment.latest, Some(generation(1)));
     assert_eq!(experiment.champion_fitness, Some(0.625));
     assert_eq!(experiment.digest, "link");
-    assert_eq!(store.checkpoint(id).unwrap().unwrap(), "after 1");
+    assert_eq!(store.resumable(id).unwrap().1, "after 1");
     let champion = store.champion(id).unwrap().unwrap();
     assert_eq!(champion.genotype, [0.1, 1.0 / 3.0]);
     assert_eq!(champion.generation, 1);
@@ -123,7 +128,7 @@ fn a_new_experiment_can_be_resumed_before_its_first_generation() {
     let (_directory, mut store) = open();
     let new = new_experiment(None);
     let (id, _) = store.create(&new, 5).unwrap();
-    let checkpoint = store.checkpoint(id).unwrap().unwrap();
+    let checkpoint = store.resumable(id).unwrap().1;
     let evolution: Evolution = serde_json::from_str(&checkpoint).unwrap();
     assert_eq!(evolution.n_generations(), 0);
     assert_eq!(checkpoint_json(&evolution), checkpoint);
@@ -231,7 +236,7 @@ fn a_generation_that_cannot_be_committed_leaves_nothing_behind() {
     let before = store.events(id, 1, 100).unwrap();
     assert!(commit(&mut store, id, 0, None).is_err(), "a generation is committed once");
     assert_eq!(store.events(id, 1, 100).unwrap(), before);
-    assert_eq!(store.checkpoint(id).unwrap().unwrap(), "after 0");
+    assert_eq!(store.resumable(id).unwrap().1, "after 0");
 }
 
 #[test]

@@ -111,22 +111,6 @@ fn a_database_of_another_program_is_refused_untouched() {
 }
 
 #[test]
-fn a_damaged_checkpoint_is_named() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut coordinator = CoordinatorProcess::start_in(directory.path());
-    let id = TINY.submit(&coordinator);
-    coordinator.process.kill();
-    let database = coordinator.database();
-    database.execute("UPDATE checkpoints SET state = '{\"mu\":'", []).unwrap();
-    drop(database);
-    let outcome = run_coordinator("127.0.0.1:0", directory.path());
-    assert_eq!(outcome.code, Some(2), "{outcome:#?}");
-    assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
-    let expected = format!("checkpoint of experiment {id}");
-    assert!(outcome.stderr.contains(&expected), "{}", outcome.stderr);
-}
-
-#[test]
 fn a_sound_database_is_used_whatever_is_beside_it() {
     let directory = data_directory();
     // What is left of a first start that was killed, and a stale lock file.

@@ -1,0 +1,140 @@
+//! What goes wrong with the store, with the next step.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use crate::ids::ExperimentId;
+
+/// What went wrong with the store.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The directory cannot be created or written. Fix its path or permissions.
+    #[error(
+        "cannot use the data directory {}: {source}; let the coordinator's user write there, or \
+         choose another with --data-dir",
+        path.display()
+    )]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Another coordinator uses the directory.
+    #[error(
+        "the data directory {} is in use by another coordinator; stop it or choose another directory",
+        path.display()
+    )]
+    Locked {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// Another coordinator has opened the database meanwhile, and owns it now.
+    #[error(
+        "another coordinator has taken over the data directory {}; this one stops and loses \
+         nothing: run one coordinator per data directory",
+        path.display()
+    )]
+    TakenOver {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The database was written by a newer version.
+    #[error(
+        "the database has schema version {found}, this program knows up to {supported}; \
+         use the newer program, or another data directory"
+    )]
+    Newer {
+        /// Version of the database.
+        found: i64,
+        /// Version of this program.
+        supported: i64,
+    },
+    /// The database's content makes no sense.
+    #[error(
+        "the database is damaged: {0}; restore it from a copy, or let \
+         `swarmctl doctor --data-dir DIR` say what of it is sound"
+    )]
+    Corrupt(String),
+    /// The database is a copy of one in use, and lacks what was not in the copied file.
+    #[error(
+        "{} is a copy of a database in use without its write-ahead log: the latest generations are \
+         missing; copy it with `swarmctl backup`, or continue from what is there: \
+         `swarmctl doctor --data-dir {} --recover NEW`",
+        path.display(),
+        directory(path).display()
+    )]
+    WithoutLog {
+        /// The database.
+        path: PathBuf,
+    },
+    /// What a run would continue from is not what was stored.
+    #[error(
+        "experiment {id} is damaged and does not continue: {what}; \
+         `swarmctl doctor --data-dir {}` says what can be done",
+        directory(path).display()
+    )]
+    Unsound {
+        /// The experiment.
+        id: ExperimentId,
+        /// What is wrong.
+        what: String,
+        /// The database.
+        path: PathBuf,
+    },
+    /// The disk is full, or cannot be read or written; try again later.
+    #[error("the database cannot be read or written: {0}; is the disk full, or read-only?")]
+    Unavailable(rusqlite::Error),
+    /// The experiment has ended meanwhile.
+    #[error("experiment {0} has ended")]
+    Ended(ExperimentId),
+    /// Anything else is a bug.
+    #[error("the database refuses an operation: {0}; please report this")]
+    Bug(rusqlite::Error),
+}
+
+/// The result of an operation of the store.
+pub type Result<T, E = StoreError> = std::result::Result<T, E>;
+
+impl StoreError {
+    /// Names the database that is damaged.
+    pub fn at(self, path: &Path) -> Self {
+        match self {
+            Self::Corrupt(what) => Self::Corrupt(format!("{}: {what}", path.display())),
+            other => other,
+        }
+    }
+}
+
+impl From<rusqlite::Error> for StoreError {
+    fn from(error: rusqlite::Error) -> Self {
+        use rusqlite::ErrorCode::{
+            CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
+            ReadOnly, SystemIoFailure,
+        };
+        // Every query asks for the types of the schema: other bytes are damage.
+        if matches!(
+            error,
+            rusqlite::Error::FromSqlConversionFailure(..)
+                | rusqlite::Error::IntegralValueOutOfRange(..)
+                | rusqlite::Error::InvalidColumnType(..)
+                | rusqlite::Error::Utf8Error(..)
+        ) {
+            return Self::Corrupt(error.to_string());
+        }
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
+            Some(
+                CannotOpen | DatabaseBusy | DatabaseLocked | DiskFull | ReadOnly | SystemIoFailure,
+            ) => Self::Unavailable(error),
+            _ => Self::Bug(error),
+        }
+    }
+}
+
+/// The directory of a database.
+fn directory(path: &Path) -> &Path {
+    path.parent().unwrap_or(path)
+}

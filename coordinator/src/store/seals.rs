@@ -1,0 +1,160 @@
+//! Seals: keyed digests of what runs depend on, so that a row that was changed by
+//! accident or by hand is found, and so is one that was moved to another place.
+//!
+//! A seal is HMAC-SHA256 of a row's content and its place, under a random key that is
+//! in the database itself, so that a copy can be checked without anything beside it.
+//! Whoever reads the key can make seals: they do not protect against an attacker who
+//! may write the database.
+
+use hmac::{Hmac, KeyInit as _, Mac as _};
+use rusqlite::{Connection, Transaction, params};
+use sha2::Sha256;
+
+use super::{GenerationRecord, Result, champions, checkpoints, history};
+use crate::ids::ExperimentId;
+
+/// A keyed digest.
+pub type Seal = [u8; 32];
+
+/// Makes the seals of a database.
+#[derive(Debug, Clone)]
+pub struct Sealer(Hmac<Sha256>);
+
+impl Sealer {
+    /// The sealer of a database.
+    pub fn of(connection: &Connection) -> rusqlite::Result<Self> {
+        connection.query_row("SELECT seal_key FROM identity", [], |row| {
+            let key = row.get_ref(0)?.as_blob()?;
+            Ok(Self(Hmac::new_from_slice(key).expect("keys may have any length")))
+        })
+    }
+
+    /// Of an experiment's configuration and what identifies its bits.
+    pub fn experiment(
+        &self,
+        id: ExperimentId,
+        config: &[u8],
+        config_digest: &str,
+        fingerprint: &str,
+        genotype_len: u64,
+    ) -> Seal {
+        self.begin("experiment", id)
+            .text(config)
+            .text(config_digest.as_bytes())
+            .text(fingerprint.as_bytes())
+            .number(genotype_len)
+            .finish()
+    }
+
+    /// Of a checkpoint, which follows the `latest` generation.
+    pub fn checkpoint(
+        &self,
+        id: ExperimentId,
+        latest: Option<&GenerationRecord>,
+        state: &[u8],
+    ) -> Seal {
+        self.begin("checkpoint", id)
+            .number(latest.map_or(0, |latest| latest.generation + 1))
+            .text(latest.map_or("", |latest| latest.digest.as_str()).as_bytes())
+            .text(state)
+            .finish()
+    }
+
+    /// Of a row of the history.
+    pub fn generation(&self, id: ExperimentId, generation: &GenerationRecord) -> Seal {
+        let statistics = &generation.statistics;
+        self.begin("generation", id)
+            .number(generation.generation)
+            .real(statistics.best)
+            .real(statistics.mean)
+            .real(statistics.min)
+            .real(statistics.standard_deviation)
+            .text(generation.digest.as_bytes())
+            .number(generation.duration_ms)
+            .number(generation.episodes)
+            .number(generation.workers)
+            .real(generation.idle_share)
+            .finish()
+    }
+
+    /// The beginning of the seal of a row of an experiment.
+    pub fn begin(&self, kind: &str, id: ExperimentId) -> Unfinished {
+        Unfinished(self.0.clone()).text(kind.as_bytes()).number(id.0)
+    }
+}
+
+/// A seal of a row that is not complete yet.
+pub struct Unfinished(Hmac<Sha256>);
+
+impl Unfinished {
+    /// Adds text, or bytes, with their length.
+    pub fn text(self, bytes: &[u8]) -> Self {
+        let mut with = self.number(bytes.len() as u64);
+        with.0.update(bytes);
+        with
+    }
+
+    /// Adds a whole number.
+    pub fn number(mut self, number: u64) -> Self {
+        self.0.update(&number.to_le_bytes());
+        self
+    }
+
+    /// Adds a number. SQLite does not keep the sign of zero.
+    pub fn real(self, number: f64) -> Self {
+        self.number((number + 0.0).to_bits())
+    }
+
+    /// The seal.
+    pub fn finish(self) -> Seal {
+        self.0.finalize().into_bytes().into()
+    }
+}
+
+/// Seals an experiment as it is stored.
+pub fn seal_experiment(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+) -> rusqlite::Result<()> {
+    let seal = experiment_seal(transaction, sealer, id)?.1;
+    transaction.execute("UPDATE experiments SET seal = ?2 WHERE id = ?1", params![id.0, seal])?;
+    Ok(())
+}
+
+/// The seal that an experiment has, and the one that it should have.
+pub fn experiment_seal(
+    connection: &Connection,
+    sealer: &Sealer,
+    id: ExperimentId,
+) -> rusqlite::Result<(Vec<u8>, Seal)> {
+    let mut statement = connection.prepare_cached(
+        "SELECT seal, config, config_digest, fingerprint, genotype_len FROM experiments
+         WHERE id = ?1",
+    )?;
+    statement.query_row([id.0], |row| {
+        let config = row.get_ref(1)?.as_bytes()?;
+        let (digest, fingerprint): (String, String) = (row.get(2)?, row.get(3)?);
+        let seal = sealer.experiment(id, config, &digest, &fingerprint, row.get(4)?);
+        Ok((row.get(0)?, seal))
+    })
+}
+
+/// Seals everything in a database that has no seals yet, as it is.
+pub fn seal_all(transaction: &Transaction<'_>) -> Result<()> {
+    let sealer = Sealer::of(transaction)?;
+    let mut statement = transaction.prepare("SELECT id FROM experiments")?;
+    let ids = statement.query_map([], |row| row.get(0).map(ExperimentId))?;
+    for id in ids {
+        let id = id?;
+        seal_experiment(transaction, &sealer, id)?;
+        let history = history::read_all(transaction, id)?;
+        for (generation, _) in &history {
+            history::seal(transaction, &sealer, id, generation)?;
+        }
+        let latest = history.last().map(|(generation, _)| generation);
+        checkpoints::seal(transaction, &sealer, id, latest)?;
+        champions::seal(transaction, &sealer, id)?;
+    }
+    Ok(())
+}

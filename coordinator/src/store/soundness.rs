@@ -1,0 +1,65 @@
+//! What a run continues from, and whether it is what was stored.
+
+use rusqlite::params;
+
+use super::{
+    ExperimentRecord, ExperimentState, Result, Store, StoreError, add_notice, add_state_event,
+    checkpoints, experiment, seals,
+};
+use crate::ids::ExperimentId;
+
+impl Store {
+    /// An experiment and its checkpoint (evolution as JSON), both as they were stored;
+    /// [`StoreError::Unsound`] if one of them is not.
+    pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, String)> {
+        self.read(|connection| {
+            let unsound = |what: &str| self.unsound(id, what.to_owned());
+            let found = match experiment(connection, id) {
+                Err(StoreError::Corrupt(what)) => return Err(self.unsound(id, what)),
+                other => other?.ok_or_else(|| unsound("it is not there"))?,
+            };
+            let (seal, expected) = seals::experiment_seal(connection, &self.sealer, id)?;
+            if seal != expected {
+                return Err(unsound("its configuration is not what was stored"));
+            }
+            let checkpoint = checkpoints::get(connection, id)?
+                .ok_or_else(|| unsound("its checkpoint is gone"))?;
+            let latest = found.latest.as_ref();
+            if checkpoint.seal != self.sealer.checkpoint(id, latest, &checkpoint.state) {
+                return Err(unsound(
+                    "its checkpoint, or the end of its history, is not what was stored",
+                ));
+            }
+            let state = String::from_utf8(checkpoint.state)
+                .map_err(|_| unsound("its checkpoint is not text"))?;
+            Ok((found, state))
+        })
+    }
+
+    /// The error that a run cannot continue from what is stored.
+    pub fn unsound(&self, id: ExperimentId, what: String) -> StoreError {
+        StoreError::Unsound { id, what, path: self.path.clone() }
+    }
+
+    /// Pauses an experiment from which no run can continue, and says why among its
+    /// events; nothing else of it is changed, so that nothing is lost. Once it is sound
+    /// again, it can be resumed.
+    pub fn set_aside(&mut self, id: ExperimentId, now_ms: u64, reason: &str) -> Result<()> {
+        let paused = ExperimentState::Paused;
+        self.write(|transaction, _| {
+            let n_changed = transaction.execute(
+                "UPDATE experiments SET state = ?2, reason = ?3
+                 WHERE id = ?1 AND state IN ('running', 'paused') AND reason <> ?3",
+                params![id.0, paused.name(), reason],
+            )?;
+            if n_changed > 0 {
+                add_notice(transaction, id, now_ms, reason)?;
+                add_state_event(transaction, id, now_ms, paused, reason)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,233 @@
+//! Databases that were edited, copied wrongly or taken over.
+
+use std::{fs, path::Path};
+
+use super::super::{
+    tests::{commit, new_experiment},
+    *,
+};
+
+/// Two experiments after two generations each.
+fn two_experiments(directory: &Path) -> (Store, [ExperimentId; 2]) {
+    let mut store = Store::open(directory).unwrap();
+    let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
+    for id in ids {
+        commit(&mut store, id, 0, None).unwrap();
+        commit(&mut store, id, 1, None).unwrap();
+    }
+    (store, ids)
+}
+
+#[test]
+fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
+    for (edit, what) in [
+        ("UPDATE experiments SET config = replace(config, '1', '2') WHERE id = 1", "configuration"),
+        ("UPDATE experiments SET config_digest = 'd' WHERE id = 1", "configuration"),
+        ("UPDATE experiments SET fingerprint = 'f' WHERE id = 1", "configuration"),
+        ("UPDATE experiments SET seal = x'' WHERE id = 1", "configuration"),
+        ("UPDATE checkpoints SET state = 'after 2' WHERE experiment_id = 1", "checkpoint"),
+        (
+            "UPDATE checkpoints SET state = CAST(x'ff' AS TEXT) WHERE experiment_id = 1",
+            "checkpoint",
+        ),
+        ("DELETE FROM checkpoints WHERE experiment_id = 1", "checkpoint is gone"),
+        (
+            // The neighbour's, with its seal.
+            "UPDATE checkpoints SET (state, seal) =
+                    (SELECT state, seal FROM checkpoints WHERE experiment_id = 2)
+             WHERE experiment_id = 1",
+            "checkpoint",
+        ),
+        ("DELETE FROM generations WHERE experiment_id = 1 AND generation = 1", "history"),
+        ("UPDATE generations SET digest = 'd' WHERE experiment_id = 1", "history"),
+        ("UPDATE experiments SET state = 'odd' WHERE id = 1", "state \"odd\""),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let (store, [edited, neighbour]) = two_experiments(directory.path());
+        let sound = store.resumable(edited).unwrap();
+        assert_eq!(sound.1, "after 1");
+        store.connection.pragma_update(None, "ignore_check_constraints", true).unwrap();
+        store.connection.execute_batch(edit).unwrap();
+        match store.resumable(edited) {
+            Err(error @ StoreError::Unsound { .. }) => {
+                let text = error.to_string();
+                for part in [what, "experiment 1", "swarmctl doctor --data-dir"] {
+                    assert!(text.contains(part), "{edit}: {text}");
+                }
+            }
+            other => panic!("{edit}: {other:?}"),
+        }
+        store.resumable(neighbour).unwrap();
+    }
+}
+
+#[test]
+fn an_earlier_checkpoint_of_the_same_experiment_is_not_taken_for_the_latest() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mut store, [id, _]) = two_experiments(directory.path());
+    store.connection.execute_batch("CREATE TABLE kept AS SELECT * FROM checkpoints").unwrap();
+    commit(&mut store, id, 2, None).unwrap();
+    store.resumable(id).unwrap();
+    let put_back = "INSERT OR REPLACE INTO checkpoints SELECT * FROM kept";
+    store.connection.execute_batch(put_back).unwrap();
+    assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })));
+}
+
+#[test]
+fn an_edited_champion_is_damage() {
+    for edit in [
+        "UPDATE champions SET genotype = '[0.5,0.5]'",
+        "UPDATE champions SET held_out_mean = 9",
+        "UPDATE experiments SET digest = 'd'",
+        "DELETE FROM generations WHERE generation = 1",
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let (store, [id, _]) = two_experiments(directory.path());
+        store.champion(id).unwrap().unwrap();
+        store.connection.execute_batch(edit).unwrap();
+        assert!(matches!(store.champion(id), Err(StoreError::Corrupt(_))), "{edit}");
+    }
+}
+
+#[test]
+fn an_experiment_that_is_set_aside_says_why_once_and_loses_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mut store, [id, other]) = two_experiments(directory.path());
+    store.set_state(other, 6, ExperimentState::Paused, "for lunch").unwrap();
+    let n_events = store.events(id, 1, 100).unwrap().len();
+    for id in [id, other] {
+        store.set_aside(id, 7, "damaged").unwrap();
+        store.set_aside(id, 8, "damaged").unwrap();
+        let found = store.resumable(id).unwrap().0;
+        assert_eq!((found.state, found.reason.as_str()), (ExperimentState::Paused, "damaged"));
+    }
+    assert_eq!(store.events(id, 1, 100).unwrap().len(), n_events + 2, "a notice and a pause");
+}
+
+#[test]
+fn a_coordinator_that_has_lost_the_database_writes_nothing_and_still_reads() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mut store, [id, _]) = two_experiments(directory.path());
+    let other = Connection::open(file::path_in(directory.path())).unwrap();
+    other.execute("UPDATE identity SET owner = randomblob(16)", []).unwrap();
+    let before = store.events(id, 1, 100).unwrap();
+    for result in [
+        commit(&mut store, id, 2, None),
+        store.set_state(id, 9, ExperimentState::Failed, "why"),
+        store.notice(id, 9, "look"),
+        store.create(&new_experiment(None), 5).map(|_| ()),
+    ] {
+        assert!(matches!(result, Err(StoreError::TakenOver { .. })), "{result:?}");
+    }
+    assert_eq!(store.events(id, 1, 100).unwrap(), before);
+    assert_eq!(store.experiments().unwrap().len(), 2);
+}
+
+#[test]
+fn only_checkpoints_that_nothing_can_continue_from_are_deleted() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = Store::open(directory.path()).unwrap();
+    let mut ended = |state: ExperimentState, reason: &str| {
+        let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+        commit(&mut store, id, 0, None).unwrap();
+        if state == ExperimentState::Completed {
+            commit(&mut store, id, 1, Some(reason)).unwrap();
+        } else {
+            store.set_state(id, 6, state, reason).unwrap();
+        }
+        checkpoints::get(&store.connection, id).unwrap().is_some()
+    };
+    assert!(!ended(ExperimentState::Failed, "why"));
+    assert!(!ended(ExperimentState::Cancelled, "enough"));
+    assert!(!ended(ExperimentState::Completed, "the target is reached"));
+    assert!(ended(ExperimentState::Completed, ""), "it can be given more generations");
+    assert!(ended(ExperimentState::Paused, "for lunch"));
+}
+
+/// Copies the database of a directory, with or without its log.
+fn copy(directory: &Path, with_log: bool) -> tempfile::TempDir {
+    let to = tempfile::tempdir().unwrap();
+    let (from, into) = (file::path_in(directory), file::path_in(to.path()));
+    if with_log {
+        fs::copy(write_ahead_log::path(&from), write_ahead_log::path(&into)).unwrap();
+    }
+    fs::copy(from, into).unwrap();
+    to
+}
+
+#[test]
+fn a_copy_of_a_database_in_use_is_refused_without_its_log() {
+    let directory = tempfile::tempdir().unwrap();
+    let assert_refused = || {
+        let copied = copy(directory.path(), false);
+        match Store::open(copied.path()) {
+            Err(error @ StoreError::WithoutLog { .. }) => {
+                assert!(error.to_string().contains("swarmctl backup"), "{error}");
+            }
+            other => panic!("{other:?}"),
+        }
+    };
+    let mut store = Store::open(directory.path()).unwrap();
+    assert_refused();
+    let (id, _) = store.create(&new_experiment(None), 5).unwrap();
+    assert_refused();
+
+    // As a killed coordinator leaves it.
+    let killed = copy(directory.path(), true);
+    // Whoever looks into it may move the log into the main file.
+    let looked_at = copy(directory.path(), true);
+    let looking = Connection::open(file::path_in(looked_at.path())).unwrap();
+    looking.query_row("SELECT count(*) FROM experiments", [], |_| Ok(())).unwrap();
+    drop(looking);
+    assert!(!write_ahead_log::exists(&file::path_in(looked_at.path())));
+    drop(store);
+    let stopped = copy(directory.path(), false);
+    for sound in [killed, looked_at, stopped] {
+        Store::open(sound.path()).unwrap().resumable(id).unwrap();
+    }
+}
+
+#[test]
+fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = Store::open(directory.path()).unwrap();
+    let new = NewExperiment { checkpoint: "x".repeat(1 << 20), ..new_experiment(None) };
+    let database = file::path_in(directory.path());
+    let log_len = || fs::metadata(write_ahead_log::path(&database)).unwrap().len();
+    let mut n_folded = 0;
+    for _ in 0..40 {
+        let before = log_len();
+        store.create(&new, 5).unwrap();
+        n_folded += u32::from(log_len() < before);
+    }
+    assert_eq!(n_folded, 2, "40 MB are more than twice 16 MB");
+    let copied = copy(directory.path(), false);
+    assert!(matches!(Store::open(copied.path()), Err(StoreError::WithoutLog { .. })));
+    let copied = copy(directory.path(), true);
+    assert_eq!(Store::open(copied.path()).unwrap().experiments().unwrap().len(), 40);
+}
+
+#[test]
+fn a_database_of_the_second_schema_is_sealed_as_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let (store, [running, ended]) = two_experiments(directory.path());
+    drop(store);
+    let database = Connection::open(file::path_in(directory.path())).unwrap();
+    database
+        .execute_batch(
+            "ALTER TABLE experiments DROP COLUMN seal;
+             ALTER TABLE generations DROP COLUMN seal;
+             ALTER TABLE checkpoints DROP COLUMN seal;
+             ALTER TABLE champions DROP COLUMN seal;
+             DROP TABLE identity;
+             PRAGMA user_version = 2;
+             UPDATE experiments SET state = 'cancelled' WHERE id = 2;",
+        )
+        .unwrap();
+    drop(database);
+    let store = Store::open(directory.path()).unwrap();
+    assert_eq!(store.resumable(running).unwrap().1, "after 1");
+    store.champion(running).unwrap().unwrap();
+    store.champion(ended).unwrap().unwrap();
+    assert!(checkpoints::get(&store.connection, ended).unwrap().is_none());
+}

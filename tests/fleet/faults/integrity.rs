@@ -1,0 +1,123 @@
+//! Data directories that somebody else edits, or uses at the same time.
+
+use std::fs;
+
+use harness::{CoordinatorProcess, LogLine, WorkerProcess, run_coordinator};
+use rusqlite::{Connection, params};
+
+use super::{OTHER, TINY};
+
+/// Waits until an experiment is paused because it is damaged; returns the reason.
+fn wait_for_pause(coordinator: &CoordinatorProcess) -> String {
+    let is_pause =
+        |line: &LogLine| line["message"] == "experiment paused" && line["level"] == "ERROR";
+    let line = coordinator.process.wait_for("pause", is_pause);
+    line["reason"].as_str().unwrap().to_owned()
+}
+
+/// Edits a stopped coordinator's database and starts the coordinator again.
+fn edit_and_restart(coordinator: &mut CoordinatorProcess, edit: impl FnOnce(&Connection)) {
+    coordinator.process.kill();
+    edit(&coordinator.database());
+    coordinator.restart();
+}
+
+#[test]
+fn an_experiment_whose_configuration_was_edited_waits_for_a_person_and_the_others_go_on() {
+    let mut coordinator = CoordinatorProcess::start();
+    let edited = TINY.submit(&coordinator);
+    let sound = OTHER.submit(&coordinator);
+    let read = "SELECT config FROM experiments WHERE id = ?1";
+    let write = "UPDATE experiments SET config = ?2 WHERE id = ?1";
+    let original: String =
+        coordinator.database().query_row(read, [edited], |row| row.get(0)).unwrap();
+    // Another seed, and the same everywhere else.
+    let changed = original.replace("\"seed\":7", "\"seed\":6");
+    assert_ne!(changed, original);
+    edit_and_restart(&mut coordinator, |database| {
+        database.execute(write, params![edited, changed]).unwrap();
+    });
+
+    let reason = wait_for_pause(&coordinator);
+    for part in ["its configuration is not what was stored", "swarmctl doctor --data-dir"] {
+        assert!(reason.contains(part), "{reason}");
+    }
+    assert!(reason.contains(&format!("experiment {edited} ")), "{reason}");
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    OTHER.assert_undisturbed(coordinator.watch(sound));
+    let id = edited.to_string();
+    let explained = coordinator.swarmctl(&["explain", &id]).expect_success().json();
+    assert_eq!(explained["experiment"]["state"], "paused");
+    assert_eq!(explained["experiment"]["reason"], reason.as_str());
+    assert_eq!(explained["experiment"]["generations_done"], 0);
+    let refused = coordinator.swarmctl(&["resume", &id]);
+    assert_eq!(refused.code, Some(3), "{refused:#?}");
+    assert!(refused.stderr.contains("its configuration is not"), "{}", refused.stderr);
+
+    // Once it is as it was, it continues, even without a restart.
+    coordinator.database().execute(write, params![edited, original]).unwrap();
+    coordinator.swarmctl(&["resume", &id]).expect_success();
+    TINY.assert_undisturbed(coordinator.watch(edited));
+}
+
+#[test]
+fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
+    let mut coordinator = CoordinatorProcess::start();
+    let workers = WorkerProcess::start_many(&coordinator, 1);
+    let id = TINY.submit(&coordinator);
+    coordinator.wait_for_generation(1);
+    edit_and_restart(&mut coordinator, |database| {
+        // Digits of some numbers: still valid JSON, and a valid evolution.
+        let edit = "UPDATE checkpoints SET state = replace(state, '0.1', '0.2')
+                    WHERE state LIKE '%0.1%'";
+        assert_eq!(database.execute(edit, []).unwrap(), 1);
+    });
+    let reason = wait_for_pause(&coordinator);
+    assert!(reason.contains("its checkpoint"), "{reason}");
+    let n_committed = coordinator.n_committed(id);
+    // The next start says the same, and nothing has happened meanwhile.
+    coordinator.process.kill();
+    coordinator.restart();
+    assert_eq!(wait_for_pause(&coordinator), reason);
+    assert_eq!(coordinator.n_committed(id), n_committed);
+    drop(workers);
+}
+
+#[test]
+fn a_deleted_lock_file_does_not_let_a_second_coordinator_in() {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let id = TINY.submit(&coordinator);
+    coordinator.wait_for_generation(0);
+    fs::remove_file(coordinator.data_dir().join("swarmevo.lock")).unwrap();
+    let second = run_coordinator("127.0.0.1:0", coordinator.data_dir());
+    assert_eq!(second.code, Some(2), "{second:#?}");
+    assert_eq!(second.stderr.lines().count(), 1, "{}", second.stderr);
+    assert!(second.stderr.contains("in use by another coordinator"), "{}", second.stderr);
+    TINY.assert_undisturbed(coordinator.watch(id));
+}
+
+#[test]
+fn a_coordinator_that_loses_its_database_to_another_stops_and_fails_nothing() {
+    let mut coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let id = TINY.submit(&coordinator);
+    coordinator.wait_for_generation(1);
+    // What a coordinator on another machine, whose locks do not reach here, does first.
+    let claim = "UPDATE identity SET owner = randomblob(16)";
+    coordinator.database().execute(claim, []).unwrap();
+    assert_eq!(coordinator.process.wait().code(), Some(3));
+    let lines = coordinator.process.lines();
+    let last = lines.last().unwrap();
+    assert_eq!(last["level"], "ERROR");
+    assert!(last["message"].as_str().unwrap().contains("has taken over"), "{last}");
+    assert_eq!(lines.iter().filter(|line| line["level"] == "ERROR").count(), 1, "{lines:#?}");
+    let state: String = coordinator
+        .database()
+        .query_row("SELECT state FROM experiments", [], |row| row.get(0))
+        .unwrap();
+    assert_eq!(state, "running");
+
+    coordinator.restart();
+    TINY.assert_undisturbed(coordinator.watch(id));
+}
