@@ -3,7 +3,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
+    env, fs,
     path::{Path, PathBuf},
 };
 
@@ -12,8 +12,12 @@ use experiment_file::ExperimentConfig;
 use harness::{swarmctl, workspace_file};
 use serde_json::Value;
 
-/// Generations that are computed again.
-const N_GENERATIONS: usize = 3;
+/// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, 1 without
+/// it. `.ci/run` takes 3, which is a minute of CPU.
+fn n_generations() -> usize {
+    let text = env::var("SWARM_TEST_GENERATIONS").unwrap_or_else(|_| "1".to_owned());
+    text.parse().unwrap_or_else(|_| panic!("SWARM_TEST_GENERATIONS is {text}, not a number"))
+}
 
 /// A run in `results/`.
 struct Run {
@@ -86,9 +90,10 @@ fn runs_are_complete_and_of_the_shipped_experiments() {
 
 #[test]
 fn runs_that_are_repeated_begin_with_the_same_bits() {
+    let n_generations = n_generations();
     for run in Run::all() {
         let data_dir = tempfile::tempdir().unwrap();
-        let generations = N_GENERATIONS.to_string();
+        let generations = n_generations.to_string();
         let lines = swarmctl([
             "run",
             &run.config_path(),
@@ -101,11 +106,11 @@ fn runs_that_are_repeated_begin_with_the_same_bits() {
         ])
         .expect_success()
         .json_lines();
-        let again: Vec<&str> = lines[..N_GENERATIONS]
+        let again: Vec<&str> = lines[..n_generations]
             .iter()
             .map(|generation| generation["digest"].as_str().unwrap())
             .collect();
-        let published: Vec<&str> = run.history[..N_GENERATIONS]
+        let published: Vec<&str> = run.history[..n_generations]
             .iter()
             .map(|generation| generation["digest"].as_str())
             .collect();

@@ -61,14 +61,14 @@ fn generation_time(config: EngineConfig, speeds: &[f64], n_individuals: usize) -
 }
 
 #[test]
-fn ten_thousand_workers_come_and_go_and_a_hundred_thousand_individuals_are_evaluated() {
+fn a_thousand_workers_come_and_go_and_ten_thousand_individuals_are_evaluated() {
     let model = FleetModel { checks: false, trial: SECOND, ..MODEL };
     let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));
-    for worker in 0..10_000 {
+    for worker in 0..1000 {
         fleet.join(1, 0.25 + uniform(worker));
     }
     fleet.submit(EXPERIMENT, 100);
-    fleet.ask(EXPERIMENT, 0, 100_000, 1);
+    fleet.ask(EXPERIMENT, 0, 10_000, 1);
     let mut n_replaced = 0;
     while fleet.evaluated.is_empty() {
         fleet.run_for(SECOND);
@@ -90,8 +90,8 @@ fn ten_thousand_workers_come_and_go_and_a_hundred_thousand_individuals_are_evalu
         assert!(fleet.now() < HOUR);
     }
     assert!(fleet.failed.is_empty(), "{:?}", fleet.failed);
-    assert!(n_replaced > 100);
-    assert_right(&fleet, 100_000, 1);
+    assert!(n_replaced > 10);
+    assert_right(&fleet, 10_000, 1);
 }
 
 #[test]
@@ -126,8 +126,8 @@ fn a_stalled_worker_holds_nobody_up() {
 
 #[test]
 fn short_items_keep_slots_busy_over_a_slow_network() {
-    let model =
-        FleetModel { trial: Duration::from_millis(1), latency: Duration::from_millis(4), ..MODEL };
+    let (trial, latency) = (Duration::from_millis(1), Duration::from_millis(4));
+    let model = FleetModel { trial, latency, checks: false, ..MODEL };
     let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));
     fleet.join(4, 1.0);
     fleet.submit(EXPERIMENT, 100);

@@ -102,11 +102,10 @@ fn assert_converges(name: &str, params: &AlgorithmParams, cases: &[Case]) {
     for case in cases {
         let algorithm = Algorithm::new(name, params, case.d).unwrap();
         let start = evolution_of(vec![algorithm], case.population_size);
-        let mut needed: Vec<usize> =
-            (0..11).map(|seed| n_evaluations(case, &start, seed)).collect();
-        needed.sort_unstable();
-        let function = case.function;
-        assert!(needed[5] <= case.budget, "{name} on {function:?} in {}: {needed:?}", case.d);
+        // The median is within the budget as soon as six of the seeds are.
+        let within = |seed: &u64| n_evaluations(case, &start, *seed) <= case.budget;
+        let n_within = (0..11).filter(within).take(6).count();
+        assert_eq!(n_within, 6, "{name} on {:?} in {}", case.function, case.d);
     }
 }
 
