@@ -14,6 +14,7 @@
 //! - `health_check`: asks another process's coordinator how it is
 //! - [`referee`]: evaluates single items, in a process of its own
 //! - [`metrics`]: what can be scraped
+//! - `memory`: what an experiment takes of it
 //! - [`limits`]: every bound on what the network can ask for
 
 mod clock;
@@ -24,6 +25,7 @@ mod failpoint;
 mod health_check;
 pub mod ids;
 pub mod limits;
+mod memory;
 pub mod metrics;
 pub mod priority;
 mod queries;

@@ -54,6 +54,10 @@ pub const KEY_LEN_MAX: usize = 128;
 /// Bytes of the problems of a configuration: they travel in a header, whose size
 /// clients limit.
 pub const PROBLEMS_LEN_MAX: usize = 4096;
+/// MiB of memory that all unfinished experiments together may take, as estimated, unless
+/// whoever starts the coordinator chooses another number. It does not depend on the
+/// machine: what one accepts, all accept.
+pub const MEMORY_BUDGET_MIB: u32 = 4096;
 /// Experiments that may be unfinished at the same time.
 pub const UNFINISHED_MAX: usize = 1000;
 /// Time for what a client changes to be stored before the client is told that it
@@ -61,6 +65,12 @@ pub const UNFINISHED_MAX: usize = 1000;
 pub const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Evaluations that are computed at the same time; more wait, as calls.
 pub const EVALUATIONS_MAX: usize = 16;
+/// Bytes of experiment files and genotypes from clients that are being checked, wait, or
+/// are evaluated: some thirty of the largest evaluations, or thousands of usual ones.
+pub const REQUESTS_LEN_MAX: usize = 256 << 20;
+/// Experiment files that are checked at the same time; more wait. A check compiles the
+/// experiment, for which a large one takes a processor and tens of megabytes.
+pub const CHECKS_MAX: usize = 4;
 /// Numbers that an evaluation gives, 16 MiB: trials x steps x measures of the task.
 pub const EVALUATION_VALUES_MAX: usize = 1 << 21;
 /// Numbers of one of its trials, 2 MiB: a trial travels in one message.

@@ -6,7 +6,10 @@ use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
 
 use access_args::{AccessArgs, AccessInputError};
 use clap::{Parser, Subcommand};
-use coordinator::{Coordinator, CoordinatorConfig, RunError, StartError, health_check, referee};
+use coordinator::{
+    Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
+    referee,
+};
 use swarm_telemetry::{LogArgs, MetricsArgs};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -41,6 +44,11 @@ struct Args {
     /// differ, one of the two is faulty, and the experiment is paused.
     #[arg(long, default_value_t = 0.0, value_parser = fraction)]
     audit_fraction: f64,
+    /// MiB of memory that unfinished experiments may take together, as estimated from their
+    /// population, genes and algorithm. A submission beyond it is refused; after a restart
+    /// with less, experiments wait for others to end.
+    #[arg(long, value_name = "MIB", default_value_t = MEMORY_BUDGET_MIB)]
+    memory_budget: u32,
     #[command(flatten)]
     metrics: MetricsArgs,
     #[command(flatten)]
@@ -145,6 +153,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         lease,
         access: args.access.load()?,
         audit_fraction: args.audit_fraction,
+        memory_budget: u64::from(args.memory_budget) << 20,
         metrics_listen: args.metrics.metrics_listen,
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })

@@ -30,8 +30,6 @@ pub struct Submission {
 pub struct CheckedSubmission {
     /// For the store.
     pub new: NewExperiment,
-    /// Before its first generation.
-    pub evolution: Evolution,
     /// Keys of the file without effect, and parameters that keep their defaults; one
     /// line each.
     pub warnings: Vec<String>,
@@ -63,6 +61,6 @@ impl Submission {
             priority: self.priority,
             config,
         };
-        Ok(CheckedSubmission { new, evolution, warnings })
+        Ok(CheckedSubmission { new, warnings })
     }
 }

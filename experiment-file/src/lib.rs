@@ -87,7 +87,7 @@ use serde_json::json;
 pub use actuators::*;
 pub use algorithm::*;
 pub use description::{
-    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Parameter, ParameterValue,
+    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, Parameter, ParameterValue,
 };
 pub use fitness::*;
 pub use neuron::*;

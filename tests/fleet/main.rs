@@ -3,6 +3,7 @@
 //! `cargo test -p fleet-tests --test fleet faults::` runs one subject.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod budgets;
 mod command_line;
 mod determinism;
 mod evaluation;

@@ -51,7 +51,12 @@ impl CoordinatorProcess {
 
     /// Starts a coordinator on a data directory.
     pub fn start_in(data_dir: &Path) -> Self {
-        Self::launch(data_dir.to_owned(), None, &[], None)
+        Self::start_in_with(data_dir, &[])
+    }
+
+    /// Starts a coordinator on a data directory with more arguments.
+    pub fn start_in_with(data_dir: &Path, args: &[&str]) -> Self {
+        Self::launch(data_dir.to_owned(), None, args, None)
     }
 
     fn launch(

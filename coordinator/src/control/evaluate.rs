@@ -5,7 +5,7 @@ use std::sync::Arc;
 use evolution::{ALGORITHMS, Genotype};
 use experiment_file::{ExperimentConfig, limits};
 use sim_core::Simulation;
-use tokio::{sync::OwnedSemaphorePermit, task};
+use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     driver::DriverEvent,
@@ -14,7 +14,7 @@ use crate::{
     runs::Evaluation,
 };
 
-use super::{Control, ControlError};
+use super::{Control, ControlError, requests::RequestPlace};
 
 /// What a client wants evaluated.
 #[derive(Debug)]
@@ -38,6 +38,7 @@ pub struct CheckedEvaluation {
     pub measures: Vec<String>,
     /// Steps of an episode.
     pub n_steps: u32,
+    place: RequestPlace,
 }
 
 /// An evaluated genotype. Counts as being computed until it is dropped, so that the
@@ -49,12 +50,20 @@ pub struct Evaluated {
     /// Numbers per trial.
     n_values: usize,
     _permit: OwnedSemaphorePermit,
+    _place: RequestPlace,
 }
 
 impl EvaluationOrder {
+    /// Bytes that it takes until it is answered.
+    fn len(&self) -> usize {
+        2 * self.config_json.len() + size_of_val(&*self.genotype)
+    }
+
     /// Checks everything about an order; work for a CPU.
-    pub fn check(self) -> Result<CheckedEvaluation, ControlError> {
-        let Self { config_json, genotype, n_trials, priority } = self;
+    fn check(self, place: RequestPlace) -> Result<CheckedEvaluation, ControlError> {
+        let Self { config_json, mut genotype, n_trials, priority } = self;
+        // It waits, and a list that grew as it was read has room for more.
+        genotype.shrink_to_fit();
         if n_trials == 0 || n_trials > limits::TRIALS {
             let message = format!("trial_count is {n_trials}, not within 1..={}", limits::TRIALS);
             return Err(ControlError::Invalid(message));
@@ -77,6 +86,7 @@ impl EvaluationOrder {
             measures: simulation.measure_names().iter().map(ToString::to_string).collect(),
             n_steps: simulation.n_steps(),
             evaluation: Evaluation { spec, genotype, n_trials, n_values, priority },
+            place,
         })
     }
 }
@@ -94,22 +104,20 @@ impl Control {
         &self,
         order: EvaluationOrder,
     ) -> Result<CheckedEvaluation, ControlError> {
-        // Compiling is work for a CPU, not for the I/O threads.
-        task::spawn_blocking(move || order.check())
-            .await
-            .map_err(|_| ControlError::Panicked("checking the configuration"))?
+        let place = self.requests.enter(order.len())?;
+        self.requests.check(move || order.check(place)).await?
     }
 
     /// Has the fleet evaluate a genotype, once few enough others are evaluated.
     /// Dropping the future tells the driver that nobody waits.
     pub async fn evaluate(&self, checked: CheckedEvaluation) -> Result<Evaluated, ControlError> {
-        let evaluation = checked.evaluation;
+        let CheckedEvaluation { evaluation, place, .. } = checked;
         let n_values = evaluation.n_values;
         let permits = Arc::clone(&self.evaluations);
         let permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
         let result =
             self.ask(|reply| DriverEvent::EvaluationRequested(Box::new(evaluation), reply));
         let values = result.await?.map_err(ControlError::EvaluationFailed)?;
-        Ok(Evaluated { values, n_values, _permit: permit })
+        Ok(Evaluated { values, n_values, _permit: permit, _place: place })
     }
 }

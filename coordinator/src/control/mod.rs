@@ -6,6 +6,7 @@
 mod evaluate;
 mod explain;
 mod placement;
+mod requests;
 mod restart;
 mod steer;
 mod submit;
@@ -22,11 +23,14 @@ use crate::{
     driver::{DriverEvent, EventSender},
     engine::WorkerStatus,
     ids::ExperimentId,
-    limits::{EVALUATIONS_MAX, UNFINISHED_MAX},
+    limits::{EVALUATIONS_MAX, REQUESTS_LEN_MAX, UNFINISHED_MAX},
+    memory::Shortage,
     queries::{self, QueryError},
     shared_store::SharedStore,
     store::{ExperimentRecord, StoreError},
 };
+
+use requests::Requests;
 
 pub use evaluate::{CheckedEvaluation, EvaluationOrder};
 pub use explain::Explanation;
@@ -37,6 +41,9 @@ pub use submit::Submitted;
 pub struct Control {
     events: EventSender,
     store: SharedStore,
+    /// Bytes that all unfinished experiments may take together.
+    memory_budget: u64,
+    requests: Requests,
     /// One for each evaluation that is computed.
     evaluations: Arc<Semaphore>,
     /// Unfinished experiments that are damaged, so that the driver does not know them.
@@ -55,6 +62,16 @@ pub enum ControlError {
     /// Too much is going on already.
     #[error("{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some")]
     TooManyUnfinished,
+    /// Clients have sent too much at the same time.
+    #[error(
+        "experiment files and genotypes of {} MiB, as much as the coordinator takes at the \
+         same time, are being checked or wait to be evaluated; try again when some are done",
+        REQUESTS_LEN_MAX >> 20
+    )]
+    TooManyRequests,
+    /// There is no memory for another experiment.
+    #[error("{0}")]
+    NoMemory(Shortage),
     /// A change is not stored in time; it will be.
     #[error(
         "the database does not take it that experiment {0} is changed; \
@@ -82,10 +99,12 @@ impl From<StoreError> for ControlError {
 }
 
 impl Control {
-    /// The way to the coordinator with this driver and store.
-    pub fn new(events: EventSender, store: SharedStore) -> Self {
+    /// The way to the coordinator with this driver and store. `memory_budget`: bytes that
+    /// all unfinished experiments may take together.
+    pub fn new(events: EventSender, store: SharedStore, memory_budget: u64) -> Self {
         let evaluations = Arc::new(Semaphore::new(EVALUATIONS_MAX));
-        Self { events, store, evaluations, set_aside: Arc::default() }
+        let requests = Requests::default();
+        Self { events, store, memory_budget, requests, evaluations, set_aside: Arc::default() }
     }
 
     /// The connected workers, in the order in which they joined.

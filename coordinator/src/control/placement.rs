@@ -1,7 +1,7 @@
 //! Decides which experiment a submission leads to: a new one, the one of the same
 //! request, or one of the same bits that can go on.
 
-use evolution::{ALGORITHMS, Evolution};
+use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 use tracing::warn;
 
@@ -9,6 +9,7 @@ use crate::{
     clock,
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
+    memory::{self, Shortage},
     runs::Runnable,
     store::{ExperimentRecord, ExperimentState, NewExperiment, Store, StoreError},
 };
@@ -21,15 +22,18 @@ pub enum Placement {
     RunsAlready(ExperimentId),
     /// Too many experiments are unfinished.
     TooMany,
+    /// Unfinished experiments leave too little memory.
+    NoMemory(Shortage),
 }
 
 /// Stores a submission, or finds the experiment that it stands for: the one of the same
-/// request, or, if `resume_unfinished`, one of the same bits.
+/// request, or, if `resume_unfinished`, one of the same bits. `memory_budget`: bytes that
+/// all unfinished experiments may take together, whether they run or wait.
 pub fn place(
     store: &mut Store,
     new: NewExperiment,
-    evolution: Evolution,
     resume_unfinished: bool,
+    memory_budget: u64,
 ) -> Result<Placement, StoreError> {
     if let Some(request_id) = &new.request_id
         && let Some(id) = store.experiment_of_request(request_id)?
@@ -37,19 +41,39 @@ pub fn place(
         return Ok(Placement::RunsAlready(id));
     }
     let experiments = store.experiments()?;
-    if resume_unfinished && let Some(placement) = resume(store, &experiments, &new)? {
+    let shortage = shortage(&experiments, &new, memory_budget);
+    if resume_unfinished && let Some(placement) = resume(store, &experiments, &new, shortage)? {
         return Ok(placement);
     }
     let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
     if experiments.iter().filter(is_unfinished).count() >= UNFINISHED_MAX {
         return Ok(Placement::TooMany);
     }
+    if let Some(shortage) = shortage {
+        return Ok(Placement::NoMemory(shortage));
+    }
     let (id, is_new) = store.create(&new, clock::unix_ms())?;
     Ok(if is_new {
-        Placement::Runs(Box::new(Runnable::new(id, new.config, evolution, new.priority)))
+        let genotype_len = new.genotype_len as u64;
+        Placement::Runs(Box::new(Runnable::new(id, new.config, genotype_len, new.priority)))
     } else {
         Placement::RunsAlready(id)
     })
+}
+
+/// Why there is no memory for a submission, if there is none.
+fn shortage(
+    experiments: &[ExperimentRecord],
+    new: &NewExperiment,
+    memory_budget: u64,
+) -> Option<Shortage> {
+    // One of another release does not run.
+    let takes_memory =
+        |e: &&ExperimentRecord| e.state.is_unfinished() && e.fingerprint == sim_core::FINGERPRINT;
+    let taken = experiments.iter().filter(takes_memory);
+    let in_use = taken.map(|e| memory::estimate(&e.config_json, e.genotype_len)).sum();
+    let needed = memory::estimate(&new.config.to_canonical_json(), new.genotype_len as u64);
+    Shortage::check(needed, in_use, memory_budget).err()
 }
 
 /// Looks for an experiment of the same bits that can go on: one that is
@@ -58,6 +82,7 @@ fn resume(
     store: &mut Store,
     experiments: &[ExperimentRecord],
     new: &NewExperiment,
+    shortage: Option<Shortage>,
 ) -> Result<Option<Placement>, StoreError> {
     let config_json = new.config.to_canonical_json();
     // The digest tells versions of the simulation apart.
@@ -78,6 +103,9 @@ fn resume(
             continue;
         }
         match reopened(store, experiment.id, &config_json) {
+            Ok(_) if let Some(shortage) = shortage => {
+                return Ok(Some(Placement::NoMemory(shortage)));
+            }
             Ok(runnable) => {
                 store.reopen(experiment.id, &config_json, clock::unix_ms())?;
                 return Ok(Some(Placement::Runs(Box::new(runnable))));

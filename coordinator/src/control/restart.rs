@@ -9,17 +9,19 @@ use crate::{
     driver::DriverEvent,
     ids::ExperimentId,
     runs::Runnable,
-    store::{ExperimentRecord, StoreError},
+    store::{ExperimentRecord, ExperimentState, StoreError},
 };
 
 use super::{Control, ControlError};
 
 impl Control {
-    /// Hands every unfinished experiment that this program can compute to the driver.
-    /// One that is damaged is paused, and the others go on.
+    /// Hands every unfinished experiment that this program can compute to the driver:
+    /// first those that are not paused, as memory may not suffice for all. One that is
+    /// damaged is paused, and the others go on.
     pub async fn run_unfinished(&self) -> Result<(), StoreError> {
         let mut experiments = self.store.read(|store| store.experiments()).await?;
         experiments.retain(|experiment| experiment.state.is_unfinished());
+        experiments.sort_by_key(|experiment| experiment.state == ExperimentState::Paused);
         for ExperimentRecord { id, .. } in experiments {
             match self.restore(id).await {
                 Ok(Some(runnable)) => self.start(runnable).await,

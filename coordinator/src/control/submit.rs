@@ -1,6 +1,5 @@
 //! Submits an experiment: checks it, stores it, has it run.
 
-use tokio::task;
 use tracing::info;
 
 use crate::{
@@ -43,17 +42,16 @@ impl Control {
                 return Err(ControlError::Invalid(message));
             }
         }
-        // Compiling is work for a CPU, not for the I/O threads.
-        let checked = task::spawn_blocking(move || submission.check())
-            .await
-            .map_err(|_| ControlError::Panicked("checking the configuration"))?;
-        let CheckedSubmission { new, evolution, warnings } = checked?;
+        let _place = self.requests.enter(submission.config_json.len())?;
+        let checked = self.requests.check(move || submission.check()).await?;
+        let CheckedSubmission { new, warnings } = checked?;
         // In a task of its own: what is stored must reach the driver even if the
         // client goes away meanwhile.
         let (store, events) = (self.store.clone(), self.events.clone());
+        let memory_budget = self.memory_budget;
         let placing = tokio::spawn(async move {
             let placing =
-                store.try_write(move |store| place(store, new, evolution, resume_unfinished));
+                store.try_write(move |store| place(store, new, resume_unfinished, memory_budget));
             run(placing.await?, &events).await
         });
         let id = placing.await.map_err(|_| ControlError::Panicked("storing the experiment"))??;
@@ -74,5 +72,6 @@ async fn run(placement: Placement, events: &EventSender) -> Result<ExperimentId,
         }
         Placement::RunsAlready(id) => Ok(id),
         Placement::TooMany => Err(ControlError::TooManyUnfinished),
+        Placement::NoMemory(shortage) => Err(ControlError::NoMemory(shortage)),
     }
 }

@@ -63,17 +63,18 @@ pub struct Driver {
 
 impl Driver {
     /// A loop without workers or experiments. `commit_duration` measures how long
-    /// commits take, in s.
+    /// commits take, in s. `memory_budget`: bytes that all experiments together may take.
     pub fn new(
         store: SharedStore,
         events: mpsc::Receiver<DriverEvent>,
         config: EngineConfig,
         shutdown: CancellationToken,
         commit_duration: Histogram,
+        memory_budget: u64,
     ) -> Self {
         Self {
             engine: Engine::new(clock::now(), config),
-            runs: Runs::default(),
+            runs: Runs::new(memory_budget),
             disk: Disk { store, shutdown: shutdown.clone(), commit_duration },
             events,
             shutdown,
@@ -147,12 +148,6 @@ impl Driver {
     }
 
     fn start(&mut self, runnable: Runnable) {
-        let generations = runnable.config.algorithm.generations;
-        info!(
-            experiment = %runnable.id, name = runnable.config.name, seed = runnable.config.seed,
-            generation = runnable.round.trial_set().generation(), generations,
-            "experiment starts"
-        );
         if runnable.is_paused {
             info!(experiment = %runnable.id, "experiment is paused");
         }
@@ -176,6 +171,7 @@ impl Driver {
 
     fn on_task_done(&mut self, done: Result<Done, tokio::task::JoinError>) {
         match done {
+            Ok(Done::Loaded(run, loaded)) => self.runs.on_loaded(run, loaded),
             Ok(Done::Concluded(run, conclusion)) => self.runs.on_concluded(run, conclusion),
             Ok(Done::Committed(run, outcome)) => self.runs.on_committed(run, outcome),
             Ok(Done::ChangeWritten(id, is_stored)) => self.runs.on_change_written(id, is_stored),
@@ -207,6 +203,17 @@ impl Driver {
                 if is_paused {
                     self.engine.on_job_paused(now, job);
                 }
+            }
+            Command::Load { run, config, generation } => {
+                info!(
+                    experiment = %run.experiment, name = config.name, seed = config.seed,
+                    generation, generations = config.algorithm.generations,
+                    "experiment starts"
+                );
+                self.tasks.spawn(tasks::load(run, self.disk.clone()));
+            }
+            Command::PublishWait { experiment, shortage } => {
+                warn!(%experiment, reason = %shortage, "experiment waits for memory");
             }
             Command::Evaluate { job, batch } => self.engine.on_batch_requested(now, job, batch),
             Command::PauseJob { job } => self.engine.on_job_paused(now, job),

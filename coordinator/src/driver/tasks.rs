@@ -1,26 +1,31 @@
 //! What may take long and so runs beside the loop: evolution's arithmetic and the
 //! disk.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use experiment_file::ExperimentConfig;
 use swarm_telemetry::Histogram;
 use tokio::task;
 use tokio_util::sync::CancellationToken;
-use tracing::info;
+use tracing::{error, info};
 
 use crate::{
     clock,
     engine::EvaluatedBatch,
     failpoint,
     ids::ExperimentId,
-    runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId},
+    runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId, restore_evolution},
     shared_store::{Retry, SharedStore, Written},
-    store::{GenerationCommit, GenerationRecord, checkpoint_json},
+    store::{GenerationCommit, GenerationRecord, StoreError, checkpoint_json},
 };
+
+/// Pause before a checkpoint that could not be read is read again.
+const READ_RETRY_DELAY: Duration = Duration::from_secs(5);
 
 /// The outcome of a task.
 pub enum Done {
+    /// A run is loaded, or cannot be.
+    Loaded(RunId, Result<Round, String>),
     /// Conclusions are drawn, or cannot be.
     Concluded(RunId, Result<Next, String>),
     /// A commit is over.
@@ -38,6 +43,39 @@ pub struct Disk {
     pub shutdown: CancellationToken,
     /// Measures the time per commit, s.
     pub commit_duration: Histogram,
+}
+
+/// Reads a run's evolution from the store and draws its next generation.
+pub async fn load(run: RunId, disk: Disk) -> Done {
+    let id = run.experiment;
+    let what = format!("experiment {id}");
+    let stored = loop {
+        match disk.store.read(move |store| store.resumable(id)).await {
+            Err(error @ StoreError::Unavailable(_)) => {
+                let delay = READ_RETRY_DELAY;
+                error!("{what} waits: {error}; trying again in {} s", delay.as_secs());
+                tokio::select! {
+                    () = tokio::time::sleep(delay) => {}
+                    () = disk.shutdown.cancelled() => {
+                        return Done::Loaded(run, Err("the coordinator stops".to_owned()));
+                    }
+                }
+            }
+            other => break other,
+        }
+    };
+    let loading = task::spawn_blocking(move || {
+        let (experiment, checkpoint) = stored.map_err(|error| error.to_string())?;
+        restore_evolution(&experiment, &checkpoint).map(Round::generation)
+    });
+    let loaded = match loading.await {
+        Ok(loaded) => loaded,
+        Err(panic) => Err(format!("evolution panicked ({panic}); please report this")),
+    };
+    if let Err(reason) = &loaded {
+        error!(experiment = %id, reason, "experiment paused");
+    }
+    Done::Loaded(run, loaded)
 }
 
 /// Draws conclusions from an evaluated batch.

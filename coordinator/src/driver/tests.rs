@@ -28,7 +28,7 @@ impl Rig {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
         let config_json = fs::read_to_string(path).unwrap();
         let submission = Submission { config_json, ..Submission::default() };
-        let CheckedSubmission { new, evolution, .. } = submission.check().unwrap();
+        let CheckedSubmission { new, .. } = submission.check().unwrap();
         store.create(&new, 0).unwrap();
         let (_events, queue) = channel();
         let mut driver = Driver::new(
@@ -37,6 +37,7 @@ impl Rig {
             EngineConfig::new(Duration::from_secs(10)),
             CancellationToken::new(),
             crate::metrics::Instruments::default().commit_duration,
+            u64::MAX,
         );
         let (outbox, inbox) = mpsc::channel(1024);
         let (reply, id) = oneshot::channel();
@@ -48,9 +49,13 @@ impl Rig {
             process: None,
         };
         driver.on_event(DriverEvent::WorkerJoined { introduction, link, reply });
-        let runnable = Runnable::new(ID, new.config, evolution, new.priority);
+        let runnable = Runnable::new(ID, new.config, new.genotype_len as u64, new.priority);
         driver.on_event(DriverEvent::ExperimentReady(Box::new(runnable)));
-        Self { driver, inbox, worker: id.await.unwrap(), _directory: directory }
+        driver.carry_out_all();
+        let mut rig = Self { driver, inbox, worker: id.await.unwrap(), _directory: directory };
+        // The experiment is loaded.
+        rig.advance().await;
+        rig
     }
 
     /// Carries out what there is to do; the worker answers all it is sent. Returns

@@ -61,9 +61,11 @@ impl From<ControlError> for Status {
         match error {
             ControlError::Invalid(_) => Self::invalid_argument(text),
             ControlError::Config(error) => Self::invalid_argument(problems(&error)),
-            ControlError::TooManyUnfinished | ControlError::NotStoredYet(_) => {
-                Self::resource_exhausted(text)
-            }
+            ControlError::NoMemory(shortage) if shortage.is_final() => Self::invalid_argument(text),
+            ControlError::TooManyUnfinished
+            | ControlError::TooManyRequests
+            | ControlError::NoMemory(_)
+            | ControlError::NotStoredYet(_) => Self::resource_exhausted(text),
             ControlError::EvaluationFailed(_) | ControlError::Panicked(_) => Self::internal(text),
             ControlError::Query(error) => error.into(),
             ControlError::ShuttingDown => Self::unavailable(text),

@@ -31,8 +31,10 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     let shutdown = CancellationToken::new();
     let config = EngineConfig::new(Duration::from_secs(10));
     let duration = Instruments::default().commit_duration;
-    tokio::spawn(Driver::new(store.clone(), queue, config, shutdown.clone(), duration).run());
-    let service = Experiments { control: Control::new(events, store.clone()), store, shutdown };
+    let driver = Driver::new(store.clone(), queue, config, shutdown.clone(), duration, u64::MAX);
+    tokio::spawn(driver.run());
+    let service =
+        Experiments { control: Control::new(events, store.clone(), u64::MAX), store, shutdown };
     let config_json = include_str!("../../../configs/quickstart.json").to_owned();
     let request = SubmitExperimentRequest { config_json, ..Default::default() };
     service.submit_experiment(Request::new(request)).await.unwrap();

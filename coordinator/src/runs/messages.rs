@@ -7,6 +7,7 @@ use experiment_file::ExperimentConfig;
 use crate::{
     engine::{Batch, EvaluatedBatch},
     ids::{EvaluationId, ExperimentId, JobId},
+    memory::Shortage,
     priority::Priority,
     store::ExperimentState,
 };
@@ -26,6 +27,16 @@ pub enum Command {
         priority: Priority,
         /// Whether it waits to be resumed.
         is_paused: bool,
+    },
+    /// Read a run's evolution from the store, draw its next generation and report
+    /// [`Runs::on_loaded`](super::Runs::on_loaded).
+    Load {
+        /// Of which run.
+        run: RunId,
+        /// Its configuration.
+        config: Arc<ExperimentConfig>,
+        /// Index of that generation.
+        generation: u64,
     },
     /// Have the fleet evaluate a batch; the job has no other in progress.
     Evaluate {
@@ -98,6 +109,13 @@ pub enum Command {
         state: ExperimentState,
         /// For the experiment's owner.
         reason: String,
+    },
+    /// Tell readers of the log that a run waits for memory.
+    PublishWait {
+        /// Of which experiment.
+        experiment: ExperimentId,
+        /// How much is missing.
+        shortage: Shortage,
     },
     /// Answer whoever wants an evaluation.
     AnswerEvaluation {

@@ -22,6 +22,9 @@
 //!   in which things happened. Each client is answered once its change is stored.
 //! - An experiment can be reopened before the end of its former run is reported
 //!   here. Each run has an epoch of its own, and what belongs to another is ignored.
+//! - A run is loaded, which is to say that its evolution is read from the store and its
+//!   first generation drawn, as soon as its estimated memory fits into the budget beside
+//!   that of the runs that are loaded. Until then it waits; its owner is told.
 //! - After [`Runs::on_shutdown`] nothing new is begun; what is being stored is
 //!   stored.
 //! - Evaluations, which nobody stores, only pass through: a batch and an answer.
@@ -42,6 +45,7 @@ use std::{
 use crate::{
     engine::{Batch, EvaluatedBatch},
     ids::{EvaluationId, ExperimentId},
+    memory::Shortage,
     store::ExperimentState,
 };
 
@@ -49,7 +53,7 @@ pub use change_queue::{Change, PendingChange};
 pub use evaluations::Evaluation;
 pub use messages::{Command, CommitOutcome, Request, RequestId, RunId};
 pub use round::{Next, ReadyToCommit, Round};
-pub use runnable::Runnable;
+pub use runnable::{Runnable, restore_evolution};
 pub use stats::RunStats;
 
 use change_queue::ChangeQueue;
@@ -59,8 +63,10 @@ use run::{Committing, End, Run, Stage};
 const CANCELLED: &str = "cancelled by a client";
 
 /// The state machine.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Runs {
+    /// Bytes that all loaded runs together may take.
+    memory_budget: u64,
     runs: BTreeMap<ExperimentId, Run>,
     /// Runs begun so far; also the epoch of the latest.
     n_begun: u64,
@@ -73,6 +79,20 @@ pub struct Runs {
 }
 
 impl Runs {
+    /// No runs. `memory_budget`: bytes that all together may take.
+    pub fn new(memory_budget: u64) -> Self {
+        Self {
+            memory_budget,
+            runs: BTreeMap::new(),
+            n_begun: 0,
+            evaluations: BTreeSet::new(),
+            n_evaluations: 0,
+            changes: ChangeQueue::default(),
+            commands: VecDeque::new(),
+            is_stopping: false,
+        }
+    }
+
     /// The next thing to do, if any. Call until there is none after every handler.
     pub fn poll_command(&mut self) -> Option<Command> {
         self.commands.pop_front()
@@ -81,16 +101,71 @@ impl Runs {
     /// A stored, unfinished experiment is to run: it is new, or has been reopened, or
     /// the coordinator has started.
     pub fn on_submitted(&mut self, runnable: Runnable) {
-        let Runnable { id, config, spec, latest, round, priority, is_paused } = runnable;
+        let Runnable { id, config, spec, memory, latest, priority, is_paused } = runnable;
         if self.is_stopping {
             return;
         }
         self.n_begun += 1;
-        let run = Run::new(config, self.n_begun, latest);
+        let run = Run::new(config, self.n_begun, latest, memory);
         let former = self.runs.insert(id, run);
         self.commands.push_back(Command::StartJob { job: id.into(), spec, priority, is_paused });
-        self.evaluate(id, round);
         self.apply_former_requests(id, former);
+        self.load_what_fits();
+        self.report_shortage(id);
+    }
+
+    /// Has the runs loaded that wait and for which there is memory, the oldest first.
+    fn load_what_fits(&mut self) {
+        if self.is_stopping {
+            return;
+        }
+        let mut in_use = self.memory_in_use();
+        for (&id, run) in &mut self.runs {
+            if run.is_waiting() && Shortage::check(run.memory, in_use, self.memory_budget).is_ok() {
+                in_use += run.memory;
+                run.stage = Stage::Loading;
+                let generation = run.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+                let (config, run) = (Arc::clone(&run.config), run.id(id));
+                self.commands.push_back(Command::Load { run, config, generation });
+            }
+        }
+    }
+
+    /// Tells the owner of a run that waits for memory.
+    fn report_shortage(&mut self, id: ExperimentId) {
+        let in_use = self.memory_in_use();
+        let Some(run) = self.runs.get(&id).filter(|run| run.is_waiting()) else { return };
+        let Err(shortage) = Shortage::check(run.memory, in_use, self.memory_budget) else { return };
+        let reason = format!("waits for memory: {shortage}");
+        self.commands.push_back(Command::PublishWait { experiment: id, shortage });
+        let change = Change::Notice(reason);
+        self.change(PendingChange { experiment: id, change, requests: Vec::new() });
+    }
+
+    /// Bytes of the runs that are loaded.
+    fn memory_in_use(&self) -> u64 {
+        self.runs.values().filter(|run| run.has_memory()).map(|run| run.memory).sum()
+    }
+
+    /// A run's evolution has been read from the store; or why that is not possible.
+    pub fn on_loaded(&mut self, run_id: RunId, loaded: Result<Round, String>) {
+        if self.is_stopping {
+            return;
+        }
+        let Some(run) = self.find(run_id).filter(|run| run.end.is_none()) else { return };
+        if !matches!(run.stage, Stage::Loading) {
+            return;
+        }
+        match loaded {
+            Ok(round) => self.evaluate(run_id.experiment, round),
+            // Nothing is lost yet: it is paused until somebody has looked.
+            Err(reason) => {
+                run.stage = Stage::Unreadable;
+                self.commands.push_back(Command::PauseJob { job: run_id.experiment.into() });
+                self.on_job_suspended(run_id.experiment, reason);
+                self.load_what_fits();
+            }
+        }
     }
 
     /// An experiment can be reopened while changes that were asked of its former run
@@ -169,6 +244,7 @@ impl Runs {
             CommitOutcome::Stored | CommitOutcome::NotWanted => {
                 self.runs.remove(&id);
                 self.commands.push_back(Command::EndJob { job: id.into() });
+                self.load_what_fits();
             }
             CommitOutcome::Failed(reason) => {
                 self.end(id, End { state: ExperimentState::Failed, reason });
@@ -210,6 +286,11 @@ impl Runs {
                 (Change::State(ExperimentState::Paused, reason), Some(command))
             }
             Request::Resume => {
+                if let Some(run) = run
+                    && matches!(run.stage, Stage::Unreadable)
+                {
+                    run.stage = Stage::Waiting;
+                }
                 let command = Command::ResumeJob { job: id.into() };
                 (Change::State(ExperimentState::Running, String::new()), Some(command))
             }
@@ -219,6 +300,7 @@ impl Runs {
             }
         };
         self.commands.extend(command.filter(|_| is_active));
+        self.load_what_fits();
         self.change(PendingChange { experiment: id, change, requests: vec![request_id] });
     }
 
@@ -292,6 +374,7 @@ impl Runs {
         self.commands.push_back(Command::PublishEnd { experiment, state, reason: reason.clone() });
         let change = Change::State(state, reason);
         self.change(PendingChange { experiment, change, requests });
+        self.load_what_fits();
     }
 
     /// Has a change stored after all that came before it.

@@ -16,6 +16,8 @@ use super::{ReadyToCommit, RequestId, Round, RunId};
 pub struct Run {
     /// Its configuration.
     pub config: Arc<ExperimentConfig>,
+    /// Bytes that it takes once it is loaded, about.
+    pub memory: u64,
     /// Tells this run from former ones of the same experiment, before more
     /// generations were asked for.
     pub run_epoch: u64,
@@ -34,6 +36,12 @@ pub struct Run {
 /// Where a generation stands that is not being committed yet.
 #[derive(Debug)]
 pub enum Stage {
+    /// There is no memory for it yet.
+    Waiting,
+    /// Its evolution cannot be read from the store; it is paused.
+    Unreadable,
+    /// Its evolution is being read from the store.
+    Loading,
     /// The fleet evaluates a batch.
     Evaluating(Round),
     /// Conclusions are being drawn.
@@ -63,13 +71,19 @@ pub struct End {
 }
 
 impl Run {
-    /// A run of which nothing is evaluated yet.
-    pub fn new(config: ExperimentConfig, run_epoch: u64, latest: Option<GenerationRecord>) -> Self {
+    /// A run that waits to be loaded. `memory`: bytes that it takes then.
+    pub fn new(
+        config: ExperimentConfig,
+        run_epoch: u64,
+        latest: Option<GenerationRecord>,
+        memory: u64,
+    ) -> Self {
         Self {
             config: Arc::new(config),
+            memory,
             run_epoch,
             latest,
-            stage: Stage::NoneLeft,
+            stage: Stage::Waiting,
             committing: None,
             end: None,
             cancellations: Vec::new(),
@@ -79,6 +93,16 @@ impl Run {
     /// What it is called; `experiment`: its experiment.
     pub fn id(&self, experiment: ExperimentId) -> RunId {
         RunId { experiment, run_epoch: self.run_epoch }
+    }
+
+    /// Whether it waits for memory.
+    pub fn is_waiting(&self) -> bool {
+        matches!(self.stage, Stage::Waiting)
+    }
+
+    /// Whether it takes memory.
+    pub fn has_memory(&self) -> bool {
+        !matches!(self.stage, Stage::Waiting | Stage::Unreadable)
     }
 
     /// Takes the round that the fleet has evaluated, if there is one: conclusions are

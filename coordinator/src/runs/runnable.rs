@@ -7,13 +7,13 @@ use experiment_file::ExperimentConfig;
 
 use crate::{
     ids::ExperimentId,
+    memory,
     priority::Priority,
     store::{ExperimentRecord, ExperimentState, GenerationRecord},
 };
 
-use super::Round;
-
-/// An experiment that can run.
+/// An experiment that can run. Its evolution is read from the store once there is
+/// memory for it.
 #[derive(Debug)]
 pub struct Runnable {
     /// Its id.
@@ -22,10 +22,10 @@ pub struct Runnable {
     pub config: ExperimentConfig,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
+    /// Bytes that it takes while it runs, about.
+    pub memory: u64,
     /// The latest generation that is stored.
     pub latest: Option<GenerationRecord>,
-    /// What is to be evaluated first.
-    pub round: Round,
     /// Its share of the fleet.
     pub priority: Priority,
     /// Whether it waits to be resumed.
@@ -33,50 +33,72 @@ pub struct Runnable {
 }
 
 impl Runnable {
-    /// An experiment that is not paused, with its evolution after some generation.
-    /// Draws the next generation, which may take long.
+    /// An experiment that is not paused, before its first generation.
     pub fn new(
         id: ExperimentId,
         config: ExperimentConfig,
-        evolution: Evolution,
+        genotype_len: u64,
         priority: Priority,
     ) -> Self {
-        let spec = config.to_canonical_json().into();
-        let round = Round::generation(evolution);
-        Self { id, spec, config, latest: None, round, priority, is_paused: false }
+        let spec: Arc<str> = config.to_canonical_json().into();
+        let memory = memory::estimate(&spec, genotype_len);
+        Self { id, spec, config, memory, latest: None, priority, is_paused: false }
     }
 
     /// An experiment as the store has it, or what contradicts what. `checkpoint`:
     /// evolution, as JSON.
     pub fn restore(experiment: &ExperimentRecord, checkpoint: &str) -> Result<Self, String> {
-        let id = experiment.id;
-        let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
-            .map_err(|error| format!("its configuration is not valid: {error}"))?;
-        let config_digest = Digest::of_config(&config, &experiment.fingerprint).to_string();
-        if config_digest != experiment.config_digest {
-            return Err(format!(
-                "its configuration has the digest {config_digest}, and not {}",
-                experiment.config_digest
-            ));
-        }
-        let evolution: Evolution = serde_json::from_str(checkpoint)
-            .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
-        let (n_generations, link) = match &experiment.latest {
-            Some(latest) => (latest.generation + 1, &latest.digest),
-            None => (0, &config_digest),
-        };
-        if evolution.n_generations() != n_generations || evolution.digest().to_string() != *link {
-            return Err(format!(
-                "its history has {n_generations} generations and digest {link}, its checkpoint {} and \
-                 {}",
-                evolution.n_generations(),
-                evolution.digest()
-            ));
-        }
+        let (id, config) = (experiment.id, config(experiment)?);
+        evolution(experiment, &config, checkpoint)?;
         let is_paused = experiment.state == ExperimentState::Paused;
         let latest = experiment.latest.clone();
-        Ok(Self { is_paused, latest, ..Self::new(id, config, evolution, experiment.priority) })
+        let new = Self::new(id, config, experiment.genotype_len, experiment.priority);
+        Ok(Self { is_paused, latest, ..new })
     }
+}
+
+/// Evolution of an experiment as the store has it, or what contradicts what. `checkpoint`:
+/// evolution, as JSON.
+pub fn restore_evolution(
+    experiment: &ExperimentRecord,
+    checkpoint: &str,
+) -> Result<Evolution, String> {
+    evolution(experiment, &config(experiment)?, checkpoint)
+}
+
+fn config(experiment: &ExperimentRecord) -> Result<ExperimentConfig, String> {
+    let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
+        .map_err(|error| format!("its configuration is not valid: {error}"))?;
+    Ok(config)
+}
+
+fn evolution(
+    experiment: &ExperimentRecord,
+    config: &ExperimentConfig,
+    checkpoint: &str,
+) -> Result<Evolution, String> {
+    let config_digest = Digest::of_config(config, &experiment.fingerprint).to_string();
+    if config_digest != experiment.config_digest {
+        return Err(format!(
+            "its configuration has the digest {config_digest}, and not {}",
+            experiment.config_digest
+        ));
+    }
+    let evolution: Evolution = serde_json::from_str(checkpoint)
+        .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
+    let (n_generations, link) = match &experiment.latest {
+        Some(latest) => (latest.generation + 1, &latest.digest),
+        None => (0, &config_digest),
+    };
+    if evolution.n_generations() != n_generations || evolution.digest().to_string() != *link {
+        return Err(format!(
+            "its history has {n_generations} generations and digest {link}, its checkpoint {} and \
+             {}",
+            evolution.n_generations(),
+            evolution.digest()
+        ));
+    }
+    Ok(evolution)
 }
 
 #[cfg(test)]

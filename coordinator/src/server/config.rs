@@ -5,7 +5,7 @@ use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
 use swarm_telemetry::ListenError;
 
 use super::access::{Access, AccessError};
-use crate::store::StoreError;
+use crate::{limits::MEMORY_BUDGET_MIB, store::StoreError};
 
 /// How to run a coordinator.
 #[derive(Debug, Clone)]
@@ -21,6 +21,8 @@ pub struct CoordinatorConfig {
     /// Share of the individuals, 0 to 1, that two workers compute, so that a faulty
     /// one is found.
     pub audit_fraction: f64,
+    /// Bytes of memory that all unfinished experiments may take together, as estimated.
+    pub memory_budget: u64,
     /// Who may connect.
     pub access: Access,
     /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
@@ -37,6 +39,7 @@ impl CoordinatorConfig {
             heartbeat_interval: Duration::from_secs(2),
             lease: Duration::from_secs(10),
             audit_fraction: 0.0,
+            memory_budget: u64::from(MEMORY_BUDGET_MIB) << 20,
             access: Access::default(),
             metrics_listen: None,
         }

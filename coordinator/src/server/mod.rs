@@ -70,11 +70,17 @@ impl Coordinator {
             ..EngineConfig::new(config.lease)
         };
         let commit_duration = instruments.commit_duration.clone();
-        let loop_ =
-            Driver::new(store.clone(), event_queue, engine, shutdown.clone(), commit_duration);
+        let loop_ = Driver::new(
+            store.clone(),
+            event_queue,
+            engine,
+            shutdown.clone(),
+            commit_duration,
+            config.memory_budget,
+        );
         let mut driver = JoinSet::new();
         driver.spawn(loop_.run());
-        let control = Control::new(events.clone(), store.clone());
+        let control = Control::new(events.clone(), store.clone(), config.memory_budget);
         control.run_unfinished().await?;
 
         let calls = instruments.calls.clone();

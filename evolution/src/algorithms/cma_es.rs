@@ -4,7 +4,7 @@
 //! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016,
 //! revised 2023); equation numbers are its own.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, limits};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, limits};
 use nalgebra::DVector;
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,7 @@ impl Described for CmaEs {
         title: "Covariance matrix adaptation evolution strategy",
         learns: "mean, step size, covariance",
         state: "d²/2",
+        keeps: Keeps::Matrix,
         individuals_min: 2,
         genes_max: Some(limits::GENES_OF_FULL_MATRIX),
         parameters: &[MU_INIT, SIGMA_INIT],

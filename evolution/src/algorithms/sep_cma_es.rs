@@ -4,7 +4,7 @@
 //! Ros, Hansen: "A simple modification in CMA-ES achieving linear time and space
 //! complexity", PPSN X (2008).
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,7 @@ impl Described for SepCmaEs {
         title: "CMA-ES with a diagonal covariance",
         learns: "mean, step size, variance per gene",
         state: "4 d",
+        keeps: Keeps::Vectors,
         individuals_min: 2,
         genes_max: None,
         parameters: &[MU_INIT, SIGMA_INIT],

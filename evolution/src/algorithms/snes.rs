@@ -4,7 +4,7 @@
 //! natural evolution strategies", GECCO 2011; Wierstra et al.: "Natural
 //! evolution strategies", JMLR 15 (2014); the thesis's Algorithm 3.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +33,7 @@ impl Described for Snes {
         title: "Separable natural evolution strategy",
         learns: "mean, deviation per gene",
         state: "2 d",
+        keeps: Keeps::Vectors,
         individuals_min: 1,
         genes_max: None,
         parameters: &[ETA_MU, ETA_SIGMA, MU_INIT, SIGMA_INIT],

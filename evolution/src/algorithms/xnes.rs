@@ -4,7 +4,7 @@
 //! evolution strategies", GECCO 2010; Wierstra et al.: "Natural evolution
 //! strategies", JMLR 15 (2014); the thesis's Algorithm 2.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter, limits};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter, limits};
 use nalgebra::{DMatrix, DVector};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
@@ -46,6 +46,7 @@ impl Described for Xnes {
         title: "Exponential natural evolution strategy",
         learns: "mean, step size, shape",
         state: "d²",
+        keeps: Keeps::Matrix,
         individuals_min: 1,
         genes_max: Some(limits::GENES_OF_FULL_MATRIX),
         parameters: &[ETA_MU, ETA_SIGMA, ETA_B, MU_INIT, SIGMA_INIT],

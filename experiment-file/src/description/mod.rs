@@ -29,12 +29,25 @@ pub struct AlgorithmDescription {
     /// Numbers that it keeps between generations, in terms of the genes d and the
     /// individuals P.
     pub state: &'static str,
+    /// Of which order that is, for estimates of memory.
+    pub keeps: Keeps,
     /// Fewest individuals per generation, at least 1.
     pub individuals_min: u32,
     /// Most genes of all populations together; none: no limit of its own.
     pub genes_max: Option<u64>,
     /// In the order of the canonical form.
     pub parameters: &'static [Parameter],
+}
+
+/// The largest of what an algorithm keeps between generations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keeps {
+    /// A few vectors of genes.
+    Vectors,
+    /// A matrix with a row and a column per gene.
+    Matrix,
+    /// A population.
+    Population,
 }
 
 /// One key of `params`.

@@ -12,6 +12,7 @@ enum Step {
     Submit(u64),
     Reopen(Index),
     Request(Index, Request),
+    Load(Index),
     Batch(Index),
     Conclusion(Index),
     CommitWritten(Index),
@@ -41,6 +42,7 @@ fn step() -> impl Strategy<Value = Step> {
         2 => (1..5_u64).prop_map(Step::Submit),
         2 => index().prop_map(Step::Reopen),
         3 => (index(), request()).prop_map(|(index, request)| Step::Request(index, request)),
+        6 => index().prop_map(Step::Load),
         8 => index().prop_map(Step::Batch),
         8 => index().prop_map(Step::Conclusion),
         6 => index().prop_map(Step::CommitWritten),
@@ -78,6 +80,11 @@ fn take(world: &mut World, step: Step) {
         Step::Request(index, request) => {
             if let Some(id) = pick(&index, world.store.keys().copied()) {
                 world.request(id, request);
+            }
+        }
+        Step::Load(index) => {
+            if let Some(i) = at(&index, world.loads.len()) {
+                world.finish_load(i);
             }
         }
         Step::Batch(index) => {
@@ -131,6 +138,7 @@ fn take(world: &mut World, step: Step) {
                 let stale = RunId { experiment, run_epoch: 0 };
                 world.runs.on_committed(stale, CommitOutcome::NotWanted);
                 world.runs.on_concluded(stale, Err("of another run".to_owned()));
+                world.runs.on_loaded(stale, Err("of another run".to_owned()));
                 assert!(world.runs.poll_command().is_none(), "a stale report changes nothing");
             }
         }
@@ -153,7 +161,7 @@ proptest! {
         }
         world.settle();
         world.check_settled();
-        // Those that are paused can still be completed.
+        // Those that are paused, or wait for them, can still be completed.
         for id in world.store.keys().copied().collect::<Vec<_>>() {
             world.request(id, Request::Resume);
         }

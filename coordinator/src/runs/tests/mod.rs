@@ -10,6 +10,7 @@ use world::World;
 fn committing() -> (World, ExperimentId) {
     let mut world = World::new();
     let id = world.submit(4);
+    world.finish_load(0);
     world.finish_batch(id);
     world.finish_conclusion(0);
     assert_eq!(world.commits.len(), 1);
@@ -71,6 +72,53 @@ fn conclusions_that_come_after_the_end_are_not_heeded() {
 }
 
 #[test]
+fn a_run_waits_for_memory_and_is_loaded_when_another_ends() {
+    let mut world = World::new();
+    let [first, _, third] = [2, 2, 2].map(|generations| world.submit(generations));
+    assert_eq!(world.loads.len(), 2, "there is memory for two");
+    let notices: Vec<_> =
+        world.changes.iter().map(|task| (task.experiment, &task.change)).collect();
+    let [(experiment, Change::Notice(text))] = &notices[..] else { panic!("{notices:?}") };
+    assert_eq!(*experiment, third);
+    assert!(text.contains("waits for memory") && text.contains("--memory-budget"), "{text}");
+    world.request(third, Request::Pause(String::new()));
+    world.request(third, Request::Resume);
+    world.request(first, Request::Cancel);
+    assert_eq!(world.loads.last().map(|run| run.experiment), Some(third));
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&third].state, ExperimentState::Completed);
+}
+
+#[test]
+fn a_run_that_ends_while_it_is_loaded_or_waits_is_not_evaluated() {
+    let mut world = World::new();
+    let ids = [2, 2, 2].map(|generations| world.submit(generations));
+    world.request(ids[2], Request::Cancel);
+    world.request(ids[0], Request::Cancel);
+    assert_eq!(world.loads.len(), 2, "the one that waited has ended");
+    world.finish_load(0);
+    assert!(!world.jobs.contains_key(&ids[0]));
+    world.settle();
+    world.check_settled();
+}
+
+#[test]
+fn a_run_that_cannot_be_loaded_is_paused_until_it_can() {
+    let mut world = World::new();
+    let id = world.submit(2);
+    let run = world.loads.remove(0);
+    world.runs.on_loaded(run, Err("damaged".to_owned()));
+    world.settle_after_commands();
+    assert_eq!(world.store[&id].state, ExperimentState::Paused);
+    assert!(world.loads.is_empty());
+    world.request(id, Request::Resume);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Completed);
+}
+
+#[test]
 fn two_clients_cancel_and_both_are_answered() {
     let (mut world, id) = committing();
     let requests = [world.request(id, Request::Cancel), world.request(id, Request::Cancel)];
@@ -84,6 +132,7 @@ fn two_clients_cancel_and_both_are_answered() {
 fn completed_unnoticed() -> (World, ExperimentId) {
     let mut world = World::new();
     let id = world.submit(1);
+    world.finish_load(0);
     world.finish_batch(id);
     world.finish_conclusion(0);
     world.finish_batch(id);
@@ -98,6 +147,7 @@ fn the_stale_end_of_a_reopened_run_does_not_end_it() {
     let (mut world, id) = completed_unnoticed();
     world.reopen(id);
     world.report_commit(0);
+    world.finish_load(0);
     assert!(world.jobs[&id].batch.is_some(), "it runs");
     world.settle();
     world.check_settled();
@@ -167,7 +217,7 @@ fn changes_are_written_one_after_the_other() {
 
 #[test]
 fn an_abandoned_evaluation_is_dropped_and_a_finished_one_answered() {
-    let mut runs = Runs::default();
+    let mut runs = Runs::new(u64::MAX);
     let evaluation = || Evaluation {
         spec: "{}".into(),
         genotype: vec![0.5],

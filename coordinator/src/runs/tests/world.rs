@@ -16,12 +16,17 @@ pub struct World {
     pub store: BTreeMap<ExperimentId, Stored>,
     /// What the engine knows.
     pub jobs: BTreeMap<ExperimentId, Job>,
+    pub loads: Vec<RunId>,
     pub conclusions: Vec<(RunId, Arc<ExperimentConfig>, Round, EvaluatedBatch)>,
     pub commits: Vec<CommitTask>,
     pub changes: Vec<ChangeTask>,
     /// All requests; answered: whether what they wanted is stored.
     pub answers: BTreeMap<RequestId, Option<bool>>,
 }
+
+/// Bytes that a run takes; there is memory for two.
+const MEMORY: u64 = 5;
+const MEMORY_BUDGET: u64 = 2 * MEMORY + 1;
 
 /// An experiment as the store has it.
 pub struct Stored {
@@ -121,9 +126,10 @@ fn experiment(job: JobId) -> ExperimentId {
 impl World {
     pub fn new() -> Self {
         Self {
-            runs: Runs::default(),
+            runs: Runs::new(MEMORY_BUDGET),
             store: BTreeMap::new(),
             jobs: BTreeMap::new(),
+            loads: Vec::new(),
             conclusions: Vec::new(),
             commits: Vec::new(),
             changes: Vec::new(),
@@ -157,11 +163,12 @@ impl World {
     }
 
     fn run(&mut self, id: ExperimentId) {
-        let Stored { config, state, evolution, latest, priority } = &self.store[&id];
+        let Stored { config, state, latest, priority, .. } = &self.store[&id];
         let runnable = Runnable {
             latest: latest.clone(),
             is_paused: *state == ExperimentState::Paused,
-            ..Runnable::new(id, config.clone(), evolution.clone(), *priority)
+            memory: MEMORY,
+            ..Runnable::new(id, config.clone(), 3, *priority)
         };
         self.runs.on_submitted(runnable);
         self.carry_out();
@@ -173,6 +180,14 @@ impl World {
         self.runs.on_request(id, request, request_id);
         self.carry_out();
         request_id
+    }
+
+    /// A run's evolution is read from the store.
+    pub fn finish_load(&mut self, i: usize) {
+        let run = self.loads.remove(i);
+        let evolution = self.store[&run.experiment].evolution.clone();
+        self.runs.on_loaded(run, Ok(Round::generation(evolution)));
+        self.carry_out();
     }
 
     /// The fleet finishes a job's batch. Returns of how many genotypes.
@@ -267,8 +282,9 @@ impl World {
 
     /// The coordinator is killed and started again. What is written is there.
     pub fn crash(&mut self) {
-        self.runs = Runs::default();
+        self.runs = Runs::new(MEMORY_BUDGET);
         self.jobs.clear();
+        self.loads.clear();
         self.conclusions.clear();
         self.commits.clear();
         self.changes.clear();
@@ -311,7 +327,9 @@ impl World {
         loop {
             let mut jobs = self.jobs.iter().filter(|(_, job)| !job.is_paused);
             let busy = jobs.find(|(_, job)| job.batch.is_some()).map(|(&id, _)| id);
-            if !self.conclusions.is_empty() {
+            if !self.loads.is_empty() {
+                self.finish_load(0);
+            } else if !self.conclusions.is_empty() {
                 self.finish_conclusion(0);
             } else if !self.commits.is_empty() {
                 self.write_commit(0);
@@ -327,6 +345,13 @@ impl World {
         }
     }
 
+    /// Carries out what the test has caused, and all that follows.
+    pub fn settle_after_commands(&mut self) {
+        self.carry_out();
+        self.settle();
+        self.check_settled();
+    }
+
     /// What must hold when nothing is under way.
     pub fn check_settled(&self) {
         assert!(self.answers.values().all(Option::is_some), "every client is answered");
@@ -337,7 +362,10 @@ impl World {
         for (id, stored) in &self.store {
             let is_paused = stored.state == ExperimentState::Paused;
             if let Some(job) = self.jobs.get(id) {
-                assert!(is_paused && job.is_paused, "what could go on has gone on");
+                assert_eq!(is_paused, job.is_paused);
+                let is_waiting = self.runs.runs[id].is_waiting();
+                assert!(is_paused || is_waiting, "what could go on has gone on");
+                assert!(!is_waiting || self.n_loaded() == 2, "what could be loaded is");
             }
             assert_eq!(
                 stored.evolution,
@@ -345,6 +373,11 @@ impl World {
                 "whatever has happened, experiment {id} is where it would be otherwise"
             );
         }
+    }
+
+    /// The number of runs that take memory.
+    fn n_loaded(&self) -> usize {
+        self.runs.runs.values().filter(|run| run.has_memory()).count()
     }
 
     /// Carries out commands, and checks each.
@@ -358,6 +391,11 @@ impl World {
         match command {
             Command::StartJob { job, is_paused, .. } => {
                 self.jobs.insert(experiment(job), Job { is_paused, batch: None });
+            }
+            Command::Load { run, generation, .. } => {
+                assert_eq!(generation, self.store[&run.experiment].n_done());
+                assert!(self.n_loaded() <= 2, "there is memory for two");
+                self.loads.push(run);
             }
             Command::Evaluate { job, batch: Batch { genotypes, n_trials, .. } } => {
                 let id = experiment(job);
@@ -402,6 +440,9 @@ impl World {
             Command::Answer { request, is_stored } => {
                 let answer = self.answers.get_mut(&request).expect("somebody asked");
                 assert!(answer.replace(is_stored).is_none(), "one answer each");
+            }
+            Command::PublishWait { experiment, .. } => {
+                assert!(self.runs.runs[&experiment].is_waiting());
             }
             Command::PublishEnd { state, .. } => assert!(!state.is_unfinished()),
             Command::AnswerEvaluation { .. } => unreachable!("nobody wants an evaluation"),

@@ -8,7 +8,7 @@ mod crossover;
 mod mutation;
 mod selection;
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Parameter};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,7 @@ impl Described for Ga {
         title: "Genetic algorithm",
         learns: "population",
         state: "P d",
+        keeps: Keeps::Population,
         individuals_min: 1,
         genes_max: None,
         parameters: &[

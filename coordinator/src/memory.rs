@@ -1,0 +1,164 @@
+//! How much of the coordinator's memory an experiment takes, estimated from its size,
+//! so that together they take no more than there is.
+
+use std::fmt;
+
+use evolution::ALGORITHMS;
+use experiment_file::Keeps;
+use serde::Deserialize;
+
+/// Bytes per gene of a generation, as measured at the most: the genotypes, the draws
+/// behind them, and those of the generation before, which the allocator has not given
+/// back yet. A population that is kept is copied and written out as text, too.
+const BYTES_PER_GENE: u64 = 32;
+const BYTES_PER_GENE_OF_MATRIX: u64 = 48;
+const BYTES_PER_GENE_OF_POPULATION: u64 = 104;
+/// Bytes per entry of a matrix, which is copied, decomposed and written out as text.
+const BYTES_PER_ENTRY: u64 = 96;
+/// Bytes per trial: its fitness, who evaluated it, and a copy.
+const BYTES_PER_TRIAL: u64 = 32;
+/// Bytes per individual: where its genes and results are, its item.
+const BYTES_PER_INDIVIDUAL: u64 = 256;
+/// Copies of the configuration: the text, its values, and what workers are sent.
+const CONFIG_COPIES: u64 = 4;
+/// Bytes of everything else.
+const BYTES_PER_EXPERIMENT: u64 = 64 << 10;
+
+/// The parts of a canonical configuration that memory depends on.
+#[derive(Debug, Deserialize)]
+struct Config {
+    algorithm: Algorithm,
+}
+
+#[derive(Debug, Deserialize)]
+struct Algorithm {
+    name: String,
+    population_size: u64,
+    num_evaluations: u64,
+    champion_trials: u64,
+}
+
+/// Bytes that an experiment takes at the most, about. `config_json`: its canonical
+/// configuration; one of another release, which does not run, may count as nothing.
+pub fn estimate(config_json: &str, genotype_len: u64) -> u64 {
+    let Ok(Config { algorithm }) = serde_json::from_str(config_json) else { return 0 };
+    let description = ALGORITHMS.iter().find(|description| description.name == algorithm.name);
+    let keeps = description.map_or(Keeps::Population, |description| description.keeps);
+    let n_genes = algorithm.population_size.saturating_mul(genotype_len);
+    let state = match keeps {
+        Keeps::Vectors => n_genes.saturating_mul(BYTES_PER_GENE),
+        Keeps::Matrix => n_genes
+            .saturating_mul(BYTES_PER_GENE_OF_MATRIX)
+            .saturating_add(genotype_len.saturating_mul(genotype_len) * BYTES_PER_ENTRY),
+        Keeps::Population => n_genes.saturating_mul(BYTES_PER_GENE_OF_POPULATION),
+    };
+    let n_trials = algorithm.population_size.saturating_mul(algorithm.num_evaluations);
+    [
+        state,
+        n_trials.saturating_add(algorithm.champion_trials).saturating_mul(BYTES_PER_TRIAL),
+        algorithm.population_size.saturating_mul(BYTES_PER_INDIVIDUAL),
+        CONFIG_COPIES * config_json.len() as u64,
+        BYTES_PER_EXPERIMENT,
+    ]
+    .into_iter()
+    .fold(0, u64::saturating_add)
+}
+
+/// An experiment that finds too little memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shortage {
+    /// Bytes that it takes.
+    pub needed: u64,
+    /// Bytes that other unfinished experiments take.
+    pub in_use: u64,
+    /// Bytes that all may take together.
+    pub budget: u64,
+}
+
+impl Shortage {
+    /// Why there is no room for `needed` bytes, if there is none.
+    pub fn check(needed: u64, in_use: u64, budget: u64) -> Result<(), Self> {
+        let is_short = needed > budget.saturating_sub(in_use);
+        if is_short { Err(Self { needed, in_use, budget }) } else { Ok(()) }
+    }
+
+    /// Whether there will never be room.
+    pub fn is_final(&self) -> bool {
+        self.needed > self.budget
+    }
+}
+
+impl fmt::Display for Shortage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let (needed, in_use, budget) = (mib(self.needed), mib(self.in_use), mib(self.budget));
+        if self.is_final() {
+            write!(
+                f,
+                "the experiment takes about {needed} MiB of the coordinator's memory, more than \
+                 all experiments may take together, {budget} MiB; make its population or its \
+                 network smaller, or start the coordinator with a larger --memory-budget"
+            )
+        } else {
+            write!(
+                f,
+                "the experiment takes about {needed} MiB of the coordinator's memory, and \
+                 unfinished experiments take {in_use} of {budget} MiB; wait until some end, \
+                 cancel some, or start the coordinator with a larger --memory-budget"
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(algorithm: &str, population_size: u64, n_trials: u64) -> String {
+        format!(
+            r#"{{"name": "x", "algorithm": {{"name": "{algorithm}",
+                "population_size": {population_size}, "num_evaluations": {n_trials},
+                "champion_trials": 50, "populations": {{}}}}, "world": {{}}}}"#
+        )
+    }
+
+    fn mib(algorithm: &str, population_size: u64, n_trials: u64, genotype_len: u64) -> u64 {
+        estimate(&config(algorithm, population_size, n_trials), genotype_len) >> 20
+    }
+
+    /// Of a coordinator process with a worker over three generations, less what it
+    /// takes without an experiment: 268, 799 and 401 MiB.
+    #[test]
+    fn the_estimates_are_not_below_what_was_measured() {
+        assert_eq!(mib("SNES", 20_000, 1, 424), 264);
+        assert_eq!(mib("GA", 20_000, 1, 424), 846);
+        assert_eq!(mib("CMA-ES", 20_000, 1, 424), 410);
+    }
+
+    #[test]
+    fn every_part_of_an_experiment_counts() {
+        let base = mib("SNES", 1_000, 10, 400);
+        assert!(base < 16, "{base}");
+        assert!(mib("SNES", 100_000, 10, 400) > 80 * base);
+        assert!(mib("SNES", 1_000, 10, 40_000) > 80 * base);
+        assert!(mib("SNES", 1_000, 1_000, 400) > 25 + base);
+        assert!(mib("xNES", 10, 1, 1_000) >= 91);
+        let long = config("SNES", 1, 1).replace(r#""x""#, &format!("{:?}", "x".repeat(1 << 20)));
+        assert!(estimate(&long, 1) > 4 << 20);
+        assert!(estimate(&config("SNES", u64::MAX, 2), u64::MAX) == u64::MAX, "no overflow");
+    }
+
+    #[test]
+    fn a_shortage_says_how_much_and_what_to_do() {
+        const MIB: u64 = 1 << 20;
+        assert_eq!(Shortage::check(MIB, 3 * MIB, 4 * MIB), Ok(()));
+        let full = Shortage::check(2 * MIB, 3 * MIB, 4 * MIB).unwrap_err();
+        assert!(!full.is_final());
+        let text = full.to_string();
+        assert!(text.contains("about 2 MiB") && text.contains("3 of 4 MiB"), "{text}");
+        let never = Shortage::check(5 * MIB, 0, 4 * MIB).unwrap_err();
+        assert!(never.is_final());
+        assert!(never.to_string().contains("about 5 MiB"), "{never}");
+        assert!(Shortage::check(1, 9 * MIB, 4 * MIB).is_err(), "a budget that is exceeded already");
+    }
+}

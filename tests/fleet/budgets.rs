@@ -1,0 +1,143 @@
+//! What large requests may take of the coordinator, and that it lives on.
+#![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
+
+use std::fs;
+
+use harness::{CoordinatorProcess, Experiment, workspace_file};
+use serde_json::{Value, json};
+use swarm_proto::v1::{
+    EvaluateRequest, EvaluateResponse, SubmitExperimentRequest,
+    evaluation_service_client::EvaluationServiceClient,
+    experiment_service_client::ExperimentServiceClient,
+};
+use tonic::{Code, Status, Streaming, transport::Channel};
+
+/// An experiment of so many individuals with 440 genes each.
+fn large(population_size: u64) -> Experiment {
+    let text = fs::read_to_string(workspace_file("configs/quickstart.json")).unwrap();
+    let mut value: Value = serde_json::from_str(&text).unwrap();
+    value["algorithm"]["population_size"] = json!(population_size);
+    value["algorithm"]["num_evaluations"] = json!(1);
+    value["algorithm"]["evaluation_steps"] = json!(1);
+    Experiment::of(value)
+}
+
+async fn submit(
+    client: &mut ExperimentServiceClient<Channel>,
+    experiment: &Experiment,
+) -> Result<u64, Status> {
+    let request = SubmitExperimentRequest {
+        config_json: experiment.text(),
+        ..SubmitExperimentRequest::default()
+    };
+    let response = client.submit_experiment(request).await?.into_inner();
+    Ok(response.experiment.unwrap().id)
+}
+
+#[tokio::test]
+async fn submissions_beyond_the_memory_budget_are_refused_until_others_end() {
+    let coordinator = CoordinatorProcess::start_with(&["--memory-budget", "600"]);
+    let mut client = ExperimentServiceClient::connect(coordinator.url()).await.unwrap();
+    let experiment = large(20_000);
+    let mut ids = Vec::new();
+    for _ in 0..11 {
+        match submit(&mut client, &experiment).await {
+            Ok(id) => ids.push(id),
+            Err(status) => {
+                assert_eq!(status.code(), Code::ResourceExhausted);
+                let text = status.message();
+                for expected in ["about 275 MiB", "549 of 600 MiB", "cancel", "--memory-budget"] {
+                    assert!(text.contains(expected), "`{expected}` in {text}");
+                }
+            }
+        }
+    }
+    assert_eq!(ids, [1, 2], "there is memory for two");
+    coordinator.process.wait_for("second", |line| {
+        line["message"] == "experiment starts" && line["experiment"] == "2"
+    });
+    coordinator.swarmctl(&["explain", "2"]).expect_success();
+    assert!(coordinator.process.memory_mib() < 600, "{}", coordinator.process.memory_mib());
+
+    let status = submit(&mut client, &large(90_000)).await.unwrap_err();
+    assert_eq!(status.code(), Code::InvalidArgument, "it would never have room: {status:?}");
+    coordinator.swarmctl(&["cancel", "1"]).expect_success();
+    assert_eq!(submit(&mut client, &experiment).await.unwrap(), 3);
+}
+
+#[test]
+fn after_a_restart_with_less_memory_experiments_wait_for_others_to_end() {
+    let directory = tempfile::tempdir().unwrap();
+    let experiment = large(1_000);
+    let mut coordinator = CoordinatorProcess::start_in(directory.path());
+    let ids = [(); 3].map(|()| coordinator.submit(&experiment.path()));
+    coordinator.process.kill();
+
+    let coordinator =
+        CoordinatorProcess::start_in_with(directory.path(), &["--memory-budget", "20"]);
+    let is_about = |message: &str, id: u64| {
+        let (message, id) = (message.to_owned(), id.to_string());
+        move |line: &Value| line["message"] == message && line["experiment"] == id
+    };
+    coordinator.process.wait_for("start", is_about("experiment starts", ids[0]));
+    for id in &ids[1..] {
+        let waits = is_about("experiment waits for memory", *id);
+        let line = coordinator.process.wait_for("wait", waits);
+        assert!(line["reason"].as_str().unwrap().contains("--memory-budget"), "{line}");
+    }
+    let started = is_about("experiment starts", ids[1]);
+    assert!(!coordinator.process.lines().iter().any(&started));
+
+    coordinator.swarmctl(&["cancel", &ids[0].to_string()]).expect_success();
+    coordinator.process.wait_for("start", started);
+    let logs = coordinator.swarmctl(&["logs", &ids[2].to_string()]).expect_success().stdout;
+    assert!(logs.contains("waits for memory"), "{logs}");
+}
+
+/// An evaluation of 7 MB.
+fn large_evaluation() -> EvaluateRequest {
+    let experiment = large(1).edit(|value| {
+        value["topology"]["ensembles"]["H1"]["n"] = json!(940);
+        value["topology"]["synapses"]["H1-H1"]["p"] = json!(1.0);
+    });
+    let (config, _) =
+        experiment_file::ExperimentConfig::from_json(&experiment.text(), "", evolution::ALGORITHMS)
+            .unwrap();
+    let n_genes = sim_core::Simulation::compile(&config).unwrap().genotype_len();
+    assert!(n_genes > 900_000, "{n_genes}");
+    EvaluateRequest {
+        config_json: experiment.text(),
+        genotype: vec![0.5; n_genes],
+        trial_count: 1,
+        priority: None,
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 1)]
+async fn evaluations_that_wait_take_no_more_memory_than_they_may() {
+    let coordinator = CoordinatorProcess::start();
+    let client = EvaluationServiceClient::connect(coordinator.url()).await.unwrap();
+    let request = large_evaluation();
+    let mut waiting: Vec<Streaming<EvaluateResponse>> = Vec::new();
+    let mut refused = Vec::new();
+    for _ in 0..40 {
+        match client.clone().evaluate(request.clone()).await {
+            Ok(response) => waiting.push(response.into_inner()),
+            Err(status) => refused.push(status),
+        }
+    }
+    assert!((30..40).contains(&waiting.len()), "{} of 7 MB each", waiting.len());
+    assert!(refused.iter().all(|status| status.code() == Code::ResourceExhausted));
+    let text = refused[0].message();
+    assert!(text.contains("256 MiB") && text.contains("try again"), "{text}");
+    let memory = coordinator.process.memory_mib();
+    assert!(memory < 450, "{memory} MiB");
+    // The others' room is free once they have gone.
+    waiting.clear();
+    coordinator
+        .process
+        .wait_for("end", |line| line["message"] == "evaluation dropped: its client has gone");
+    while let Err(status) = client.clone().evaluate(request.clone()).await {
+        assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+    }
+}
