@@ -80,6 +80,7 @@ Exit codes:
   8    no TLS connection: one side has no TLS, or the certificate is not trusted
   9    the server at the address is not a coordinator, or one of another version
   10   the experiment has not ended within wait --timeout
+  11   the database is damaged (doctor, backup)
   130  interrupted";
 
 /// The experiment that a command is about.
@@ -114,6 +115,14 @@ impl ExperimentArgs {
         let checked = file.and_then(|file| file.compile(&self.overrides()).map(|_| file));
         checked.map_err(|error| Error::invalid(&self.config, &error))
     }
+}
+
+/// The data directory of a coordinator.
+#[derive(Debug, ClapArgs)]
+pub struct DataDirArg {
+    /// The data directory of a coordinator, or of `run`.
+    #[arg(long, env = "SWARM_DATA_DIR", value_name = "DIR", default_value = "./swarm-data")]
+    pub data_dir: PathBuf,
 }
 
 /// A replacement of the file's seed.

@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use coordinator::store::StoreError;
 use experiment_file::ConfigError;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
@@ -83,6 +84,9 @@ pub enum Error {
         /// Number of the experiment.
         id: u64,
     },
+    /// A database is damaged.
+    #[error("{0}")]
+    Damaged(String),
     /// A signal interrupted the command; the text says what happens to the experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
@@ -130,6 +134,7 @@ impl Error {
             Self::Tls { .. } => 8,
             Self::Foreign(_) => 9,
             Self::TimedOut { .. } => 10,
+            Self::Damaged(_) => 11,
             Self::Interrupted(_) => 130,
         }
     }
@@ -141,6 +146,18 @@ impl Error {
             Self::Config { file, problems } => Some(prefix_lines(problems, &file.display())),
             Self::Interrupted(_) => Some(self.to_string()),
             _ => Some(format!("error: {self}")),
+        }
+    }
+
+    /// The error of reading a data directory, or of making one.
+    pub fn from_store(error: &StoreError) -> Self {
+        let text = error.to_string();
+        match error {
+            StoreError::Corrupt(_)
+            | StoreError::WithoutLog { .. }
+            | StoreError::NothingSound { .. } => Self::Damaged(text),
+            StoreError::Bug(_) => Self::Internal(text),
+            _ => Self::Input(text),
         }
     }
 
@@ -246,6 +263,7 @@ mod tests {
         assert_eq!(cancelled.exit_code(), 6);
         assert_eq!(cancelled.report().unwrap(), "error: experiment 3 was cancelled");
         assert_eq!(Error::TimedOut { id: 3 }.exit_code(), 10);
+        assert_eq!(Error::Damaged("x".into()).exit_code(), 11);
         assert_eq!(Error::Interrupted("x".into()).exit_code(), 130);
         assert_eq!(Error::Input("x".into()).exit_code(), 2);
     }

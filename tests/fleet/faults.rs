@@ -12,6 +12,7 @@ mod disk;
 mod integrity;
 mod misbehaviour;
 mod network;
+mod recovery;
 mod workers;
 
 use std::sync::OnceLock;

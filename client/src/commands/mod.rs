@@ -1,10 +1,12 @@
 //! The commands, each in a module of its own: its arguments with their help, its
 //! requests and its output. To add one, write the module and name it twice below.
 
+mod backup;
 mod bench;
 mod champion;
 mod completions;
 mod control;
+mod doctor;
 mod evaluate;
 mod explain;
 mod history;
@@ -42,6 +44,8 @@ pub enum Command {
     Evaluate(evaluate::EvaluateArgs),
     Plot(plot::PlotArgs),
     Bench(bench::BenchArgs),
+    Doctor(doctor::DoctorArgs),
+    Backup(backup::BackupArgs),
     Completions(completions::CompletionsArgs),
     /// Evaluate items for the coordinator of `run`, which starts this process itself.
     ///
@@ -126,6 +130,8 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         }
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
+        Command::Doctor(args) => return doctor::doctor(&args, &mut progress),
+        Command::Backup(args) => return backup::backup(&args, &mut progress),
         Command::Completions(args) => return completions::completions(args.shell, &mut progress),
         Command::Referee => {
             return coordinator::referee::serve_stdio()

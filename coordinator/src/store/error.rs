@@ -84,6 +84,32 @@ pub enum StoreError {
         /// The database.
         path: PathBuf,
     },
+    /// There is nothing to look at or to copy.
+    #[error("there is no database {}; give the coordinator's --data-dir", path.display())]
+    NoDatabase {
+        /// Where it would be.
+        path: PathBuf,
+    },
+    /// Nothing in a damaged database is worth a new data directory.
+    #[error("no experiment in {} is sound; restore a backup", path.display())]
+    NothingSound {
+        /// The database.
+        path: PathBuf,
+    },
+    /// A new data directory would be mixed with what is there.
+    #[error("{} is not empty; choose a directory that does not exist yet", path.display())]
+    NotEmpty {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// A new data directory cannot be written.
+    #[error("cannot write to {}: {source}; is the disk full, or read-only?", path.display())]
+    Target {
+        /// The directory.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
     /// The disk is full, or cannot be read or written; try again later.
     #[error("the database cannot be read or written: {0}; is the disk full, or read-only?")]
     Unavailable(rusqlite::Error),

@@ -44,7 +44,7 @@ pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     let mut locks = vec![lock_file(lock, directory)?];
     let path = path_in(directory);
     if !path.try_exists().map_err(unusable)? {
-        create(directory, &path, unusable)?;
+        create(directory, unusable)?;
     }
     // A lock file can be deleted while it is locked; the database itself cannot be
     // replaced so easily. Elsewhere such a lock may be one and the same as those by which
@@ -73,7 +73,7 @@ fn lock_file(file: File, directory: &Path) -> Result<File> {
 
 /// Creates an empty database. Under another name at first, so that an empty file
 /// under the right one is damage, and not a coordinator killed at its first start.
-fn create(directory: &Path, path: &Path, unusable: impl Fn(io::Error) -> StoreError) -> Result<()> {
+fn create(directory: &Path, unusable: impl Fn(io::Error) -> StoreError) -> Result<()> {
     let unfinished = unfinished_in(directory);
     match fs::remove_file(&unfinished) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(unusable(error)),
@@ -82,8 +82,7 @@ fn create(directory: &Path, path: &Path, unusable: impl Fn(io::Error) -> StoreEr
     let mut connection = Connection::open(&unfinished)?;
     schema::migrate(&mut connection)?;
     connection.close().map_err(|(_, error)| error)?;
-    fs::rename(&unfinished, path).map_err(&unusable)?;
-    File::open(directory).and_then(|directory| directory.sync_all()).map_err(unusable)
+    publish(directory).map_err(unusable)
 }
 
 /// Refuses a database that this program must not write to. Read-only, so that
@@ -111,10 +110,37 @@ fn check(path: &Path) -> Result<()> {
     verdict.map_err(|error| error.at(path))
 }
 
-/// Opens a database to read it, whoever else uses it.
+/// Opens a database to read it, whoever else uses it, and leaves nothing beside it.
 pub fn open_read_only(path: &Path) -> rusqlite::Result<Connection> {
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let connection = Connection::open_with_flags(path, flags)?;
+    let mut flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = if write_ahead_log::exists(path) {
+        Connection::open_with_flags(path, flags)?
+    } else {
+        // Without a log nobody uses it; SQLite would create one.
+        flags |= OpenFlags::SQLITE_OPEN_URI;
+        Connection::open_with_flags(format!("{}?immutable=1", uri(path)), flags)?
+    };
     connection.busy_timeout(BUSY_TIMEOUT)?;
     Ok(connection)
+}
+
+/// A path as SQLite reads it in a URI.
+fn uri(path: &Path) -> String {
+    let mut uri = "file:".to_owned();
+    for &byte in path.as_os_str().as_encoded_bytes() {
+        match byte {
+            b'/' | b'.' | b'-' | b'_' | b'~' => uri.push(byte.into()),
+            _ if byte.is_ascii_alphanumeric() => uri.push(byte.into()),
+            _ => uri += &format!("%{byte:02X}"),
+        }
+    }
+    uri
+}
+
+/// Makes a complete database of the one that is called [`unfinished_in`] so far.
+pub fn publish(directory: &Path) -> io::Result<()> {
+    let unfinished = unfinished_in(directory);
+    File::open(&unfinished)?.sync_all()?;
+    fs::rename(unfinished, path_in(directory))?;
+    File::open(directory)?.sync_all()
 }

@@ -9,6 +9,7 @@ mod checkpoints;
 mod error;
 mod file;
 mod history;
+mod inspection;
 mod records;
 mod schema;
 mod seals;
@@ -23,6 +24,9 @@ use crate::{failpoint, ids::ExperimentId, priority::Priority};
 use evolution::Champion;
 
 pub use error::StoreError;
+pub use inspection::{
+    Backup, Fate, Finding, Inspection, Recovered, Recovery, backup, inspect, recover,
+};
 pub use records::{
     Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
     checkpoint_json,

@@ -1,0 +1,44 @@
+//! `swarmctl backup`: a copy of a data directory that is whole.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use coordinator::store::{self, Backup};
+
+use super::doctor::print_inspection;
+use crate::{args::DataDirArg, error::Error, progress::Progress};
+
+/// Copy a data directory, whether or not a coordinator uses it.
+///
+/// The copy is of one moment, is looked through as by `doctor`, and appears when it is
+/// complete. A coordinator started on it continues every experiment from that moment, to
+/// the same bits.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct BackupArgs {
+    #[command(flatten)]
+    data_dir: DataDirArg,
+    /// The copy: a directory that does not exist yet, or is empty.
+    #[arg(value_name = "TO")]
+    to: PathBuf,
+}
+
+const HELP: &str = "\
+Exit code 11, and no copy, if the database is damaged.
+
+Examples:
+  swarmctl backup --data-dir ./swarm-data backups/$(date +%F)
+  coordinator --data-dir backups/2026-11-22      # to restore it";
+
+/// Makes the copy.
+pub fn backup(args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
+    let data_dir = &args.data_dir.data_dir;
+    match store::backup(data_dir, &args.to).map_err(|error| Error::from_store(&error))? {
+        Backup::Made(inspection) => print_inspection(&inspection, progress),
+        Backup::Damaged(inspection) => {
+            print_inspection(&inspection, progress)?;
+            let database = inspection.path.display();
+            Err(Error::Damaged(format!("{database} is damaged, so that it was not copied")))
+        }
+    }
+}

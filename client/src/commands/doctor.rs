@@ -1,0 +1,168 @@
+//! `swarmctl doctor`: what is wrong with a data directory, and what of it can be kept.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use coordinator::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
+use serde::Serialize;
+
+use crate::{args::DataDirArg, error::Error, json, progress::Progress, text};
+
+/// Check the database of a data directory, or keep what is sound in a damaged one.
+///
+/// Reads everything in it and never writes to it; a coordinator may use it meanwhile.
+/// Prints what is damaged, and for each the next step. Checked are the structure of the
+/// database, the seals of configurations, generations, checkpoints and champions, and
+/// that these continue each other.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct DoctorArgs {
+    #[command(flatten)]
+    data_dir: DataDirArg,
+    /// Make a new data directory of everything that is sound. An experiment whose
+    /// generations are damaged and whose configuration is sound begins again there, when
+    /// it is resumed, and comes to the same bits.
+    #[arg(long, value_name = "NEW")]
+    recover: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Exit code 0 if everything is sound, or --recover has made NEW; 11 if something is damaged.
+
+Examples:
+  swarmctl doctor --data-dir ./swarm-data
+  swarmctl doctor --data-dir ./swarm-data --recover ./recovered
+  coordinator --data-dir ./recovered";
+
+/// What is printed of a database.
+#[derive(Debug, Serialize)]
+pub struct InspectionDocument<'a> {
+    database: &'a Path,
+    schema_version: i64,
+    experiments: usize,
+    generations: usize,
+    findings: Vec<FindingDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct FindingDocument<'a> {
+    experiment: Option<u64>,
+    what: &'a str,
+    next_step: &'a str,
+}
+
+#[derive(Debug, Serialize)]
+struct RecoveryDocument<'a> {
+    data_dir: &'a Path,
+    damage: &'a [String],
+    experiments: Vec<RecoveredDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct RecoveredDocument<'a> {
+    id: u64,
+    outcome: &'static str,
+    problems: &'a [String],
+}
+
+/// Looks at a data directory, or makes a new one of it.
+pub fn doctor(args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
+    let data_dir = &args.data_dir.data_dir;
+    if let Some(to) = &args.recover {
+        let recovery = store::recover(data_dir, to).map_err(|error| Error::from_store(&error))?;
+        return progress.print(&if progress.is_json() {
+            json::document(&recovery_document(&recovery, to))
+        } else {
+            recovery_text(&recovery, to)
+        });
+    }
+    let inspection = store::inspect(data_dir).map_err(|error| Error::from_store(&error))?;
+    print_inspection(&inspection, progress)?;
+    match inspection.findings.len() {
+        0 => Ok(()),
+        n => Err(Error::Damaged(format!(
+            "{} in {}",
+            text::counted(n as u64, "finding"),
+            inspection.path.display()
+        ))),
+    }
+}
+
+/// Prints what a database is like.
+pub fn print_inspection(inspection: &Inspection, progress: &mut Progress) -> Result<(), Error> {
+    progress.print(&if progress.is_json() {
+        json::document(&inspection_document(inspection))
+    } else {
+        let findings = inspection.findings.iter().map(finding_text);
+        let lines: Vec<String> = [summary(inspection)].into_iter().chain(findings).collect();
+        lines.join("\n")
+    })
+}
+
+fn summary(inspection: &Inspection) -> String {
+    format!(
+        "{}: {}, {}, schema version {}{}",
+        inspection.path.display(),
+        text::counted(inspection.n_experiments as u64, "experiment"),
+        text::counted(inspection.n_generations as u64, "generation"),
+        inspection.schema_version,
+        if inspection.findings.is_empty() { "; all sound" } else { "" }
+    )
+}
+
+fn finding_text(finding: &Finding) -> String {
+    format!("{}\n  -> {}", finding.what, finding.next_step)
+}
+
+fn inspection_document(inspection: &Inspection) -> InspectionDocument<'_> {
+    InspectionDocument {
+        database: &inspection.path,
+        schema_version: inspection.schema_version,
+        experiments: inspection.n_experiments,
+        generations: inspection.n_generations,
+        findings: inspection.findings.iter().map(finding_document).collect(),
+    }
+}
+
+fn finding_document(finding: &Finding) -> FindingDocument<'_> {
+    FindingDocument {
+        experiment: finding.experiment.map(|id| id.0),
+        what: &finding.what,
+        next_step: &finding.next_step,
+    }
+}
+
+fn recovery_text(recovery: &Recovery, to: &Path) -> String {
+    let outcome = |recovered: &Recovered| {
+        let what = match recovered.fate {
+            Fate::Kept if recovered.problems.is_empty() => "kept",
+            Fate::Kept => "kept, but for a part",
+            Fate::Restarted => "paused before its first generation",
+            Fate::Lost => "lost",
+        };
+        text::with_reason(
+            &format!("experiment {} {what}", recovered.id),
+            &recovered.problems.join("; "),
+        )
+    };
+    let made = format!("new data directory: {}", to.display());
+    let lines: Vec<String> = recovery.experiments.iter().map(outcome).chain([made]).collect();
+    lines.join("\n")
+}
+
+fn recovery_document<'a>(recovery: &'a Recovery, to: &'a Path) -> RecoveryDocument<'a> {
+    let recovered = |recovered: &'a Recovered| RecoveredDocument {
+        id: recovered.id.0,
+        outcome: match recovered.fate {
+            Fate::Kept => "kept",
+            Fate::Restarted => "restarted",
+            Fate::Lost => "lost",
+        },
+        problems: &recovered.problems,
+    };
+    RecoveryDocument {
+        data_dir: to,
+        damage: &recovery.damage,
+        experiments: recovery.experiments.iter().map(recovered).collect(),
+    }
+}

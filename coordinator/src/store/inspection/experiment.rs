@@ -1,0 +1,294 @@
+//! An experiment, read part by part: what of it can be read and is as it was stored.
+
+use evolution::{ALGORITHMS, Champion, Digest, Evolution};
+use experiment_file::ExperimentConfig;
+use rusqlite::{Connection, Row};
+
+use super::{
+    super::{
+        ExperimentState, GenerationRecord, StoreError, champions, checkpoints, history,
+        seals::{self, Sealer},
+    },
+    source::Source,
+};
+use crate::ids::ExperimentId;
+
+/// What there is of an experiment. A part that is none is damaged.
+#[derive(Debug)]
+pub struct Inspected {
+    /// Its id.
+    pub id: ExperimentId,
+    /// Its configuration and the rest of its row.
+    pub row: Option<ExperimentRow>,
+    /// All its generations.
+    pub history: Option<Vec<GenerationRecord>>,
+    /// Its champion, if it has one.
+    pub champion: Option<Option<Champion>>,
+    /// Its checkpoint, if it has one.
+    pub checkpoint: Option<Option<String>>,
+    /// All its events.
+    pub events: Option<Vec<EventRow>>,
+    /// What is wrong, one line each.
+    pub problems: Vec<String>,
+}
+
+/// A row of the table of experiments; see the schema.
+#[derive(Debug)]
+pub struct ExperimentRow {
+    pub request_id: Option<String>,
+    pub name: String,
+    pub config: String,
+    pub config_digest: String,
+    pub fingerprint: String,
+    pub genotype_len: u64,
+    /// None if there is no such state.
+    pub state: Option<ExperimentState>,
+    pub reason: String,
+    pub submitted_at_ms: u64,
+    pub digest: String,
+    pub priority: i64,
+}
+
+/// A row of the table of events; see the schema.
+#[derive(Debug)]
+pub struct EventRow {
+    pub sequence: u64,
+    pub at_ms: u64,
+    pub kind: String,
+    pub generation: Option<u64>,
+    pub state: Option<String>,
+    pub message: Option<String>,
+}
+
+/// What can be kept of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// All that its bits and its results depend on.
+    Kept,
+    /// Its configuration: it can be computed again, to the same bits.
+    Restarted,
+    /// Nothing.
+    Lost,
+}
+
+impl Fate {
+    /// What to do about damage. `restore`: what always helps.
+    pub fn next_step(self, restore: &str) -> String {
+        let outcome = match self {
+            Self::Kept => "that keeps the rest of the experiment",
+            Self::Restarted => "that has the experiment computed again, to the same bits",
+            Self::Lost => "that loses the experiment: submit it again",
+        };
+        format!("{restore}; {outcome}")
+    }
+}
+
+impl Inspected {
+    /// Reads an experiment.
+    pub fn read(source: &Source, id: ExperimentId) -> Self {
+        let Source { connection, sealer, .. } = source;
+        let sealer = sealer.as_ref();
+        let mut problems = Vec::new();
+        let row = keep(&mut problems, read_row(connection, sealer, id));
+        let history = keep(&mut problems, read_history(connection, sealer, id));
+        let champion = keep(&mut problems, read_champion(connection, sealer, id));
+        let latest = history.as_ref().map(|history| history.last());
+        let checkpoint =
+            keep(&mut problems, read_checkpoint(connection, sealer, id, latest, row.as_ref()));
+        let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
+        let mut inspected = Self { id, row, history, champion, checkpoint, events, problems };
+        inspected.find_what_is_missing();
+        inspected
+    }
+
+    /// What can be kept of it.
+    pub fn fate(&self) -> Fate {
+        let Some(row) = &self.row else { return Fate::Lost };
+        let has_all = match row.state {
+            None => false,
+            // The next generation brings the champion again.
+            Some(state) if state.is_unfinished() => {
+                matches!(self.checkpoint, Some(Some(_))) && self.history.is_some()
+            }
+            Some(_) => self.history.is_some() && self.champion.is_some(),
+        };
+        match has_all {
+            true => Fate::Kept,
+            false if row.fingerprint == sim_core::FINGERPRINT => Fate::Restarted,
+            false => Fate::Lost,
+        }
+    }
+
+    fn find_what_is_missing(&mut self) {
+        let Some(row) = &self.row else { return };
+        match row.state {
+            None => self.problems.push("its state is not a state".to_owned()),
+            Some(state) if state.is_unfinished() && matches!(self.checkpoint, Some(None)) => {
+                self.problems.push("its checkpoint is gone".to_owned());
+            }
+            Some(_) => {}
+        }
+        let has_ended = row.state.is_some_and(|state| !state.is_unfinished());
+        let has_history = self.history.as_ref().is_some_and(|history| !history.is_empty());
+        if has_ended && has_history && matches!(self.champion, Some(None)) {
+            self.champion = None;
+            self.problems.push("its champion is gone".to_owned());
+        }
+    }
+}
+
+/// A part, or none and what is wrong with it.
+fn keep<T>(problems: &mut Vec<String>, part: Result<T, String>) -> Option<T> {
+    part.map_err(|problem| problems.push(problem)).ok()
+}
+
+fn unreadable(what: &str) -> impl Fn(rusqlite::Error) -> String {
+    move |error| format!("{what} cannot be read: {error}")
+}
+
+fn read_row(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+) -> Result<ExperimentRow, String> {
+    let unreadable = unreadable("its configuration");
+    let from_row = |row: &Row<'_>| {
+        Ok(ExperimentRow {
+            request_id: row.get(0)?,
+            name: row.get(1)?,
+            config: row.get(2)?,
+            config_digest: row.get(3)?,
+            fingerprint: row.get(4)?,
+            genotype_len: row.get(5)?,
+            state: ExperimentState::from_name(&row.get::<_, String>(6)?),
+            reason: row.get(7)?,
+            submitted_at_ms: row.get(8)?,
+            digest: row.get(9)?,
+            priority: row.get::<_, i64>(10)?.clamp(1, 1000),
+        })
+    };
+    let sql = "SELECT request_id, name, config, config_digest, fingerprint, genotype_len, state,
+                      reason, submitted_at_ms, digest, priority
+               FROM experiments WHERE id = ?1";
+    let row = connection.query_row(sql, [id.0], from_row).map_err(&unreadable)?;
+    if let Some(sealer) = sealer {
+        let (seal, expected) =
+            seals::experiment_seal(connection, sealer, id).map_err(&unreadable)?;
+        if seal != expected {
+            return Err("its configuration is not what was stored".to_owned());
+        }
+    }
+    // Another version of the simulation may have other files.
+    if row.fingerprint == sim_core::FINGERPRINT {
+        let (config, _) = ExperimentConfig::from_json(&row.config, "", ALGORITHMS)
+            .map_err(|error| format!("its configuration is not valid: {error}"))?;
+        let digest = Digest::of_config(&config, &row.fingerprint).to_string();
+        if digest != row.config_digest {
+            return Err(format!(
+                "its configuration has the digest {digest}, and not {}",
+                row.config_digest
+            ));
+        }
+    }
+    Ok(row)
+}
+
+fn read_history(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+) -> Result<Vec<GenerationRecord>, String> {
+    let rows = history::read_all(connection, id).map_err(unreadable("its history"))?;
+    let mut history = Vec::with_capacity(rows.len());
+    for (number, (generation, seal)) in (0..).zip(rows) {
+        if generation.generation != number {
+            return Err(format!("generation {number} is gone from its history"));
+        }
+        if sealer.is_some_and(|sealer| seal != sealer.generation(id, &generation)) {
+            return Err(format!("generation {number} of its history is not what was stored"));
+        }
+        history.push(generation);
+    }
+    Ok(history)
+}
+
+fn read_champion(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+) -> Result<Option<Champion>, String> {
+    champions::get(connection, sealer, id).map_err(|error| match error {
+        StoreError::Corrupt(what) => format!("its champion cannot be used: {what}"),
+        error => format!("its champion cannot be read: {error}"),
+    })
+}
+
+/// `latest`: the end of the history, if that can be read.
+fn read_checkpoint(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+    latest: Option<Option<&GenerationRecord>>,
+    row: Option<&ExperimentRow>,
+) -> Result<Option<String>, String> {
+    let stored = checkpoints::get(connection, id).map_err(unreadable("its checkpoint"))?;
+    let Some(checkpoints::Stored { seal, state }) = stored else { return Ok(None) };
+    let Some(latest) = latest else {
+        return Err("its checkpoint has no history to follow".to_owned());
+    };
+    if sealer.is_some_and(|sealer| seal != sealer.checkpoint(id, latest, &state)) {
+        let what = "its checkpoint, or the end of its history, is not what was stored";
+        return Err(what.to_owned());
+    }
+    let state = String::from_utf8(state).map_err(|_| "its checkpoint is not text".to_owned())?;
+    if let Some(row) = row.filter(|row| row.fingerprint == sim_core::FINGERPRINT) {
+        let evolution: Evolution = serde_json::from_str(&state)
+            .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
+        let link = latest.map_or(&row.config_digest, |latest| &latest.digest);
+        if evolution.digest().to_string() != *link {
+            return Err(format!(
+                "its checkpoint has the digest {}, and the history {link}",
+                evolution.digest()
+            ));
+        }
+    }
+    Ok(Some(state))
+}
+
+/// Events have no seals, as no result depends on them.
+fn read_events(
+    connection: &Connection,
+    id: ExperimentId,
+    history: Option<&[GenerationRecord]>,
+) -> Result<Vec<EventRow>, String> {
+    let unreadable = unreadable("its events");
+    let mut statement = connection
+        .prepare_cached(
+            "SELECT sequence, at_ms, kind, generation, state, message FROM events
+             WHERE experiment_id = ?1 ORDER BY sequence",
+        )
+        .map_err(&unreadable)?;
+    let from_row = |row: &Row<'_>| {
+        Ok(EventRow {
+            sequence: row.get(0)?,
+            at_ms: row.get(1)?,
+            kind: row.get(2)?,
+            generation: row.get(3)?,
+            state: row.get(4)?,
+            message: row.get(5)?,
+        })
+    };
+    let rows = statement.query_map([id.0], from_row).map_err(&unreadable)?;
+    let events: Vec<EventRow> = rows.collect::<rusqlite::Result<_>>().map_err(&unreadable)?;
+    let are_whole = (1..).zip(&events).all(|(sequence, event)| event.sequence == sequence);
+    if !are_whole || events.is_empty() {
+        return Err("some of its events are gone".to_owned());
+    }
+    let generations = events.iter().filter_map(|event| event.generation);
+    match history {
+        Some(history) if !generations.eq(0..history.len() as u64) => {
+            Err("its events and its history are not of the same generations".to_owned())
+        }
+        _ => Ok(events),
+    }
+}

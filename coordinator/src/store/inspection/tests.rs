@@ -1,0 +1,347 @@
+//! Databases with damage of every kind, and what is found and kept of them.
+
+use std::fs;
+
+use evolution::Evolution;
+use rusqlite::Connection;
+use tempfile::TempDir;
+
+use super::{
+    super::{file, schema, tests::new_experiment},
+    *,
+};
+use crate::store::{
+    ExperimentState, GenerationCommit, GenerationRecord, Store, StoreError, checkpoint_json,
+};
+
+/// Commits a generation of a real evolution, whose fitness is its index.
+fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
+    let (_, checkpoint) = store.resumable(id).unwrap();
+    let mut evolution: Evolution = serde_json::from_str(&checkpoint).unwrap();
+    let generation = evolution.ask();
+    let fitness = vec![vec![generation.index as f64]; generation.genotypes.len()];
+    let told = evolution.tell(generation, &fitness).unwrap();
+    let record = GenerationRecord {
+        generation: told.generation,
+        statistics: told.statistics,
+        digest: told.digest.to_string(),
+        duration_ms: 5,
+        episodes: 300,
+        workers: 2,
+        idle_share: 0.25,
+    };
+    let commit = GenerationCommit {
+        generation: &record,
+        checkpoint: &checkpoint_json(&evolution),
+        champion: evolution.champion(),
+        digest: &record.digest,
+        notices: &[],
+        completed,
+    };
+    store.commit_generation(id, 1000, &commit).unwrap();
+}
+
+/// Experiment 1 completed, 2 running, 3 cancelled, 4 new.
+fn store_in(directory: &Path) -> Store {
+    let mut store = Store::open(directory).unwrap();
+    let ids = [0; 4].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
+    for id in &ids[..3] {
+        advance(&mut store, *id, None);
+        advance(&mut store, *id, None);
+    }
+    advance(&mut store, ids[0], Some(""));
+    store.set_state(ids[2], 9, ExperimentState::Cancelled, "enough").unwrap();
+    store
+}
+
+fn data_directory() -> TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    drop(store_in(directory.path()));
+    directory
+}
+
+fn edit(directory: &Path, sql: &str) {
+    let database = Connection::open(file::path_in(directory)).unwrap();
+    database.execute_batch(sql).unwrap();
+}
+
+fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
+    let findings = inspect(directory).unwrap().findings;
+    findings.into_iter().map(|f| (f.experiment.map(|id| id.0), f.what)).collect()
+}
+
+/// Everything of the experiments in a directory, bit for bit.
+fn contents(store: &Store) -> Vec<String> {
+    let experiments = store.experiments().unwrap();
+    let all = experiments.iter().map(|experiment| {
+        let id = experiment.id;
+        let generations = store.generations(id, 0, 100).unwrap();
+        let events = store.events(id, 0, 100).unwrap();
+        let checkpoint = store.resumable(id).map_or_else(|_| None, |(_, state)| Some(state));
+        format!("{experiment:?} {generations:?} {events:?} {:?} {checkpoint:?}", store.champion(id))
+    });
+    all.collect()
+}
+
+fn fates(recovery: &Recovery) -> Vec<Fate> {
+    recovery.experiments.iter().map(|recovered| recovered.fate).collect()
+}
+
+#[test]
+fn a_sound_database_has_no_findings_in_use_or_not_and_nothing_is_left_beside_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let store = store_in(directory.path());
+    for _ in 0..2 {
+        let inspection = inspect(directory.path()).unwrap();
+        assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
+        assert_eq!((inspection.n_experiments, inspection.n_generations), (4, 7));
+    }
+    drop(store);
+    let names = || {
+        let entries = fs::read_dir(directory.path()).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    let before = names();
+    assert!(inspect(directory.path()).unwrap().findings.is_empty());
+    assert_eq!(names(), before);
+}
+
+#[test]
+fn every_edit_is_found_and_named() {
+    for (sql, experiment, what) in [
+        ("UPDATE experiments SET config = '{}' WHERE id = 2", 2, "its configuration is not"),
+        (
+            "UPDATE generations SET best = 9 WHERE experiment_id = 3",
+            3,
+            "generation 0 of its history",
+        ),
+        (
+            "DELETE FROM generations WHERE experiment_id = 3 AND generation = 0",
+            3,
+            "generation 0 is gone",
+        ),
+        (
+            "DELETE FROM generations WHERE experiment_id = 3 AND generation = 1",
+            3,
+            "or the end of the history, is not",
+        ),
+        ("UPDATE champions SET genotype = '[]' WHERE experiment_id = 1", 1, "its champion"),
+        ("DELETE FROM champions WHERE experiment_id = 1", 1, "its champion is gone"),
+        ("UPDATE checkpoints SET state = '' WHERE experiment_id = 2", 2, "its checkpoint"),
+        ("DELETE FROM checkpoints WHERE experiment_id = 2", 2, "its checkpoint is gone"),
+        ("DELETE FROM events WHERE experiment_id = 2 AND sequence = 2", 2, "its events"),
+    ] {
+        let directory = data_directory();
+        edit(directory.path(), sql);
+        let findings = findings(directory.path());
+        assert!(!findings.is_empty(), "{sql}");
+        assert!(findings.iter().all(|found| found.0 == Some(experiment)), "{sql}: {findings:?}");
+        assert!(findings.iter().any(|found| found.1.contains(what)), "{sql}: {findings:?}");
+    }
+}
+
+#[test]
+fn rows_without_an_experiment_are_found() {
+    let directory = data_directory();
+    edit(directory.path(), "PRAGMA foreign_keys = 0; DELETE FROM experiments WHERE id = 3");
+    let findings = findings(directory.path());
+    assert!(findings.iter().any(|found| found.1.contains("belong to no experiment")));
+}
+
+#[test]
+fn a_copy_without_its_log_is_found_and_what_is_in_it_can_be_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = store_in(directory.path());
+    drop(store);
+    store = Store::open(directory.path()).unwrap();
+    advance(&mut store, ExperimentId(2), None);
+    let copied = tempfile::tempdir().unwrap();
+    fs::copy(file::path_in(directory.path()), file::path_in(copied.path())).unwrap();
+    let found = findings(copied.path());
+    assert!(found[0].1.contains("without its write-ahead log"), "{found:?}");
+    let to = copied.path().join("new");
+    assert_eq!(fates(&recover(copied.path(), &to).unwrap()), [Fate::Kept; 4]);
+    let recovered = Store::open(&to).unwrap();
+    let latest = recovered.experiment(ExperimentId(2)).unwrap().unwrap().latest.unwrap();
+    assert_eq!(latest.generation, 1, "the third one was in the log");
+}
+
+#[test]
+fn recovery_of_a_sound_database_is_a_copy() {
+    let directory = data_directory();
+    let to = directory.path().join("new");
+    assert_eq!(fates(&recover(directory.path(), &to).unwrap()), [Fate::Kept; 4]);
+    let [before, after] = [directory.path(), &to].map(|directory| Store::open(directory).unwrap());
+    assert_eq!(contents(&before), contents(&after));
+    assert!(inspect(&to).unwrap().findings.is_empty());
+}
+
+#[test]
+fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
+    let directory = data_directory();
+    edit(
+        directory.path(),
+        "UPDATE generations SET best = 9 WHERE experiment_id = 1;
+         UPDATE checkpoints SET state = '{}' WHERE experiment_id = 2;
+         UPDATE experiments SET config = '{}' WHERE id = 3;
+         DELETE FROM events WHERE experiment_id = 4;",
+    );
+    let to = directory.path().join("new");
+    let recovery = recover(directory.path(), &to).unwrap();
+    assert_eq!(fates(&recovery), [Fate::Restarted, Fate::Restarted, Fate::Lost, Fate::Kept]);
+    let mut store = Store::open(&to).unwrap();
+    for id in [1, 2].map(ExperimentId) {
+        let (experiment, checkpoint) = store.resumable(id).unwrap();
+        assert_eq!(experiment.state, ExperimentState::Paused);
+        assert!(experiment.reason.contains("resume it"), "{}", experiment.reason);
+        assert!(experiment.latest.is_none());
+        assert_eq!(checkpoint, new_experiment(None).checkpoint);
+        advance(&mut store, id, None);
+    }
+    assert_eq!(store.experiment(ExperimentId(4)).unwrap().unwrap().state, ExperimentState::Running);
+    assert_eq!(store.events(ExperimentId(4), 0, 9).unwrap().len(), 1);
+    assert!(store.experiment(ExperimentId(3)).unwrap().is_none());
+    let (next, _) = store.create(&new_experiment(None), 5).unwrap();
+    assert_eq!(next, ExperimentId(5), "ids are not used again");
+    drop(store);
+    assert!(inspect(&to).unwrap().findings.is_empty());
+}
+
+/// Whatever page is damaged, everything that the new directory has is as it was.
+#[test]
+fn no_damaged_page_gets_into_a_recovered_directory() {
+    let sound = data_directory();
+    let before = contents(&Store::open(sound.path()).unwrap());
+    let bytes = fs::read(file::path_in(sound.path())).unwrap();
+    let page_len = 4096;
+    let n_pages = bytes.len() / page_len;
+    assert!(n_pages > 12, "{n_pages}");
+    let n_free: usize = Connection::open(file::path_in(sound.path()))
+        .unwrap()
+        .query_row("PRAGMA freelist_count", [], |row| row.get(0))
+        .unwrap();
+    let (mut n_kept, mut n_lost, mut n_harmless) = (0, 0, 0);
+    for page in 1..n_pages {
+        let directory = tempfile::tempdir().unwrap();
+        let mut damaged = bytes.clone();
+        let garbage = (0..page_len).map(|i| (i * 31 + page * 7) as u8);
+        damaged[page * page_len..][..page_len].copy_from_slice(&garbage.collect::<Vec<_>>());
+        fs::write(file::path_in(directory.path()), damaged).unwrap();
+        n_harmless += usize::from(findings(directory.path()).is_empty());
+        let to = directory.path().join("new");
+        let Ok(recovery) = recover(directory.path(), &to) else { continue };
+        let store = Store::open(&to).unwrap();
+        let after = contents(&store);
+        for (recovered, after) in
+            recovery.experiments.iter().filter(|r| r.fate != Fate::Lost).zip(&after)
+        {
+            if recovered.fate == Fate::Kept && recovered.problems.is_empty() {
+                n_kept += 1;
+                assert_eq!(*after, before[recovered.id.0 as usize - 1], "page {page}");
+            } else {
+                n_lost += 1;
+            }
+        }
+        drop(store);
+        assert!(inspect(&to).unwrap().findings.is_empty(), "page {page}");
+    }
+    assert!(n_kept > 10 && n_lost > 0, "{n_kept} {n_lost}");
+    assert!(n_harmless <= n_free, "only pages that hold nothing: {n_harmless} of {n_free}");
+}
+
+#[test]
+fn a_database_that_was_cut_off_is_read_as_far_as_it_goes() {
+    let sound = data_directory();
+    let bytes = fs::read(file::path_in(sound.path())).unwrap();
+    let mut n_left = Vec::new();
+    for len in [bytes.len() - 4096, bytes.len() / 2 + 77, 3 * 4096, 50, 0] {
+        let directory = tempfile::tempdir().unwrap();
+        fs::write(file::path_in(directory.path()), &bytes[..len]).unwrap();
+        assert!(!findings(directory.path()).is_empty(), "{len}");
+        let to = directory.path().join("new");
+        let is_kept = |fate: &Fate| *fate != Fate::Lost;
+        n_left.push(match recover(directory.path(), &to) {
+            Ok(recovery) => fates(&recovery).into_iter().filter(is_kept).count(),
+            Err(error) => {
+                assert!(matches!(error, StoreError::NothingSound { .. }), "{error}");
+                assert!(!to.exists());
+                0
+            }
+        });
+    }
+    assert!(n_left[0] > 0 && n_left[4] == 0, "{n_left:?}");
+}
+
+#[test]
+fn older_schemas_are_looked_at_and_recovered_without_a_change() {
+    let directory = data_directory();
+    edit(
+        directory.path(),
+        "ALTER TABLE experiments DROP COLUMN seal;
+         ALTER TABLE generations DROP COLUMN seal;
+         ALTER TABLE checkpoints DROP COLUMN seal;
+         ALTER TABLE champions DROP COLUMN seal;
+         DROP TABLE identity;
+         PRAGMA user_version = 2;",
+    );
+    let path = file::path_in(directory.path());
+    let before = fs::read(&path).unwrap();
+    let inspection = inspect(directory.path()).unwrap();
+    assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
+    assert_eq!((inspection.schema_version, inspection.n_generations), (2, 7));
+    let to = directory.path().join("new");
+    assert_eq!(fates(&recover(directory.path(), &to).unwrap()), [Fate::Kept; 4]);
+    assert!(fs::read(&path).unwrap() == before);
+    edit(directory.path(), "UPDATE checkpoints SET state = replace(state, '0.1', '0.2')");
+    edit(
+        directory.path(),
+        "UPDATE experiments SET config = replace(config, '\"seed\":1', '\"seed\":2')",
+    );
+    assert!(!findings(directory.path()).is_empty());
+}
+
+#[test]
+fn backups_are_whole_and_of_one_moment() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = store_in(directory.path());
+    let to = directory.path().join("backups").join("today");
+    let Backup::Made(inspection) = backup(directory.path(), &to).unwrap() else { panic!() };
+    assert_eq!((inspection.path, inspection.n_generations), (file::path_in(&to), 7));
+    let then = contents(&store);
+    advance(&mut store, ExperimentId(2), None);
+    assert_eq!(contents(&Store::open(&to).unwrap()), then);
+    assert_ne!(contents(&store), then);
+    assert!(matches!(backup(directory.path(), &to), Err(StoreError::NotEmpty { .. })));
+
+    drop(store);
+    let stopped = directory.path().join("stopped");
+    assert!(matches!(backup(directory.path(), &stopped), Ok(Backup::Made(_))));
+    assert_eq!(contents(&Store::open(&stopped).unwrap()).len(), 4);
+}
+
+#[test]
+fn an_interrupted_backup_is_made_again() {
+    let directory = data_directory();
+    let to = directory.path().join("backup");
+    fs::create_dir(&to).unwrap();
+    fs::write(file::unfinished_in(&to), "half a datab").unwrap();
+    assert!(matches!(backup(directory.path(), &to), Ok(Backup::Made(_))));
+    assert_eq!(fs::read_dir(&to).unwrap().count(), 1);
+}
+
+#[test]
+fn there_is_no_backup_of_a_damaged_database() {
+    let directory = data_directory();
+    edit(directory.path(), "UPDATE checkpoints SET state = '{}' WHERE experiment_id = 2");
+    let to = directory.path().join("backup");
+    let Backup::Damaged(inspection) = backup(directory.path(), &to).unwrap() else { panic!() };
+    assert_eq!(inspection.findings[0].experiment, Some(ExperimentId(2)));
+    assert!(!to.exists());
+    let nothing = directory.path().join("nothing");
+    assert!(matches!(backup(&nothing, &to), Err(StoreError::NoDatabase { .. })));
+    assert!(matches!(inspect(&nothing), Err(StoreError::NoDatabase { .. })));
+    edit(directory.path(), &format!("PRAGMA user_version = {}", schema::VERSION + 1));
+    assert!(matches!(inspect(directory.path()), Err(StoreError::Newer { .. })));
+}
