@@ -8,9 +8,19 @@ use std::time::Duration;
 
 use swarm_proto::{ITEMS_PER_SLOT_MAX, SLOTS_MAX};
 
-/// Connections at the same time: every worker and every call of a client on one
-/// of its own. More wait in the system's queue.
+/// Connections at the same time of those who have made a call that was let in: every
+/// worker and every call of a client on one of its own.
 pub const CONNECTIONS_MAX: usize = WORKERS_MAX + CLIENT_CALLS_MAX;
+/// Connections at the same time of those who have not: one more ends the oldest.
+pub const STRANGERS_MAX: usize = 512;
+/// Time that each of those has at least to say something.
+pub const SILENT_STRANGER_GRACE: Duration = Duration::from_millis(100);
+/// Time that each of those has at least to make its first call if it says something. If
+/// all are younger, more wait in the system's queue: so a whole fleet that comes back at
+/// once gets in.
+pub const STRANGER_GRACE: Duration = Duration::from_millis(500);
+/// Connections that wait in the system's queue, as far as the system permits.
+pub const LISTEN_BACKLOG: u32 = 4096;
 /// Workers at the same time. Each holds a stream, some buffers and a file
 /// descriptor.
 pub const WORKERS_MAX: usize = 4096;
@@ -32,8 +42,6 @@ pub const KEEPALIVE: Duration = Duration::from_secs(20);
 /// Pause after the system cannot accept a connection, for lack of descriptors,
 /// say.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
-/// Least time between two log lines about what anybody may cause.
-pub const STRANGER_LOG_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for open streams to end at shutdown.
 pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 

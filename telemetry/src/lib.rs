@@ -6,6 +6,8 @@
 mod endpoint;
 mod log;
 mod metric;
+mod text;
+mod throttle;
 
 use std::net::SocketAddr;
 
@@ -13,6 +15,8 @@ pub use endpoint::{Endpoint, ListenError};
 pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
 pub use prometheus::Histogram;
+pub use text::{EscapingWriter, escape, escape_lines, is_unprintable};
+pub use throttle::Throttle;
 
 /// The address at which metrics are served.
 #[derive(Debug, clap::Args)]

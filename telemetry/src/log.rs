@@ -1,8 +1,22 @@
 //! Logs to standard error, as text or as JSON.
 
-use std::io::{self, IsTerminal as _};
+use std::{
+    collections::BTreeMap,
+    io::{self, IsTerminal as _},
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
 
-use tracing_subscriber::{EnvFilter, filter::ParseError};
+use tracing::{Event, Level, Subscriber, warn};
+use tracing_subscriber::{
+    EnvFilter, Layer,
+    filter::ParseError,
+    fmt,
+    layer::{Context, SubscriberExt as _},
+    util::SubscriberInitExt as _,
+};
+
+use crate::{text::EscapingWriter, throttle::Throttle};
 
 /// Format and level of the log.
 #[derive(Debug, clap::Args)]
@@ -38,11 +52,95 @@ impl LogArgs {
         let level = &self.log_level;
         let filter = EnvFilter::try_new(level)
             .map_err(|source| LogError { level: level.clone(), source })?;
-        let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr);
-        match self.log_format {
-            LogFormat::Text => log.with_target(false).with_ansi(io::stderr().is_terminal()).init(),
-            LogFormat::Json => log.json().flatten_event(true).with_current_span(false).init(),
-        }
+        let lines = fmt::layer().with_writer(|| EscapingWriter(io::stderr()));
+        let lines = match self.log_format {
+            LogFormat::Text => {
+                lines.with_target(false).with_ansi(io::stderr().is_terminal()).boxed()
+            }
+            LogFormat::Json => lines.json().flatten_event(true).with_current_span(false).boxed(),
+        };
+        let log = tracing_subscriber::registry().with(filter);
+        log.with(LibraryThrottle::default()).with(lines).init();
         Ok(())
+    }
+}
+
+/// Libraries whose lines are about what peers do.
+const LIBRARIES: [&str; 6] = ["h2", "hyper", "hyper_util", "rustls", "tonic", "tower"];
+
+/// Withholds lines of libraries at INFO and above beyond one per second each, as any
+/// peer can cause any number of them. Whoever wants more detail gets all of it.
+#[derive(Debug, Default)]
+struct LibraryThrottle {
+    throttles: Mutex<BTreeMap<&'static str, Throttle>>,
+}
+
+impl<S: Subscriber> Layer<S> for LibraryThrottle {
+    fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
+        let metadata = event.metadata();
+        let module = metadata.target().split("::").next().unwrap_or_default();
+        let Some(library) = LIBRARIES.into_iter().find(|&library| library == module) else {
+            return true;
+        };
+        if *metadata.level() > Level::INFO {
+            return true;
+        }
+        let mut throttles = self.throttles.lock().unwrap_or_else(PoisonError::into_inner);
+        #[expect(clippy::disallowed_methods, reason = "a log has the time of its lines")]
+        let withheld = throttles.entry(library).or_default().on_line(Instant::now());
+        drop(throttles);
+        if let Some(withheld @ 1..) = withheld {
+            warn!(library, withheld, "a library's log lines were withheld");
+        }
+        withheld.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tracing::{debug, subscriber::with_default};
+
+    use super::*;
+
+    /// What is written.
+    #[derive(Debug, Clone, Default)]
+    struct Lines(Arc<Mutex<Vec<u8>>>);
+
+    impl io::Write for Lines {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().extend_from_slice(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_librarys_warnings_are_few_and_everything_else_is_there() {
+        let lines = Lines::default();
+        let sink = lines.clone();
+        let layer = fmt::layer().with_writer(move || sink.clone()).with_ansi(false);
+        let log = tracing_subscriber::registry()
+            .with(EnvFilter::new("trace"))
+            .with(LibraryThrottle::default())
+            .with(layer);
+        with_default(log, || {
+            for _ in 0..100 {
+                warn!(target: "h2::proto", "a reset");
+                warn!(target: "hyper", "a header");
+                debug!(target: "h2::proto", "detail");
+                warn!(target: "coordinator::h2", "worker lost");
+            }
+        });
+        let text = String::from_utf8(lines.0.lock().unwrap().clone()).unwrap();
+        let count = |line: &str| text.matches(line).count();
+        assert!((1..4).contains(&count("a reset")), "{text}");
+        assert!((1..4).contains(&count("a header")));
+        assert_eq!(count("detail"), 100);
+        assert_eq!(count("worker lost"), 100);
     }
 }

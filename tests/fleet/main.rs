@@ -18,3 +18,4 @@ mod reproduction;
 mod security;
 mod simulate;
 mod steering;
+mod strangers;

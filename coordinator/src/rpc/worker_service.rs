@@ -1,6 +1,10 @@
 //! `WorkerService`: one stream per worker, translated to the driver's events.
 
-use std::{num::NonZeroU64, pin::Pin};
+use std::{
+    num::NonZeroU64,
+    pin::Pin,
+    sync::{Mutex, PoisonError},
+};
 
 use swarm_proto::{
     ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION, SLOTS_MAX, WORKER_NAME_LEN_MAX,
@@ -9,6 +13,7 @@ use swarm_proto::{
         worker_service_server::WorkerService,
     },
 };
+use swarm_telemetry::Throttle;
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::{Stream, StreamExt as _, wrappers::ReceiverStream};
 use tokio_util::sync::CancellationToken;
@@ -16,6 +21,7 @@ use tonic::{Request, Response, Status, Streaming};
 use tracing::warn;
 
 use crate::{
+    clock,
     driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
     engine::Introduction,
     ids::WorkerId,
@@ -38,6 +44,8 @@ pub struct Workers {
     pub times: WelcomeTimes,
     /// Ends all streams.
     pub shutdown: CancellationToken,
+    /// Of lines about workers that are refused, who may come back at once.
+    pub refusals: Mutex<Throttle>,
 }
 
 #[tonic::async_trait]
@@ -59,8 +67,11 @@ impl WorkerService for Workers {
             _ => return Err(Status::invalid_argument("the first message must be Hello")),
         };
         check_hello(&hello).inspect_err(|status| {
-            let name = printable(&hello.name);
-            warn!(name, address, reason = status.message(), "worker refused");
+            let refusals = &mut *self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(withheld) = refusals.on_line(clock::now()) {
+                let name = printable(&hello.name);
+                warn!(name, address, withheld, reason = status.message(), "worker refused");
+            }
         })?;
 
         let n_slots = hello.slots as usize;

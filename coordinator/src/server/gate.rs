@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use http::{Request, header::AUTHORIZATION};
 use swarm_proto::v1::worker_service_server;
+use swarm_telemetry::Throttle;
 use swarm_transport::BEARER;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Status, body::Body, transport::server::TlsConnectInfo};
@@ -13,8 +14,7 @@ use tracing::warn;
 use super::{
     access::{Role, Tokens},
     call_layer::{Guard, Watch},
-    listener::Peer,
-    throttle::Throttle,
+    listener::{Peer, TooManyConnections},
 };
 use crate::{
     clock,
@@ -122,11 +122,16 @@ impl Guard for Gate {
         let authorization = request.headers().get(AUTHORIZATION).map(|value| value.as_bytes());
         let place = self
             .admit(role, authorization)
+            .and_then(|place| match peer.as_ref().map_or(Ok(()), Peer::admit) {
+                Ok(()) => Ok(place),
+                Err(TooManyConnections) => Err(Status::resource_exhausted(
+                    "the coordinator has as many connections as it can; try again later",
+                )),
+            })
             .inspect_err(|status| self.log_refusal(peer.as_ref(), path, status))?;
         // What was checked is not needed any more, and must not be seen any more.
         request.headers_mut().remove(AUTHORIZATION);
         if let Some(peer) = peer {
-            peer.admit();
             request.extensions_mut().insert(peer);
         }
         Ok(Admitted { _place: Some(place) })

@@ -7,9 +7,9 @@ mod config;
 mod gate;
 pub mod listener;
 mod services;
-mod throttle;
+mod strangers;
 
-use std::{convert::Infallible, net::SocketAddr, path::PathBuf};
+use std::{convert::Infallible, net::SocketAddr, path::PathBuf, sync::Mutex};
 
 use swarm_telemetry::Endpoint;
 use swarm_transport::tls_diagnosis;
@@ -92,7 +92,12 @@ impl Coordinator {
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let services = Services {
-            workers: Workers { events, times, shutdown: shutdown.clone() },
+            workers: Workers {
+                events,
+                times,
+                shutdown: shutdown.clone(),
+                refusals: Mutex::default(),
+            },
             fleet: Fleet { control: control.clone() },
             evaluations: Evaluations { control: control.clone(), shutdown: shutdown.clone() },
             experiments: Experiments { control, store: store.clone(), shutdown: shutdown.clone() },
@@ -157,7 +162,7 @@ fn with_tls(server: Server, tls: Option<Tls>) -> Result<Server, StartError> {
 
 async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
     let listen_error = |source| StartError::Listen { address, source };
-    let listener = TcpListener::bind(address).await.map_err(listen_error)?;
+    let listener = listener::bind(address).map_err(listen_error)?;
     let local_addr = listener.local_addr().map_err(listen_error)?;
     Ok((listener, local_addr))
 }

@@ -2,13 +2,15 @@
 
 use tracing_subscriber::filter::LevelFilter;
 
+use swarm_telemetry::EscapingWriter;
+
 use crate::progress::BesideBar;
 
 /// Logs warnings and errors, on lines of their own.
 pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
     tracing_subscriber::fmt()
         .with_max_level(LevelFilter::WARN)
-        .with_writer(stderr)
+        .with_writer(move || EscapingWriter(stderr()))
         .with_ansi(false)
         .with_target(false)
         .without_time()

@@ -1,8 +1,6 @@
-//! Keeps strangers from filling the log.
+//! Keeps others from filling the log.
 
-use std::time::Instant;
-
-use crate::limits::STRANGER_LOG_INTERVAL;
+use std::time::{Duration, Instant};
 
 /// Lets one line through per interval and counts the others.
 #[derive(Debug, Default)]
@@ -12,9 +10,12 @@ pub struct Throttle {
 }
 
 impl Throttle {
+    /// Least time between two lines.
+    pub const INTERVAL: Duration = Duration::from_secs(1);
+
     /// Whether a line is due; if so, how many were withheld since the last one.
     pub fn on_line(&mut self, now: Instant) -> Option<u64> {
-        let is_due = |at| now.saturating_duration_since(at) >= STRANGER_LOG_INTERVAL;
+        let is_due = |at| now.saturating_duration_since(at) >= Self::INTERVAL;
         if self.logged_at.is_none_or(is_due) {
             self.logged_at = Some(now);
             return Some(std::mem::take(&mut self.n_withheld));
@@ -27,16 +28,16 @@ impl Throttle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock;
 
     #[test]
+    #[expect(clippy::disallowed_methods, reason = "any instant will do")]
     fn one_line_per_interval_says_how_many_there_were() {
-        let now = clock::now();
+        let now = Instant::now();
         let mut throttle = Throttle::default();
         assert_eq!(throttle.on_line(now), Some(0));
         assert_eq!(throttle.on_line(now), None);
-        assert_eq!(throttle.on_line(now + STRANGER_LOG_INTERVAL / 2), None);
-        assert_eq!(throttle.on_line(now + STRANGER_LOG_INTERVAL), Some(2));
-        assert_eq!(throttle.on_line(now + STRANGER_LOG_INTERVAL * 2), Some(0));
+        assert_eq!(throttle.on_line(now + Throttle::INTERVAL / 2), None);
+        assert_eq!(throttle.on_line(now + Throttle::INTERVAL), Some(2));
+        assert_eq!(throttle.on_line(now + Throttle::INTERVAL * 2), Some(0));
     }
 }

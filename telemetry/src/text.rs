@@ -1,0 +1,90 @@
+//! Text of others, made fit for a terminal and a log.
+
+use std::{
+    borrow::Cow,
+    fmt::Write as _,
+    io::{self, Write},
+};
+
+/// Whether a character is no text: it moves the cursor, changes the order in which text
+/// is shown, or cannot be seen. (Unicode's categories Cc, Cf, Zl and Zp.)
+pub fn is_unprintable(c: char) -> bool {
+    c.is_control() || is_format(c)
+}
+
+fn is_format(c: char) -> bool {
+    matches!(c,
+        '\u{ad}' | '\u{600}'..='\u{605}' | '\u{61c}' | '\u{6dd}' | '\u{70f}' | '\u{890}'
+        | '\u{891}' | '\u{8e2}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
+        | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}'
+        | '\u{fff9}'..='\u{fffb}' | '\u{110bd}' | '\u{110cd}' | '\u{13430}'..='\u{1343f}'
+        | '\u{1bca0}'..='\u{1bca3}' | '\u{1d173}'..='\u{1d17a}' | '\u{e0001}'..='\u{e007f}')
+}
+
+/// Text with unprintable characters escaped as in JSON (`\u202e`). So text stays on its
+/// line, in the order in which it is read.
+pub fn escape(text: &str) -> Cow<'_, str> {
+    escape_if(text, is_unprintable)
+}
+
+/// The same for lines of text: their ends stay. What is JSON stays the same JSON.
+pub fn escape_lines(text: &str) -> Cow<'_, str> {
+    escape_if(text, |c| c != '\n' && is_unprintable(c))
+}
+
+fn escape_if(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_unfit) {
+        return Cow::Borrowed(text);
+    }
+    let mut escaped = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if is_unfit(c) {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                write!(escaped, "\\u{unit:04x}").expect("a string takes all");
+            }
+        } else {
+            escaped.push(c);
+        }
+    }
+    Cow::Owned(escaped)
+}
+
+/// Writes log lines, whose control characters the log escapes by itself, with all other
+/// unprintable characters escaped. Each line comes whole.
+#[derive(Debug)]
+pub struct EscapingWriter<W>(pub W);
+
+impl<W: Write> Write for EscapingWriter<W> {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        match std::str::from_utf8(line) {
+            Ok(text) => self.0.write_all(escape_if(text, is_format).as_bytes())?,
+            Err(_) => self.0.write_all(line)?,
+        }
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_text_is_escaped_and_text_stays() {
+        let plain = "größe 漢字 \"a\" \\ =1+1";
+        assert!(matches!(escape(plain), Cow::Borrowed(text) if text == plain));
+        let name = "a\u{202e}b\u{1b}[2J\r\n\u{2028}\u{e0041}c\u{9b}";
+        assert_eq!(escape(name), r"a\u202eb\u001b[2J\u000d\u000a\u2028\udb40\udc41c\u009b");
+        assert_eq!(escape_lines("a\nb\t\u{feff}"), "a\nb\\u0009\\ufeff");
+    }
+
+    #[test]
+    fn lines_of_a_log_keep_their_colours() {
+        let mut written = Vec::new();
+        EscapingWriter(&mut written).write_all("\u{1b}[31mname=\u{202e}x\n".as_bytes()).unwrap();
+        assert_eq!(written, b"\x1b[31mname=\\u202ex\n");
+    }
+}
