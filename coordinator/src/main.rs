@@ -73,7 +73,7 @@ Exit codes:
   0  stopped by a signal
   1  internal error; committed generations are safe, the next start continues after them
   2  bad input: address in use, or open to a network without tokens or TLS; token,
-     certificate or data directory unusable; wrong arguments
+     certificate or data directory unusable; database damaged; wrong arguments
   3  another coordinator has taken over the data directory, and goes on there
 
 docs/security.md says how to create tokens and certificates.";
@@ -116,7 +116,8 @@ async fn run(args: &Args) -> ExitCode {
         Err(error) => {
             error!("{error}");
             ExitCode::from(match error.downcast_ref() {
-                Some(RunError::TakenOver) => 3,
+                Some(RunError::TakenOver(_)) => 3,
+                Some(RunError::Damaged(_)) => 2,
                 _ if error.is::<StartError>() || error.is::<AccessInputError>() => 2,
                 _ => 1,
             })
@@ -158,12 +159,15 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })
     .await?;
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = interrupt.recv() => {}
-        error = coordinator.failure() => return Err(error.into()),
+    let ended = tokio::select! {
+        _ = terminate.recv() => Ok(()),
+        _ = interrupt.recv() => Ok(()),
+        error = coordinator.failure() => Err(error),
+    };
+    if ended.is_ok() {
+        info!("coordinator stops");
     }
-    info!("coordinator stops");
+    // Whatever the reason, it is the last line of the log.
     coordinator.shutdown().await;
-    Ok(())
+    Ok(ended?)
 }

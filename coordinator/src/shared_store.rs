@@ -33,11 +33,19 @@ pub enum Retry {
 pub enum Written {
     /// It is on disk.
     Yes,
-    /// The experiment has ended, the coordinator is shutting down, or another one has
-    /// taken over: nothing is lost.
+    /// The experiment has ended, or the coordinator stops: nothing is lost.
     NotWanted,
     /// It cannot be written, now or later.
     Never(StoreError),
+}
+
+/// Why a coordinator must not write to its database any more; the texts are for people.
+#[derive(Debug, Clone)]
+pub enum Unusable {
+    /// Another coordinator has taken it over.
+    TakenOver(String),
+    /// It is damaged, and every write may make that worse.
+    Damaged(String),
 }
 
 /// A store that many tasks share.
@@ -48,8 +56,8 @@ pub struct SharedStore {
     news: Arc<watch::Sender<u64>>,
     /// Why the latest write did not reach the disk, if it did not.
     trouble: Arc<Mutex<Option<String>>>,
-    /// Cancelled when another coordinator has taken over the database.
-    taken_over: CancellationToken,
+    /// Set once, when nothing must be written any more.
+    unusable: Arc<watch::Sender<Option<Unusable>>>,
 }
 
 impl SharedStore {
@@ -59,14 +67,15 @@ impl SharedStore {
             store: Arc::new(Mutex::new(store)),
             news: Arc::new(watch::Sender::new(0)),
             trouble: Arc::default(),
-            taken_over: CancellationToken::new(),
+            unusable: Arc::default(),
         }
     }
 
-    /// Waits until another coordinator has taken over the database, so that nothing can be
-    /// written any more.
-    pub async fn taken_over(&self) {
-        self.taken_over.cancelled().await;
+    /// Waits until nothing must be written any more; says why.
+    pub async fn unusable(&self) -> Unusable {
+        let mut reason = self.unusable.subscribe();
+        let reason = reason.wait_for(Option::is_some).await;
+        reason.ok().and_then(|reason| reason.clone()).expect("this store has the sender")
     }
 
     /// Changes whenever something has been written.
@@ -95,8 +104,8 @@ impl SharedStore {
         let result = self.call(operation).await;
         let trouble = match &result {
             Err(error @ StoreError::Unavailable(_)) => Some(error.to_string()),
-            Err(StoreError::TakenOver { .. }) => {
-                self.taken_over.cancel();
+            Err(error @ StoreError::TakenOver { .. }) => {
+                self.unusable.send_replace(Some(Unusable::TakenOver(error.to_string())));
                 None
             }
             _ => None,
@@ -139,8 +148,11 @@ impl SharedStore {
                     return Written::Yes;
                 }
                 Ok(()) => return Written::Yes,
-                // The other coordinator computes it, too.
                 Err(StoreError::Ended(_) | StoreError::TakenOver { .. }) => {
+                    return Written::NotWanted;
+                }
+                Err(error @ StoreError::Corrupt(_)) => {
+                    self.unusable.send_replace(Some(Unusable::Damaged(error.to_string())));
                     return Written::NotWanted;
                 }
                 Err(error)

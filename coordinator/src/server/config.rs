@@ -84,12 +84,12 @@ pub enum RunError {
          Started again, the coordinator goes on from the last completed generation"
     )]
     Driver(String),
-    /// Another coordinator uses the data directory.
-    #[error(
-        "another coordinator has taken over the data directory; this one stops, and nothing is \
-         lost: run one coordinator per data directory"
-    )]
-    TakenOver,
+    /// Another coordinator uses the data directory, and goes on there.
+    #[error("{0}")]
+    TakenOver(String),
+    /// The database is damaged.
+    #[error("{0}")]
+    Damaged(String),
     /// Connections are no longer accepted.
     #[error("the server ended ({0}); start the coordinator again")]
     Server(String),

@@ -25,7 +25,7 @@ use crate::{
     limits::SHUTDOWN_GRACE,
     metrics::{Instruments, Source},
     rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
-    shared_store::SharedStore,
+    shared_store::{SharedStore, Unusable},
     store::Store,
 };
 
@@ -124,7 +124,10 @@ impl Coordinator {
     /// Waits for a part of it to end, which none does before [`Self::shutdown`].
     pub async fn failure(&mut self) -> RunError {
         tokio::select! {
-            () = self.store.taken_over() => RunError::TakenOver,
+            unusable = self.store.unusable() => match unusable {
+                Unusable::TakenOver(why) => RunError::TakenOver(why),
+                Unusable::Damaged(why) => RunError::Damaged(why),
+            },
             Some(ended) = self.driver.join_next() => RunError::Driver(match ended {
                 Ok(()) => "nobody asked it to".to_owned(),
                 Err(error) => error.to_string(),

@@ -91,7 +91,7 @@ async fn a_write_that_can_never_succeed_is_given_up_unless_there_is_no_other_way
         let counter = Arc::clone(&n_attempts);
         let written = store
             .write(&shutdown, "it", retry, move |_| match counter.fetch_add(1, Ordering::Relaxed) {
-                0 => Err(StoreError::Corrupt("a page".to_owned())),
+                0 => Err(StoreError::Bug(rusqlite::Error::InvalidQuery)),
                 _ => Ok(()),
             })
             .await;
@@ -100,5 +100,20 @@ async fn a_write_that_can_never_succeed_is_given_up_unless_there_is_no_other_way
             Retry::Always => assert!(matches!(written, Written::Yes)),
         }
         assert_eq!(n_attempts.load(Ordering::Relaxed), n_expected);
+    }
+}
+
+#[tokio::test]
+async fn to_a_damaged_database_nothing_is_written_again_and_the_coordinator_is_told() {
+    let (_directory, store) = shared();
+    let shutdown = CancellationToken::new();
+    for retry in [Retry::WhileUnavailable, Retry::Always] {
+        let damaged = |_: &mut Store| Err(StoreError::Corrupt("a page".to_owned()));
+        let written = store.write(&shutdown, "it", retry, damaged).await;
+        assert!(matches!(written, Written::NotWanted), "no experiment fails of it");
+    }
+    match store.unusable().await {
+        Unusable::Damaged(why) => assert!(why.contains("a page"), "{why}"),
+        other => panic!("{other:?}"),
     }
 }

@@ -140,13 +140,14 @@ impl From<rusqlite::Error> for StoreError {
             CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
             ReadOnly, SystemIoFailure,
         };
-        // Every query asks for the types of the schema: other bytes are damage.
+        // Every query asks for the types of the schema, and for rows that must exist.
         if matches!(
             error,
             rusqlite::Error::FromSqlConversionFailure(..)
                 | rusqlite::Error::IntegralValueOutOfRange(..)
                 | rusqlite::Error::InvalidColumnType(..)
                 | rusqlite::Error::Utf8Error(..)
+                | rusqlite::Error::QueryReturnedNoRows
         ) {
             return Self::Corrupt(error.to_string());
         }

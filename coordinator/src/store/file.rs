@@ -22,7 +22,8 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// What keeps other coordinators out, for as long as it is kept.
 #[derive(Debug)]
 pub struct Locks {
-    _files: Vec<File>,
+    _directory: File,
+    _database: Option<File>,
 }
 
 /// The database of a data directory.
@@ -40,17 +41,13 @@ pub fn unfinished_in(directory: &Path) -> PathBuf {
 pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
     fs::create_dir_all(directory).map_err(unusable)?;
-    let lock = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
-    let mut locks = vec![lock_file(lock, directory)?];
+    let file = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
+    let lock = lock(file, directory)?;
     let path = path_in(directory);
     if !path.try_exists().map_err(unusable)? {
         create(directory, unusable)?;
     }
-    // A lock file can be deleted while it is locked; the database itself cannot be
-    // replaced so easily. Elsewhere such a lock may be one and the same as those by which
-    // SQLite lets others read.
-    #[cfg(target_os = "linux")]
-    locks.push(lock_file(File::open(&path).map_err(unusable)?, directory)?);
+    let locks = Locks { _directory: lock, _database: lock_database(&path, directory)? };
     check(&path)?;
     let mut connection = Connection::open(&path)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
@@ -58,11 +55,22 @@ pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     connection.pragma_update(None, "synchronous", "FULL")?;
     write_ahead_log::configure(&connection)?;
     schema::migrate(&mut connection).map_err(|error| error.at(&path))?;
-    Ok((connection, Locks { _files: locks }))
+    Ok((connection, locks))
+}
+
+/// Locks the database itself: a lock file can be deleted while it is locked.
+fn lock_database(path: &Path, directory: &Path) -> Result<Option<File>> {
+    // Elsewhere this may be one and the same lock as those by which SQLite lets others read.
+    if !cfg!(target_os = "linux") {
+        return Ok(None);
+    }
+    let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
+    let file = File::open(path).map_err(unusable)?;
+    lock(file, directory).map(Some)
 }
 
 /// Locks a file of the data directory, or says that another has it.
-fn lock_file(file: File, directory: &Path) -> Result<File> {
+fn lock(file: File, directory: &Path) -> Result<File> {
     let path = directory.to_owned();
     match file.try_lock() {
         Ok(()) => Ok(file),

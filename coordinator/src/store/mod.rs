@@ -72,11 +72,10 @@ impl Store {
     /// from whoever owned it.
     pub fn open(directory: &Path) -> Result<Self> {
         let (connection, locks) = file::open(directory)?;
-        connection.execute("UPDATE identity SET owner = randomblob(16)", [])?;
-        let owner = owner(&connection)?;
-        write_ahead_log::fold(&connection)?;
-        let sealer = Sealer::of(&connection)?;
-        Ok(Self { connection, path: file::path_in(directory), sealer, owner, _locks: locks })
+        let path = file::path_in(directory);
+        let (owner, sealer) =
+            claim(&connection).map_err(|error| StoreError::from(error).at(&path))?;
+        Ok(Self { connection, path, sealer, owner, _locks: locks })
     }
 
     /// Adds an experiment. If `request_id` has been used before, nothing is
@@ -271,6 +270,14 @@ impl Store {
         transaction.commit()?;
         Ok(result)
     }
+}
+
+/// Makes this coordinator the owner of a database; returns its token, and the sealer.
+fn claim(connection: &Connection) -> rusqlite::Result<(Vec<u8>, Sealer)> {
+    connection.execute("UPDATE identity SET owner = randomblob(16)", [])?;
+    let owner = owner(connection)?;
+    write_ahead_log::fold(connection)?;
+    Ok((owner, Sealer::of(connection)?))
 }
 
 /// The token of the coordinator that owns a database.

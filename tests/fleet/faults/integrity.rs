@@ -121,3 +121,37 @@ fn a_coordinator_that_loses_its_database_to_another_stops_and_fails_nothing() {
     coordinator.restart();
     TINY.assert_undisturbed(coordinator.watch(id));
 }
+
+#[test]
+fn a_coordinator_whose_database_breaks_stops_and_fails_nothing() {
+    let mut coordinator = CoordinatorProcess::start();
+    let workers = WorkerProcess::start_many(&coordinator, 2);
+    let id = TINY.submit(&coordinator);
+    coordinator.wait_for_generation(0);
+    // The table of events is where no page is.
+    let database = coordinator.database();
+    let root = "SELECT rootpage FROM sqlite_schema WHERE name = 'events'";
+    let sound: u64 = database.query_row(root, [], |row| row.get(0)).unwrap();
+    let version: u64 = database.query_row("PRAGMA schema_version", [], |row| row.get(0)).unwrap();
+    let move_to = |database: &Connection, page: u64, version: u64| {
+        let sql = format!(
+            "PRAGMA writable_schema = ON;
+             UPDATE sqlite_schema SET rootpage = {page} WHERE name = 'events';
+             PRAGMA schema_version = {version};"
+        );
+        database.execute_batch(&sql).unwrap();
+    };
+    move_to(&database, 1 << 30, version + 1);
+    assert_eq!(coordinator.process.wait().code(), Some(2));
+    let lines = coordinator.process.lines();
+    let last = lines.last().unwrap()["message"].as_str().unwrap();
+    assert!(last.starts_with("the database is damaged: "), "{last}");
+    assert!(last.contains("swarmevo.sqlite3") && last.contains("swarmctl doctor"), "{last}");
+    assert!(!lines.iter().any(|line| line["message"] == "experiment failed"), "{lines:#?}");
+
+    move_to(&database, sound, version + 2);
+    drop(database);
+    coordinator.restart();
+    TINY.assert_undisturbed(coordinator.watch(id));
+    drop(workers);
+}

@@ -3,7 +3,7 @@
 
 use std::{net::Ipv4Addr, path::Path};
 
-use coordinator::{Access, Coordinator, CoordinatorConfig, Tokens};
+use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
 use sim_core::Isa;
 use swarm_transport::{Credentials, Token};
 use tokio::task::JoinSet;
@@ -64,7 +64,10 @@ impl Fleet {
     /// Waits for the coordinator or a worker to end unexpectedly.
     pub async fn failure(&mut self) -> Error {
         let ended = tokio::select! {
-            error = self.coordinator.failure() => return Error::Internal(error.to_string()),
+            error = self.coordinator.failure() => return match error {
+                RunError::TakenOver(why) | RunError::Damaged(why) => Error::Input(why),
+                error => Error::Internal(error.to_string()),
+            },
             ended = self.workers.join_next() => ended,
         };
         let reason = match ended {

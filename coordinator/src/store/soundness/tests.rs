@@ -231,3 +231,26 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     store.champion(ended).unwrap().unwrap();
     assert!(checkpoints::get(&store.connection, ended).unwrap().is_none());
 }
+
+#[test]
+fn bytes_that_are_no_text_and_rows_that_are_gone_are_damage_with_the_path() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mut store, [id, _]) = two_experiments(directory.path());
+    let path = file::path_in(directory.path()).display().to_string();
+    let assert_damage = |result: Result<()>| match result {
+        Err(error @ StoreError::Corrupt(_)) => {
+            let text = error.to_string();
+            assert!(text.contains(&path) && text.contains("swarmctl doctor"), "{text}");
+            assert!(!text.contains("report"), "{text}");
+        }
+        other => panic!("{other:?}"),
+    };
+    let garbage = "UPDATE experiments SET name = CAST(x'ff' AS TEXT), config = CAST(x'ff' AS TEXT)";
+    store.connection.execute_batch(garbage).unwrap();
+    assert_damage(store.experiments().map(|_| ()));
+    assert_damage(store.experiment(id).map(|_| ()));
+    store.connection.execute_batch("DELETE FROM identity").unwrap();
+    assert_damage(store.notice(id, 1, "look"));
+    drop(store);
+    assert_damage(Store::open(directory.path()).map(|_| ()));
+}
