@@ -112,7 +112,7 @@ impl ExperimentArgs {
     /// Reads the file; fails if the experiment cannot be evolved.
     pub fn checked_file(&self) -> Result<ExperimentFile, Error> {
         let file = ExperimentFile::read(&self.config);
-        let checked = file.and_then(|file| file.compile(&self.overrides()).map(|_| file));
+        let checked = file.and_then(|file| file.check(&self.overrides()).map(|_| file));
         checked.map_err(|error| Error::invalid(&self.config, &error))
     }
 }

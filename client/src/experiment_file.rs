@@ -67,8 +67,14 @@ impl ExperimentFile {
         Ok(Self { path: path.into(), text })
     }
 
-    /// Checks the experiment as the coordinator will, and makes it ready to be
-    /// simulated.
+    /// Checks the experiment as the coordinator will.
+    pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
+        let compiled = self.compile(overrides)?;
+        compiled.experiment.check_starts(&compiled.config.algorithm)?;
+        Ok(compiled)
+    }
+
+    /// Makes the experiment ready to be simulated.
     pub fn compile(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
         let (config, mut warnings) =
             ExperimentConfig::from_json(&self.text, &self.default_name(), ALGORITHMS)?;

@@ -142,7 +142,16 @@ impl ExperimentService for FakeCoordinator {
     ) -> Result<Response<Self::WatchExperimentStream>, Status> {
         let (events, end) = self.script(|script| {
             script.watched_from.push(request.into_inner().from_sequence);
-            script.watches.pop_front().ok_or_else(|| Status::not_found("the script is over"))
+            let watch = script
+                .watches
+                .pop_front()
+                .ok_or_else(|| Status::not_found("the script is over"))?;
+            for event in &watch.0 {
+                if let Some(Kind::StateChanged(change)) = &event.kind {
+                    script.experiment.set_state(change.state());
+                }
+            }
+            Ok::<_, Status>(watch)
         })?;
         let events =
             events.into_iter().map(|event| Ok(WatchExperimentResponse { event: Some(event) }));

@@ -25,6 +25,7 @@ use std::{
 };
 
 use clap::Parser as _;
+use swarm_telemetry::escape_lines;
 
 use crate::{args::Args, progress::Progress};
 
@@ -36,7 +37,7 @@ async fn main() -> ExitCode {
     let Err(error) = result else { return ExitCode::SUCCESS };
     if let Some(report) = error.report() {
         // If standard error is closed there is no place left to report to.
-        let _ = writeln!(io::stderr(), "{report}");
+        let _ = writeln!(io::stderr(), "{}", escape_lines(&report));
     }
     error.exit_code().into()
 }

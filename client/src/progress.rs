@@ -10,6 +10,7 @@ use std::{
 use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationSummary};
+use swarm_telemetry::{escape, escape_lines};
 
 use crate::{
     args::OutputFormat,
@@ -79,17 +80,24 @@ impl Progress {
         empty: &str,
     ) -> Result<(), Error> {
         let text = match self.format {
-            OutputFormat::Json => json::document(&records),
+            OutputFormat::Json => return self.print(&json::document(&records)),
+            // For programs, to the byte.
             OutputFormat::Csv => table::csv(csv_keys, records),
             OutputFormat::Table | OutputFormat::Wide if records.is_empty() => empty.to_owned(),
+            // Their cells are escaped; what is left are colours.
             OutputFormat::Table => table.to_text(self.screen),
             OutputFormat::Wide => table.to_wide_text(self.screen),
         };
-        self.print(&text)
+        self.write(&text)
     }
 
-    /// A line, or several, on standard output.
+    /// A line, or several, on standard output. Nothing in it moves the cursor or changes
+    /// the direction of text, whoever has chosen it.
     pub fn print(&mut self, text: &str) -> Result<(), Error> {
+        self.write(&escape_lines(text))
+    }
+
+    fn write(&mut self, text: &str) -> Result<(), Error> {
         let Self { bar, stdout, .. } = self;
         bar.suspend(|| writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
             .map_err(Error::from_stdout)
@@ -98,7 +106,7 @@ impl Progress {
     /// A remark on standard error.
     pub fn remark(&self, text: &str) {
         // If standard error is closed there is no place left to report to.
-        let _ = self.stderr()().write_all(format!("{text}\n").as_bytes());
+        let _ = self.stderr()().write_all(format!("{}\n", escape_lines(text)).as_bytes());
     }
 
     /// Makes writers to standard error that hide the bar while they write.
@@ -116,7 +124,7 @@ impl Progress {
                 .expect("the template is valid");
             self.bar.set_style(style);
             self.bar.set_length(experiment.generations);
-            self.bar.set_prefix(experiment.name.clone());
+            self.bar.set_prefix(escape(&experiment.name).into_owned());
             self.bar.set_message("waiting for the first generation");
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
             self.bar.tick();

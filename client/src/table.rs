@@ -3,11 +3,14 @@
 use console::{Style, Term, measure_text_width, truncate_str};
 use serde::Serialize;
 use serde_json::Value;
+use swarm_telemetry::escape;
 
 /// Space between columns.
 const GAP: &str = "  ";
 /// Replaces the end of a text that is cut off.
 const ELLIPSIS: &str = "…";
+/// What a spreadsheet takes for the start of a formula.
+const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 /// Columns of text are not made narrower than this.
 const COLUMN_WIDTH_MIN: usize = 8;
 
@@ -94,9 +97,8 @@ impl Table {
     pub fn push(&mut self, cells: impl Into<Vec<String>>) {
         let cells = cells.into();
         debug_assert_eq!(cells.len(), self.columns.len());
-        // Names are chosen by others: control characters in them must not move the cursor.
-        let is_plain = |c: char| if c.is_control() { ' ' } else { c };
-        self.rows.push(cells.iter().map(|cell| cell.chars().map(is_plain).collect()).collect());
+        // Names are chosen by others: nothing in them may move the cursor.
+        self.rows.push(cells.iter().map(|cell| escape(cell).into_owned()).collect());
     }
 
     /// The default columns, with no line longer than the screen.
@@ -167,7 +169,8 @@ impl Table {
 }
 
 /// Records as CSV (RFC 4180, but for the line ends), one column per key. Numbers
-/// read back to the same bits; what is missing or not finite is empty.
+/// read back to the same bits; what is missing or not finite is empty. Text that a
+/// spreadsheet would take for a formula has an apostrophe before it.
 pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
     let mut lines = vec![keys.join(",")];
     for record in records {
@@ -176,6 +179,9 @@ pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
             .iter()
             .map(|key| match &record[key] {
                 Value::Null => String::new(),
+                Value::String(text) if text.starts_with(FORMULA_STARTS) => {
+                    quoted(&format!("'{text}"))
+                }
                 Value::String(text) => quoted(text),
                 value => quoted(&value.to_string()),
             })
@@ -249,7 +255,17 @@ mod tests {
     fn names_do_not_move_the_cursor() {
         let mut table = Table::new([Column::text("name")]);
         table.push(["a\u{1b}[2J\nb".to_owned()]);
-        assert_eq!(table.to_text(Screen::default()), "name\na [2J b");
+        assert_eq!(table.to_text(Screen::default()), "name\na\\u001b[2J\\u000ab");
+    }
+
+    #[test]
+    fn csv_has_no_formulas_and_numbers_stay_numbers() {
+        for start in ["=", "+", "-", "@", "\t"] {
+            let record = json!({"name": format!("{start}1+1"), "n": -1.5});
+            assert_eq!(csv(&["name", "n"], &[record]), format!("name,n\n'{start}1+1,-1.5"));
+        }
+        assert_eq!(csv(&["name"], &[json!({"name": "\r=1"})]), "name\n\"'\r=1\"");
+        assert_eq!(csv(&["name"], &[json!({"name": "a=1"})]), "name\na=1");
     }
 
     #[test]

@@ -6,6 +6,8 @@ use swarm_proto::v1::{
     Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
 };
 
+use swarm_telemetry::escape;
+
 use crate::{clock, json::state_name};
 
 /// Number of hexadecimal digits of a digest that are shown.
@@ -63,7 +65,7 @@ pub fn log_line(experiment: &Experiment, event: &Event) -> String {
             short(&summary.digest),
         ),
         Some(Kind::StateChanged(change)) => with_reason(state_name(change.state()), &change.reason),
-        Some(Kind::Notice(notice)) => notice.message.clone(),
+        Some(Kind::Notice(notice)) => escape(&notice.message).into_owned(),
         None => "an event of a kind that this version of swarmctl does not know".into(),
     };
     format!("{}  {}  {what}", clock::utc(event.at_ms), title(experiment))
@@ -71,12 +73,12 @@ pub fn log_line(experiment: &Experiment, event: &Event) -> String {
 
 /// "failed: REASON", or "failed" without a reason.
 pub fn with_reason(what: &str, reason: &str) -> String {
-    if reason.is_empty() { what.into() } else { format!("{what}: {reason}") }
+    if reason.is_empty() { what.into() } else { format!("{what}: {}", escape(reason)) }
 }
 
 /// "experiment 3 (leader)".
 pub fn title(experiment: &Experiment) -> String {
-    format!("experiment {} ({})", experiment.id, experiment.name)
+    format!("experiment {} ({})", experiment.id, escape(&experiment.name))
 }
 
 /// A submitted experiment, on one line.
@@ -226,6 +228,17 @@ mod tests {
             "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
         );
         assert!(generation(&summary(0), 100).starts_with("  1/100  generation   0  "));
+    }
+
+    #[test]
+    fn names_and_reasons_stay_on_their_line_and_in_their_order() {
+        let name = "a\nexperiment 4 (b) completed\u{202e}".to_owned();
+        let reason = "\u{1b}[2J".to_owned();
+        let named = Experiment { name, reason, ..experiment(ExperimentState::Failed) };
+        assert_eq!(
+            state_line(&named),
+            r"experiment 3 (a\u000aexperiment 4 (b) completed\u202e) failed after 12 of 40 generations: \u001b[2J"
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ use coordinator::{
     ids::{ExperimentId, JobId},
     priority::Priority,
 };
-use sim_core::TrialSet;
+use sim_core::{Output, TrialSet};
 use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 
 const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
@@ -132,7 +132,12 @@ fn throughput() -> f64 {
                 let compute_time = Duration::from_millis(100);
                 for assignment in assignments {
                     let outcome = Ok(vec![fitness(&assignment.genotype, 0)]);
-                    let result = ItemResult { id: assignment.id, outcome, compute_time };
+                    let result = ItemResult {
+                        id: assignment.id,
+                        output: Output::Fitness,
+                        outcome,
+                        compute_time,
+                    };
                     engine.on_results(now, worker, vec![result]);
                 }
             }

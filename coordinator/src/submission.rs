@@ -49,6 +49,7 @@ impl Submission {
                 ExperimentConfig::from_json(&config.to_canonical_json(), &name, ALGORITHMS)?;
         }
         let experiment = sim_core::Simulation::compile(&config)?;
+        experiment.check_starts(&config.algorithm)?;
         let evolution =
             Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT);
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();

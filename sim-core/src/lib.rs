@@ -96,6 +96,7 @@ mod senses;
 mod sensors;
 mod simulation;
 mod specified;
+mod starts;
 mod swarm;
 #[cfg(test)]
 mod testing;

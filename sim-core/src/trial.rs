@@ -105,6 +105,20 @@ impl Address {
     }
 }
 
+/// Draws where all objects of a trial start; fails where [`Trial::new`] does.
+pub(crate) fn try_places(
+    simulation: &Simulation,
+    trial_set: TrialSet,
+    trial: u32,
+) -> Result<(), EvaluateError> {
+    let address = Address { seed: simulation.seed, trial_set, trial };
+    for site in simulation.world.sites() {
+        let mut stream = address.stream(Purpose::Positions, site.object);
+        address.place(site, &simulation.world.torus, &mut stream)?;
+    }
+    Ok(())
+}
+
 impl<'a> Trial<'a> {
     /// The trial before its first step.
     pub fn new(

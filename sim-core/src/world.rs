@@ -70,6 +70,13 @@ impl RobotGroup {
 }
 
 impl World {
+    /// Where objects come from.
+    pub fn sites(&self) -> impl Iterator<Item = &Site> {
+        let static_objects = self.lights.iter().chain(&self.areas);
+        let robots = self.groups.iter().map(|group| &group.site);
+        robots.chain(static_objects.map(|objects| &objects.site))
+    }
+
     /// Compiles the objects, of which `evolvable_object` names the robots that
     /// are evaluated; none if there are no such robots.
     pub fn compile(

@@ -27,9 +27,10 @@ pub fn escape(text: &str) -> Cow<'_, str> {
     escape_if(text, is_unprintable)
 }
 
-/// The same for lines of text: their ends stay. What is JSON stays the same JSON.
+/// The same for lines of text: their ends stay, and tabs. What is JSON stays the same
+/// JSON.
 pub fn escape_lines(text: &str) -> Cow<'_, str> {
-    escape_if(text, |c| c != '\n' && is_unprintable(c))
+    escape_if(text, |c| !matches!(c, '\n' | '\t') && is_unprintable(c))
 }
 
 fn escape_if(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
@@ -78,7 +79,7 @@ mod tests {
         assert!(matches!(escape(plain), Cow::Borrowed(text) if text == plain));
         let name = "a\u{202e}b\u{1b}[2J\r\n\u{2028}\u{e0041}c\u{9b}";
         assert_eq!(escape(name), r"a\u202eb\u001b[2J\u000d\u000a\u2028\udb40\udc41c\u009b");
-        assert_eq!(escape_lines("a\nb\t\u{feff}"), "a\nb\\u0009\\ufeff");
+        assert_eq!(escape_lines("a\nb\t\u{feff}"), "a\nb\t\\ufeff");
     }
 
     #[test]

@@ -278,16 +278,19 @@ async fn answers_of_the_wrong_size_are_refused_and_others_compute() {
             trials
         })
     };
-    for wrong in [
-        Answer::Measures(TrialMeasures { values: vec![0.5; n_values - 1] }),
-        Answer::Fitness(TrialFitness { values: vec![0.5; 3] }),
+    for (wrong, expected) in [
+        (Answer::Measures(TrialMeasures { values: vec![0.5; n_values - 1] }), "values for"),
+        (
+            Answer::Fitness(TrialFitness { values: vec![0.5; 3 * n_values] }),
+            "it returned fitness where measures are due",
+        ),
     ] {
         let mut worker = HandWorker::connect(&url, hello()).await.unwrap();
         let batch = worker.receive_assignments().await.unwrap();
         assert_eq!(batch.output(), swarm_proto::v1::Output::Measures);
         worker.answer(batch.assignments[0].assignment_id, wrong).await;
         let end = worker.receive_end().await;
-        assert!(end.message().contains("values for"), "{end}");
+        assert!(end.message().contains(expected), "{end}");
     }
     let _worker = WorkerProcess::start(&coordinator, "good");
     let trials = asking.await.unwrap();

@@ -50,13 +50,14 @@ async fn submit(
 
 #[tokio::test]
 async fn a_worker_of_another_version_is_refused_with_both_versions() {
-    let coordinator = CoordinatorProcess::start();
     let other_protocol = Hello { protocol_version: 999, ..hello() };
     let other_simulation = Hello { sim_core_fingerprint: "sim-core 999".to_owned(), ..hello() };
     for (hello, theirs, ours) in [
         (other_protocol, "999", PROTOCOL_VERSION.to_string()),
         (other_simulation, "sim-core 999", sim_core::FINGERPRINT.to_owned()),
     ] {
+        // One of its own for each, as lines about refusals are few.
+        let coordinator = CoordinatorProcess::start();
         let Err(status) = HandWorker::connect(&coordinator.url(), hello).await else {
             panic!("it was let in")
         };
@@ -314,7 +315,7 @@ async fn there_is_a_limit_to_unfinished_experiments() {
              INSERT INTO experiments
              SELECT n.i, NULL, name, config, config_digest, fingerprint, genotype_len,
                     CASE WHEN n.i % 2 = 0 THEN 'paused' ELSE 'running' END, reason,
-                    submitted_at_ms, digest, priority
+                    submitted_at_ms, digest, priority, seal
              FROM experiments, n",
         )
         .unwrap();

@@ -80,7 +80,7 @@ struct Summary {
 impl Report {
     fn of(path: &Path) -> Self {
         let file = path.to_string_lossy().into_owned();
-        match ExperimentFile::read(path).and_then(|file| file.compile(&Overrides::default())) {
+        match ExperimentFile::read(path).and_then(|file| file.check(&Overrides::default())) {
             Ok(compiled) => {
                 let summary = Some(Summary::of(&compiled));
                 Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary }

@@ -3,21 +3,12 @@
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use swarm_proto::v1::Experiment;
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
 
 use super::Remote;
 use crate::{
-    args::ExperimentId,
-    connection::{Connection, PATIENCE_WHILE_FOLLOWING},
-    error::Error,
-    json::{self, has_ended},
-    progress::Progress,
-    text,
+    args::ExperimentId, connection::Connection, error::Error, json, progress::Progress, text,
 };
-
-/// Time between two requests for the experiment's state.
-const INTERVAL: Duration = Duration::from_secs(1);
 
 /// Wait until an experiment ends.
 #[derive(Debug, Args)]
@@ -56,10 +47,7 @@ Examples:
 impl Remote for WaitArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let id = self.experiment.id;
-        // An unknown experiment is an error at once, not after the patience below.
-        connection.experiment(id).await?;
-        let connection = connection.with_patience(PATIENCE_WHILE_FOLLOWING);
-        let ended = ended(&connection, id);
+        let ended = super::watch::ended(connection, connection.experiment(id).await?);
         let experiment = match self.timeout {
             Some(limit) => timeout(limit, ended).await.map_err(|_| Error::TimedOut { id })?,
             None => ended.await,
@@ -73,17 +61,6 @@ impl Remote for WaitArgs {
             WaitFor::Completed => super::watch::success(&experiment),
             WaitFor::Ended => Ok(()),
         }
-    }
-}
-
-/// The experiment, once it has ended.
-async fn ended(connection: &Connection, experiment_id: u64) -> Result<Experiment, Error> {
-    loop {
-        let experiment = connection.experiment(experiment_id).await?;
-        if has_ended(experiment.state()) {
-            return Ok(experiment);
-        }
-        sleep(INTERVAL).await;
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::Args;
 use swarm_proto::v1::{Event, Experiment, ExperimentState, GetChampionResponse, event::Kind};
+use swarm_telemetry::escape;
 use tokio::time::{Instant, sleep};
 use tonic::Streaming;
 
@@ -80,7 +81,9 @@ pub async fn follow(
 ) -> Result<Followed, Error> {
     progress.begin(&connection.experiment(experiment_id).await?);
     let connection = connection.with_patience(PATIENCE);
-    let first_best = Follower { connection: &connection, experiment_id, progress }.run().await?;
+    let follower =
+        Follower { connection: &connection, experiment_id, progress: Some(&mut *progress) };
+    let first_best = follower.run(1).await?;
     progress.clear();
     let experiment = connection.experiment(experiment_id).await?;
     let champion = match connection.champion(experiment_id).await {
@@ -89,6 +92,17 @@ pub async fn follow(
         Err(error) => return Err(error),
     };
     Ok(Followed { experiment, champion, first_best })
+}
+
+/// An experiment once it has ended; shows nothing.
+pub async fn ended(connection: &Connection, experiment: Experiment) -> Result<Experiment, Error> {
+    if has_ended(experiment.state()) {
+        return Ok(experiment);
+    }
+    let (experiment_id, next) = (experiment.id, experiment.last_sequence + 1);
+    let connection = &connection.with_patience(PATIENCE);
+    Follower { connection, experiment_id, progress: None }.run(next).await?;
+    connection.experiment(experiment_id).await
 }
 
 /// Success if the experiment completed; fails if it failed or was cancelled.
@@ -104,7 +118,8 @@ pub fn success(experiment: &Experiment) -> Result<(), Error> {
 struct Follower<'a> {
     connection: &'a Connection,
     experiment_id: u64,
-    progress: &'a mut Progress,
+    /// Shows what happens, if anybody looks.
+    progress: Option<&'a mut Progress>,
 }
 
 /// How a stream of events ended.
@@ -116,9 +131,10 @@ enum StreamEnd {
 }
 
 impl Follower<'_> {
-    /// Returns the best fitness of the first generation once the experiment has ended.
-    async fn run(mut self) -> Result<Option<f64>, Error> {
-        let mut seen = Seen { next_sequence: 1, first_best: None, is_over: false };
+    /// Follows from an event on. Returns the best fitness of the first generation, if that
+    /// was among the events, once the experiment has ended.
+    async fn run(mut self, next_sequence: u64) -> Result<Option<f64>, Error> {
+        let mut seen = Seen { next_sequence, first_best: None, is_over: false };
         let mut backoff = backoff();
         let mut unreachable_since = None;
         loop {
@@ -143,7 +159,7 @@ impl Follower<'_> {
             };
             let now = Instant::now();
             let since = *unreachable_since.get_or_insert_with(|| {
-                self.progress.remark(&format!(
+                self.remark(&format!(
                     "lost the connection to the coordinator ({reason}); trying to reconnect for {} s",
                     PATIENCE.as_secs()
                 ));
@@ -178,6 +194,12 @@ impl Follower<'_> {
         }
     }
 
+    fn remark(&self, text: &str) {
+        if let Some(progress) = &self.progress {
+            progress.remark(text);
+        }
+    }
+
     /// Shows an event once.
     fn show(&mut self, event: Event, seen: &mut Seen) -> Result<(), Error> {
         if event.sequence < seen.next_sequence {
@@ -189,12 +211,14 @@ impl Follower<'_> {
                 if summary.generation == 0 {
                     seen.first_best = Some(summary.best);
                 }
-                self.progress.generation(&summary)?;
+                if let Some(progress) = &mut self.progress {
+                    progress.generation(&summary)?;
+                }
             }
             Some(Kind::StateChanged(change)) => {
                 seen.is_over = has_ended(change.state());
             }
-            Some(Kind::Notice(notice)) => self.progress.remark(&notice.message),
+            Some(Kind::Notice(notice)) => self.remark(&escape(&notice.message)),
             // A kind of event that only newer versions know.
             None => {}
         }

@@ -69,6 +69,7 @@ impl Rig {
             answered = trial_set.generation();
             let results = assignments.into_iter().map(|it| ItemResult {
                 id: it.id,
+                output: sim_core::Output::Fitness,
                 outcome: Ok(it.trials.map(|_| it.genotype[0]).collect()),
                 compute_time: Duration::from_millis(1),
             });

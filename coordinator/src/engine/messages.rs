@@ -167,6 +167,8 @@ pub struct ItemResult {
     /// The numbers of all its trials, one trial after the other, each as
     /// [`Batch::output`] says; or why there are none.
     pub outcome: Result<Vec<f64>, String>,
+    /// What the worker says that these numbers are.
+    pub output: Output,
     /// Time that the worker says it computed.
     pub compute_time: Duration,
 }

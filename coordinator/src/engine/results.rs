@@ -5,6 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use sim_core::Output;
+
 use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
@@ -19,7 +21,9 @@ impl Engine {
     pub(super) fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         let Some(assignment) = worker.in_flight.get(&result.id) else {
-            if let (Some(recalled), Ok(fitness)) = (worker.take_recalled(result.id), result.outcome)
+            let recalled = worker.take_recalled(result.id);
+            if let (Some(recalled), Ok(fitness)) = (recalled, result.outcome)
+                && self.is_due(recalled.job, result.output)
             {
                 self.on_late_result(now, id, &recalled, &fitness);
             }
@@ -27,14 +31,22 @@ impl Engine {
             // up. Neither can do harm.
             return;
         };
-        let n_trials = assignment.item.trials.len();
-        let batch = self.jobs[&assignment.job].batch.as_ref();
+        let (job, n_trials) = (assignment.job, assignment.item.trials.len());
+        let batch = self.jobs[&job].batch.as_ref();
         let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
         if let Ok(fitness) = &result.outcome
             && fitness.len() != n_values
         {
             let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
             self.drop_worker(now, id, Some("was dropped"), reason);
+            return;
+        }
+        if result.outcome.is_ok() && !self.is_due(job, result.output) {
+            let reason = match result.output {
+                Output::Fitness => "it returned fitness where measures are due",
+                Output::Measures => "it returned measures where fitness is due",
+            };
+            self.drop_worker(now, id, Some("was dropped"), reason.to_owned());
             return;
         }
         let assignment = self.take_assignment(id, result.id);
@@ -51,6 +63,12 @@ impl Engine {
                 self.retry(now, assignment, Some((None, &failure)));
             }
         }
+    }
+
+    /// Whether this is what the results of a job's batch are.
+    fn is_due(&self, job: JobId, output: Output) -> bool {
+        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
+        batch.is_none_or(|batch| batch.output() == output)
     }
 
     /// Learns how long things take; returns how long this took, as far as it can

@@ -94,8 +94,13 @@ fn assignment(assignment: &Assignment) -> v1::Assignment {
 
 /// A worker's result.
 pub fn item_result(result: v1::ItemResult) -> ItemResult {
+    let output = match result.outcome {
+        Some(Outcome::Measures(_)) => Output::Measures,
+        _ => Output::Fitness,
+    };
     ItemResult {
         id: AssignmentId(result.assignment_id),
+        output,
         outcome: match result.outcome {
             Some(Outcome::Fitness(fitness)) => Ok(fitness.values),
             Some(Outcome::Measures(measures)) => Ok(measures.values),

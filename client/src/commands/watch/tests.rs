@@ -65,6 +65,25 @@ async fn an_experiment_that_fails_is_reported_and_is_a_failure() {
 }
 
 #[tokio::test]
+async fn waiting_follows_the_events_instead_of_asking_again() {
+    let completed = ExperimentState::Completed;
+    let running = Experiment { last_sequence: 4, ..experiment(ExperimentState::Running) };
+    let (fake, connection) = FakeCoordinator::serve(Script {
+        experiment: running.clone(),
+        watches: [
+            (vec![generation(5, 2)], Some(Status::unavailable("shutting down"))),
+            (vec![generation(6, 3), state(7, completed)], None),
+        ]
+        .into(),
+        ..Script::default()
+    })
+    .await;
+    let experiment = ended(&connection, running).await.unwrap();
+    assert_eq!(experiment.state(), completed);
+    assert_eq!(fake.script(|script| script.watched_from.clone()), [5, 6]);
+}
+
+#[tokio::test]
 async fn an_unknown_experiment_is_not_found() {
     let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
     let mut progress = Captured::default().progress(OutputFormat::Table);
@@ -78,8 +97,9 @@ async fn a_coordinator_that_stays_away_is_unreachable() {
     let mut progress = Captured::default().progress(OutputFormat::Table);
     let error = watch(&connection, 3, &mut progress).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
-    let follower = Follower { connection: &connection, experiment_id: 3, progress: &mut progress };
-    let error = follower.run().await.unwrap_err();
+    let follower =
+        Follower { connection: &connection, experiment_id: 3, progress: Some(&mut progress) };
+    let error = follower.run(1).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
     assert!(error.to_string().to_lowercase().contains("connection refused"), "{error}");
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use sim_core::Output;
+
 use crate::ids::EvaluationId;
 
 use super::{
@@ -35,7 +37,9 @@ impl Fleet {
         };
         let values = measures(assignment.trials.clone());
         assert!(values.len() <= 1 << 16, "an answer of {} numbers", values.len());
+        self.output = Output::Measures;
         self.answer(id, assignment.id, Ok(values));
+        self.output = Output::Fitness;
         true
     }
 }
@@ -65,11 +69,30 @@ fn a_worker_that_returns_too_few_or_too_many_measures_is_dropped() {
         fleet.evaluate(id, 3);
         let bad = fleet.join(1);
         let assignment = fleet.workers[&bad].assignments[0].1.id;
+        fleet.output = Output::Measures;
         fleet.answer(bad, assignment, Ok(vec![0.0; n_wrong]));
         assert!(fleet.engine.worker_status(fleet.now).is_empty(), "{n_wrong}");
         let good = fleet.join(1);
         while fleet.measure(good) {}
         assert_eq!(fleet.evaluated[0].1.values, [measures(0..3)]);
+    }
+}
+
+#[test]
+fn a_worker_that_returns_measures_for_fitness_or_fitness_for_measures_is_dropped() {
+    for is_evaluation in [true, false] {
+        let mut fleet = Fleet::plain();
+        if is_evaluation {
+            fleet.evaluate(JobId::Evaluation(EvaluationId(1)), 1);
+        } else {
+            fleet.start(super::EXPERIMENT, 1, N_VALUES as u32);
+        }
+        let bad = fleet.join(1);
+        let assignment = fleet.workers[&bad].assignments[0].1.id;
+        fleet.output = if is_evaluation { Output::Fitness } else { Output::Measures };
+        fleet.answer(bad, assignment, Ok(measures(0..1)));
+        assert!(fleet.engine.worker_status(fleet.now).is_empty(), "{is_evaluation}");
+        assert!(fleet.evaluated.is_empty());
     }
 }
 
@@ -100,6 +123,7 @@ fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
             let last = values.last_mut().unwrap();
             *last = f64::from_bits(last.to_bits() ^ 1);
         }
+        fleet.output = Output::Measures;
         fleet.answer(worker, assignment.id, Ok(values));
     }
     assert_eq!(fleet.paused[0].0, id);

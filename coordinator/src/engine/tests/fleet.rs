@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use evolution::Population;
+use sim_core::Output;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 
 use super::{super::*, LEASE};
@@ -20,6 +21,8 @@ pub(super) struct Fleet {
     pub(super) n_items_sent: usize,
     /// What workers say that an item took.
     pub(super) compute_time: Duration,
+    /// What workers say that their numbers are.
+    pub(super) output: Output,
 }
 
 #[derive(Default)]
@@ -65,6 +68,7 @@ impl Fleet {
             paused: Vec::new(),
             n_items_sent: 0,
             compute_time: Duration::from_millis(10),
+            output: Output::Fitness,
         }
     }
 
@@ -112,7 +116,12 @@ impl Fleet {
         assignment: AssignmentId,
         outcome: Result<Vec<f64>, String>,
     ) {
-        let result = ItemResult { id: assignment, outcome, compute_time: self.compute_time };
+        let result = ItemResult {
+            id: assignment,
+            output: self.output,
+            outcome,
+            compute_time: self.compute_time,
+        };
         self.engine.on_results(self.now, worker, vec![result]);
         self.carry_out();
     }

@@ -352,7 +352,12 @@ impl SimulatedFleet {
                 .clone()
                 .map(|t| fitness(&assignment.genotype, t) + wrong)
                 .collect();
-            let result = ItemResult { id: assignment.id, outcome: Ok(values), compute_time: time };
+            let result = ItemResult {
+                id: assignment.id,
+                output: sim_core::Output::Fitness,
+                outcome: Ok(values),
+                compute_time: time,
+            };
             self.results.insert(assignment.id, result);
             self.schedule(time, Happening::Computed(id, assignment.id));
         }

@@ -1,0 +1,112 @@
+//! Whether the world can hold its objects: by trying, as nobody can tell from sizes.
+
+use experiment_file::{AlgorithmConfig, ConfigError};
+use numeric::random::TrialSet;
+
+use crate::initializers::Positions;
+use crate::objects::Site;
+use crate::problems::Problems;
+use crate::simulation::{EvaluateError, Simulation};
+use crate::trial;
+
+/// Starts that are tried at the most: the first of those that fail one time in a hundred
+/// is found almost always.
+const N_STARTS_MAX: u64 = 512;
+/// Pairs of robots whose distances a check may take, about.
+const N_PAIRS_MAX: u64 = 50_000_000;
+
+impl Simulation {
+    /// Tries where objects start in trials of a run: those of the re-evaluation at its
+    /// end, then those of its first generations, as far as that is quick. One where an
+    /// object finds no place would end the run.
+    pub fn check_starts(&self, algorithm: &AlgorithmConfig) -> Result<(), ConfigError> {
+        let n_pairs: u64 = self.world.sites().map(n_pairs_of_a_draw).sum();
+        if n_pairs == 0 {
+            return Ok(());
+        }
+        let n_starts = (N_PAIRS_MAX / n_pairs).clamp(1, N_STARTS_MAX);
+        let last = algorithm.generations.saturating_sub(1);
+        let held_out = (0..algorithm.champion_trials).map(|trial| (TrialSet::HeldOut(last), trial));
+        let generations = (0..=last).flat_map(|generation| {
+            let trials = 0..algorithm.num_evaluations;
+            trials.map(move |trial| (TrialSet::Generation(generation), trial))
+        });
+        let mut problems = Problems::default();
+        for (trial_set, trial) in held_out.chain(generations).take(n_starts as usize) {
+            if let Err(EvaluateError::Unplaceable { object, index, .. }) =
+                trial::try_places(self, trial_set, trial)
+            {
+                let path = format!("world.objects.{object}.initializers.positions");
+                let message = format!(
+                    "no place for number {index} in {trial_set}, trial {trial}, which would end the \
+                     run; make the world larger or the number of robots smaller"
+                );
+                problems.add(path, message);
+                break;
+            }
+        }
+        problems.check()
+    }
+}
+
+/// Distances that are computed to place an object's instances; 0 if they always find a
+/// place.
+fn n_pairs_of_a_draw(site: &Site) -> u64 {
+    match site.positions {
+        Positions::Graph { n, .. } => (n as u64 * n as u64).max(1),
+        Positions::Fixed(_) | Positions::Uniform { .. } | Positions::Circumference { .. } => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use experiment_file::{ExperimentConfig, Initializer};
+
+    use super::*;
+    use crate::testing::{experiment_a, robot};
+
+    /// Robots in a small world, with one trial per generation.
+    fn config(n_robots: u32) -> ExperimentConfig {
+        let mut config = experiment_a();
+        config.algorithm.num_evaluations = 1;
+        config.algorithm.generations = 3;
+        config.algorithm.evaluation_steps = 1;
+        config.world.width = 250.0;
+        config.world.height = 250.0;
+        let robot = robot(&mut config);
+        robot.num_instances = n_robots;
+        robot.initializers.positions =
+            Initializer::RandomGraph { max_rad: 100.0, initial_pos: [125.0, 125.0] };
+        config
+    }
+
+    #[test]
+    fn a_world_that_holds_its_robots_in_some_trials_only_is_found() {
+        let mut n_found = 0;
+        for n_robots in 2..40 {
+            let config = config(n_robots);
+            // The first trial of the first generation, in which there is a place for all.
+            let Ok(simulation) = Simulation::compile(&config) else { continue };
+            let Err(error) = simulation.check_starts(&config.algorithm) else { continue };
+            n_found += 1;
+            let text = error.to_string();
+            assert!(text.contains("initializers.positions: no place for number"), "{text}");
+            assert!(text.contains("make the world larger"), "{text}");
+            let genotype = vec![0.5; simulation.genotype_len()];
+            let sets = [TrialSet::HeldOut(2), TrialSet::Generation(1), TrialSet::Generation(2)];
+            let is_real = sets.iter().any(|&set| {
+                let n_trials = if set == sets[0] { config.algorithm.champion_trials } else { 1 };
+                (0..n_trials)
+                    .any(|trial| simulation.evaluate(&genotype, set, trial..trial + 1).is_err())
+            });
+            assert!(is_real, "{n_robots} robots: {text}");
+        }
+        assert!(n_found > 0, "some numbers of robots fit only sometimes");
+    }
+
+    #[test]
+    fn a_world_with_room_is_not_refused() {
+        let roomy = config(3);
+        Simulation::compile(&roomy).unwrap().check_starts(&roomy.algorithm).unwrap();
+    }
+}
