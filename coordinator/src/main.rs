@@ -47,7 +47,12 @@ struct Args {
     /// MiB of memory that unfinished experiments may take together, as estimated from their
     /// population, genes and algorithm. A submission beyond it is refused; after a restart
     /// with less, experiments wait for others to end.
-    #[arg(long, value_name = "MIB", default_value_t = MEMORY_BUDGET_MIB)]
+    #[arg(
+        long,
+        env = "SWARM_MEMORY_BUDGET",
+        value_name = "MIB",
+        default_value_t = MEMORY_BUDGET_MIB
+    )]
     memory_budget: u32,
     #[command(flatten)]
     metrics: MetricsArgs,
