@@ -10,32 +10,67 @@ use super::{
     seals::{Seal, Sealer},
 };
 
-/// Replaces an experiment's champion, after its row of the history and its digest.
+/// Replaces an experiment's champion. `latest`: the experiment's latest generation;
+/// `digest`: of everything so far.
 pub fn put(
     transaction: &Transaction<'_>,
     sealer: &Sealer,
     id: ExperimentId,
     champion: &Champion,
+    latest: Option<u64>,
+    digest: &str,
 ) -> rusqlite::Result<()> {
     let individual = match champion.source {
         ChampionSource::Individual(individual) => Some(individual),
         ChampionSource::Mean => None,
     };
-    transaction.execute(
-        "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, x'')",
-        params![
-            id.0,
-            champion.generation,
-            individual,
-            to_json(&champion.trial_fitness),
-            to_json(&champion.genotype),
-            champion.held_out.map(|held_out| held_out.mean),
-            champion.held_out.map(|held_out| held_out.ci95),
-            champion.held_out.map(|held_out| held_out.n_trials),
-            champion.held_out.map(|held_out| held_out.generation),
-        ],
+    let held_out = champion.held_out;
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
     )?;
-    seal(transaction, sealer, id)
+    let (trial_fitness, genotype) = (to_json(&champion.trial_fitness), to_json(&champion.genotype));
+    let seal = seal_of(sealer, id, champion, &trial_fitness, &genotype, latest, digest);
+    statement.execute(params![
+        id.0,
+        champion.generation,
+        individual,
+        trial_fitness,
+        genotype,
+        held_out.map(|held_out| held_out.mean),
+        held_out.map(|held_out| held_out.ci95),
+        held_out.map(|held_out| held_out.n_trials),
+        held_out.map(|held_out| held_out.generation),
+        seal,
+    ])?;
+    Ok(())
+}
+
+/// The seal of a champion, whose lists are given as they are stored. It covers the end of
+/// the history, too, which has no checkpoint any more once the experiment has ended.
+fn seal_of(
+    sealer: &Sealer,
+    id: ExperimentId,
+    champion: &Champion,
+    trial_fitness: &str,
+    genotype: &str,
+    latest: Option<u64>,
+    digest: &str,
+) -> Seal {
+    let mut seal = sealer
+        .begin("champion", id)
+        .number(latest.map_or(0, |latest| latest + 1))
+        .text(digest.as_bytes())
+        .number(champion.generation)
+        .text(trial_fitness.as_bytes())
+        .text(genotype.as_bytes());
+    if let ChampionSource::Individual(individual) = champion.source {
+        seal = seal.text(b"individual").number(individual.into());
+    }
+    if let Some(HeldOut { mean, ci95, n_trials, generation }) = champion.held_out {
+        seal = seal.text(b"held out").real(mean).real(ci95);
+        seal = seal.number(n_trials.into()).number(generation);
+    }
+    seal.finish()
 }
 
 /// A champion as it is stored.
@@ -90,25 +125,10 @@ impl Stored {
         })
     }
 
-    /// The seal that it should have. It covers the end of the history, too, which has
-    /// no checkpoint any more once the experiment has ended.
+    /// The seal that it should have.
     fn expected_seal(&self, sealer: &Sealer, id: ExperimentId) -> Seal {
-        let Champion { generation, source, held_out, .. } = &self.champion;
-        let mut seal = sealer
-            .begin("champion", id)
-            .number(self.latest.map_or(0, |latest| latest + 1))
-            .text(self.digest.as_bytes())
-            .number(*generation)
-            .text(self.trial_fitness.as_bytes())
-            .text(self.genotype.as_bytes());
-        if let ChampionSource::Individual(individual) = source {
-            seal = seal.text(b"individual").number((*individual).into());
-        }
-        if let Some(HeldOut { mean, ci95, n_trials, generation }) = *held_out {
-            seal = seal.text(b"held out").real(mean).real(ci95);
-            seal = seal.number(n_trials.into()).number(generation);
-        }
-        seal.finish()
+        let Self { champion, trial_fitness, genotype, latest, digest, .. } = self;
+        seal_of(sealer, id, champion, trial_fitness, genotype, *latest, digest)
     }
 }
 

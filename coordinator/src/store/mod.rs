@@ -133,35 +133,37 @@ impl Store {
         // Hashing takes longer than the rest, and needs no transaction.
         let seal = self.sealer.checkpoint(id, Some(generation), commit.checkpoint.as_bytes());
         self.write(|transaction, sealer| {
-            let state: String = transaction.query_row(
-                "SELECT state FROM experiments WHERE id = ?1",
-                [id.0],
-                |row| row.get(0),
-            )?;
+            let state: String = transaction
+                .prepare_cached("SELECT state FROM experiments WHERE id = ?1")?
+                .query_row([id.0], |row| row.get(0))?;
             if !ExperimentState::from_name(&state).is_some_and(ExperimentState::is_unfinished) {
                 return Err(StoreError::Ended(id));
             }
             history::put(transaction, sealer, id, generation)?;
             failpoint::reached("history written");
             checkpoints::put(transaction, id, commit.checkpoint, seal)?;
-            transaction.execute(
-                "UPDATE experiments SET digest = ?2 WHERE id = ?1",
-                params![id.0, commit.digest],
-            )?;
+            transaction
+                .prepare_cached("UPDATE experiments SET digest = ?2 WHERE id = ?1")?
+                .execute(params![id.0, commit.digest])?;
             match commit.champion {
-                Some(champion) => champions::put(transaction, sealer, id, champion)?,
+                Some(champion) => {
+                    let latest = Some(generation.generation);
+                    champions::put(transaction, sealer, id, champion, latest, commit.digest)?;
+                }
                 None => champions::seal(transaction, sealer, id)?,
             }
             for notice in commit.notices {
                 add_notice(transaction, id, now_ms, notice)?;
             }
-            transaction.execute(
-                "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
-                 VALUES (?1,
-                         (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
-                         ?2, 'generation', ?3)",
-                params![id.0, now_ms, generation.generation],
-            )?;
+            transaction
+                .prepare_cached(
+                    "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
+                     VALUES (?1,
+                             (SELECT ifnull(max(sequence), 0) + 1 FROM events
+                              WHERE experiment_id = ?1),
+                             ?2, 'generation', ?3)",
+                )?
+                .execute(params![id.0, now_ms, generation.generation])?;
             if let Some(reason) = commit.completed {
                 set_state(transaction, id, now_ms, ExperimentState::Completed, reason)?;
             }
@@ -249,10 +251,8 @@ impl Store {
         operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
     ) -> Result<T> {
         let result = self.transact(operation).map_err(|error| error.at(&self.path))?;
-        if write_ahead_log::is_long(&self.path) {
-            // What is written is on disk anyway; the next write tries again.
-            let _ = write_ahead_log::fold(&self.connection);
-        }
+        // What is written is on disk anyway; the next write tries again.
+        let _ = write_ahead_log::fold_if_long(&self.connection);
         Ok(result)
     }
 

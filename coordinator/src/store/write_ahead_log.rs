@@ -13,14 +13,12 @@ use std::{
 
 use rusqlite::Connection;
 
-/// Length at which the log is moved into the main file.
-const LEN_MAX: u64 = 16 << 20;
+/// Pages in the log at which it is moved into the main file, as many as by SQLite's default.
+const N_PAGES_MAX: u32 = 1000;
 
 /// Takes over the moving of the log from SQLite.
 pub fn configure(connection: &Connection) -> rusqlite::Result<()> {
-    connection.pragma_update(None, "wal_autocheckpoint", 0)?;
-    // A log that begins anew is as long as what is in it.
-    connection.pragma_update(None, "journal_size_limit", 0)
+    connection.pragma_update(None, "wal_autocheckpoint", 0)
 }
 
 /// The log of a database.
@@ -32,12 +30,14 @@ pub fn path(database: &Path) -> PathBuf {
 
 /// Whether a database has a log that says anything.
 pub fn exists(database: &Path) -> bool {
-    len(database) > 0
+    fs::metadata(path(database)).is_ok_and(|metadata| metadata.len() > 0)
 }
 
-/// Whether it is time to move the log into the main file.
-pub fn is_long(database: &Path) -> bool {
-    len(database) > LEN_MAX
+/// Moves the log into the main file if it is long.
+pub fn fold_if_long(connection: &Connection) -> rusqlite::Result<()> {
+    let mut statement = connection.prepare_cached("PRAGMA wal_checkpoint(NOOP)")?;
+    let n_pages: u32 = statement.query_row([], |row| row.get(1))?;
+    if n_pages < N_PAGES_MAX { Ok(()) } else { fold(connection) }
 }
 
 /// Whether the database says that it lacks its log.
@@ -58,8 +58,4 @@ pub fn fold(connection: &Connection) -> rusqlite::Result<()> {
 pub fn set_missed(connection: &Connection, is_missed: bool) -> rusqlite::Result<()> {
     connection.execute("UPDATE identity SET needs_log = ?1", [is_missed])?;
     Ok(())
-}
-
-fn len(database: &Path) -> u64 {
-    fs::metadata(path(database)).map_or(0, |metadata| metadata.len())
 }

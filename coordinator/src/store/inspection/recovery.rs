@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use evolution::Champion;
 use rusqlite::{Connection, Transaction, params};
 
 use super::{
@@ -129,8 +128,8 @@ fn write_whole(
         history::put(transaction, sealer, id, generation)?;
     }
     if let Some(Some(champion)) = &from.champion {
-        let champion: &Champion = champion;
-        champions::put(transaction, sealer, id, champion)?;
+        let latest = history.last().map(|latest| latest.generation);
+        champions::put(transaction, sealer, id, champion, latest, &row.digest)?;
     }
     if let Some(Some(checkpoint)) = &from.checkpoint {
         let seal = sealer.checkpoint(id, history.last(), checkpoint.as_bytes());
