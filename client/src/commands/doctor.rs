@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use coordinator::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
 use serde::Serialize;
+use swarm_telemetry::escape;
 
 use crate::{args::DataDirArg, error::Error, json, progress::Progress, text};
 
@@ -111,7 +112,7 @@ fn summary(inspection: &Inspection) -> String {
 }
 
 fn finding_text(finding: &Finding) -> String {
-    format!("{}\n  -> {}", finding.what, finding.next_step)
+    format!("{}\n  -> {}", escape(&finding.what), finding.next_step)
 }
 
 fn inspection_document(inspection: &Inspection) -> InspectionDocument<'_> {
