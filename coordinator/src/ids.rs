@@ -53,6 +53,10 @@ pub struct WorkerId(pub u64);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AssignmentId(pub u64);
 
+/// Something that the referee is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct QuestionId(pub u64);
+
 impl fmt::Display for JobId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -72,4 +76,4 @@ macro_rules! display_number {
     };
 }
 
-display_number!(ExperimentId, EvaluationId, WorkerId, AssignmentId);
+display_number!(ExperimentId, EvaluationId, WorkerId, AssignmentId, QuestionId);

@@ -42,6 +42,8 @@ pub const KEEPALIVE: Duration = Duration::from_secs(20);
 /// Pause after the system cannot accept a connection, for lack of descriptors,
 /// say.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
+/// Time for which the referee's process is kept when it is not asked anything.
+pub const REFEREE_IDLE_TIME: Duration = Duration::from_secs(30);
 /// Time for open streams to end at shutdown.
 pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 

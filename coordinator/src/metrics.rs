@@ -16,7 +16,7 @@ metrics! {
     BUILD = Gauge "swarm_coordinator_build_info" ["version", "fingerprint"]
         "1; the labels say which release runs, and with which simulation.";
     WORKERS = Gauge "swarm_workers" ["state"]
-        "Connected workers: available for work, draining (they leave when they have finished what they compute), or distrusted (their results are in doubt).";
+        "Connected workers: available for work, draining (they leave when they have finished what they compute), waiting (they get nothing for a while, because they returned nothing or their word is in doubt), or distrusted (in quarantine: they returned what is wrong).";
     SLOTS = Gauge "swarm_slots" []
         "Items that all connected workers together compute at the same time.";
     SLOT_TIME = Counter "swarm_slot_seconds_total" []
@@ -116,7 +116,8 @@ impl Source {
         for (state, n_workers) in [
             ("available", fleet.n_workers_available),
             ("draining", fleet.n_workers_draining),
-            ("distrusted", fleet.n_workers_distrusted),
+            ("waiting", fleet.n_workers_waiting),
+            ("distrusted", fleet.n_workers_quarantined),
         ] {
             scrape.put(&WORKERS, &[state], n_workers as f64);
         }

@@ -16,7 +16,7 @@ use std::{collections::BTreeMap, time::Duration};
 use swarm_telemetry::Histogram;
 use tokio::{
     sync::{mpsc, oneshot},
-    task::JoinSet,
+    task::{AbortHandle, JoinSet},
     time::MissedTickBehavior,
 };
 use tokio_util::sync::CancellationToken;
@@ -26,7 +26,8 @@ use crate::{
     clock,
     engine::{self, Engine, EngineConfig, EvaluatedBatch},
     failpoint,
-    ids::{EvaluationId, ExperimentId, JobId},
+    ids::{EvaluationId, ExperimentId, JobId, QuestionId},
+    referee::{Referee, RefereeRequest, Verdict},
     runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
     store::ExperimentState,
@@ -59,6 +60,10 @@ pub struct Driver {
     /// The clients that wait for an evaluation.
     evaluations: BTreeMap<EvaluationId, EvaluationReply>,
     tasks: JoinSet<Done>,
+    referee: Referee,
+    /// What the referee is asked; aborted when the answer is not wanted any more.
+    questions: BTreeMap<QuestionId, AbortHandle>,
+    verdicts: JoinSet<(QuestionId, Verdict)>,
 }
 
 impl Driver {
@@ -71,6 +76,7 @@ impl Driver {
         shutdown: CancellationToken,
         commit_duration: Histogram,
         memory_budget: u64,
+        referee: Referee,
     ) -> Self {
         Self {
             engine: Engine::new(clock::now(), config),
@@ -84,6 +90,9 @@ impl Driver {
             n_requests: 0,
             evaluations: BTreeMap::new(),
             tasks: JoinSet::new(),
+            referee,
+            questions: BTreeMap::new(),
+            verdicts: JoinSet::new(),
         }
     }
 
@@ -96,6 +105,11 @@ impl Driver {
                 () = self.shutdown.cancelled() => break,
                 Some(event) = self.events.recv() => self.on_event(event),
                 Some(done) = self.tasks.join_next() => self.on_task_done(done),
+                Some(Ok((question, verdict))) = self.verdicts.join_next() => {
+                    self.questions.remove(&question);
+                    log_verdict(question, &verdict);
+                    self.engine.on_verdict(clock::now(), question, verdict);
+                }
                 _ = ticks.tick() => {
                     self.drop_abandoned_evaluations();
                     self.engine.on_tick(clock::now());
@@ -105,6 +119,7 @@ impl Driver {
         }
         // Dropping the links ends the workers' streams.
         self.workers.clear();
+        self.verdicts.shutdown().await;
         self.runs.on_shutdown();
         while let Some(done) = self.tasks.join_next().await {
             self.on_task_done(done);
@@ -273,8 +288,25 @@ impl Driver {
             Command::FinishBatch { job: JobId::Evaluation(id), mut evaluated } => {
                 self.runs.on_evaluation_finished(id, Ok(evaluated.values.swap_remove(0)));
             }
-            Command::FailJob { job: JobId::Evaluation(id), reason }
-            | Command::PauseJob { job: JobId::Evaluation(id), reason } => {
+            Command::AskReferee { question, spec, trial_set, output, genotype, trials } => {
+                let specification = spec;
+                let genotype = genotype.to_vec();
+                let request = RefereeRequest { specification, genotype, trial_set, trials, output };
+                let referee = self.referee.clone();
+                let asking = self
+                    .verdicts
+                    .spawn(async move { (question, referee.evaluate(&request).await) });
+                self.questions.insert(question, asking);
+            }
+            Command::WithdrawQuestion { question } => {
+                if let Some(asking) = self.questions.remove(&question) {
+                    asking.abort();
+                }
+            }
+            Command::Quarantine { name, reason } => {
+                error!(worker = name, reason, "worker is faulty and gets no more items");
+            }
+            Command::FailJob { job: JobId::Evaluation(id), reason } => {
                 error!(evaluation = %id, reason, "evaluation failed");
                 self.runs.on_evaluation_finished(id, Err(reason));
             }
@@ -293,11 +325,16 @@ impl Driver {
             Command::FailJob { job: JobId::Experiment(experiment), reason } => {
                 self.runs.on_job_failed(experiment, reason);
             }
-            Command::PauseJob { job: JobId::Experiment(experiment), reason } => {
-                error!(%experiment, reason, "experiment paused");
-                self.runs.on_job_suspended(experiment, reason);
-            }
         }
+    }
+}
+
+fn log_verdict(question: QuestionId, verdict: &Verdict) {
+    match verdict {
+        Verdict::Values(values) => debug!(%question, values = values.len(), "referee: values"),
+        Verdict::Failed(failure) => debug!(%question, failure, "referee: failure"),
+        Verdict::Died(how) => warn!(%question, how, "an item has taken the referee down"),
+        Verdict::Unavailable(reason) => warn!(%question, reason, "the referee cannot answer"),
     }
 }
 

@@ -85,7 +85,7 @@ impl Engine {
             n_episodes: batch.n_episodes(),
             n_episodes_left: batch.n_episodes_left(),
             n_items_queued: batch.n_queued(),
-            n_individuals_failing: batch.failures.n_individuals(),
+            n_individuals_failing: batch.losses.n_individuals(),
             held: held.collect(),
             running_for: batch.running_for(now),
         }

@@ -2,7 +2,8 @@
 //! what waits.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    mem,
     ops::Range,
     sync::Arc,
     time::{Duration, Instant},
@@ -13,14 +14,13 @@ use sim_core::{Output, TrialSet};
 use crate::ids::{AssignmentId, WorkerId};
 
 use super::{
-    Batch, EvaluatedBatch, SharedGenotype, failures::FailureRecord, fleet_time::FleetTime,
-    item::Item,
+    Batch, EvaluatedBatch, SharedGenotype, fleet_time::FleetTime, item::Item, losses::LossRecord,
 };
 
-/// Copies of a trial that are computed at the same time, at most.
-const COPIES_MAX: usize = 3;
 /// Stands for the worker of a trial without a result.
 const NOBODY: WorkerId = WorkerId(0);
+/// Stands for the worker of a trial that the referee has computed.
+pub const REFEREE: WorkerId = WorkerId(u64::MAX);
 
 /// Numbers of one item of measures, half a MiB: results travel in messages of
 /// limited size.
@@ -55,8 +55,8 @@ pub struct Disagreement {
     pub first_name: Arc<str>,
     /// The trial.
     pub trial: u32,
-    /// A number of the first result, and the number at its place in the second.
-    pub values: (f64, f64),
+    /// The numbers of the trial, of the first result and of the second.
+    pub values: [Vec<f64>; 2],
 }
 
 /// A batch that is being computed.
@@ -66,12 +66,20 @@ pub struct BatchInProgress {
     /// What no worker has been given, in the order in which it will be.
     queue: VecDeque<Item>,
     n_trials_queued: usize,
+    /// Items that workers were lost with and that no worker has been given again.
+    suspects: VecDeque<Item>,
+    /// Items that no worker is given until the referee has answered.
+    held_back: Vec<Item>,
+    /// Items that no worker is given until a time.
+    delayed: Vec<(Instant, Item)>,
+    /// Disagreements that the referee has not settled.
+    pub n_disagreements: usize,
     /// The workers that compute items, by individual.
     holders: BTreeMap<u32, Vec<Holder>>,
     /// Assignments that are not duplicated yet, by when they should be done.
     pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
-    /// Items that failed, or took workers down.
-    pub failures: FailureRecord,
+    /// Items that workers were lost with.
+    pub losses: LossRecord,
     /// Per individual the numbers of all trials, [`Batch::values_per_trial`] each;
     /// meaningless for trials without a result.
     values: Vec<Vec<f64>>,
@@ -85,6 +93,8 @@ pub struct BatchInProgress {
     audits: BTreeMap<Arc<str>, VecDeque<Item>>,
     n_audits_in_flight: usize,
     n_audited: usize,
+    /// Workers that an audit agreed with.
+    confirmed: BTreeSet<Arc<str>>,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
@@ -109,9 +119,13 @@ impl BatchInProgress {
         Self {
             queue: items(&batch).collect(),
             n_trials_queued: n_episodes,
+            suspects: VecDeque::new(),
+            held_back: Vec::new(),
+            delayed: Vec::new(),
+            n_disagreements: 0,
             holders: BTreeMap::new(),
             uncovered: BTreeMap::new(),
-            failures: FailureRecord::default(),
+            losses: LossRecord::default(),
             values: vec![vec![f64::NAN; n_values]; n_individuals],
             evaluated_by: vec![NOBODY; n_episodes],
             names: BTreeMap::new(),
@@ -119,6 +133,7 @@ impl BatchInProgress {
             audits: BTreeMap::new(),
             n_audits_in_flight: 0,
             n_audited: 0,
+            confirmed: BTreeSet::new(),
             batch,
             started: now,
             fleet_time_at_start: fleet_time,
@@ -147,22 +162,90 @@ impl BatchInProgress {
         self.uncovered.clear();
         self.queue.clear();
         self.n_trials_queued = 0;
+        self.suspects.clear();
         for item in items(&self.batch) {
             for item in self.unclaimed(&item) {
-                self.n_trials_queued += item.trials.len();
-                self.queue.push_back(item);
+                self.queue_back(item);
             }
         }
     }
 
-    /// Forgets all results: those who gave them cannot be trusted.
-    pub fn start_over(&mut self) {
-        self.evaluated_by.fill(NOBODY);
-        self.names.clear();
-        self.n_trials_left = self.evaluated_by.len();
-        self.audits.clear();
-        self.n_audited = 0;
-        self.requeue_all();
+    fn queue_back(&mut self, item: Item) {
+        if self.losses.is_suspect(&item) {
+            self.suspects.push_back(item);
+        } else {
+            self.n_trials_queued += item.trials.len();
+            self.queue.push_back(item);
+        }
+    }
+
+    /// Forgets all values of a worker, and the audits of them, and queues what is unknown
+    /// then.
+    pub fn discard(&mut self, name: &str) {
+        self.audits.remove(name);
+        self.confirmed.remove(name);
+        let by: BTreeSet<WorkerId> =
+            self.names.iter().filter(|(_, of)| ***of == *name).map(|(&id, _)| id).collect();
+        for individual in 0..self.values.len() as u32 {
+            let is_its =
+                |trial: u32| by.contains(&self.evaluated_by[self.index(individual, trial)]);
+            let whole = Item { individual, trials: 0..self.batch.n_trials };
+            for part in self.parts(&whole, is_its) {
+                for trial in part.trials.clone() {
+                    let index = self.index(individual, trial);
+                    self.evaluated_by[index] = NOBODY;
+                }
+                self.n_trials_left += part.trials.len();
+                for part in self.unclaimed(&part) {
+                    self.queue_back(part);
+                }
+            }
+        }
+    }
+
+    /// Takes what has become known of an individual out of the queues.
+    pub fn remove_known(&mut self, individual: u32) {
+        let queues = [mem::take(&mut self.queue), mem::take(&mut self.suspects)];
+        let [queue, suspects] = queues.map(|queue| {
+            let parts = queue.into_iter().flat_map(|item| {
+                if item.individual == individual {
+                    self.parts(&item, |trial| !self.is_known(individual, trial))
+                } else {
+                    vec![item]
+                }
+            });
+            parts.collect::<VecDeque<Item>>()
+        });
+        self.n_trials_queued = queue.iter().map(|item| item.trials.len()).sum();
+        (self.queue, self.suspects) = (queue, suspects);
+    }
+
+    /// Gives an item to no worker until [`Self::release`].
+    pub fn hold_back(&mut self, item: Item) {
+        self.held_back.push(item);
+    }
+
+    /// Takes back [`Self::hold_back`]; whether it was in force.
+    pub fn release(&mut self, item: &Item) -> bool {
+        let index = self.held_back.iter().position(|held_back| held_back == item);
+        index.map(|index| self.held_back.swap_remove(index)).is_some()
+    }
+
+    /// Gives an item to no worker until a time.
+    pub fn delay(&mut self, item: Item, until: Instant) {
+        self.delayed.push((until, item));
+    }
+
+    /// Items whose time has come.
+    pub fn take_due(&mut self, now: Instant) -> Vec<Item> {
+        let due = self.delayed.extract_if(.., |(until, _)| *until < now);
+        due.map(|(_, item)| item).collect()
+    }
+
+    fn is_held_back(&self, individual: u32, trial: u32) -> bool {
+        let delayed = self.delayed.iter().map(|(_, item)| item);
+        let mut items = self.held_back.iter().chain(delayed);
+        items.any(|item| item.individual == individual && item.trials.contains(&trial))
     }
 
     fn index(&self, individual: u32, trial: u32) -> usize {
@@ -179,17 +262,25 @@ impl BatchInProgress {
         self.parts(item, |trial| {
             !self.is_known(item.individual, trial)
                 && self.n_copies(item.individual, trial) == 0
-                && !self.failures.is_held_back(item.individual, trial)
+                && !self.is_held_back(item.individual, trial)
         })
     }
 
     /// The first part of an item that may be given to another worker as well.
     pub fn duplicable(&self, item: &Item) -> Option<Item> {
-        let parts = self.parts(item, |trial| {
-            !self.is_known(item.individual, trial)
-                && self.n_copies(item.individual, trial) < COPIES_MAX
-        });
-        parts.into_iter().next()
+        let may = |trial| {
+            !self.is_known(item.individual, trial) && !self.is_held_back(item.individual, trial)
+        };
+        self.parts(item, may).into_iter().next()
+    }
+
+    /// Whether a worker computes a part of an item, apart from audits.
+    pub fn is_holder(&self, worker: WorkerId, item: &Item) -> bool {
+        let holders = self.holders.get(&item.individual).into_iter().flatten();
+        let mut holders = holders.filter(|holder| !holder.is_audit && holder.worker == worker);
+        holders.any(|holder| {
+            holder.trials.start < item.trials.end && item.trials.start < holder.trials.end
+        })
     }
 
     fn n_copies(&self, individual: u32, trial: u32) -> usize {
@@ -210,8 +301,16 @@ impl BatchInProgress {
         parts
     }
 
-    /// Queues an item before all others.
-    pub fn push_front(&mut self, item: Item) {
+    /// Queues an item before all others; a suspect, with the suspects.
+    pub fn queue_front(&mut self, item: Item) {
+        if self.losses.is_suspect(&item) {
+            self.suspects.push_front(item);
+        } else {
+            self.push_front(item);
+        }
+    }
+
+    fn push_front(&mut self, item: Item) {
         self.n_trials_queued += item.trials.len();
         self.queue.push_front(item);
     }
@@ -245,7 +344,9 @@ impl BatchInProgress {
 
     /// Items that wait for a worker, audits included.
     pub fn n_waiting(&self) -> usize {
-        self.queue.len() + self.audits.values().map(VecDeque::len).sum::<usize>()
+        self.queue.len()
+            + self.suspects.len()
+            + self.audits.values().map(VecDeque::len).sum::<usize>()
     }
 
     /// Items that workers have.
@@ -279,9 +380,19 @@ impl BatchInProgress {
         item
     }
 
+    /// Whether a suspect waits.
+    pub fn has_suspects(&self) -> bool {
+        !self.suspects.is_empty()
+    }
+
+    /// Takes the first suspect.
+    pub fn pop_suspect(&mut self) -> Option<Item> {
+        self.suspects.pop_front()
+    }
+
     /// Whether anything waits.
     pub fn has_waiting(&self) -> bool {
-        !self.queue.is_empty() || !self.audits.is_empty()
+        !self.queue.is_empty() || !self.suspects.is_empty() || !self.audits.is_empty()
     }
 
     /// An item has been given to a worker.
@@ -327,6 +438,12 @@ impl BatchInProgress {
         }
     }
 
+    /// The name of the worker whose values for an item are known.
+    pub fn computed_by(&self, item: &Item) -> Option<&str> {
+        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
+        self.names.get(&first).map(|name| &**name)
+    }
+
     /// Whether a worker's values agree with what is known.
     pub fn compare(&self, item: &Item, fitness: &[f64]) -> Result<(), Disagreement> {
         for (trial, values) in
@@ -337,9 +454,10 @@ impl BatchInProgress {
                 continue;
             }
             let known = &self.values[item.individual as usize][self.places(trial)];
-            let mut pairs = known.iter().copied().zip(values.iter().copied());
-            if let Some(values) = pairs.find(|(known, value)| known.to_bits() != value.to_bits()) {
-                let first_name = Arc::clone(&self.names[&first]);
+            if !same_bits(known, values) {
+                let first_name =
+                    self.names.get(&first).map_or_else(|| "referee".into(), Arc::clone);
+                let values = [known.to_vec(), values.to_vec()];
                 return Err(Disagreement { first, first_name, trial, values });
             }
         }
@@ -366,16 +484,25 @@ impl BatchInProgress {
                 n_new += 1;
             }
         }
-        if n_new > 0 && !self.names.contains_key(&worker) {
+        if n_new > 0 && worker != REFEREE && !self.names.contains_key(&worker) {
             self.names.insert(worker, name.into());
         }
         self.n_trials_left -= n_new;
         n_new
     }
 
-    /// An audit has agreed.
-    pub fn count_audited(&mut self) {
+    /// An audit by a worker has agreed.
+    pub fn count_audited(&mut self, item: &Item, auditor: &str) {
         self.n_audited += 1;
+        self.confirmed.insert(auditor.into());
+        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
+        self.confirmed.extend(self.names.get(&first).map(Arc::clone));
+    }
+
+    /// The names of those who contributed, and whether an audit has agreed with them.
+    pub fn contributors(&self) -> impl Iterator<Item = (Arc<str>, bool)> {
+        let names = self.names.values();
+        names.map(|name| (Arc::clone(name), self.confirmed.contains(name)))
     }
 
     /// Assignments of an individual, apart from audits, whose results are all known.
@@ -414,10 +541,11 @@ impl BatchInProgress {
         }
     }
 
-    /// Whether all fitness is known and no audit is under way, or waits for a worker
-    /// that is there.
+    /// Whether all fitness is known and undisputed, and no audit is under way, or waits for
+    /// a worker that is there.
     pub fn is_finished(&self, is_there: impl Fn(&Self) -> bool) -> bool {
         self.n_trials_left == 0
+            && self.n_disagreements == 0
             && self.n_audits_in_flight == 0
             && (self.audits.is_empty() || !is_there(self))
     }
@@ -433,6 +561,7 @@ impl BatchInProgress {
         now: Instant,
         n_workers: usize,
         fleet_time: &FleetTime,
+        notices: Vec<String>,
     ) -> EvaluatedBatch {
         EvaluatedBatch {
             trial_set: self.batch.trial_set,
@@ -442,6 +571,7 @@ impl BatchInProgress {
             idle_share: fleet_time.idle_share_since(&self.fleet_time_at_start),
             n_audited: self.n_audited,
             n_unaudited: self.audits.values().map(VecDeque::len).sum(),
+            notices,
         }
     }
 
@@ -470,7 +600,7 @@ impl BatchInProgress {
         // Every trial has a result, is queued or is being computed, possibly by several, or
         // held back; and it is queued only if it is nothing else.
         let mut claims = vec![0_u32; self.evaluated_by.len()];
-        for item in &self.queue {
+        for item in self.queue.iter().chain(&self.suspects) {
             for trial in item.trials.clone() {
                 claims[self.index(item.individual, trial)] += 1;
             }
@@ -480,11 +610,15 @@ impl BatchInProgress {
             let (individual, trial) = ((index / n_trials) as u32, (index % n_trials) as u32);
             let n_copies = self.n_copies(individual, trial);
             let is_known = self.is_known(individual, trial);
-            let is_held_back = self.failures.is_held_back(individual, trial);
+            let is_held_back = self.is_held_back(individual, trial);
             let is_waited_for = !is_known && (n_copies > 0 || is_held_back);
             let n_states = u32::from(is_known) + n_queued + u32::from(is_waited_for);
             assert_eq!(n_states, 1, "individual {individual}, trial {trial}");
-            assert!(n_copies <= COPIES_MAX);
         }
     }
+}
+
+/// Whether numbers agree in every bit.
+pub fn same_bits(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }

@@ -6,7 +6,7 @@
 //!
 //! Then, while slots are idle: what waits in a worker behind other items moves to
 //! them; and what others compute is computed by them as well, if they should be
-//! done sooner, or if it is late. The first result wins.
+//! done sooner, or if it is late, again and again if need be. The first result wins.
 
 use std::{
     collections::BTreeMap,
@@ -30,6 +30,16 @@ use super::{
 const MOVING_COST: Duration = Duration::from_millis(20);
 /// Workers that are looked at when the first is not suitable.
 const N_LOOKED_AT: usize = 8;
+/// Time after which an item is late whose like nobody has computed yet.
+const UNKNOWN_LATE: Duration = Duration::from_secs(5);
+
+/// From where a worker's next item is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Queue,
+    Suspects,
+    Audits,
+}
 
 /// Messages to workers that are being put together.
 #[derive(Debug, Default)]
@@ -64,17 +74,20 @@ impl Engine {
     }
 
     fn hand_out_queued(&mut self, now: Instant) {
-        while let Some((job, worker, is_audit)) = self.next_item() {
+        while let Some((job, worker, source)) = self.next_item() {
             self.virtual_now = self.virtual_now.max(self.jobs[&job].virtual_time);
-            let item = if is_audit {
-                let name = self.workers[&worker].name().to_owned();
-                let audit = self.batch_mut(job).pop_audit_for(&name);
-                audit.expect("the audit was just seen")
-            } else {
-                let n_trials = self.n_trials_per_item(job, self.workers[&worker].pace);
-                let batch = self.batch_mut(job);
-                batch.pop_front(n_trials).expect("the item was just seen")
+            let item = match source {
+                Source::Audits => {
+                    let name = self.workers[&worker].name().to_owned();
+                    self.batch_mut(job).pop_audit_for(&name)
+                }
+                Source::Suspects => self.batch_mut(job).pop_suspect(),
+                Source::Queue => {
+                    let n_trials = self.n_trials_per_item(job, self.workers[&worker].pace);
+                    self.batch_mut(job).pop_front(n_trials)
+                }
             };
+            let item = item.expect("it was just seen");
             let pace = self.workers[&worker].pace;
             let work = self.jobs.get_mut(&job).expect("just seen");
             let charge = work.charge(item.trials.len(), pace);
@@ -84,14 +97,13 @@ impl Engine {
             if work.is_ready() {
                 self.ready_queue.insert((work.virtual_time, job));
             }
-            self.give(now, worker, job, item, is_audit, charge);
+            self.give(now, worker, job, item, source, charge);
         }
     }
 
-    /// The job whose item is next, the worker that gets it, and whether it is an
-    /// audit. A job that waits for a free slot keeps its place: if others went on
+    /// The job whose item is next, the worker that gets it, and where it is. A job that waits for a free slot keeps its place: if others went on
     /// handing out ahead, no slot would ever be free.
-    fn next_item(&self) -> Option<(JobId, WorkerId, bool)> {
+    fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
         let available = &self.load_index.available;
         let &(load, _, first) = available.first()?;
         for &(_, id) in &self.ready_queue {
@@ -100,12 +112,19 @@ impl Engine {
                 let mut workers = available.iter().map(|&(.., worker)| worker);
                 let may = |id: &WorkerId| batch.has_audit_for(self.workers[id].name());
                 if let Some(auditor) = workers.find(may) {
-                    return Some((id, auditor, true));
+                    return Some((id, auditor, Source::Audits));
+                }
+            }
+            if batch.has_suspects() {
+                let idle = available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
+                let mut workers = idle.map(|&(.., worker)| worker);
+                if let Some(worker) = workers.find(|id| !self.workers[id].has_suspect()) {
+                    return Some((id, worker, Source::Suspects));
                 }
             }
             if batch.n_queued() > 0 {
                 let may_have = load < FULL_LOAD || self.hands_out_ahead(id);
-                return may_have.then_some((id, first, false));
+                return may_have.then_some((id, first, Source::Queue));
             }
         }
         None
@@ -150,8 +169,7 @@ impl Engine {
         let candidate =
             self.load_index.backlogged.iter().rev().take(N_LOOKED_AT).find_map(|&(_, holder)| {
                 let worker = &self.workers[&holder];
-                let n_waiting = worker.in_flight.len() - worker.n_slots();
-                let mut waiting = worker.in_flight.iter().rev().take(n_waiting);
+                let mut waiting = worker.in_flight.iter().rev().take(worker.n_waiting());
                 let (&assignment_id, _) =
                     waiting.find(|(_, a)| !a.is_audit && a.expected > now + MOVING_COST)?;
                 Some((holder, assignment_id))
@@ -165,35 +183,36 @@ impl Engine {
     /// Gives work that is being computed to idle slots, too; whether there was any
     /// for which that is worth it.
     fn duplicate(&mut self, now: Instant) -> bool {
-        let Some(idle) = self.idle_worker_except(None) else { return false };
+        let Some(idle) = self.idle_worker(|_| true) else { return false };
         let pace = self.workers[&idle].pace;
         let candidate = self.jobs.iter().find_map(|(&id, work)| {
             let copy = work.slowest(now, self.load_index.n_idle_slots, pace, &self.workers)?;
             Some((id, copy))
         });
-        let Some((job, Slow { key, holder, item, n_parts })) = candidate else {
-            return false;
+        let Some((job, Slow { key, item, n_parts })) = candidate else { return false };
+        let other = |engine: &Self, item: &Item| {
+            let batch = engine.jobs[&job].batch.as_ref();
+            engine.idle_worker(|id| batch.is_some_and(|batch| !batch.is_holder(id, item)))
         };
-        if self.idle_worker_except(Some(holder)).is_none() {
+        if other(self, &item).is_none() {
             return false;
         }
         self.batch_mut(job).uncovered.remove(&key);
         let n_per_part = item.trials.len().div_ceil(n_parts) as u32;
         let mut start = item.trials.start;
-        while start < item.trials.end
-            && let Some(worker) = self.idle_worker_except(Some(holder))
-        {
+        while start < item.trials.end {
             let trials = start..(start + n_per_part).min(item.trials.end);
-            start = trials.end;
             let part = Item { individual: item.individual, trials };
-            self.give(now, worker, job, part, false, Duration::ZERO);
+            let Some(worker) = other(self, &part) else { break };
+            start = part.trials.end;
+            self.give(now, worker, job, part, Source::Queue, Duration::ZERO);
         }
         true
     }
 
-    fn idle_worker_except(&self, holder: Option<WorkerId>) -> Option<WorkerId> {
+    fn idle_worker(&self, is_suitable: impl Fn(WorkerId) -> bool) -> Option<WorkerId> {
         let idle = self.load_index.available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
-        idle.map(|&(.., id)| id).find(|&id| Some(id) != holder)
+        idle.map(|&(.., id)| id).find(|&id| is_suitable(id))
     }
 
     /// Assigns an item to a worker.
@@ -203,20 +222,22 @@ impl Engine {
         worker_id: WorkerId,
         job: JobId,
         item: Item,
-        is_audit: bool,
+        source: Source,
         charge: Duration,
     ) {
+        let (is_audit, is_suspect) = (source == Source::Audits, source == Source::Suspects);
         self.n_items_assigned += 1;
         let id = AssignmentId(self.n_items_assigned);
         let work = self.jobs.get_mut(&job).expect("the caller has seen it");
         let worker = &self.workers[&worker_id];
         let expected = work.expected(item.trials.len(), worker.pace).unwrap_or_default();
         // What it has been given before comes first.
-        let n_before = (worker.in_flight.len() / worker.n_slots()) as u32;
+        let n_before = (worker.load() / FULL_LOAD) as u32;
         let expected = now + expected * (n_before + 1);
         let batch = work.batch.as_mut().expect("the caller has seen it");
         batch.add_holder(id, worker_id, &item, is_audit);
-        if !is_audit && batch.duplicable(&item).is_some() {
+        // A copy of a suspect might take another worker down.
+        if source == Source::Queue {
             batch.uncovered.insert((expected, id), worker_id);
         }
         let (trial_set, output) = (batch.trial_set(), batch.output());
@@ -224,8 +245,16 @@ impl Engine {
         let assignment = Assignment { id, trials: item.trials.clone(), genotype };
         let outgoing = self.outgoing.assignments.entry((worker_id, job));
         outgoing.or_insert_with(|| (trial_set, output, Vec::new())).2.push(assignment);
-        let assigned =
-            AssignedItem { job, trial_set, item, is_audit, assigned: now, expected, charge };
+        let assigned = AssignedItem {
+            job,
+            trial_set,
+            item,
+            is_audit,
+            is_suspect,
+            assigned: now,
+            expected,
+            charge,
+        };
         self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 
@@ -285,7 +314,6 @@ impl Engine {
 /// Work that is worth computing once more.
 struct Slow {
     key: (Instant, AssignmentId),
-    holder: WorkerId,
     item: Item,
     /// Into how many items it is split for that.
     n_parts: usize,
@@ -304,16 +332,20 @@ impl JobWork {
     ) -> Option<Slow> {
         let batch = self.batch.as_ref().filter(|batch| batch.n_queued() == 0)?;
         let ends = [batch.uncovered.last_key_value(), batch.uncovered.first_key_value()];
-        ends.into_iter().flatten().find_map(|(&key, &holder)| {
+        ends.into_iter().flatten().find_map(|(&key, holder)| {
             let (expected, assignment_id) = key;
-            let running = &workers[&holder].in_flight[&assignment_id].item;
+            let running = &workers[holder].in_flight[&assignment_id].item;
             let item = batch.duplicable(running)?;
             let n_trials = item.trials.len();
             let n_parts = (n_idle_slots / batch.uncovered.len()).clamp(1, n_trials);
-            let needed = self.expected(n_trials.div_ceil(n_parts), pace)?;
-            // Half as long again, as a worker may finish what it is told to drop.
-            let is_worth_it = needed.mul_f64(1.5) + MOVING_COST < remaining(expected, now);
-            is_worth_it.then_some(Slow { key, holder, item, n_parts })
+            let needed = match self.expected(n_trials.div_ceil(n_parts), pace) {
+                // Half as long again, as a worker may finish what it is told to drop.
+                Some(needed) => needed.mul_f64(1.5) + MOVING_COST,
+                // Twice as late for each copy.
+                None => UNKNOWN_LATE.max(batch.running_for(now) / 2),
+            };
+            let is_worth_it = needed < remaining(expected, now);
+            is_worth_it.then_some(Slow { key, item, n_parts })
         })
     }
 }

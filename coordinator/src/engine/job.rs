@@ -7,7 +7,7 @@ use std::{
 
 use crate::priority::Priority;
 
-use super::{batch::BatchInProgress, item::Item};
+use super::{batch::BatchInProgress, item::Item, unaudited::Unaudited};
 
 /// What a call costs beside its trials, in trials. Measured: one trial of the
 /// shipped experiments takes 1.3 to 1.5 times as long as one of ten.
@@ -31,6 +31,10 @@ pub struct JobWork {
     pub virtual_time: u128,
     /// Trials whose fitness became known.
     pub n_episodes: u64,
+    /// Whose results have not been confirmed for how long.
+    pub unaudited: Unaudited,
+    /// What its owner should know when the batch is done.
+    pub notices: Vec<String>,
     /// Time per trial for a worker of pace 1, s; smoothed.
     trial_s: Option<f64>,
     n_learnt: u64,
@@ -46,6 +50,8 @@ impl JobWork {
             priority,
             virtual_time: 0,
             n_episodes: 0,
+            unaudited: Unaudited::default(),
+            notices: Vec::new(),
             trial_s: None,
             n_learnt: 0,
         }

@@ -30,7 +30,7 @@ impl WorkerLoadIndex {
             self.backlogged.insert((load, id));
         }
         self.n_idle_slots += worker.n_idle_slots();
-        self.n_usable_slots += if worker.is_usable() { worker.n_slots() } else { 0 };
+        self.n_usable_slots += worker.n_usable_slots();
     }
 
     /// Takes a worker out, as it was when it was added.
@@ -43,6 +43,6 @@ impl WorkerLoadIndex {
             self.backlogged.remove(&(load, id));
         }
         self.n_idle_slots -= worker.n_idle_slots();
-        self.n_usable_slots -= if worker.is_usable() { worker.n_slots() } else { 0 };
+        self.n_usable_slots -= worker.n_usable_slots();
     }
 }

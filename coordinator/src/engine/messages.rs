@@ -10,7 +10,7 @@ use std::{
 
 use sim_core::{Output, TrialSet};
 
-use crate::ids::{AssignmentId, JobId, WorkerId};
+use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
 use evolution::{Genotype, Population};
 
 /// What a job wants computed at once: every genotype on every trial.
@@ -102,12 +102,33 @@ pub enum Command {
         /// The results.
         evaluated: EvaluatedBatch,
     },
-    /// A job must not go on until somebody has looked at it; the engine has paused
-    /// it already.
-    PauseJob {
-        /// The job.
-        job: JobId,
-        /// For its owner.
+    /// Have the referee evaluate an item, after those that it was asked for before, and report
+    /// [`Engine::on_verdict`](super::Engine::on_verdict).
+    AskReferee {
+        /// Names this in the report.
+        question: QuestionId,
+        /// As given to [`Engine::on_job_started`](super::Engine::on_job_started).
+        spec: Arc<str>,
+        /// Which worlds and noise the trials meet.
+        trial_set: TrialSet,
+        /// What is computed for a trial.
+        output: Output,
+        /// The genotype.
+        genotype: SharedGenotype,
+        /// At least one.
+        trials: Range<u32>,
+    },
+    /// An answer of the referee is not needed any more.
+    WithdrawQuestion {
+        /// As given to [`Command::AskReferee`].
+        question: QuestionId,
+    },
+    /// A worker is proved faulty: it is given nothing until an operator says otherwise, and
+    /// this has to be remembered.
+    Quarantine {
+        /// What it calls itself.
+        name: String,
+        /// For people.
         reason: String,
     },
     /// A job cannot go on; the engine has forgotten it already.
@@ -191,6 +212,8 @@ pub struct EvaluatedBatch {
     pub n_audited: usize,
     /// Items that were to be audited while there was no second worker.
     pub n_unaudited: usize,
+    /// What the experiment's owner should know about its results.
+    pub notices: Vec<String>,
 }
 
 /// Who a worker says it is.
@@ -230,8 +253,10 @@ pub struct WorkerStatus {
     pub silent_for: Duration,
     /// Whether it wants no more items.
     pub is_draining: bool,
-    /// Why it is given no items, if its results are in doubt.
-    pub distrusted: Option<String>,
+    /// Why it is in quarantine, if it is.
+    pub quarantined: Option<String>,
+    /// Why it is given nothing for a while, if that is so.
+    pub waits: Option<String>,
 }
 
 /// The fleet as a reader of logs sees it.

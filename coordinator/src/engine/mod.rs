@@ -23,38 +23,42 @@
 //!   trial; when nothing is left to hand out, assigned items are duplicated if idle
 //!   workers should be done sooner. The first result counts, and the other workers
 //!   are told to drop the assignment.
-//! - An item returns to the front of the queue when its worker leaves or falls
-//!   silent, never because it takes long.
+//! - An item returns to the front of the queue when its worker leaves, falls silent, or
+//!   finishes nothing for long while others do.
 //! - A result counts by its place in the batch, not by its arrival, and the first
 //!   one for each place is kept. So who computes what, and how often, cannot change
 //!   the results of a batch.
-//! - Two results for the same place whose bits differ mean a faulty worker. The
-//!   batch's results are thrown away, both workers get nothing more, and the job is
-//!   paused with a reason that names them: nothing that was committed is lost,
-//!   nothing doubtful is committed, and the owner decides. To find such workers, a
-//!   share of the individuals can be audited: computed by a second worker, too, if
-//!   there is one.
-//! - An item that fails, or that takes its worker down, [`MAX_ATTEMPTS`] times fails
-//!   its job; other jobs continue. A worker whose process comes back was not taken
-//!   down.
+//! - Trouble with workers is settled by proof, and never fails a job. What an item comes
+//!   to is the same everywhere, so the *referee*, a process of the coordinator's, is asked
+//!   ([`questions`]): when a worker reports a failure; when two results for the same place
+//!   differ in their bits; when workers were lost again and again with the same item
+//!   ([`losses`]). If the item fails there, too, it fails its job, and no other. A worker
+//!   whose word was wrong is put in quarantine, and what it computed for the batch is
+//!   computed again. To find such workers, a share of the individuals can be audited:
+//!   computed by a second worker, too, if there is one.
 
 mod activity;
 mod batch;
+mod crash_loops;
 mod dispatch;
-mod failures;
 mod fleet_time;
 mod item;
 mod job;
 mod load_index;
+mod losses;
 mod messages;
+mod quarantine;
+mod questions;
 mod results;
+mod stalls;
 mod stats;
+mod unaudited;
+mod verdicts;
 mod worker;
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     mem,
-    num::NonZeroU64,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -68,6 +72,7 @@ use crate::{
 
 pub use activity::{BatchActivity, HeldItems, JobActivity};
 use batch::BatchInProgress;
+use crash_loops::CrashLoops;
 use dispatch::Outgoing;
 use fleet_time::FleetTime;
 use item::Item;
@@ -77,11 +82,11 @@ pub use messages::{
     Assignment, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
     SharedGenotype, WorkerStatus,
 };
+use quarantine::Quarantine;
+use questions::Questions;
+use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
 use worker::Worker;
-
-/// Times that an item is tried before its job fails.
-pub const MAX_ATTEMPTS: u32 = 3;
 
 /// How an engine decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,6 +123,9 @@ pub struct Engine {
     /// The present virtual time: that of the job that was given workers last. A job
     /// that comes back from waiting starts here, so that nobody saves up time.
     virtual_now: u128,
+    questions: Questions,
+    quarantine: Quarantine,
+    crash_loops: CrashLoops,
     outgoing: Outgoing,
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
@@ -137,6 +145,9 @@ impl Engine {
             jobs: BTreeMap::new(),
             ready_queue: BTreeSet::new(),
             virtual_now: 0,
+            questions: Questions::default(),
+            quarantine: Quarantine::default(),
+            crash_loops: CrashLoops::default(),
             outgoing: Outgoing::default(),
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
@@ -163,13 +174,19 @@ impl Engine {
     /// A worker has introduced itself.
     pub fn on_worker_joined(&mut self, now: Instant, introduction: Introduction) -> WorkerId {
         if let Some(process) = introduction.process {
-            self.clear_failures(process);
+            let works = self.jobs.values_mut();
+            let batches = works.filter_map(|work| work.batch.as_mut());
+            batches.for_each(|batch| batch.losses.on_process_joined(process));
         }
         self.n_workers_seen += 1;
         self.counters.n_workers_joined += 1;
         let id = WorkerId(self.n_workers_seen);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
-        let worker = Worker::new(introduction, now);
+        let rest = self.crash_loops.rest(&introduction.name);
+        let mut worker = Worker::new(introduction, now);
+        worker.quarantined = self.quarantine.reason(&worker.introduction).map(str::to_owned);
+        worker.is_on_probation = rest.is_some();
+        worker.resting_until = rest.filter(|&until| until > now && self.has_usable_worker());
         self.load_index.add(id, &worker);
         self.workers.insert(id, worker);
         self.assign(now);
@@ -178,7 +195,7 @@ impl Engine {
 
     /// A worker's stream has ended. Its items go to others; returns their number.
     pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
-        let n_items_requeued = self.forget_worker(now, id, Some("was lost"));
+        let n_items_requeued = self.forget_worker(now, id, true);
         self.assign(now);
         n_items_requeued
     }
@@ -261,9 +278,6 @@ impl Engine {
         let pause = now.saturating_duration_since(mem::replace(&mut self.last_tick, now));
         if pause > lease / 2 {
             self.workers.values_mut().for_each(|worker| worker.last_heard += pause);
-            let works = self.jobs.values_mut();
-            let batches = works.filter_map(|work| work.batch.as_mut());
-            batches.for_each(|batch| batch.failures.postpone(pause));
         }
         let silent: Vec<WorkerId> = self
             .workers
@@ -273,10 +287,40 @@ impl Engine {
             .collect();
         for id in silent {
             // Silence is the network's fault, or a pause's, not an item's.
-            self.drop_worker(now, id, None, format!("silent for {} s", lease.as_secs_f64()));
+            let reason = format!("silent for {} s", lease.as_secs_f64());
+            let n_items_requeued = self.forget_worker(now, id, false);
+            self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
         }
-        self.give_up_overdue(now);
+        self.write_off_stalled(now);
+        self.requeue_delayed(now);
+        self.wake_rested(now);
+        self.ask_again(now);
         self.assign(now);
+    }
+
+    fn has_usable_worker(&self) -> bool {
+        self.workers.values().any(Worker::is_usable)
+    }
+
+    /// Gives items again to workers that have waited for long enough, or that are all there is.
+    fn wake_rested(&mut self, now: Instant) {
+        let is_needed = !self.has_usable_worker();
+        let resting = self.workers.iter().filter(|(_, worker)| {
+            worker.resting_until.is_some_and(|until| is_needed || until <= now)
+        });
+        for id in resting.map(|(&id, _)| id).collect::<Vec<WorkerId>>() {
+            self.update_worker(id, |worker| worker.resting_until = None);
+        }
+    }
+
+    /// Puts a job into the ready queue or takes it out, as it has something to hand out or not.
+    fn update_readiness(&mut self, id: JobId) {
+        let Some(work) = self.jobs.get(&id) else { return };
+        if work.is_ready() {
+            self.make_ready(id);
+        } else {
+            self.ready_queue.remove(&(work.virtual_time, id));
+        }
     }
 
     /// Puts a job into the ready queue, if it has something to hand out.
@@ -317,71 +361,39 @@ impl Engine {
         (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
     }
 
-    /// A process is alive, so that no work has taken it down.
-    fn clear_failures(&mut self, process: NonZeroU64) {
-        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
-        for id in ids {
-            let work = self.jobs.get_mut(&id).expect("just listed");
-            let Some(batch) = &mut work.batch else { continue };
-            for item in batch.failures.on_process_joined(process) {
-                self.requeue(id, &item);
-            }
-        }
-    }
-
-    /// Fails jobs one of whose items has taken too many workers down for good.
-    fn give_up_overdue(&mut self, now: Instant) {
-        let overdue: Vec<(JobId, Item, String)> = self
-            .jobs
-            .iter()
-            .filter_map(|(&id, work)| {
-                let batch = work.batch.as_ref()?;
-                let (item, failure) = batch.failures.overdue(now)?;
-                // Another copy's result may have come.
-                let is_needed = batch.duplicable(item).is_some();
-                is_needed.then(|| (id, item.clone(), failure.to_owned()))
-            })
-            .collect();
-        for (id, item, failure) in overdue {
-            self.fail(id, &item, &failure);
-        }
-    }
-
-    fn drop_worker(&mut self, now: Instant, id: WorkerId, failure: Option<&str>, reason: String) {
-        let n_items_requeued = self.forget_worker(now, id, failure);
-        self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
-    }
-
-    /// `failure`: what happened to the worker, if the items that it was computing
-    /// may have caused it.
-    fn forget_worker(&mut self, now: Instant, id: WorkerId, failure: Option<&str>) -> usize {
+    /// `is_evidence`: whether the items that the worker was computing may have taken it down.
+    fn forget_worker(&mut self, now: Instant, id: WorkerId, is_evidence: bool) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
-        match worker.is_draining {
-            true => self.counters.n_workers_left += 1,
-            false => self.counters.n_workers_lost += 1,
+        if worker.is_draining {
+            self.counters.n_workers_left += 1;
+        } else {
+            self.counters.n_workers_lost += 1;
+            self.crash_loops.on_lost(now, worker.name());
         }
         self.load_index.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
         // Only what it was computing can have taken it down: its oldest items,
         // one per slot. A worker that said goodbye was not taken down.
-        let n_suspects = if worker.is_draining { 0 } else { worker.n_slots() };
         let n_items = worker.in_flight.len();
-        let failure = failure.map(|failure| format!("its worker \"{}\" {failure}", worker.name()));
+        let n_computing = n_items - worker.n_waiting();
+        let n_suspects = if is_evidence && !worker.is_draining { n_computing } else { 0 };
         let process = worker.introduction.process;
+        let lost = NoResult::WorkerLost { process, is_alone: n_computing == 1 };
         // Later items first, so that the earliest ends up at the queue's front.
         for (age_rank, (assignment_id, assignment)) in
             worker.in_flight.into_iter().enumerate().rev()
         {
             self.forget_holder(assignment_id, &assignment);
             self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
-            let failure = failure.as_deref().filter(|_| age_rank < n_suspects);
-            self.retry(now, assignment, failure.map(|failure| (process, failure)));
+            let why = if age_rank < n_suspects { lost } else { NoResult::TakenBack };
+            self.retry(now, assignment, why);
         }
         self.finish_waived(now);
         n_items
     }
 
     fn forget_job(&mut self, id: JobId) {
+        self.withdraw_questions(id, |_| true);
         self.withdraw(id);
         self.jobs.remove(&id);
     }
@@ -404,6 +416,7 @@ impl Engine {
                 self.load_index.remove(worker_id, worker);
                 let ours = worker.in_flight.extract_if(.., |_, a| a.job == id);
                 audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
+                worker.written_off.retain(|_, assignment| assignment.job != id);
                 self.load_index.add(worker_id, worker);
                 self.commands.push_back(Command::SendEnd { worker: worker_id, job: id });
             }
@@ -439,6 +452,12 @@ impl Engine {
                 in_flight.entry(assignment.job).or_default().insert(assignment_id, entry);
             }
             assert!(worker.recalled.len() <= 2 * worker.n_slots());
+            assert!(
+                worker.is_usable()
+                    || worker.is_draining
+                    || worker.quarantined.is_none()
+                    || worker.in_flight.is_empty()
+            );
         }
         assert_eq!(load_index.available, self.load_index.available);
         assert_eq!(load_index.backlogged, self.load_index.backlogged);
@@ -457,7 +476,7 @@ impl Engine {
         let n_ready = self.jobs.values().filter(|work| work.is_ready()).count();
         assert_eq!(self.ready_queue.len(), n_ready);
         let has_queued = |work: &&JobWork| {
-            work.is_ready() && work.batch.as_ref().is_some_and(|g| g.n_queued() > 0)
+            work.is_ready() && work.batch.as_ref().is_some_and(|batch| batch.n_queued() > 0)
         };
         assert!(
             !self.has_idle_slot() || self.jobs.values().find(has_queued).is_none(),
@@ -484,6 +503,3 @@ fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)
 }
-
-#[cfg(test)]
-mod tests;

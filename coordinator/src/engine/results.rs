@@ -2,6 +2,7 @@
 
 use std::{
     num::NonZeroU64,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -11,21 +12,32 @@ use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
     Command, Engine, ItemResult,
-    batch::{BatchInProgress, Disagreement},
-    failures::RetryDecision,
+    batch::{BatchInProgress, Disagreement, REFEREE},
     item::Item,
+    losses::AfterLoss,
+    questions::{Doubt, Party},
     worker::{AssignedItem, Worker},
 };
+
+/// Why an item has no result yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoResult {
+    /// It was taken back, or has to be done by somebody else.
+    TakenBack,
+    /// Its worker was lost while it computed it, and `is_alone` nothing else.
+    WorkerLost { process: Option<NonZeroU64>, is_alone: bool },
+}
 
 impl Engine {
     pub(super) fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
-        let Some(assignment) = worker.in_flight.get(&result.id) else {
-            let recalled = worker.take_recalled(result.id);
-            if let (Some(recalled), Ok(fitness)) = (recalled, result.outcome)
+        let is_in_flight = worker.in_flight.contains_key(&result.id);
+        let assignment = worker.in_flight.get(&result.id);
+        let Some(assignment) = assignment.or_else(|| worker.written_off.get(&result.id)) else {
+            if let (Some(recalled), Ok(values)) = (worker.take_recalled(result.id), result.outcome)
                 && self.is_due(recalled.job, result.output)
             {
-                self.on_late_result(now, id, &recalled, &fitness);
+                self.on_late_result(now, id, &recalled, &values);
             }
             // Else the experiment has ended meanwhile, or the worker makes items
             // up. Neither can do harm.
@@ -34,11 +46,13 @@ impl Engine {
         let (job, n_trials) = (assignment.job, assignment.item.trials.len());
         let batch = self.jobs[&job].batch.as_ref();
         let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
-        if let Ok(fitness) = &result.outcome
-            && fitness.len() != n_values
+        let name: Arc<str> = worker.name().into();
+        if let Ok(values) = &result.outcome
+            && values.len() != n_values
+            && batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set)
         {
-            let reason = format!("it returned {} values for {n_trials} trials", fitness.len());
-            self.drop_worker(now, id, Some("was dropped"), reason);
+            let reason = format!("it returned {} values for {n_trials} trials", values.len());
+            self.put_in_quarantine(now, &Party { id, name }, &reason);
             return;
         }
         if result.outcome.is_ok() && !self.is_due(job, result.output) {
@@ -46,21 +60,33 @@ impl Engine {
                 Output::Fitness => "it returned fitness where measures are due",
                 Output::Measures => "it returned measures where fitness is due",
             };
-            self.drop_worker(now, id, Some("was dropped"), reason.to_owned());
+            self.put_in_quarantine(now, &Party { id, name }, reason);
             return;
         }
-        let assignment = self.take_assignment(id, result.id);
+        let assignment = if is_in_flight {
+            self.take_assignment(id, result.id)
+        } else {
+            let taken = self.update_worker(id, |worker| worker.written_off.remove(&result.id));
+            taken.expect("just seen")
+        };
         let busy = self.account(now, id, &assignment, result.compute_time);
         match result.outcome {
-            Ok(fitness) => {
+            Ok(values) => {
                 self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
-                self.accept(now, id, &assignment, &fitness);
+                self.crash_loops.on_result(self.workers[&id].name());
+                self.update_worker(id, |worker| worker.is_on_probation = false);
+                if is_in_flight {
+                    self.accept(now, id, &assignment, &values);
+                } else {
+                    self.accept_late(now, id, &assignment, &values);
+                }
             }
             Err(message) => {
                 self.counters.n_items_failed += 1;
-                let failure = format!("the worker reports: {message}");
-                self.retry(now, assignment, Some((None, &failure)));
+                if is_in_flight {
+                    self.on_failure_reported(now, id, assignment, message);
+                }
             }
         }
     }
@@ -86,6 +112,8 @@ impl Engine {
             let busy = worker.time.add_result(now, assignment.assigned, compute_time);
             let pace = worker.pace;
             worker.learn(busy, expected);
+            worker.last_result = Some(now);
+            worker.is_stalled = false;
             (busy, pace)
         });
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
@@ -94,31 +122,78 @@ impl Engine {
         busy
     }
 
-    fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, fitness: &[f64]) {
+    fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, values: &[f64]) {
         let (job, item) = (assignment.job, &assignment.item);
-        if let Err(disagreement) = self.batch_mut(job).compare(item, fitness) {
-            self.on_disagreement(now, job, id, item, &disagreement);
+        if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
+            if assignment.is_audit {
+                self.batch_mut(job).push_audit(item.clone());
+                self.update_readiness(job);
+            } else {
+                self.requeue(job, item);
+            }
+            self.on_disagreement(now, job, id, item, disagreement);
             return;
         }
-        if assignment.is_audit {
-            self.batch_mut(job).count_audited();
-        } else {
-            let is_audited = self.is_audited(job, item);
-            let worker = &self.workers[&id];
-            let work = self.jobs.get_mut(&job).expect("it is assigned");
-            let batch = work.batch.as_mut().expect("it is assigned");
-            let n_new = batch.accept(id, worker.name(), item, fitness);
-            work.n_episodes += n_new as u64;
-            self.counters.n_episodes += n_new as u64;
-            if n_new > 0 && is_audited {
-                batch.push_audit(item.clone());
-            }
-            for (holder, assignment_id) in batch.redundant(item.individual) {
-                self.recall(holder, assignment_id);
-            }
-            self.make_ready(job);
+        let name = self.workers[&id].name().to_owned();
+        // What was to be audited may have been discarded meanwhile.
+        let n_new = self.take_values(job, id, &name, item, values, assignment.is_audit);
+        if assignment.is_audit && n_new == 0 {
+            self.batch_mut(job).count_audited(item, &name);
         }
+        self.update_readiness(job);
         self.finish_if_evaluated(now, job);
+    }
+
+    /// Takes the values of those trials that have none; returns the number of these.
+    /// `may_be_queued`: whether the item may be waiting for another worker.
+    pub(super) fn take_values(
+        &mut self,
+        job: JobId,
+        id: WorkerId,
+        name: &str,
+        item: &Item,
+        values: &[f64],
+        may_be_queued: bool,
+    ) -> usize {
+        let is_audited = self.is_audited(job, item);
+        let batch = self.batch_mut(job);
+        let n_new = batch.accept(id, name, item, values);
+        if n_new > 0 && is_audited {
+            batch.push_audit(item.clone());
+        }
+        if may_be_queued {
+            batch.remove_known(item.individual);
+        }
+        for (holder, assignment_id) in batch.redundant(item.individual) {
+            self.recall(holder, assignment_id);
+        }
+        self.jobs.get_mut(&job).expect("just seen").n_episodes += n_new as u64;
+        self.counters.n_episodes += n_new as u64;
+        n_new
+    }
+
+    /// A worker that had been given up has computed an item after all.
+    fn accept_late(
+        &mut self,
+        now: Instant,
+        id: WorkerId,
+        assignment: &AssignedItem,
+        values: &[f64],
+    ) {
+        let (job, item) = (assignment.job, &assignment.item);
+        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
+        let is_wanted = batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set);
+        if !is_wanted || self.jobs[&job].is_paused {
+            return;
+        }
+        if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
+            self.on_disagreement(now, job, id, item, disagreement);
+        } else if !assignment.is_audit {
+            let name = self.workers[&id].name().to_owned();
+            self.take_values(job, id, &name, item, values, true);
+            self.update_readiness(job);
+            self.finish_if_evaluated(now, job);
+        }
     }
 
     /// Another's result came first, but this one is here, so compare them.
@@ -127,62 +202,76 @@ impl Engine {
         now: Instant,
         id: WorkerId,
         recalled: &AssignedItem,
-        fitness: &[f64],
+        values: &[f64],
     ) {
         let job = recalled.job;
         let work = self.jobs.get(&job);
         let batch = work.and_then(|work| work.batch.as_ref());
         if let Some(batch) = batch
             && batch.trial_set() == recalled.trial_set
-            && let Err(disagreement) = batch.compare(&recalled.item, fitness)
+            && let Err(disagreement) = batch.compare(&recalled.item, values)
         {
-            self.on_disagreement(now, job, id, &recalled.item, &disagreement);
+            self.on_disagreement(now, job, id, &recalled.item, disagreement);
         }
     }
 
-    /// Two workers differ about the same trial, so one of them is faulty, and nobody
-    /// knows which. Neither gets work any more. Their other results may be wrong as
-    /// well: the batch starts over when the job is resumed. What is committed stays.
+    /// A worker says that an item fails. If it does, it fails everywhere: the referee knows.
+    fn on_failure_reported(
+        &mut self,
+        now: Instant,
+        id: WorkerId,
+        assignment: AssignedItem,
+        message: String,
+    ) {
+        let (job, item) = (assignment.job, assignment.item.clone());
+        let name: Arc<str> = self.workers[&id].name().into();
+        if let Some(confirmed) = self.confirms(job, &item, &name, &message) {
+            return self.fail(job, &item, &confirmed);
+        }
+        // A worker whose word is in doubt already says nothing new.
+        let is_doubted = self.workers[&id].question.is_some();
+        if assignment.is_audit || is_doubted || self.jobs[&job].batch.is_none() {
+            self.retry(now, assignment, NoResult::TakenBack);
+        }
+        if !is_doubted {
+            let reporter = Party { id, name };
+            self.ask_referee(job, item, Doubt::Failure { reporter, message });
+        }
+    }
+
+    /// Two workers differ about the same trial, so one of them is faulty: the referee
+    /// knows which. Neither gets work meanwhile.
     fn on_disagreement(
         &mut self,
         now: Instant,
         job: JobId,
         second: WorkerId,
         item: &Item,
-        disagreement: &Disagreement,
+        disagreement: Disagreement,
     ) {
-        let Disagreement { first, first_name, trial, values: (a, b) } = disagreement;
-        let second_name = self.workers[&second].name().to_owned();
-        let batch = self.batch_mut(job);
-        let reason = format!(
-            "workers \"{first_name}\" ({first}) and \"{second_name}\" ({second}) differ: {a:?} and \
-             {b:?} for trial {trial} of individual {} of {}; at least one of them is faulty, and \
-             results of earlier generations may be wrong, too; neither gets work until it is \
-             started again, and the generation is evaluated anew when the experiment is resumed",
-            item.individual,
-            batch.name(),
-        );
-        self.pause(job);
-        self.batch_mut(job).start_over();
-        for id in [*first, second] {
-            self.distrust(now, id, &reason);
+        let Disagreement { first, first_name, trial, values: [first_values, second_values] } =
+            disagreement;
+        let second = Party { id: second, name: self.workers[&second].name().into() };
+        let batch = self.jobs[&job].batch.as_ref().expect("just compared");
+        if first == REFEREE {
+            let reason = format!(
+                "it returned {second_values:?} for trial {trial} of individual {} of {}, and \
+                 the referee {first_values:?}",
+                item.individual,
+                batch.name(),
+            );
+            return self.put_in_quarantine(now, &second, &reason);
         }
-        self.commands.push_back(Command::PauseJob { job, reason });
-    }
-
-    /// A worker gets no work any more, and what it has goes to others.
-    fn distrust(&mut self, now: Instant, id: WorkerId, reason: &str) {
-        let Some(worker) = self.workers.get(&id) else { return };
-        let assignments: Vec<AssignmentId> = worker.in_flight.keys().copied().collect();
-        self.update_worker(id, |worker| worker.distrusted = Some(reason.to_owned()));
-        for assignment_id in assignments.into_iter().rev() {
-            let assignment = self.recall(id, assignment_id);
-            self.retry(now, assignment, None);
+        let is_doubted =
+            |id| self.workers.get(&id).is_some_and(|worker: &Worker| worker.question.is_some());
+        // What they differ about will be compared again when it is clear who is right.
+        if is_doubted(first) || is_doubted(second.id) {
+            return;
         }
-        if let Some(worker) = self.workers.get_mut(&id) {
-            worker.recalled.clear();
-        }
-        self.finish_waived(now);
+        let first = Party { id: first, name: first_name };
+        let parties = [(first, first_values), (second, second_values)];
+        let item = Item { individual: item.individual, trials: trial..trial + 1 };
+        self.ask_referee(job, item, Doubt::Disagreement { parties });
     }
 
     /// Finishes batches whose last audits no worker can do any more.
@@ -201,13 +290,13 @@ impl Engine {
 
     /// Reports a batch of which nothing is left to do. An audit for which
     /// there is no second worker is waived, and counted as such.
-    fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
+    pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
-        let Some(batch) = &work.batch else { return };
+        let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
         let workers = &self.workers;
         let has_auditor = |batch: &BatchInProgress| {
-            let mut usable = workers.values().filter(|worker| worker.is_usable());
-            usable.any(|worker| batch.has_audit_for(worker.name()))
+            let mut auditors = workers.values().filter(|worker| worker.may_audit());
+            auditors.any(|worker| batch.has_audit_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {
             return;
@@ -215,18 +304,17 @@ impl Engine {
         self.ready_queue.remove(&(work.virtual_time, id));
         self.fleet_time.advance(now);
         let batch = work.batch.take().expect("just seen");
-        let evaluated = batch.into_evaluated(now, self.workers.len(), &self.fleet_time);
+        if let sim_core::TrialSet::Generation(generation) = batch.trial_set() {
+            work.unaudited.add(generation, batch.contributors());
+        }
+        let notices = std::mem::take(&mut work.notices);
+        let evaluated = batch.into_evaluated(now, self.workers.len(), &self.fleet_time, notices);
         self.commands.push_back(Command::FinishBatch { job: id, evaluated });
+        self.withdraw_questions(id, |question| matches!(question.doubt, Doubt::Losses));
     }
 
-    /// Queues an item again that gave no result. `failure`: what counts against it, if
-    /// anything, and the process whose return would take that back.
-    pub(super) fn retry(
-        &mut self,
-        now: Instant,
-        assignment: AssignedItem,
-        failure: Option<(Option<NonZeroU64>, &str)>,
-    ) {
+    /// Queues an item again that gave no result.
+    pub(super) fn retry(&mut self, now: Instant, assignment: AssignedItem, why: NoResult) {
         let AssignedItem { job: id, item, is_audit, .. } = assignment;
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = &mut work.batch else { return };
@@ -234,18 +322,33 @@ impl Engine {
         if is_audit {
             // It may have been the second worker that made an audit possible.
             batch.push_audit(item);
-            self.make_ready(id);
+            self.update_readiness(id);
             return;
         }
-        if let Some((process, failure)) = failure {
-            let until = now + self.config.lease;
-            match batch.failures.add(&item, process, failure, until) {
-                RetryDecision::Retry => {}
-                RetryDecision::HoldBack => return,
-                RetryDecision::Fail => return self.fail(id, &item, failure),
+        let next = match why {
+            NoResult::TakenBack => AfterLoss::Retry,
+            NoResult::WorkerLost { process, is_alone } => {
+                batch.losses.add(now, &item, process, is_alone)
+            }
+        };
+        match next {
+            AfterLoss::Wait(until) => batch.delay(item, until),
+            AfterLoss::Ask if batch.duplicable(&item).as_ref() == Some(&item) => {
+                self.ask_referee(id, item, Doubt::Losses);
+            }
+            AfterLoss::Ask | AfterLoss::Retry => self.requeue(id, &item),
+        }
+    }
+
+    /// Queues items that had to wait for a while.
+    pub(super) fn requeue_delayed(&mut self, now: Instant) {
+        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
+        for id in ids {
+            let batch = self.jobs.get_mut(&id).and_then(|work| work.batch.as_mut());
+            for item in batch.map(|batch| batch.take_due(now)).unwrap_or_default() {
+                self.requeue(id, &item);
             }
         }
-        self.requeue(id, &item);
     }
 
     /// Queues what no other worker computes of an item, before all others, and lets
@@ -254,28 +357,29 @@ impl Engine {
         let work = self.jobs.get_mut(&id).expect("the caller has seen it");
         let batch = work.batch.as_mut().expect("the caller has seen it");
         for part in batch.unclaimed(item).into_iter().rev() {
-            batch.push_front(part);
+            batch.queue_front(part);
         }
         let holders: Vec<(WorkerId, AssignmentId)> = batch.holders(item.individual).collect();
         for (holder, assignment_id) in holders {
             let worker: Option<&Worker> = self.workers.get(&holder);
             if let Some(assignment) = worker.and_then(|worker| worker.in_flight.get(&assignment_id))
+                && !assignment.is_suspect
             {
                 batch.uncovered.insert((assignment.expected, assignment_id), holder);
             }
         }
-        self.make_ready(id);
+        self.update_readiness(id);
     }
 
+    /// An item fails wherever it is computed.
     pub(super) fn fail(&mut self, id: JobId, item: &Item, failure: &str) {
         let batch = self.batch_mut(id);
         let reason = format!(
-            "individual {} of {}, trials {}..{}, failed {} times; at last {failure}",
+            "individual {} of {}, trials {}..{}, fails wherever it is computed: {failure}",
             item.individual,
             batch.name(),
             item.trials.start,
             item.trials.end,
-            super::MAX_ATTEMPTS,
         );
         self.forget_job(id);
         self.commands.push_back(Command::FailJob { job: id, reason });

@@ -28,6 +28,12 @@ pub struct Counters {
     pub n_items_recalled: u64,
     /// Trials whose fitness became known.
     pub n_episodes: u64,
+    /// Workers that were proved faulty.
+    pub n_workers_quarantined: u64,
+    /// Times that a worker finished nothing for long while others did.
+    pub n_workers_stalled: u64,
+    /// Items that the referee was asked about.
+    pub n_questions: u64,
 }
 
 /// The fleet in numbers.
@@ -39,8 +45,10 @@ pub struct FleetStats {
     pub n_workers_available: usize,
     /// Connected workers that want no more.
     pub n_workers_draining: usize,
-    /// Connected workers whose results are in doubt.
-    pub n_workers_distrusted: usize,
+    /// Connected workers that are given nothing for a while.
+    pub n_workers_waiting: usize,
+    /// Connected workers in quarantine.
+    pub n_workers_quarantined: usize,
     /// Slots of all connected workers.
     pub n_slots: usize,
     /// Time that slots have existed, s.
@@ -69,11 +77,18 @@ impl Engine {
         fleet_time.advance(now);
         let n_draining = self.workers.values().filter(|worker| worker.is_draining).count();
         let n_available = self.workers.values().filter(|worker| worker.is_usable()).count();
+        let quarantined = self.workers.values().filter(|worker| worker.quarantined.is_some());
+        let n_quarantined = quarantined.filter(|worker| !worker.is_draining).count();
         FleetStats {
-            counters: Counters { n_items_assigned: self.n_items_assigned, ..self.counters },
+            counters: Counters {
+                n_items_assigned: self.n_items_assigned,
+                n_questions: self.questions.n_asked(),
+                ..self.counters
+            },
             n_workers_available: n_available,
             n_workers_draining: n_draining,
-            n_workers_distrusted: self.workers.len() - n_available - n_draining,
+            n_workers_waiting: self.workers.len() - n_available - n_draining - n_quarantined,
+            n_workers_quarantined: n_quarantined,
             n_slots: fleet_time.n_slots(),
             slot_time_s: fleet_time.capacity_s(),
             busy_time_s: fleet_time.busy_s(),

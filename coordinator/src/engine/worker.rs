@@ -8,7 +8,7 @@ use std::{
 use sim_core::TrialSet;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 
-use crate::ids::{AssignmentId, JobId, WorkerId};
+use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
 
 use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, item::Item};
 
@@ -27,12 +27,26 @@ pub struct Worker {
     pub last_heard: Instant,
     /// Whether it wants no more items.
     pub is_draining: bool,
-    /// Why it must not be given items.
-    pub distrusted: Option<String>,
+    /// Why it is in quarantine, if it is.
+    pub quarantined: Option<String>,
+    /// The question that its word is in doubt for; it gets nothing until that is answered.
+    pub question: Option<QuestionId>,
+    /// Until when it is given nothing, as it was lost before it returned anything.
+    pub resting_until: Option<Instant>,
+    /// Whether it was lost, and has returned nothing since: it is given one item.
+    pub is_on_probation: bool,
+    /// Whether it has returned nothing for a long time while others have: it gets nothing
+    /// until it does.
+    pub is_stalled: bool,
+    /// When it last returned something.
+    pub last_result: Option<Instant>,
     /// Jobs whose specification it has.
     pub known_jobs: BTreeSet<JobId>,
     /// What it has been given and has not answered; oldest first, as ids grow.
     pub in_flight: BTreeMap<AssignmentId, AssignedItem>,
+    /// What it was computing when it was found to be stalled. Others have been given it, but
+    /// its results are still welcome.
+    pub written_off: BTreeMap<AssignmentId, AssignedItem>,
     /// What was taken back from it lately, as the answer may be under way.
     pub recalled: VecDeque<(AssignmentId, AssignedItem)>,
     /// What it computed.
@@ -55,6 +69,8 @@ pub struct AssignedItem {
     pub item: Item,
     /// Whether it is computed only to be compared.
     pub is_audit: bool,
+    /// Whether workers were lost with it: a worker has one such item at a time.
+    pub is_suspect: bool,
     /// When it was sent.
     pub assigned: Instant,
     /// When it should be done.
@@ -71,9 +87,15 @@ impl Worker {
             introduction,
             last_heard: now,
             is_draining: false,
-            distrusted: None,
+            quarantined: None,
+            question: None,
+            resting_until: None,
+            is_on_probation: false,
+            is_stalled: false,
+            last_result: None,
             known_jobs: BTreeSet::new(),
             in_flight: BTreeMap::new(),
+            written_off: BTreeMap::new(),
             recalled: VecDeque::new(),
             item_s: None,
             pace: 1.0,
@@ -91,15 +113,28 @@ impl Worker {
         self.introduction.n_slots
     }
 
-    /// Whether it may be given items at all.
+    /// Whether it may be given items now.
     pub fn is_usable(&self) -> bool {
-        !self.is_draining && self.distrusted.is_none()
+        self.may_audit() && self.question.is_none() && self.resting_until.is_none()
+    }
+
+    /// Whether audits wait for it: it may be given items now, or soon.
+    pub fn may_audit(&self) -> bool {
+        !self.is_draining && self.quarantined.is_none() && !self.is_stalled
+    }
+
+    /// Whether it has an item that workers were lost with.
+    pub fn has_suspect(&self) -> bool {
+        self.in_flight.values().any(|assigned| assigned.is_suspect)
     }
 
     /// Most items it may hold: one per slot, and as many more as it computes in
     /// [`WORK_AHEAD`], so that few items wait behind long ones, and slots do not
-    /// wait for short ones. At first, two per slot.
+    /// wait for short ones. At first, two per slot; one in all after a loss.
     pub fn n_credits(&self) -> usize {
+        if self.is_on_probation {
+            return 1;
+        }
         let n_slots = self.n_slots();
         let n_ahead = match self.item_s {
             Some(item_s) => (n_slots as f64 * WORK_AHEAD.as_secs_f64() / item_s).ceil() as usize,
@@ -110,12 +145,22 @@ impl Worker {
 
     /// Whether it may be given another item.
     pub fn has_credit(&self) -> bool {
-        self.is_usable() && self.in_flight.len() < self.n_credits()
+        self.is_usable() && self.n_held() < self.n_credits()
     }
 
-    /// Items in flight per slot, in units of 1 / [`FULL_LOAD`].
+    /// Items that it computes, or will.
+    fn n_held(&self) -> usize {
+        self.in_flight.len() + self.written_off.len()
+    }
+
+    /// Items in flight that wait for a slot.
+    pub fn n_waiting(&self) -> usize {
+        self.n_held().saturating_sub(self.n_slots()).min(self.in_flight.len())
+    }
+
+    /// Items per slot, in units of 1 / [`FULL_LOAD`].
     pub fn load(&self) -> u64 {
-        (self.in_flight.len() as u64 * FULL_LOAD) / self.n_slots() as u64
+        (self.n_held() as u64 * FULL_LOAD) / self.n_slots() as u64
     }
 
     /// Its pace as a whole number, for sorting.
@@ -123,9 +168,14 @@ impl Worker {
         (self.pace * 64.0) as u32
     }
 
-    /// Slots without an item, if they may have one.
+    /// Slots that may have an item.
+    pub fn n_usable_slots(&self) -> usize {
+        if self.is_usable() { self.n_slots().min(self.n_credits()) } else { 0 }
+    }
+
+    /// Those that have none.
     pub fn n_idle_slots(&self) -> usize {
-        if self.is_usable() { self.n_slots().saturating_sub(self.in_flight.len()) } else { 0 }
+        self.n_usable_slots().saturating_sub(self.n_held())
     }
 
     /// Learns from an item that took `busy` and was expected to take `expected`
@@ -172,7 +222,24 @@ impl Worker {
             connected_for: now.saturating_duration_since(self.time.joined()),
             silent_for: now.saturating_duration_since(self.last_heard),
             is_draining: self.is_draining,
-            distrusted: self.distrusted.clone(),
+            quarantined: self.quarantined.clone(),
+            waits: self.waits(now),
+        }
+    }
+
+    /// Why it is given nothing for a while.
+    fn waits(&self, now: Instant) -> Option<String> {
+        if self.question.is_some() {
+            Some("its word is in doubt, and the referee is asked".to_owned())
+        } else if let Some(until) = self.resting_until {
+            let left = until.saturating_duration_since(now).as_secs_f64();
+            Some(format!("it was lost before it returned anything; {left:.1} s to wait"))
+        } else if self.is_stalled {
+            let silent = self.last_result.map_or(self.time.joined(), |at| at);
+            let seconds = now.saturating_duration_since(silent).as_secs();
+            Some(format!("it has returned nothing for {seconds} s while others have"))
+        } else {
+            None
         }
     }
 }

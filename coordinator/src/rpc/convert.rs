@@ -125,7 +125,8 @@ pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
         results_per_second: worker.results_per_s,
         idle_share: worker.idle_share,
         draining: worker.is_draining,
-        distrusted: worker.distrusted.unwrap_or_default(),
+        distrusted: worker.quarantined.unwrap_or_default(),
+        waits: worker.waits.unwrap_or_default(),
     }
 }
 

@@ -115,6 +115,7 @@ impl Round {
             Self::Reevaluation(mut updated, candidates) => {
                 let mut with_champion = updated.evolution.clone();
                 with_champion.set_champion(&candidates, &evaluated.values);
+                updated.notices.extend(evaluated.notices.iter().cloned());
                 updated.notices.extend(with_champion.champion().map(describe));
                 if updated.is_scheduled(config) {
                     updated.evolution = with_champion.clone();
@@ -169,7 +170,7 @@ fn learn(
         workers: evaluated.n_workers as u64,
         idle_share: evaluated.idle_share,
     };
-    let mut notices = Vec::new();
+    let mut notices = evaluated.notices.clone();
     if record.n_non_finite > 0 {
         notices.push(format!(
             "generation {}: the fitness of {} individuals is not finite; they rank last",

@@ -5,7 +5,7 @@ use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
 use swarm_telemetry::ListenError;
 
 use super::access::{Access, AccessError};
-use crate::{limits::MEMORY_BUDGET_MIB, store::StoreError};
+use crate::{limits::MEMORY_BUDGET_MIB, referee::RefereeProgram, store::StoreError};
 
 /// How to run a coordinator.
 #[derive(Debug, Clone)]
@@ -23,6 +23,9 @@ pub struct CoordinatorConfig {
     pub audit_fraction: f64,
     /// Bytes of memory that all unfinished experiments may take together, as estimated.
     pub memory_budget: u64,
+    /// The program that checks single results: [`serve_stdio`](crate::referee::serve_stdio)
+    /// has to be behind it.
+    pub referee: RefereeProgram,
     /// Who may connect.
     pub access: Access,
     /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
@@ -31,7 +34,8 @@ pub struct CoordinatorConfig {
 
 impl CoordinatorConfig {
     /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits, no metrics.
-    /// Access is open, and so for loopback only.
+    /// Access is open, and so for loopback only. The referee is this program, with the
+    /// argument `referee`.
     pub fn new(listen: SocketAddr, data_dir: PathBuf) -> Self {
         Self {
             listen,
@@ -40,6 +44,7 @@ impl CoordinatorConfig {
             lease: Duration::from_secs(10),
             audit_fraction: 0.0,
             memory_budget: u64::from(MEMORY_BUDGET_MIB) << 20,
+            referee: RefereeProgram::this_program(),
             access: Access::default(),
             metrics_listen: None,
         }

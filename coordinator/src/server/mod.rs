@@ -22,8 +22,9 @@ use crate::{
     control::Control,
     driver::{self, Driver},
     engine::EngineConfig,
-    limits::SHUTDOWN_GRACE,
+    limits::{REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
+    referee::Referee,
     rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
     shared_store::{SharedStore, Unusable},
     store::Store,
@@ -77,6 +78,7 @@ impl Coordinator {
             shutdown.clone(),
             commit_duration,
             config.memory_budget,
+            Referee::new(config.referee.clone(), REFEREE_IDLE_TIME),
         );
         let mut driver = JoinSet::new();
         driver.spawn(loop_.run());

@@ -1,24 +1,31 @@
 //! A fleet in virtual time: the real engine, and workers that take as long as
 //! they say, over a network with latency. No sockets, no sleeping.
+//!
+//! A worker that [joins by hand](SimulatedFleet::join_by_hand) has neither latency nor a
+//! time of its own: it computes when the test says so.
 
 use std::{
     cmp::Reverse,
     collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque},
     num::NonZeroU64,
+    ops::Range,
     time::{Duration, Instant},
 };
 
 use coordinator::{
     engine::{
         Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
-        WorkerStatus,
+        JobActivity, WorkerStatus,
     },
-    ids::{AssignmentId, JobId, WorkerId},
+    ids::{AssignmentId, JobId, QuestionId, WorkerId},
     priority::Priority,
+    referee::Verdict,
 };
 use evolution::Population;
-use sim_core::TrialSet;
+use sim_core::{Output, TrialSet};
 
+/// What everybody says of a genotype that cannot be computed.
+const FAILURE: &str = "it overflowed";
 /// What a call of the simulation costs beside its trials, in trials.
 const CALL_OVERHEAD: f64 = 0.4;
 const TICK: Duration = Duration::from_millis(100);
@@ -40,6 +47,21 @@ pub struct FleetModel {
     pub checks: bool,
 }
 
+/// What a worker does with its items.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Conduct {
+    /// It computes them.
+    Honest,
+    /// It makes its values up, as no other does.
+    Lies,
+    /// It says that they fail.
+    Fails,
+    /// It returns nothing, but its heart beats.
+    Hangs,
+    /// It returns something of the wrong length.
+    Babbles,
+}
+
 /// A simulated worker.
 #[derive(Debug)]
 struct Worker {
@@ -51,8 +73,8 @@ struct Worker {
     dropped: BTreeSet<AssignmentId>,
     stalled_until: Duration,
     is_silent: bool,
-    /// Makes up what it does not compute.
-    is_faulty: bool,
+    is_by_hand: bool,
+    conduct: Conduct,
 }
 
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,6 +85,9 @@ enum Happening {
     Computed(WorkerId, AssignmentId),
     Result(WorkerId, AssignmentId),
     Awake(WorkerId),
+    /// An item has taken its worker down.
+    Death(WorkerId),
+    Verdict(QuestionId),
 }
 
 /// The fleet, the engine, and what became of experiments.
@@ -70,7 +95,15 @@ pub struct SimulatedFleet {
     pub engine: Engine,
     pub evaluated: Vec<(JobId, EvaluatedBatch)>,
     pub failed: Vec<(JobId, String)>,
-    pub paused: Vec<(JobId, String)>,
+    /// Names and reasons.
+    pub quarantined: Vec<(String, String)>,
+    /// Genotypes that take whatever computes them down.
+    pub poisonous: BTreeSet<u64>,
+    /// Genotypes that cannot be computed.
+    pub failing: BTreeSet<u64>,
+    pub has_referee: bool,
+    /// Questions that the referee was asked.
+    pub n_questions: usize,
     pub n_items_sent: usize,
     pub n_items_dropped: usize,
     /// Time that workers computed, in all.
@@ -85,6 +118,9 @@ pub struct SimulatedFleet {
     n_messages: usize,
     workers: BTreeMap<WorkerId, Worker>,
     n_processes: u64,
+    /// When the referee is done with what it was asked.
+    referee_busy_until: Duration,
+    verdicts: BTreeMap<QuestionId, Verdict>,
 }
 
 /// The fitness of an individual of the simulated experiments on a trial.
@@ -105,6 +141,17 @@ pub fn uniform(seed: u64) -> f64 {
     ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+impl FleetModel {
+    /// How long an item takes a worker of speed 1.
+    fn time(&self, genotype: &[f64], trials: &Range<u32>) -> Duration {
+        let trials = trials.clone().map(|trial| {
+            let place = (genotype[0] as u64) << 16 | u64::from(trial);
+            1.0 + self.dispersion * (2.0 * uniform(place) - 1.0)
+        });
+        self.trial.mul_f64(trials.sum::<f64>() + CALL_OVERHEAD)
+    }
+}
+
 impl SimulatedFleet {
     #[expect(
         clippy::disallowed_methods,
@@ -116,7 +163,11 @@ impl SimulatedFleet {
             engine: Engine::new(origin, config),
             evaluated: Vec::new(),
             failed: Vec::new(),
-            paused: Vec::new(),
+            quarantined: Vec::new(),
+            poisonous: BTreeSet::new(),
+            failing: BTreeSet::new(),
+            has_referee: true,
+            n_questions: 0,
             n_items_sent: 0,
             n_items_dropped: 0,
             computed: Duration::ZERO,
@@ -130,6 +181,8 @@ impl SimulatedFleet {
             n_messages: 0,
             workers: BTreeMap::new(),
             n_processes: 0,
+            referee_busy_until: Duration::ZERO,
+            verdicts: BTreeMap::new(),
         };
         fleet.schedule(TICK, Happening::Tick);
         fleet
@@ -155,17 +208,38 @@ impl SimulatedFleet {
 
     /// A new worker connects.
     pub fn join(&mut self, n_slots: usize, speed: f64) -> WorkerId {
+        self.join_with(n_slots, speed, Conduct::Honest)
+    }
+
+    /// A new worker connects.
+    pub fn join_with(&mut self, n_slots: usize, speed: f64, conduct: Conduct) -> WorkerId {
+        let introduction = self.introduction(n_slots);
+        self.connect(introduction, speed, conduct, false)
+    }
+
+    /// A worker connects that computes when [`Self::step`] says so.
+    pub fn join_by_hand(&mut self, n_slots: usize) -> WorkerId {
+        let introduction = self.introduction(n_slots);
+        self.connect(introduction, 1.0, Conduct::Honest, true)
+    }
+
+    fn introduction(&mut self, n_slots: usize) -> Introduction {
         self.n_processes += 1;
-        let introduction = Introduction {
+        Introduction {
             name: format!("worker-{}", self.n_processes),
             version: "simulated".to_owned(),
             n_slots,
             process: NonZeroU64::new(self.n_processes),
-        };
-        self.connect(introduction, speed)
+        }
     }
 
-    fn connect(&mut self, introduction: Introduction, speed: f64) -> WorkerId {
+    fn connect(
+        &mut self,
+        introduction: Introduction,
+        speed: f64,
+        conduct: Conduct,
+        is_by_hand: bool,
+    ) -> WorkerId {
         let id = self.engine.on_worker_joined(self.instant(), introduction.clone());
         let worker = Worker {
             introduction,
@@ -175,7 +249,8 @@ impl SimulatedFleet {
             dropped: BTreeSet::new(),
             stalled_until: Duration::ZERO,
             is_silent: false,
-            is_faulty: false,
+            is_by_hand,
+            conduct,
         };
         self.workers.insert(id, worker);
         self.carry_out();
@@ -190,11 +265,71 @@ impl SimulatedFleet {
     }
 
     /// A worker's stream breaks, and it comes back at once.
-    pub fn flap(&mut self, id: WorkerId) {
-        let Some(worker) = self.workers.remove(&id) else { return };
+    pub fn flap(&mut self, id: WorkerId) -> Option<WorkerId> {
+        let Worker { introduction, speed, conduct, is_by_hand, .. } = self.workers.remove(&id)?;
         self.engine.on_worker_left(self.instant(), id);
         self.carry_out();
-        self.connect(worker.introduction, worker.speed);
+        Some(self.connect(introduction, speed, conduct, is_by_hand))
+    }
+
+    /// A worker is killed, and started again at once under the same name.
+    pub fn restart(&mut self, id: WorkerId) -> Option<WorkerId> {
+        self.n_processes += 1;
+        let process = NonZeroU64::new(self.n_processes);
+        let Worker { introduction, speed, conduct, is_by_hand, .. } = self.workers.remove(&id)?;
+        self.engine.on_worker_left(self.instant(), id);
+        self.carry_out();
+        Some(self.connect(Introduction { process, ..introduction }, speed, conduct, is_by_hand))
+    }
+
+    /// What a worker that joined by hand has not computed.
+    pub fn held(&self, id: WorkerId) -> Vec<Assignment> {
+        let queue = self.workers.get(&id).map(|worker| &worker.queue);
+        queue.into_iter().flatten().map(|(_, assignment)| assignment.clone()).collect()
+    }
+
+    /// The oldest item of a worker that joined by hand is computed; whether there was one.
+    pub fn step(&mut self, id: WorkerId) -> bool {
+        let worker = self.workers.get_mut(&id);
+        let Some((_, assignment)) = worker.and_then(|worker| worker.queue.pop_front()) else {
+            return false;
+        };
+        let values = assignment.trials.clone().map(|t| fitness(&assignment.genotype, t)).collect();
+        self.answer(id, assignment.id, Ok(values));
+        true
+    }
+
+    /// A worker that joined by hand answers an assignment.
+    pub fn answer(
+        &mut self,
+        id: WorkerId,
+        assignment: AssignmentId,
+        outcome: Result<Vec<f64>, String>,
+    ) {
+        self.answer_with(id, assignment, Output::Fitness, outcome);
+    }
+
+    /// The same, with numbers of either kind.
+    pub fn answer_with(
+        &mut self,
+        id: WorkerId,
+        assignment: AssignmentId,
+        output: Output,
+        outcome: Result<Vec<f64>, String>,
+    ) {
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.queue.retain(|(_, held)| held.id != assignment);
+        }
+        let compute_time = self.model.trial;
+        let result = ItemResult { id: assignment, output, outcome, compute_time };
+        self.engine.on_results(self.instant(), id, vec![result]);
+        self.carry_out();
+    }
+
+    /// Lets all workers that joined by hand compute until nothing is left.
+    pub fn run_by_hand(&mut self) {
+        let ids = self.worker_ids();
+        while ids.iter().filter(|&&id| self.step(id)).count() > 0 {}
     }
 
     /// A worker computes nothing for a while, but its heart beats.
@@ -216,7 +351,7 @@ impl SimulatedFleet {
     /// A worker computes wrong values from now on.
     pub fn corrupt(&mut self, id: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&id) {
-            worker.is_faulty = true;
+            worker.conduct = Conduct::Lies;
         }
     }
 
@@ -235,6 +370,17 @@ impl SimulatedFleet {
         let batch = Batch::fitness(TrialSet::Generation(generation), genotypes, n_trials);
         self.engine.on_batch_requested(self.instant(), id, batch);
         self.carry_out();
+    }
+
+    /// Time passes in which the coordinator does nothing and hears nothing.
+    pub fn freeze(&mut self, time: Duration) {
+        self.now += time;
+        self.tell(|engine, now| engine.on_tick(now));
+    }
+
+    /// What a job is doing.
+    pub fn activity(&self, id: JobId) -> JobActivity {
+        self.engine.activity(self.instant(), id)
     }
 
     /// Lets something happen to the engine.
@@ -294,6 +440,15 @@ impl SimulatedFleet {
                 }
             }
             Happening::Awake(id) => self.start_slots(id),
+            Happening::Death(id) => {
+                self.restart(id);
+            }
+            Happening::Verdict(question) => {
+                if let Some(verdict) = self.verdicts.remove(&question) {
+                    self.engine.on_verdict(self.instant(), question, verdict);
+                    self.carry_out();
+                }
+            }
         }
     }
 
@@ -335,29 +490,28 @@ impl SimulatedFleet {
             if worker.running.len() >= worker.introduction.n_slots || now < worker.stalled_until {
                 return;
             }
+            if worker.is_by_hand || worker.conduct == Conduct::Hangs {
+                return;
+            }
             let Some((job, assignment)) = worker.queue.pop_front() else { return };
             worker.running.insert(assignment.id, job);
-            let trials: f64 = assignment
-                .trials
-                .clone()
-                .map(|trial| {
-                    let place = (assignment.genotype[0] as u64) << 16 | u64::from(trial);
-                    1.0 + model.dispersion * (2.0 * uniform(place) - 1.0)
-                })
-                .sum();
-            let time = model.trial.mul_f64((trials + CALL_OVERHEAD) / worker.speed);
-            let wrong = if worker.is_faulty { 1e-9 } else { 0.0 };
-            let values = assignment
-                .trials
-                .clone()
-                .map(|t| fitness(&assignment.genotype, t) + wrong)
-                .collect();
-            let result = ItemResult {
-                id: assignment.id,
-                output: sim_core::Output::Fitness,
-                outcome: Ok(values),
-                compute_time: time,
+            let time = model.time(&assignment.genotype, &assignment.trials).div_f64(worker.speed);
+            let individual = assignment.genotype[0] as u64;
+            if self.poisonous.contains(&individual) && worker.conduct != Conduct::Lies {
+                self.schedule(time, Happening::Death(id));
+                continue;
+            }
+            let wrong = if worker.conduct == Conduct::Lies { 1e-9 * id.0 as f64 } else { 0.0 };
+            let values =
+                assignment.trials.clone().map(|t| fitness(&assignment.genotype, t) + wrong);
+            let outcome = match worker.conduct {
+                Conduct::Fails => Err("it is too hot here".to_owned()),
+                Conduct::Babbles => Ok(vec![1.0; assignment.trials.len() + 1]),
+                Conduct::Honest if self.failing.contains(&individual) => Err(FAILURE.to_owned()),
+                _ => Ok(values.collect()),
             };
+            let output = Output::Fitness;
+            let result = ItemResult { id: assignment.id, output, outcome, compute_time: time };
             self.results.insert(assignment.id, result);
             self.schedule(time, Happening::Computed(id, assignment.id));
         }
@@ -403,9 +557,28 @@ impl SimulatedFleet {
                 Command::FinishBatch { job, evaluated } => {
                     self.evaluated.push((job, evaluated));
                 }
-                Command::PauseJob { job, reason } => {
-                    self.paused.push((job, reason));
+                Command::AskReferee { question, genotype, trials, .. } => {
+                    self.n_questions += 1;
+                    let individual = genotype[0] as u64;
+                    let verdict = if !self.has_referee {
+                        Verdict::Unavailable("it is not there".to_owned())
+                    } else if self.poisonous.contains(&individual) {
+                        Verdict::Died("signal 11".to_owned())
+                    } else if self.failing.contains(&individual) {
+                        Verdict::Failed(FAILURE.to_owned())
+                    } else {
+                        Verdict::Values(trials.clone().map(|t| fitness(&genotype, t)).collect())
+                    };
+                    let start = self.referee_busy_until.max(self.now);
+                    self.referee_busy_until = start + self.model.time(&genotype, &trials);
+                    self.verdicts.insert(question, verdict);
+                    let delay = self.referee_busy_until - self.now;
+                    self.schedule(delay, Happening::Verdict(question));
                 }
+                Command::WithdrawQuestion { question } => {
+                    self.verdicts.remove(&question);
+                }
+                Command::Quarantine { name, reason } => self.quarantined.push((name, reason)),
                 Command::FailJob { job, reason } => {
                     self.failed.push((job, reason));
                 }
@@ -417,6 +590,9 @@ impl SimulatedFleet {
     }
 
     fn post(&mut self, worker: WorkerId, message: Command) {
+        if self.workers.get(&worker).is_some_and(|worker| worker.is_by_hand) {
+            return self.arrive(worker, message);
+        }
         self.n_messages += 1;
         self.messages.insert(self.n_messages, message);
         self.schedule(self.model.latency, Happening::Arrival(worker, self.n_messages));

@@ -1,0 +1,46 @@
+//! Workers that are proved faulty, and are given nothing until an operator says otherwise.
+
+use std::{collections::BTreeMap, num::NonZeroU64};
+
+use super::Introduction;
+
+/// The faulty workers, by name: one that is started again is the same machine.
+#[derive(Debug, Default)]
+pub struct Quarantine {
+    by_name: BTreeMap<String, Entry>,
+}
+
+#[derive(Debug)]
+struct Entry {
+    /// So that its process does not come back under another name.
+    process: Option<NonZeroU64>,
+    reason: String,
+}
+
+impl Quarantine {
+    /// Adds a worker; whether it was not there.
+    pub fn add(&mut self, name: &str, process: Option<NonZeroU64>, reason: &str) -> bool {
+        let is_new = !self.by_name.contains_key(name);
+        let entry = Entry { process, reason: reason.to_owned() };
+        self.by_name.entry(name.to_owned()).or_insert(entry);
+        is_new
+    }
+
+    /// Lets a worker out; whether it was there.
+    pub fn remove(&mut self, name: &str) -> bool {
+        self.by_name.remove(name).is_some()
+    }
+
+    /// Why a worker is in quarantine, if it is.
+    pub fn reason(&self, introduction: &Introduction) -> Option<&str> {
+        let by_name = self.by_name.get(&introduction.name);
+        let is_its =
+            |entry: &&Entry| entry.process.is_some() && entry.process == introduction.process;
+        by_name.or_else(|| self.by_name.values().find(is_its)).map(|entry| &*entry.reason)
+    }
+
+    /// The names and the reasons.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.by_name.iter().map(|(name, entry)| (&**name, &*entry.reason))
+    }
+}

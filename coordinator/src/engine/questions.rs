@@ -1,0 +1,201 @@
+//! What the referee is asked, and why.
+//!
+//! The simulation is deterministic: an item fails everywhere or nowhere, and a trial comes
+//! to the same bits everywhere. So the referee's answer settles what an item comes to,
+//! and with that, whose word was wrong.
+
+use std::{
+    collections::BTreeMap,
+    ops::Range,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use sim_core::{Output, TrialSet};
+
+use crate::ids::{JobId, QuestionId, WorkerId};
+
+use super::{Command, SharedGenotype, item::Item};
+
+/// Processes that an item must take down before it is to blame: one may be killed by
+/// chance, or by a system that is short of memory.
+const N_DEATHS: u32 = 3;
+/// Time after which a referee that could not answer is asked again; doubles with each.
+const FIRST_DELAY: Duration = Duration::from_secs(1);
+/// The longest.
+const DELAY_MAX: Duration = Duration::from_secs(60);
+
+/// Something that the referee is asked, or will be.
+#[derive(Debug)]
+pub struct Question {
+    /// The job that it is about.
+    pub job: JobId,
+    /// Opaque: the job's specification.
+    pub spec: Arc<str>,
+    /// Of the batch.
+    pub trial_set: TrialSet,
+    /// Of the batch.
+    pub output: Output,
+    /// The item's genotype.
+    pub genotype: SharedGenotype,
+    /// The item.
+    pub item: Item,
+    /// What it is about.
+    pub doubt: Doubt,
+    /// When the referee is to be asked again, if it could not answer.
+    ask_again: Option<Instant>,
+    /// Why it could not.
+    pub trouble: Option<String>,
+    n_delays: u32,
+    n_deaths: u32,
+}
+
+/// Why the referee is asked.
+#[derive(Debug)]
+pub enum Doubt {
+    /// A worker says that the item fails.
+    Failure {
+        /// The worker.
+        reporter: Party,
+        /// What it says.
+        message: String,
+    },
+    /// Workers were lost while they computed the item.
+    Losses,
+    /// Two workers' values for a trial differ.
+    Disagreement {
+        /// The two, and the numbers that each has returned for the trial.
+        parties: [(Party, Vec<f64>); 2],
+    },
+}
+
+/// A worker whose word is in doubt; it may have left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Party {
+    /// Its connection.
+    pub id: WorkerId,
+    /// What it calls itself.
+    pub name: Arc<str>,
+}
+
+impl Question {
+    /// A question that has not been asked.
+    pub fn new(
+        job: JobId,
+        spec: Arc<str>,
+        (trial_set, output, genotype): (TrialSet, Output, SharedGenotype),
+        item: Item,
+        doubt: Doubt,
+    ) -> Self {
+        Self {
+            job,
+            spec,
+            trial_set,
+            output,
+            genotype,
+            item,
+            doubt,
+            ask_again: None,
+            trouble: None,
+            n_delays: 0,
+            n_deaths: 0,
+        }
+    }
+
+    /// The workers whose word is in doubt.
+    pub fn parties(&self) -> Vec<&Party> {
+        match &self.doubt {
+            Doubt::Failure { reporter, .. } => vec![reporter],
+            Doubt::Losses => vec![],
+            Doubt::Disagreement { parties: [(first, _), (second, _)] } => vec![first, second],
+        }
+    }
+
+    /// Whether its item is given to no worker until it is answered. What two workers have
+    /// computed is not waited for; what the referee cannot answer at present is not either.
+    pub fn holds_back(&self) -> bool {
+        !matches!(self.doubt, Doubt::Disagreement { .. }) && self.trouble.is_none()
+    }
+
+    /// The referee could not answer.
+    pub fn postpone(&mut self, now: Instant, trouble: String) {
+        let delay = (FIRST_DELAY * (1 << self.n_delays.min(10))).min(DELAY_MAX);
+        self.n_delays += 1;
+        self.ask_again = Some(now + delay);
+        self.trouble = Some(trouble);
+    }
+
+    /// The referee's process died over it; whether that is the item's fault.
+    pub fn on_death(&mut self, now: Instant) -> bool {
+        self.n_deaths += 1;
+        self.ask_again = Some(now + FIRST_DELAY);
+        self.n_deaths >= N_DEATHS
+    }
+
+    fn command(&self, id: QuestionId) -> Command {
+        Command::AskReferee {
+            question: id,
+            spec: Arc::clone(&self.spec),
+            trial_set: self.trial_set,
+            output: self.output,
+            genotype: self.genotype.clone(),
+            trials: self.item.trials.clone(),
+        }
+    }
+}
+
+/// The questions without an answer.
+#[derive(Debug, Default)]
+pub struct Questions {
+    open: BTreeMap<QuestionId, Question>,
+    n_asked: u64,
+}
+
+impl Questions {
+    /// Adds a question; returns its id and the command that asks it.
+    pub fn ask(&mut self, question: Question) -> (QuestionId, Command) {
+        self.n_asked += 1;
+        let id = QuestionId(self.n_asked);
+        let command = question.command(id);
+        self.open.insert(id, question);
+        (id, command)
+    }
+
+    /// Takes a question out.
+    pub fn take(&mut self, id: QuestionId) -> Option<Question> {
+        self.open.remove(&id)
+    }
+
+    /// Puts a question back that was taken out.
+    pub fn put_back(&mut self, id: QuestionId, question: Question) {
+        self.open.insert(id, question);
+    }
+
+    /// The commands that ask again what could not be answered.
+    pub fn asked_again(&mut self, now: Instant) -> Vec<Command> {
+        let ask = |(&id, question): (&QuestionId, &mut Question)| {
+            question.ask_again.take_if(|at| *at <= now)?;
+            Some(question.command(id))
+        };
+        self.open.iter_mut().filter_map(ask).collect()
+    }
+
+    /// Those about a job.
+    pub fn of(&self, job: JobId) -> impl Iterator<Item = (QuestionId, &Question)> {
+        let ours = self.open.iter().filter(move |(_, question)| question.job == job);
+        ours.map(|(&id, question)| (id, question))
+    }
+
+    /// Number of questions since the engine began.
+    pub fn n_asked(&self) -> u64 {
+        self.n_asked
+    }
+}
+
+impl Item {
+    /// Whether two items have a trial in common.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let Range { start, end } = self.trials;
+        self.individual == other.individual && start < other.trials.end && other.trials.start < end
+    }
+}

@@ -1,0 +1,90 @@
+//! Workers that say that they are alive and finish nothing.
+
+use std::time::{Duration, Instant};
+
+use crate::ids::WorkerId;
+
+use super::{Engine, results::NoResult, worker::Worker};
+
+/// A worker is stalled after so many times the time that its oldest item should take, and so
+/// much longer.
+const PATIENCE: (u32, Duration) = (4, Duration::from_secs(1));
+/// The same, if that item is an audit that no other worker can do: it would be waived.
+const PATIENCE_WITH_AUDITOR: (u32, Duration) = (40, Duration::from_secs(10));
+
+impl Engine {
+    /// Gives what stalled workers have to others.
+    pub(super) fn write_off_stalled(&mut self, now: Instant) {
+        let mut idle = self
+            .workers
+            .iter()
+            .filter(|(_, worker)| worker.is_usable() && worker.in_flight.is_empty());
+        let has_idle = idle.next().is_some();
+        let mut latest: Vec<(Instant, WorkerId)> = self
+            .workers
+            .iter()
+            .filter_map(|(&id, worker)| worker.last_result.map(|at| (at, id)))
+            .collect();
+        if latest.is_empty() {
+            return;
+        }
+        let n = latest.len().min(2);
+        latest.select_nth_unstable_by_key(n - 1, |&latest| std::cmp::Reverse(latest));
+        latest.truncate(n);
+        // Or could have: they have nothing to do.
+        let others_since =
+            |id, since| has_idle || latest.iter().any(|&(at, other)| other != id && at > since);
+        let stalled: Vec<WorkerId> = self
+            .workers
+            .iter()
+            .filter(|&(&id, worker)| {
+                let deadline = self.deadline(id, worker);
+                deadline.is_some_and(|(since, until)| until < now && others_since(id, since))
+            })
+            .map(|(&id, _)| id)
+            .collect();
+        for id in stalled {
+            self.write_off(now, id);
+        }
+    }
+
+    /// Since when a worker should have returned something, and until when that is no
+    /// trouble.
+    fn deadline(&self, id: WorkerId, worker: &Worker) -> Option<(Instant, Instant)> {
+        let (_, oldest) = worker.in_flight.first_key_value()?;
+        let since = worker.last_result.map_or(oldest.assigned, |at| at.max(oldest.assigned));
+        let work = &self.jobs[&oldest.job];
+        let takes = work.expected(oldest.item.trials.len(), worker.pace)?;
+        let first = work.batch.as_ref()?.computed_by(&oldest.item);
+        let mut others = self.workers.iter().filter(|&(&other, _)| other != id);
+        let may_audit = |other: &Worker| other.is_usable() && Some(other.name()) != first;
+        let (times, more) = if oldest.is_audit && !others.any(|(_, other)| may_audit(other)) {
+            PATIENCE_WITH_AUDITOR
+        } else {
+            PATIENCE
+        };
+        Some((since, since + takes * times + more))
+    }
+
+    /// A worker gets nothing until it returns something. What waits in it is taken back, and
+    /// what it should be computing is given to others as well.
+    fn write_off(&mut self, now: Instant, id: WorkerId) {
+        self.counters.n_workers_stalled += 1;
+        self.update_worker(id, |worker| worker.is_stalled = true);
+        let worker = &self.workers[&id];
+        let n_computing = worker.in_flight.len() - worker.n_waiting();
+        let in_flight: Vec<_> = worker.in_flight.keys().copied().collect();
+        for (age_rank, assignment_id) in in_flight.into_iter().enumerate().rev() {
+            let assignment = if age_rank < n_computing {
+                let assignment = self.take_assignment(id, assignment_id);
+                let copy = assignment.clone();
+                self.update_worker(id, |worker| worker.written_off.insert(assignment_id, copy));
+                assignment
+            } else {
+                self.recall(id, assignment_id)
+            };
+            self.retry(now, assignment, NoResult::TakenBack);
+        }
+        self.finish_waived(now);
+    }
+}

@@ -1,0 +1,305 @@
+//! Asking the referee, and what follows from its answers.
+
+use std::{sync::Arc, time::Instant};
+
+use sim_core::TrialSet;
+
+use crate::{
+    ids::{JobId, QuestionId, WorkerId},
+    referee::Verdict,
+};
+
+use super::{
+    Command, Engine,
+    batch::{REFEREE, same_bits},
+    item::Item,
+    questions::{Doubt, Party, Question},
+    results::NoResult,
+    worker::Worker,
+};
+
+impl Engine {
+    /// The referee has answered a question.
+    pub fn on_verdict(&mut self, now: Instant, id: QuestionId, verdict: Verdict) {
+        // It may have been withdrawn.
+        let Some(mut question) = self.questions.take(id) else { return };
+        match verdict {
+            Verdict::Unavailable(trouble) => {
+                let is_first = question.trouble.is_none();
+                question.postpone(now, trouble);
+                if is_first && !matches!(question.doubt, Doubt::Disagreement { .. }) {
+                    self.release(&question);
+                }
+                match question.doubt {
+                    // The next loss asks again.
+                    Doubt::Losses => {}
+                    _ => self.questions.put_back(id, question),
+                }
+            }
+            Verdict::Died(how) if question.on_death(now) => {
+                let failure = format!("it takes its process down ({how})");
+                self.settle_failure(now, id, &question, &failure);
+            }
+            Verdict::Died(_) => self.questions.put_back(id, question),
+            Verdict::Failed(failure) => self.settle_failure(now, id, &question, &failure),
+            Verdict::Values(values) => self.settle_values(now, id, &question, &values),
+        }
+        self.assign(now);
+    }
+
+    /// Has the referee evaluate an item of a job's batch, and gives the item to no worker
+    /// meanwhile. Those whose word is in doubt get nothing.
+    pub(super) fn ask_referee(&mut self, job: JobId, item: Item, doubt: Doubt) {
+        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
+        let spec = Arc::clone(&work.spec);
+        let Some(batch) = &mut work.batch else { return };
+        let what = (batch.trial_set(), batch.output(), batch.genotype(item.individual));
+        let question = Question::new(job, spec, what, item.clone(), doubt);
+        match question.doubt {
+            Doubt::Disagreement { .. } => batch.n_disagreements += 1,
+            Doubt::Failure { .. } | Doubt::Losses => batch.hold_back(item),
+        }
+        let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
+        let (id, command) = self.questions.ask(question);
+        for party in parties {
+            if self.workers.contains_key(&party) {
+                self.update_worker(party, |worker| worker.question = Some(id));
+            }
+        }
+        self.commands.push_back(command);
+    }
+
+    /// Asks again what the referee could not answer.
+    pub(super) fn ask_again(&mut self, now: Instant) {
+        self.commands.extend(self.questions.asked_again(now));
+    }
+
+    /// Whether a failure that a worker reports has been reported in the same words by
+    /// another one, while the referee cannot be asked.
+    pub(super) fn confirms(
+        &self,
+        job: JobId,
+        item: &Item,
+        name: &str,
+        message: &str,
+    ) -> Option<String> {
+        let mut questions = self.questions.of(job).map(|(_, question)| question);
+        let is_confirmed = questions.any(|question| match &question.doubt {
+            Doubt::Failure { reporter, message: first } => {
+                question.trouble.is_some()
+                    && *reporter.name != *name
+                    && *first == message
+                    && question.item.overlaps(item)
+            }
+            _ => false,
+        });
+        is_confirmed.then(|| format!("two workers report: {message}"))
+    }
+
+    /// Forgets questions about a job that are no longer of interest.
+    pub(super) fn withdraw_questions(&mut self, job: JobId, is_moot: impl Fn(&Question) -> bool) {
+        let moot = self.questions.of(job).filter(|(_, question)| is_moot(question));
+        for id in moot.map(|(id, _)| id).collect::<Vec<QuestionId>>() {
+            let question = self.questions.take(id).expect("just seen");
+            self.end_doubt(id, &question);
+            self.commands.push_back(Command::WithdrawQuestion { question: id });
+        }
+    }
+
+    /// The item is the same everywhere: it fails.
+    fn settle_failure(&mut self, now: Instant, id: QuestionId, question: &Question, failure: &str) {
+        self.end_doubt(id, question);
+        if let Doubt::Disagreement { parties } = &question.doubt {
+            for (party, values) in parties {
+                let reason = format!(
+                    "it returned {values:?} for {} of {}, which fails: {failure}",
+                    place(&question.item),
+                    name(question.trial_set),
+                );
+                self.put_in_quarantine(now, party, &reason);
+            }
+        }
+        if self.batch_of(question) {
+            self.fail(question.job, &question.item, failure);
+        }
+    }
+
+    /// The item is the same everywhere: it comes to these values.
+    fn settle_values(&mut self, now: Instant, id: QuestionId, question: &Question, values: &[f64]) {
+        self.end_doubt(id, question);
+        let place = place(&question.item);
+        let batch = name(question.trial_set);
+        match &question.doubt {
+            Doubt::Losses => {}
+            Doubt::Failure { reporter, message } => {
+                let reason = format!(
+                    "it reports that {place} of {batch} fails (\"{message}\"), and the referee \
+                     computes it"
+                );
+                self.put_in_quarantine(now, reporter, &reason);
+            }
+            Doubt::Disagreement { parties } => {
+                for (party, returned) in parties {
+                    if !same_bits(returned, values) {
+                        let reason = format!(
+                            "it returned {returned:?} for {place} of {batch}, and the referee \
+                             {values:?}"
+                        );
+                        self.put_in_quarantine(now, party, &reason);
+                    }
+                }
+            }
+        }
+        if self.batch_of(question) {
+            let (job, item) = (question.job, &question.item);
+            // What a third worker returned meanwhile may be wrong, too.
+            while let Err(disagreement) = self.batch_mut(job).compare(item, values)
+                && disagreement.first != REFEREE
+            {
+                let party = Party { id: disagreement.first, name: disagreement.first_name };
+                let [returned, _] = disagreement.values;
+                let reason =
+                    format!("it returned {returned:?} for {place} of {batch}, and not {values:?}");
+                self.put_in_quarantine(now, &party, &reason);
+            }
+            if values.len() == self.batch_mut(job).n_values(item.trials.len()) {
+                self.take_values(job, REFEREE, "referee", item, values, true);
+            }
+            self.update_readiness(job);
+            self.finish_if_evaluated(now, job);
+        }
+    }
+
+    /// Whether the batch that a question is about is still being computed.
+    fn batch_of(&self, question: &Question) -> bool {
+        let work = self.jobs.get(&question.job);
+        let batch = work.and_then(|work| work.batch.as_ref());
+        batch.is_some_and(|batch| batch.trial_set() == question.trial_set)
+    }
+
+    /// Whoever was in doubt because of a question is not any more.
+    fn end_doubt(&mut self, id: QuestionId, question: &Question) {
+        for party in question.parties() {
+            let worker = self.workers.get(&party.id);
+            if worker.is_some_and(|worker| worker.question == Some(id)) {
+                self.update_worker(party.id, |worker| worker.question = None);
+            }
+        }
+        if matches!(question.doubt, Doubt::Disagreement { .. }) {
+            if self.batch_of(question) {
+                self.batch_mut(question.job).n_disagreements -= 1;
+            }
+        } else if question.holds_back() {
+            self.release(question);
+        }
+    }
+
+    /// Gives a question's item to workers again.
+    fn release(&mut self, question: &Question) {
+        if self.batch_of(question) && self.batch_mut(question.job).release(&question.item) {
+            self.requeue(question.job, &question.item);
+        }
+    }
+
+    /// A worker is proved faulty: it gets nothing until an operator says otherwise, and what
+    /// it computed for batches that are not complete counts no more.
+    pub(super) fn put_in_quarantine(&mut self, now: Instant, party: &Party, reason: &str) {
+        let process = self.workers.get(&party.id).and_then(|worker| worker.introduction.process);
+        if self.quarantine.add(&party.name, process, reason) {
+            self.counters.n_workers_quarantined += 1;
+            let (name, reason) = (party.name.to_string(), reason.to_owned());
+            self.commands.push_back(Command::Quarantine { name, reason });
+        }
+        let workers = self.workers.iter();
+        let its =
+            workers.filter(|(_, worker)| self.quarantine.reason(&worker.introduction).is_some());
+        let its: Vec<WorkerId> =
+            its.filter(|(_, worker)| worker.quarantined.is_none()).map(|(&id, _)| id).collect();
+        for id in its {
+            self.isolate(now, id);
+        }
+        self.discard(&party.name);
+        self.finish_waived(now);
+    }
+
+    /// Takes everything back from a worker in quarantine.
+    fn isolate(&mut self, now: Instant, id: WorkerId) {
+        let reason = self.quarantine.reason(&self.workers[&id].introduction).map(str::to_owned);
+        let in_flight: Vec<_> = self.workers[&id].in_flight.keys().copied().collect();
+        self.update_worker(id, |worker| {
+            worker.quarantined = reason;
+            worker.question = None;
+            worker.written_off.clear();
+        });
+        for assignment_id in in_flight.into_iter().rev() {
+            let assignment = self.recall(id, assignment_id);
+            self.retry(now, assignment, NoResult::TakenBack);
+        }
+        let worker: &mut Worker = self.workers.get_mut(&id).expect("just seen");
+        worker.recalled.clear();
+    }
+
+    /// Forgets the values of a faulty worker in all batches, and says which earlier ones it
+    /// may have spoilt.
+    fn discard(&mut self, name: &str) {
+        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
+        for id in ids {
+            let work = self.jobs.get_mut(&id).expect("just listed");
+            if let Some(generations) = work.unaudited.take(name) {
+                let (first, last) = generations.into_inner();
+                work.notices.push(format!(
+                    "worker \"{name}\" is faulty, and no audit has agreed with it in generations \
+                     {first} to {last}: what it computed for them may be wrong"
+                ));
+            }
+            if let Some(batch) = &mut work.batch {
+                batch.discard(name);
+                self.update_readiness(id);
+            }
+        }
+    }
+
+    /// Lets a worker out of quarantine; whether it was there.
+    pub fn on_readmitted(&mut self, now: Instant, name: &str) -> bool {
+        let was_there = self.quarantine.remove(name);
+        let workers = self.workers.iter();
+        let out = workers.filter(|(_, worker)| {
+            worker.quarantined.is_some() && self.quarantine.reason(&worker.introduction).is_none()
+        });
+        for id in out.map(|(&id, _)| id).collect::<Vec<WorkerId>>() {
+            self.update_worker(id, |worker| worker.quarantined = None);
+        }
+        self.finish_waived(now);
+        self.assign(now);
+        was_there
+    }
+
+    /// A worker was found to be faulty before the engine began.
+    pub fn on_quarantine_restored(&mut self, name: &str, reason: &str) {
+        self.quarantine.add(name, None, reason);
+    }
+
+    /// The workers in quarantine, connected or not, and why.
+    pub fn quarantine(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.quarantine.iter()
+    }
+}
+
+fn place(item: &Item) -> String {
+    let (individual, trials) = (item.individual, &item.trials);
+    if trials.len() == 1 {
+        format!("trial {} of individual {individual}", trials.start)
+    } else {
+        format!("trials {}..{} of individual {individual}", trials.start, trials.end)
+    }
+}
+
+fn name(trial_set: TrialSet) -> String {
+    match trial_set {
+        TrialSet::Generation(generation) => format!("generation {generation}"),
+        TrialSet::HeldOut(generation) => {
+            format!("the re-evaluation after generation {generation}")
+        }
+        TrialSet::Evaluation => "the evaluation".to_owned(),
+    }
+}

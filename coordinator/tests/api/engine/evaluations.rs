@@ -1,0 +1,91 @@
+//! Evaluations: generations of one, whose trials give many numbers.
+
+use std::ops::Range;
+
+use coordinator::{
+    engine::{Batch, EngineConfig},
+    ids::{EvaluationId, JobId, WorkerId},
+};
+use sim_core::{Output, TrialSet};
+
+use super::{LEASE, MODEL, fleet};
+use crate::simulated_fleet::SimulatedFleet;
+
+/// Numbers of a measured trial.
+const N_VALUES: usize = 1001;
+const EVALUATION: JobId = JobId::Evaluation(EvaluationId(1));
+
+fn measures(trials: Range<u32>) -> Vec<f64> {
+    let of_trial = |trial| (0..N_VALUES).map(move |place| f64::from(trial) + place as f64 / 1e4);
+    trials.flat_map(of_trial).collect()
+}
+
+fn evaluate(fleet: &mut SimulatedFleet, n_trials: u32) {
+    fleet.submit(EVALUATION, 100);
+    let batch = Batch::measures(vec![0.5], n_trials, N_VALUES);
+    fleet.tell(|engine, now| engine.on_batch_requested(now, EVALUATION, batch));
+}
+
+/// The worker's oldest item, which is one of an evaluation, is computed.
+fn measure(fleet: &mut SimulatedFleet, id: WorkerId) -> bool {
+    let Some(assignment) = fleet.held(id).into_iter().next() else { return false };
+    let values = measures(assignment.trials.clone());
+    assert!(values.len() <= 1 << 16, "an answer of {} numbers", values.len());
+    fleet.answer_with(id, assignment.id, Output::Measures, Ok(values));
+    true
+}
+
+#[test]
+fn an_evaluation_is_a_generation_of_one_whose_trials_have_many_numbers() {
+    let mut fleet = fleet();
+    evaluate(&mut fleet, 200);
+    let [first, second, victim] = [1, 2, 1].map(|n_slots| fleet.join_by_hand(n_slots));
+    assert!(measure(&mut fleet, first));
+    fleet.kill(victim);
+    while fleet.evaluated.is_empty() {
+        assert!(measure(&mut fleet, second) | measure(&mut fleet, first));
+    }
+    let (evaluated_id, evaluated) = &fleet.evaluated[0];
+    assert_eq!((*evaluated_id, evaluated.trial_set), (EVALUATION, TrialSet::Evaluation));
+    assert_eq!(evaluated.values, [measures(0..200)]);
+}
+
+#[test]
+fn a_worker_that_returns_too_few_or_too_many_measures_gets_nothing_more() {
+    for n_wrong in [0, 1, N_VALUES - 1, 1_000_000] {
+        let mut fleet = fleet();
+        evaluate(&mut fleet, 3);
+        let bad = fleet.join_by_hand(1);
+        let assignment = fleet.held(bad)[0].id;
+        fleet.answer_with(bad, assignment, Output::Measures, Ok(vec![0.0; n_wrong]));
+        assert!(fleet.held(bad).is_empty(), "{n_wrong}");
+        let good = fleet.join_by_hand(1);
+        while measure(&mut fleet, good) {}
+        assert_eq!(fleet.evaluated[0].1.values, [measures(0..3)]);
+    }
+}
+
+#[test]
+fn measures_that_differ_in_one_bit_of_one_number_are_noticed() {
+    let config = EngineConfig { audit_fraction: 1.0, ..EngineConfig::new(LEASE) };
+    let mut fleet = SimulatedFleet::new(MODEL, config);
+    evaluate(&mut fleet, 2);
+    let workers = [(); 2].map(|()| fleet.join_by_hand(1));
+    for turn in 0.. {
+        assert!(turn < 20, "nobody noticed");
+        let worker = workers[turn % 2];
+        let Some(assignment) = fleet.held(worker).into_iter().next() else { continue };
+        let mut values = measures(assignment.trials.clone());
+        if worker == workers[1] {
+            let last = values.last_mut().unwrap();
+            *last = f64::from_bits(last.to_bits() ^ 1);
+        }
+        fleet.answer_with(worker, assignment.id, Output::Measures, Ok(values));
+        if fleet.n_questions > 0 {
+            break;
+        }
+    }
+    let questioned = fleet.status().into_iter().filter(|worker| worker.waits.is_some());
+    assert_eq!(questioned.count(), 2);
+    assert!(fleet.evaluated.is_empty());
+}
