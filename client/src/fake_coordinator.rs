@@ -13,9 +13,9 @@ use swarm_proto::v1::{
     GetChampionRequest, GetChampionResponse, GetExperimentRequest, GetExperimentResponse,
     ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
     ListGenerationsRequest, ListGenerationsResponse, ListWorkersRequest, ListWorkersResponse,
-    PauseExperimentRequest, PauseExperimentResponse, ResumeExperimentRequest,
-    ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse, StateChange,
-    SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
+    PauseExperimentRequest, PauseExperimentResponse, ReadmitWorkerRequest, ReadmitWorkerResponse,
+    ResumeExperimentRequest, ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse,
+    StateChange, SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
     WatchExperimentResponse, Worker,
     event::Kind,
     experiment_service_server::{ExperimentService, ExperimentServiceServer},
@@ -270,5 +270,19 @@ impl FleetService for FakeCoordinator {
     ) -> Result<Response<ListWorkersResponse>, Status> {
         let workers = self.script(|script| script.workers.clone());
         Ok(Response::new(ListWorkersResponse { workers }))
+    }
+
+    async fn readmit_worker(
+        &self,
+        request: Request<ReadmitWorkerRequest>,
+    ) -> Result<Response<ReadmitWorkerResponse>, Status> {
+        let ReadmitWorkerRequest { name } = request.into_inner();
+        let is_out = self.script(|script| {
+            let mut workers = script.workers.iter_mut();
+            let worker = workers.find(|worker| worker.name == name)?;
+            (!std::mem::take(&mut worker.distrusted).is_empty()).then_some(())
+        });
+        is_out.ok_or_else(|| Status::not_found("no such worker is in quarantine"))?;
+        Ok(Response::new(ReadmitWorkerResponse {}))
     }
 }

@@ -7,6 +7,7 @@ use tokio::sync::oneshot;
 use crate::{
     driver::{DriverEvent, EventSender, StatsSnapshot},
     engine::JobStats,
+    referee::Referee,
     runs::RunStats,
     server::calls::Calls,
     shared_store::SharedStore,
@@ -40,7 +41,17 @@ metrics! {
     ITEMS_RECALLED = Counter "swarm_items_recalled_total" []
         "Items taken back from a worker because another has the result, or computes it sooner.";
     EPISODES = Counter "swarm_episodes_total" []
-        "Episodes whose fitness has become known; none counts twice.";
+        "Episodes whose fitness has become known; twice only if the first worker was faulty.";
+    WORKERS_QUARANTINED = Counter "swarm_workers_quarantined_total" []
+        "Workers that were proved faulty.";
+    WORKERS_STALLED = Counter "swarm_workers_stalled_total" []
+        "Times that a worker finished nothing for long while others did, or could have.";
+    REFEREE_QUESTIONS = Counter "swarm_referee_questions_total" []
+        "Items that the referee was asked about, because a worker's word was in doubt.";
+    REFEREE_VERDICTS = Counter "swarm_referee_verdicts_total" ["verdict"]
+        "Answers of the referee: values, failed, died (its process, over the item) or unavailable.";
+    REFEREE_BUSY_TIME = Counter "swarm_referee_busy_seconds_total" []
+        "Time that the referee has spent on items.";
     COMMIT_DURATION = Histogram "swarm_commit_duration_seconds" []
         "Time to write a completed generation out and to store it, until it is on disk.";
     STORE_AVAILABLE = Gauge "swarm_store_available" []
@@ -99,6 +110,8 @@ pub struct Source {
     pub events: EventSender,
     /// Whether it can be written.
     pub store: SharedStore,
+    /// What it has done.
+    pub referee: Referee,
     /// What is measured.
     pub instruments: Instruments,
 }
@@ -113,6 +126,15 @@ impl Source {
         let version = env!("CARGO_PKG_VERSION");
         scrape.put(&BUILD, &[version, sim_core::FINGERPRINT], 1.0);
         let counters = fleet.counters;
+        let referee = self.referee.stats();
+        for (verdict, n_verdicts) in [
+            ("values", referee.n_values),
+            ("failed", referee.n_failed),
+            ("died", referee.n_died),
+            ("unavailable", referee.n_unavailable),
+        ] {
+            scrape.put(&REFEREE_VERDICTS, &[verdict], n_verdicts as f64);
+        }
         for (state, n_workers) in [
             ("available", fleet.n_workers_available),
             ("draining", fleet.n_workers_draining),
@@ -134,6 +156,10 @@ impl Source {
             (&ITEMS_REQUEUED, counters.n_items_requeued as f64),
             (&ITEMS_RECALLED, counters.n_items_recalled as f64),
             (&EPISODES, counters.n_episodes as f64),
+            (&WORKERS_QUARANTINED, counters.n_workers_quarantined as f64),
+            (&WORKERS_STALLED, counters.n_workers_stalled as f64),
+            (&REFEREE_QUESTIONS, counters.n_questions as f64),
+            (&REFEREE_BUSY_TIME, referee.busy.as_secs_f64()),
             (&STORE_AVAILABLE, if self.store.trouble().is_none() { 1.0 } else { 0.0 }),
         ] {
             scrape.put(metric, &[], value);

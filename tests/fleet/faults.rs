@@ -13,6 +13,7 @@ mod integrity;
 mod misbehaviour;
 mod network;
 mod recovery;
+mod trouble;
 mod workers;
 
 use std::sync::OnceLock;

@@ -6,13 +6,8 @@ use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello};
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
-        ExperimentState, Hello, ItemFailure, ListWorkersRequest, SubmitExperimentRequest,
-        SubmitExperimentResponse, WatchExperimentRequest, WorkRequest, WorkResponse,
-        event::Kind,
+        Hello, SubmitExperimentRequest, SubmitExperimentResponse, WorkRequest, WorkResponse,
         experiment_service_client::ExperimentServiceClient,
-        fleet_service_client::FleetServiceClient,
-        item_result::Outcome,
-        work_response,
         worker_service_server::{WorkerService, WorkerServiceServer},
     },
 };
@@ -208,49 +203,6 @@ async fn a_bad_configuration_is_an_invalid_argument_that_lists_every_problem() {
 }
 
 #[tokio::test]
-async fn an_item_that_fails_everywhere_fails_its_experiment_by_name() {
-    let coordinator = CoordinatorProcess::start();
-    let id = coordinator.submit(&Experiment::small(1).path());
-    let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
-    loop {
-        let batch = tokio::select! {
-            batch = worker.receive() => match batch.unwrap() {
-                work_response::Message::Assignments(batch) => batch,
-                work_response::Message::EndJob(_) => break,
-                _ => continue,
-            },
-        };
-        for assignment in batch.assignments {
-            let failure = ItemFailure { message: "the wheels\ncame off".to_owned() };
-            worker.answer(assignment.assignment_id, Outcome::Failure(failure)).await;
-        }
-    }
-    let outcome = coordinator.swarmctl(&["watch", &id.to_string()]);
-    assert_eq!(outcome.code, Some(5));
-    let last = outcome.json_lines().pop().unwrap();
-    assert_eq!(last["state"], "failed");
-    let reason = last["reason"].as_str().unwrap();
-    assert!(reason.contains("generation 0") && reason.contains("the wheels came off"), "{reason}");
-}
-
-#[tokio::test]
-async fn a_worker_that_returns_the_wrong_number_of_values_is_dropped() {
-    let coordinator = CoordinatorProcess::start();
-    coordinator.submit(&Experiment::small(1).path());
-    let mut worker = HandWorker::connect(&coordinator.url(), hello()).await.unwrap();
-    let batch = worker.receive_assignments().await.unwrap();
-    worker.answer_fitness(batch.assignments[0].assignment_id, vec![1.0; 99]).await;
-    let status = loop {
-        match worker.receive().await {
-            Ok(_) => {}
-            Err(status) => break status,
-        }
-    };
-    assert_eq!(status.code(), Code::Aborted);
-    assert!(status.message().contains("99 values"), "{status}");
-}
-
-#[tokio::test]
 async fn a_silent_worker_loses_its_items_and_its_stream() {
     let coordinator = CoordinatorProcess::start_with(&["--lease", "1"]);
     coordinator.submit(&Experiment::small(1).path());
@@ -260,47 +212,6 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
     assert_eq!(lost["reason"], "silent for 1 s");
     assert_eq!(lost["items_requeued"], 2);
     assert_eq!(worker.receive().await.unwrap_err().code(), Code::Aborted);
-}
-
-#[tokio::test]
-async fn workers_that_differ_pause_the_experiment_and_are_named() {
-    let coordinator = CoordinatorProcess::start_with(&["--audit-fraction", "1"]);
-    let experiment_id = coordinator.submit(&Experiment::small(1).path());
-    for (name, value) in [("ada", 1.0), ("bob", 2.0)] {
-        let hello = Hello { name: name.to_owned(), ..hello() };
-        let mut worker = HandWorker::connect(&coordinator.url(), hello).await.unwrap();
-        tokio::spawn(async move {
-            while let Ok(message) = worker.receive().await {
-                let work_response::Message::Assignments(batch) = message else { continue };
-                for assignment in batch.assignments {
-                    let values = vec![value; assignment.trial_count as usize];
-                    worker.answer_fitness(assignment.assignment_id, values).await;
-                }
-            }
-        });
-    }
-
-    let mut client = ExperimentServiceClient::connect(coordinator.url()).await.unwrap();
-    let request = WatchExperimentRequest { experiment_id, from_sequence: 0 };
-    let mut events = client.watch_experiment(request).await.unwrap().into_inner();
-    let mut notices = Vec::new();
-    let paused = loop {
-        match events.message().await.unwrap().unwrap().event.unwrap().kind.unwrap() {
-            Kind::Notice(notice) => notices.push(notice.message),
-            Kind::StateChanged(change) if change.state() == ExperimentState::Paused => {
-                break change;
-            }
-            _ => {}
-        }
-    };
-    assert_eq!(notices, [&*paused.reason]);
-    assert!(paused.reason.contains("\"ada\"") && paused.reason.contains("\"bob\""), "{paused:?}");
-    coordinator
-        .process
-        .wait_for("alarm", |line| line["level"] == "ERROR" && line["reason"] == *paused.reason);
-    let mut fleet = FleetServiceClient::connect(coordinator.url()).await.unwrap();
-    let workers = fleet.list_workers(ListWorkersRequest {}).await.unwrap().into_inner().workers;
-    assert!(workers.iter().all(|worker| worker.distrusted == paused.reason), "{workers:?}");
 }
 
 #[tokio::test]

@@ -1,9 +1,9 @@
-//! `swarmctl workers`: the connected workers.
+//! `swarmctl workers`: the connected workers, and letting one out of quarantine.
 
 use clap::Args;
 use console::Style;
 use serde::Serialize;
-use swarm_proto::v1::{ListWorkersRequest, Worker};
+use swarm_proto::v1::{ListWorkersRequest, ReadmitWorkerRequest, Worker};
 
 use super::Remote;
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     text,
 };
 
-const CSV_KEYS: [&str; 11] = [
+const CSV_KEYS: [&str; 12] = [
     "id",
     "name",
     "version",
@@ -27,6 +27,7 @@ const CSV_KEYS: [&str; 11] = [
     "last_heard_at_ms",
     "draining",
     "distrusted",
+    "waits",
 ];
 
 /// A connected worker, as JSON and CSV have it.
@@ -43,6 +44,7 @@ struct Record<'a> {
     last_heard_at_ms: u64,
     draining: bool,
     distrusted: Option<&'a str>,
+    waits: Option<&'a str>,
 }
 
 impl<'a> From<&'a Worker> for Record<'a> {
@@ -59,23 +61,35 @@ impl<'a> From<&'a Worker> for Record<'a> {
             last_heard_at_ms: worker.last_heard_at_ms,
             draining: worker.draining,
             distrusted: Some(&*worker.distrusted).filter(|reason| !reason.is_empty()),
+            waits: Some(&*worker.waits).filter(|reason| !reason.is_empty()),
         }
     }
 }
 
-/// List the connected workers.
+/// List the connected workers, or readmit one that is in quarantine.
 ///
 /// Results per second and the idle share of the slots are those of the last minute.
-/// `items` is the number of items assigned to a worker. A distrusted worker has
-/// returned other bits than another worker for the same item; `--output wide` names
-/// the other one.
+/// `items` is the number of items assigned to a worker. `--output wide` has the reasons
+/// of the two states in which a worker gets none. `waiting`: it returned nothing, or its
+/// word is in doubt; that passes by itself. `quarantine`: it returned what is proved
+/// wrong, and stays there, restarts included, until it is readmitted.
 #[derive(Debug, Args)]
-pub struct WorkersArgs {}
+pub struct WorkersArgs {
+    /// Let this worker out of quarantine: it gets items again.
+    #[arg(long, value_name = "NAME")]
+    readmit: Option<String>,
+}
 
 impl Remote for WorkersArgs {
     const HAS_TABLE: bool = true;
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        if let Some(name) = self.readmit {
+            let request = ReadmitWorkerRequest { name };
+            connection
+                .call_fleet(async |client| client.readmit_worker(request.clone()).await)
+                .await?;
+        }
         let request = ListWorkersRequest {};
         let response =
             connection.call_fleet(async |client| client.list_workers(request).await).await?;
@@ -116,7 +130,7 @@ fn table(workers: &[Worker], now_ms: u64) -> Table {
             clock::ago(worker.last_heard_at_ms, now_ms),
             clock::ago(worker.connected_at_ms, now_ms),
             state(worker).to_owned(),
-            or_dash(&worker.distrusted),
+            or_dash(if worker.distrusted.is_empty() { &worker.waits } else { &worker.distrusted }),
         ]);
     }
     table
@@ -124,8 +138,9 @@ fn table(workers: &[Worker], now_ms: u64) -> Table {
 
 fn state(worker: &Worker) -> &'static str {
     match worker {
-        Worker { distrusted, .. } if !distrusted.is_empty() => "distrusted",
+        Worker { distrusted, .. } if !distrusted.is_empty() => "quarantine",
         Worker { draining: true, .. } => "leaving",
+        Worker { waits, .. } if !waits.is_empty() => "waiting",
         Worker { items_in_flight: 0, .. } => "idle",
         _ => "busy",
     }
@@ -134,8 +149,8 @@ fn state(worker: &Worker) -> &'static str {
 fn state_style(state: &str) -> Style {
     match state {
         "busy" => Style::new().green(),
-        "leaving" => Style::new().yellow(),
-        "distrusted" => Style::new().red(),
+        "leaving" | "waiting" => Style::new().yellow(),
+        "quarantine" => Style::new().red(),
         _ => Style::new(),
     }
 }

@@ -6,6 +6,7 @@
 mod evaluate;
 mod explain;
 mod placement;
+mod readmit;
 mod requests;
 mod restart;
 mod steer;
@@ -84,6 +85,21 @@ pub enum ControlError {
     /// A query without an answer.
     #[error(transparent)]
     Query(#[from] QueryError),
+    /// Only a worker in quarantine can be let out.
+    #[error(
+        "no worker \"{name}\" is in quarantine; {}",
+        if there.is_empty() {
+            "nobody is".to_owned()
+        } else {
+            format!("there are: {}", there.join(", "))
+        }
+    )]
+    NotInQuarantine {
+        /// Who is not there.
+        name: String,
+        /// The names of those who are.
+        there: Vec<String>,
+    },
     /// The coordinator stops.
     #[error("the coordinator is shutting down")]
     ShuttingDown,

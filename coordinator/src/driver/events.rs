@@ -51,6 +51,13 @@ pub enum DriverEvent {
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// A client has let a worker out of quarantine, as far as the store is concerned.
+    WorkerReadmitted {
+        /// What it calls itself.
+        name: String,
+        /// Gets the names of those that are there if it is not.
+        reply: oneshot::Sender<Result<(), Vec<String>>>,
+    },
     /// A client wants a genotype evaluated.
     EvaluationRequested(Box<Evaluation>, EvaluationReply),
     /// A client wants to know what the fleet does for an experiment.

@@ -30,7 +30,8 @@ use crate::{
     referee::{Referee, RefereeRequest, Verdict},
     runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
-    store::ExperimentState,
+    store::{ExperimentState, QuarantinedWorker},
+    text::printable,
 };
 
 pub use events::{
@@ -66,20 +67,37 @@ pub struct Driver {
     verdicts: JoinSet<(QuestionId, Verdict)>,
 }
 
+/// How a loop works.
+#[derive(Debug)]
+pub struct DriverConfig {
+    /// How the engine decides.
+    pub engine: EngineConfig,
+    /// Bytes that all experiments together may take.
+    pub memory_budget: u64,
+    /// Computes what a worker's word is doubted for.
+    pub referee: Referee,
+    /// Workers that have been proved faulty.
+    pub quarantine: Vec<QuarantinedWorker>,
+    /// Measures how long commits take, s.
+    pub commit_duration: Histogram,
+}
+
 impl Driver {
-    /// A loop without workers or experiments. `commit_duration` measures how long
-    /// commits take, in s. `memory_budget`: bytes that all experiments together may take.
+    /// A loop without workers or experiments.
     pub fn new(
         store: SharedStore,
         events: mpsc::Receiver<DriverEvent>,
-        config: EngineConfig,
+        config: DriverConfig,
         shutdown: CancellationToken,
-        commit_duration: Histogram,
-        memory_budget: u64,
-        referee: Referee,
     ) -> Self {
+        let DriverConfig { engine: config, memory_budget, referee, quarantine, commit_duration } =
+            config;
+        let mut engine = Engine::new(clock::now(), config);
+        for QuarantinedWorker { name, reason } in quarantine {
+            engine.on_quarantine_restored(&name, &reason);
+        }
         Self {
-            engine: Engine::new(clock::now(), config),
+            engine,
             runs: Runs::new(memory_budget),
             disk: Disk { store, shutdown: shutdown.clone(), commit_duration },
             events,
@@ -107,6 +125,7 @@ impl Driver {
                 Some(done) = self.tasks.join_next() => self.on_task_done(done),
                 Some(Ok((question, verdict))) = self.verdicts.join_next() => {
                     self.questions.remove(&question);
+                    let verdict = verdict.map_text(|text| printable(&text));
                     log_verdict(question, &verdict);
                     self.engine.on_verdict(clock::now(), question, verdict);
                 }
@@ -155,6 +174,14 @@ impl Driver {
             DriverEvent::WorkersRequested(reply) => {
                 drop(reply.send(self.engine.worker_status(now)));
             }
+            DriverEvent::WorkerReadmitted { name, reply } => {
+                let was_there = self.engine.on_readmitted(now, &name);
+                if was_there {
+                    info!(name, "worker is readmitted");
+                }
+                let names = self.engine.quarantine().map(|(name, _)| name.to_owned()).collect();
+                drop(reply.send(was_there.then_some(()).ok_or(names)));
+            }
             DriverEvent::ActivityRequested(id, reply) => {
                 drop(reply.send(self.engine.activity(now, id.into())));
             }
@@ -189,6 +216,7 @@ impl Driver {
             Ok(Done::Loaded(run, loaded)) => self.runs.on_loaded(run, loaded),
             Ok(Done::Concluded(run, conclusion)) => self.runs.on_concluded(run, conclusion),
             Ok(Done::Committed(run, outcome)) => self.runs.on_committed(run, outcome),
+            Ok(Done::QuarantineWritten) => {}
             Ok(Done::ChangeWritten(id, is_stored)) => self.runs.on_change_written(id, is_stored),
             // Its run, or its client, would wait for ever. At the next start every
             // experiment goes on from its last commit.
@@ -304,7 +332,12 @@ impl Driver {
                 }
             }
             Command::Quarantine { name, reason } => {
-                error!(worker = name, reason, "worker is faulty and gets no more items");
+                error!(
+                    name,
+                    reason, "worker is faulty: it is given nothing until it is readmitted"
+                );
+                let worker = QuarantinedWorker { name, reason };
+                self.tasks.spawn(tasks::quarantine(worker, self.disk.clone()));
             }
             Command::FailJob { job: JobId::Evaluation(id), reason } => {
                 error!(evaluation = %id, reason, "evaluation failed");

@@ -16,7 +16,9 @@ use crate::{
     ids::ExperimentId,
     runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId, restore_evolution},
     shared_store::{Retry, SharedStore, Written},
-    store::{GenerationCommit, GenerationRecord, StoreError, checkpoint_json},
+    store::{
+        GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError, checkpoint_json,
+    },
 };
 
 /// Pause before a checkpoint that could not be read is read again.
@@ -30,6 +32,8 @@ pub enum Done {
     Concluded(RunId, Result<Next, String>),
     /// A commit is over.
     Committed(RunId, CommitOutcome),
+    /// That a worker is in quarantine is stored, or the coordinator stops.
+    QuarantineWritten,
     /// The write of a change is over; whether it is stored.
     ChangeWritten(ExperimentId, bool),
 }
@@ -164,6 +168,16 @@ pub async fn write_change(id: ExperimentId, change: Change, disk: Disk) -> Done 
         failpoint::reached("changed");
     }
     Done::ChangeWritten(id, is_stored)
+}
+
+/// Remembers that a worker is in quarantine.
+pub async fn quarantine(worker: QuarantinedWorker, disk: Disk) -> Done {
+    let now_ms = clock::unix_ms();
+    let what = format!("the quarantine of worker \"{}\"", worker.name);
+    // If the coordinator stops before it is written, the worker is found out again.
+    let write = move |store: &mut Store| store.quarantine(&worker, now_ms);
+    let _ = disk.store.write(&disk.shutdown, &what, Retry::Always, write).await;
+    Done::QuarantineWritten
 }
 
 /// The line by which people follow a run.

@@ -5,6 +5,7 @@ use std::fs;
 use crate::{
     engine::{Introduction, ItemResult},
     ids::WorkerId,
+    referee::RefereeProgram,
     store::{ExperimentRecord, Store},
     submission::{CheckedSubmission, Submission},
 };
@@ -34,10 +35,14 @@ impl Rig {
         let mut driver = Driver::new(
             SharedStore::new(store),
             queue,
-            EngineConfig::new(Duration::from_secs(10)),
+            DriverConfig {
+                engine: EngineConfig::new(Duration::from_secs(10)),
+                memory_budget: u64::MAX,
+                referee: Referee::new(RefereeProgram::this_program(), Duration::ZERO),
+                quarantine: Vec::new(),
+                commit_duration: crate::metrics::Instruments::default().commit_duration,
+            },
             CancellationToken::new(),
-            crate::metrics::Instruments::default().commit_duration,
-            u64::MAX,
         );
         let (outbox, inbox) = mpsc::channel(1024);
         let (reply, id) = oneshot::channel();

@@ -18,8 +18,36 @@ pub struct JobActivity {
     pub n_workers: usize,
     /// Those that are given work.
     pub n_workers_available: usize,
+    /// Those that are given nothing, but for the ones that are leaving.
+    pub withheld: Vec<WithheldWorker>,
+    /// What the referee is asked about the job.
+    pub questions: Vec<OpenQuestion>,
     /// Other jobs with items that no worker has.
     pub rivals: Vec<JobId>,
+}
+
+/// A connected worker that is given nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithheldWorker {
+    /// The worker.
+    pub worker: WorkerId,
+    /// What it calls itself.
+    pub name: String,
+    /// Why.
+    pub reason: String,
+    /// Whether it is in quarantine; else it is for a while only.
+    pub is_quarantined: bool,
+}
+
+/// An item that the referee is asked about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenQuestion {
+    /// The item's individual.
+    pub individual: u32,
+    /// What is in doubt.
+    pub doubt: String,
+    /// Why the referee could not answer so far.
+    pub trouble: Option<String>,
 }
 
 /// A batch that is being computed.
@@ -33,7 +61,7 @@ pub struct BatchActivity {
     pub n_episodes_left: usize,
     /// Items that no worker has.
     pub n_items_queued: usize,
-    /// Individuals that failed, or took a worker down.
+    /// Individuals that a worker was computing when it was lost.
     pub n_individuals_failing: usize,
     /// The workers that have the other items.
     pub held: Vec<HeldItems>,
@@ -65,8 +93,26 @@ impl Engine {
             batch: batch.map(|batch| self.batch_activity(now, id, batch)),
             n_workers: self.workers.len(),
             n_workers_available: self.workers.values().filter(|worker| worker.is_usable()).count(),
+            withheld: self.withheld(now),
+            questions: self.questions.of(id).map(|(_, question)| question.activity()).collect(),
             rivals: rivals.map(|(&other, _)| other).collect(),
         }
+    }
+
+    fn withheld(&self, now: Instant) -> Vec<WithheldWorker> {
+        let withheld = self.workers.iter().filter_map(|(&id, worker)| {
+            let quarantined = worker.quarantined.clone();
+            let is_quarantined = quarantined.is_some();
+            let reason = quarantined.or_else(|| worker.waits(now))?;
+            let name = worker.name().to_owned();
+            (!worker.is_draining).then_some(WithheldWorker {
+                worker: id,
+                name,
+                reason,
+                is_quarantined,
+            })
+        });
+        withheld.collect()
     }
 
     fn batch_activity(&self, now: Instant, id: JobId, batch: &BatchInProgress) -> BatchActivity {

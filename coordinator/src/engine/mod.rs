@@ -70,7 +70,7 @@ use crate::{
     priority::Priority,
 };
 
-pub use activity::{BatchActivity, HeldItems, JobActivity};
+pub use activity::{BatchActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker};
 use batch::BatchInProgress;
 use crash_loops::CrashLoops;
 use dispatch::Outgoing;

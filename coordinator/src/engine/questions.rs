@@ -15,7 +15,7 @@ use sim_core::{Output, TrialSet};
 
 use crate::ids::{JobId, QuestionId, WorkerId};
 
-use super::{Command, SharedGenotype, item::Item};
+use super::{Command, OpenQuestion, SharedGenotype, item::Item};
 
 /// Processes that an item must take down before it is to blame: one may be killed by
 /// chance, or by a system that is short of memory.
@@ -109,6 +109,20 @@ impl Question {
             Doubt::Losses => vec![],
             Doubt::Disagreement { parties: [(first, _), (second, _)] } => vec![first, second],
         }
+    }
+
+    /// It, for people.
+    pub fn activity(&self) -> OpenQuestion {
+        let doubt = match &self.doubt {
+            Doubt::Failure { reporter, message } => {
+                format!("worker \"{}\" reports that it fails: {message}", reporter.name)
+            }
+            Doubt::Losses => "workers were lost again and again while they computed it".to_owned(),
+            Doubt::Disagreement { parties: [(first, _), (second, _)] } => {
+                format!("workers \"{}\" and \"{}\" return different bits", first.name, second.name)
+            }
+        };
+        OpenQuestion { individual: self.item.individual, doubt, trouble: self.trouble.clone() }
     }
 
     /// Whether its item is given to no worker until it is answered. What two workers have

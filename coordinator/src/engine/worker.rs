@@ -228,7 +228,7 @@ impl Worker {
     }
 
     /// Why it is given nothing for a while.
-    fn waits(&self, now: Instant) -> Option<String> {
+    pub fn waits(&self, now: Instant) -> Option<String> {
         if self.question.is_some() {
             Some("its word is in doubt, and the referee is asked".to_owned())
         } else if let Some(until) = self.resting_until {

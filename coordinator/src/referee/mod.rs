@@ -82,6 +82,18 @@ pub enum Verdict {
     Unavailable(String),
 }
 
+impl Verdict {
+    /// The same with another text, if it has one.
+    pub fn map_text(self, change: impl FnOnce(String) -> String) -> Self {
+        match self {
+            Self::Values(values) => Self::Values(values),
+            Self::Failed(text) => Self::Failed(change(text)),
+            Self::Died(text) => Self::Died(change(text)),
+            Self::Unavailable(text) => Self::Unavailable(change(text)),
+        }
+    }
+}
+
 /// What a referee has done since it was made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RefereeStats {

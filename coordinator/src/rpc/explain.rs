@@ -3,9 +3,15 @@
 use std::time::Duration;
 
 use sim_core::TrialSet;
-use swarm_proto::v1::{ExplainExperimentResponse, HeldItems, Round};
+use swarm_proto::v1::{
+    ExplainExperimentResponse, HeldItems, RefereeQuestion, Round, WithheldWorker,
+};
 
-use crate::{control::Explanation, engine::BatchActivity, ids::JobId};
+use crate::{
+    control::Explanation,
+    engine::{self, BatchActivity},
+    ids::JobId,
+};
 
 use super::convert;
 
@@ -18,11 +24,27 @@ pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
         round: activity.batch.and_then(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
+        withheld: activity.withheld.into_iter().map(withheld).collect(),
+        questions: activity.questions.into_iter().map(question).collect(),
         rivals: rivals.map(|id| id.0).collect(),
         notices: notices.into_iter().map(convert::event).collect(),
         store_trouble: store_trouble.unwrap_or_default(),
         incompatible: incompatible.unwrap_or_default(),
     }
+}
+
+fn withheld(worker: engine::WithheldWorker) -> WithheldWorker {
+    WithheldWorker {
+        worker_id: worker.worker.0,
+        worker_name: worker.name,
+        reason: worker.reason,
+        quarantined: worker.is_quarantined,
+    }
+}
+
+fn question(question: engine::OpenQuestion) -> RefereeQuestion {
+    let engine::OpenQuestion { individual, doubt, trouble } = question;
+    RefereeQuestion { individual, doubt, trouble: trouble.unwrap_or_default() }
 }
 
 /// A batch of an experiment; none if it is an evaluation's.

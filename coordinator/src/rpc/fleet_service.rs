@@ -1,11 +1,15 @@
-//! `FleetService`: the connected workers.
+//! `FleetService`: the connected workers, and those in quarantine.
 
-use swarm_proto::v1::{
-    ListWorkersRequest, ListWorkersResponse, fleet_service_server::FleetService,
+use swarm_proto::{
+    WORKER_NAME_LEN_MAX,
+    v1::{
+        ListWorkersRequest, ListWorkersResponse, ReadmitWorkerRequest, ReadmitWorkerResponse,
+        fleet_service_server::FleetService,
+    },
 };
 use tonic::{Request, Response, Status};
 
-use crate::{clock, control::Control};
+use crate::{clock, control::Control, text::printable};
 
 use super::convert;
 
@@ -26,5 +30,18 @@ impl FleetService for Fleet {
         let now_ms = clock::unix_ms();
         let workers = workers.into_iter().map(|worker| convert::worker(worker, now_ms)).collect();
         Ok(Response::new(ListWorkersResponse { workers }))
+    }
+
+    async fn readmit_worker(
+        &self,
+        request: Request<ReadmitWorkerRequest>,
+    ) -> Result<Response<ReadmitWorkerResponse>, Status> {
+        let ReadmitWorkerRequest { name } = request.into_inner();
+        if name.len() > WORKER_NAME_LEN_MAX {
+            let message = format!("name is longer than {WORKER_NAME_LEN_MAX} bytes");
+            return Err(Status::invalid_argument(message));
+        }
+        self.control.readmit(&printable(&name)).await?;
+        Ok(Response::new(ReadmitWorkerResponse {}))
     }
 }

@@ -66,6 +66,7 @@ impl From<ControlError> for Status {
             | ControlError::TooManyRequests
             | ControlError::NoMemory(_)
             | ControlError::NotStoredYet(_) => Self::resource_exhausted(text),
+            ControlError::NotInQuarantine { .. } => Self::not_found(text),
             ControlError::EvaluationFailed(_) | ControlError::Panicked(_) => Self::internal(text),
             ControlError::Query(error) => error.into(),
             ControlError::ShuttingDown => Self::unavailable(text),

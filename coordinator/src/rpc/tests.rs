@@ -14,10 +14,11 @@ use tonic::{Code, Request, Status};
 use super::*;
 use crate::{
     control::Control,
-    driver::{self, Driver},
+    driver::{self, Driver, DriverConfig},
     engine::EngineConfig,
     limits::{WATCH_PATIENCE, WATCH_QUEUE_LEN},
     metrics::Instruments,
+    referee::{Referee, RefereeProgram},
     shared_store::SharedStore,
     store::Store,
 };
@@ -29,9 +30,14 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     let store = SharedStore::new(Store::open(directory.path()).unwrap());
     let (events, queue) = driver::channel();
     let shutdown = CancellationToken::new();
-    let config = EngineConfig::new(Duration::from_secs(10));
-    let duration = Instruments::default().commit_duration;
-    let driver = Driver::new(store.clone(), queue, config, shutdown.clone(), duration, u64::MAX);
+    let config = DriverConfig {
+        engine: EngineConfig::new(Duration::from_secs(10)),
+        memory_budget: u64::MAX,
+        referee: Referee::new(RefereeProgram::this_program(), Duration::ZERO),
+        quarantine: Vec::new(),
+        commit_duration: Instruments::default().commit_duration,
+    };
+    let driver = Driver::new(store.clone(), queue, config, shutdown.clone());
     tokio::spawn(driver.run());
     let service =
         Experiments { control: Control::new(events, store.clone(), u64::MAX), store, shutdown };

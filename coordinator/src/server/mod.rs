@@ -20,7 +20,7 @@ use tracing::{error, info, warn};
 
 use crate::{
     control::Control,
-    driver::{self, Driver},
+    driver::{self, Driver, DriverConfig},
     engine::EngineConfig,
     limits::{REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
@@ -70,15 +70,18 @@ impl Coordinator {
             audit_fraction: config.audit_fraction,
             ..EngineConfig::new(config.lease)
         };
-        let commit_duration = instruments.commit_duration.clone();
+        let referee = Referee::new(config.referee.clone(), REFEREE_IDLE_TIME);
         let loop_ = Driver::new(
             store.clone(),
             event_queue,
-            engine,
+            DriverConfig {
+                engine,
+                memory_budget: config.memory_budget,
+                referee: referee.clone(),
+                quarantine: store.read(Store::quarantined).await?,
+                commit_duration: instruments.commit_duration.clone(),
+            },
             shutdown.clone(),
-            commit_duration,
-            config.memory_budget,
-            Referee::new(config.referee.clone(), REFEREE_IDLE_TIME),
         );
         let mut driver = JoinSet::new();
         driver.spawn(loop_.run());
@@ -88,7 +91,8 @@ impl Coordinator {
         let calls = instruments.calls.clone();
         let mut metrics = JoinSet::new();
         if let Some(endpoint) = metrics_endpoint {
-            let source = Source { events: events.clone(), store: store.clone(), instruments };
+            let (events, store) = (events.clone(), store.clone());
+            let source = Source { events, store, referee, instruments };
             metrics.spawn(endpoint.serve(move || source.clone().scrape()));
         }
         let times =

@@ -10,6 +10,7 @@ mod error;
 mod file;
 mod history;
 mod inspection;
+mod quarantine;
 mod records;
 mod schema;
 mod seals;
@@ -27,6 +28,7 @@ pub use error::StoreError;
 pub use inspection::{
     Backup, Fate, Finding, Inspection, Recovered, Recovery, backup, inspect, recover,
 };
+pub use quarantine::QuarantinedWorker;
 pub use records::{
     Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
     checkpoint_json,

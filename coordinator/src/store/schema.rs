@@ -133,6 +133,14 @@ const MIGRATIONS: &[&str] = &[
         SELECT id FROM experiments
         WHERE state IN ('failed', 'cancelled') OR (state = 'completed' AND reason <> ''));
 ",
+    "
+    CREATE TABLE quarantine (
+        -- What the worker calls itself.
+        name TEXT PRIMARY KEY,
+        reason TEXT NOT NULL,
+        since_ms INTEGER NOT NULL
+    ) STRICT, WITHOUT ROWID;
+",
 ];
 
 /// The first version with seals.

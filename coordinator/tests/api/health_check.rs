@@ -33,7 +33,7 @@ async fn start(listen: &str, data: &TempDir, tls: Option<&Tls>) -> Result<Coordi
     let token = |letter: &str| Token::parse(&letter.repeat(32)).unwrap();
     let tokens = Some(Tokens::new(token("c"), token("w")).unwrap());
     let access = Access { tokens, tls: tls.cloned(), plaintext: true };
-    let config = CoordinatorConfig::new(listen.parse().unwrap(), data.path().into());
+    let config = super::config(listen.parse().unwrap(), data.path().into());
     Coordinator::start(CoordinatorConfig { access, ..config }).await
 }
 

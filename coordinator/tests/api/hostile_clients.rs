@@ -2,7 +2,7 @@
 
 use std::net::Ipv4Addr;
 
-use coordinator::{Coordinator, CoordinatorConfig};
+use coordinator::Coordinator;
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::TestRunner};
 use serde_json::{Value, json};
 use swarm_proto::v1::{
@@ -14,7 +14,7 @@ use tonic::{Code, Status, transport::Channel};
 
 async fn start() -> (Coordinator, ExperimentServiceClient<Channel>, tempfile::TempDir) {
     let data = tempfile::tempdir().unwrap();
-    let config = CoordinatorConfig::new((Ipv4Addr::LOCALHOST, 0).into(), data.path().to_owned());
+    let config = super::config((Ipv4Addr::LOCALHOST, 0).into(), data.path().to_owned());
     let coordinator = Coordinator::start(config).await.unwrap();
     let url = format!("http://{}", coordinator.local_addr());
     let client = ExperimentServiceClient::connect(url).await.unwrap();

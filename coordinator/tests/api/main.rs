@@ -7,3 +7,14 @@ mod hostile_clients;
 mod hostile_workers;
 mod referee;
 mod simulated_fleet;
+
+use std::{net::SocketAddr, path::PathBuf};
+
+use coordinator::{CoordinatorConfig, referee::RefereeProgram};
+
+/// The usual configuration, for a coordinator in a program that is not one.
+fn config(listen: SocketAddr, data_dir: PathBuf) -> CoordinatorConfig {
+    let path = env!("CARGO_BIN_EXE_coordinator").into();
+    let referee = RefereeProgram { path, args: vec!["referee".into()] };
+    CoordinatorConfig { referee, ..CoordinatorConfig::new(listen, data_dir) }
+}

@@ -23,8 +23,7 @@ use tonic_prost::ProstCodec;
 
 use super::{OTHER, TINY, n_lost};
 
-/// Enough for each size of answer to be in a generation of its own: what is done to
-/// one item three times fails the experiment.
+/// Enough for each intruder to find work.
 const GENERATIONS: u64 = 6;
 
 /// A worker in the middle of an experiment, with items in its hands.
@@ -125,15 +124,18 @@ async fn nonsense_from_one_worker_does_not_reach_the_work_of_another() {
     ];
     for (case, wrong) in wrong.into_iter().enumerate() {
         let name = format!("sizes-{case}");
-        let mut intruder = Intruder::join(&url, &name).await;
+        let intruder = Intruder::join(&url, &name).await;
         let (assignment_id, n_trials) =
             (intruder.assignments[0].assignment_id, intruder.assignments[0].trial_count);
         let values = wrong(n_trials as usize);
         let expected = format!("{} values for {n_trials} trials", values.len());
         intruder.worker.answer_fitness(assignment_id, values).await;
-        assert_eq!(intruder.worker.receive_end().await.code(), Code::Aborted);
-        let reason = reason_of_loss(&coordinator, &name);
+        let faulty = coordinator
+            .process
+            .wait_for("quarantine", |line| line["level"] == "ERROR" && line["name"] == *name);
+        let reason = faulty["reason"].as_str().unwrap();
         assert!(reason.contains(&expected), "{reason}, not {expected}");
+        intruder.leave(&coordinator, &name).await;
         let name = format!("honest-{case}");
         Intruder::join(&url, &name).await.complete_generation(&coordinator, &name).await;
     }
@@ -247,10 +249,10 @@ async fn serve_until_poisoned(worker: &mut HandWorker, poison: &OnceLock<Vec<f64
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_genotype_that_takes_every_worker_down_fails_its_experiment_by_name_and_no_other() {
+async fn a_genotype_that_takes_every_worker_down_is_computed_by_the_coordinator() {
     let coordinator = CoordinatorProcess::start();
-    let doomed = TINY.submit(&coordinator);
-    assert_eq!(doomed, POISONED.0);
+    let poisoned = TINY.submit(&coordinator);
+    assert_eq!(poisoned, POISONED.0);
     let sound = OTHER.submit(&coordinator);
     let poison = Arc::new(OnceLock::new());
     for i in 0..3 {
@@ -258,16 +260,8 @@ async fn a_genotype_that_takes_every_worker_down_fails_its_experiment_by_name_an
         tokio::spawn(die_of(Arc::clone(&poison), coordinator.url(), name));
     }
     OTHER.assert_undisturbed(coordinator.watch(sound));
-
-    let (code, finished) = coordinator.watch(doomed).end();
-    assert_eq!(code, Some(5));
-    assert_eq!(finished.last["state"], "failed");
-    let reason = finished.last["reason"].as_str().unwrap();
-    for expected in ["of generation 1", "failed 3 times", "mortal-", "was lost"] {
-        assert!(reason.contains(expected), "{reason}");
-    }
-    assert_eq!(finished.generations.len(), 1, "what was complete stays");
-    // Beside the three on one trial, some may have had another of the genotype's
-    // trials, or the same as a duplicate.
-    assert!((3..=6).contains(&n_lost(&coordinator)), "few more than it takes");
+    // The genotype does no harm to the coordinator's own process.
+    TINY.assert_undisturbed(coordinator.watch(poisoned));
+    let n_lost = n_lost(&coordinator);
+    assert!((2..=12).contains(&n_lost), "{n_lost}: few more than it takes");
 }

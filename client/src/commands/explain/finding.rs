@@ -3,8 +3,11 @@
 use std::fmt;
 
 use serde::Serialize;
-use swarm_proto::v1::{Experiment, ExperimentState, ExplainExperimentResponse, Round};
+use swarm_proto::v1::{
+    Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,
+};
 
+use super::WORKERS_MAX;
 use crate::{clock, text};
 
 /// If a worker holds an item for longer, the findings suggest to look at the worker.
@@ -30,6 +33,10 @@ pub enum Kind {
     StoreTrouble,
     NoWorkers,
     NoWorkersAvailable,
+    Quarantine,
+    WorkersWaiting,
+    Referee,
+    RefereeTrouble,
     IndividualsFailing,
     Queued,
     Barrier,
@@ -81,6 +88,8 @@ pub fn findings(
         findings.push(finding(Kind::StoreTrouble, what, steps));
     }
     findings.extend(of_workers(answer, address));
+    findings.extend(of_withheld(answer));
+    findings.extend(of_questions(answer));
     match &answer.round {
         Some(round) => findings.extend(of_round(id, round, answer)),
         None => {
@@ -98,11 +107,68 @@ fn of_workers(answer: &ExplainExperimentResponse, address: &str) -> Option<Findi
     }
     if answer.workers_available == 0 {
         let workers = text::counted(answer.workers.into(), "connected worker");
-        let what = format!("none of {workers} gets items: all are leaving or distrusted");
+        let what =
+            format!("none of {workers} gets items: all are leaving, waiting or in quarantine");
         let steps = ["see the reasons: swarmctl workers --output wide".to_owned(), start];
         return Some(finding(Kind::NoWorkersAvailable, what, steps));
     }
     None
+}
+
+/// Workers that get nothing.
+fn of_withheld(answer: &ExplainExperimentResponse) -> Vec<Finding> {
+    let (quarantined, waiting): (Vec<_>, Vec<_>) =
+        answer.withheld.iter().partition(|worker| worker.quarantined);
+    let list = |workers: &[&WithheldWorker]| {
+        let lines = workers.iter().take(WORKERS_MAX);
+        lines.fold(String::new(), |text, worker| {
+            text + &format!("\n  {}: {}", worker.worker_name, worker.reason)
+        })
+    };
+    let mut findings = Vec::new();
+    if let [first, ..] = quarantined[..] {
+        let workers = text::counted(quarantined.len() as u64, "worker");
+        let what = format!("{workers} in quarantine, proved faulty:{}", list(&quarantined));
+        let steps = [
+            "check the machine (memory, overheating) and the worker's program; the others go on"
+                .to_owned(),
+            format!("then let it out: swarmctl workers --readmit {}", first.worker_name),
+        ];
+        findings.push(finding(Kind::Quarantine, what, steps));
+    }
+    if !waiting.is_empty() {
+        let workers = text::counted(waiting.len() as u64, "worker");
+        let what = format!("{workers} with nothing to do for a while:{}", list(&waiting));
+        let steps = [
+            "nothing has to be done: others do their items, and they get some when they answer"
+                .to_owned(),
+            "a worker that stays so hangs or crashes: read its log; restarting it is safe"
+                .to_owned(),
+        ];
+        findings.push(finding(Kind::WorkersWaiting, what, steps));
+    }
+    findings
+}
+
+/// What the referee computes.
+fn of_questions(answer: &ExplainExperimentResponse) -> Vec<Finding> {
+    let Some(question) = answer.questions.first() else { return Vec::new() };
+    let more = match answer.questions.len() {
+        1 => String::new(),
+        n => format!(" ({} more)", n - 1),
+    };
+    let doubt = format!("individual {}: {}{more}", question.individual, question.doubt);
+    let mut findings = vec![finding(
+        Kind::Referee,
+        format!("the coordinator computes an item itself to see who is right; {doubt}"),
+        [],
+    )];
+    if let Some(question) = answer.questions.iter().find(|question| !question.trouble.is_empty()) {
+        let what = format!("it cannot do so at present: {}", question.trouble);
+        let steps = ["mend that on the coordinator's machine; it tries again by itself".to_owned()];
+        findings.push(finding(Kind::RefereeTrouble, what, steps));
+    }
+    findings
 }
 
 fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<Finding> {
@@ -110,11 +176,14 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
     if round.individuals_failing > 0 {
         let individuals = text::counted(round.individuals_failing.into(), "individual");
         let what = format!(
-            "{individuals} failed, or ended a worker; the third failure of an individual ends the experiment"
+            "workers were lost while they computed {individuals}; if one takes the coordinator's \
+             own process down as well, the experiment fails"
         );
         let steps = [
-            "see the workers: swarmctl workers".to_owned(),
-            "read the logs of the coordinator and the workers".to_owned(),
+            "find out why workers are lost: read their logs, and whether their machine is short \
+             of memory"
+                .to_owned(),
+            "nothing else has to be done: their items are computed again".to_owned(),
         ];
         findings.push(finding(Kind::IndividualsFailing, what, steps));
     }
@@ -186,7 +255,7 @@ fn finding(
 
 #[cfg(test)]
 mod tests {
-    use swarm_proto::v1::HeldItems;
+    use swarm_proto::v1::{HeldItems, RefereeQuestion};
 
     use super::*;
 
@@ -248,6 +317,15 @@ mod tests {
         assert_eq!(kinds(running(), &other), [Kind::Incompatible]);
         let between = ExplainExperimentResponse { round: None, ..healthy() };
         assert_eq!(kinds(running(), &between), [Kind::BetweenGenerations]);
+        let worker = |quarantined| WithheldWorker { quarantined, ..WithheldWorker::default() };
+        let withheld = vec![worker(true), worker(false)];
+        let doubtful = ExplainExperimentResponse { withheld, ..healthy() };
+        let expected = [Kind::Quarantine, Kind::WorkersWaiting, Kind::Computing];
+        assert_eq!(kinds(running(), &doubtful), expected);
+        let question = RefereeQuestion { trouble: "no program".into(), ..Default::default() };
+        let asked = ExplainExperimentResponse { questions: vec![question], ..healthy() };
+        let expected = [Kind::Referee, Kind::RefereeTrouble, Kind::Computing];
+        assert_eq!(kinds(running(), &asked), expected);
         let round = Round { individuals_failing: 1, ..healthy().round.unwrap() };
         let failing = ExplainExperimentResponse { round: Some(round), ..healthy() };
         assert_eq!(kinds(running(), &failing), [Kind::IndividualsFailing, Kind::Computing]);

@@ -98,6 +98,7 @@ pub fn evaluated(genotypes: &[Vec<f64>], n_trials: u32) -> EvaluatedBatch {
         idle_share: 0.0,
         n_audited: 0,
         n_unaudited: 0,
+        notices: Vec::new(),
     }
 }
 

@@ -220,6 +220,7 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
              ALTER TABLE checkpoints DROP COLUMN seal;
              ALTER TABLE champions DROP COLUMN seal;
              DROP TABLE identity;
+             DROP TABLE quarantine;
              PRAGMA user_version = 2;
              UPDATE experiments SET state = 'cancelled' WHERE id = 2;",
         )

@@ -8,7 +8,7 @@ use coordinator::{
 };
 use sim_core::{Output, TrialSet};
 
-use super::{LEASE, MODEL, fleet};
+use super::{EXPERIMENT, LEASE, MODEL, fleet};
 use crate::simulated_fleet::SimulatedFleet;
 
 /// Numbers of a measured trial.
@@ -62,6 +62,25 @@ fn a_worker_that_returns_too_few_or_too_many_measures_gets_nothing_more() {
         let good = fleet.join_by_hand(1);
         while measure(&mut fleet, good) {}
         assert_eq!(fleet.evaluated[0].1.values, [measures(0..3)]);
+    }
+}
+
+#[test]
+fn measures_where_fitness_is_due_and_fitness_where_measures_are_are_proof_enough() {
+    for is_evaluation in [true, false] {
+        let mut fleet = fleet();
+        if is_evaluation {
+            evaluate(&mut fleet, 1);
+        } else {
+            fleet.submit(EXPERIMENT, 100);
+            fleet.ask(EXPERIMENT, 0, 1, N_VALUES as u32);
+        }
+        let bad = fleet.join_by_hand(1);
+        let assignment = fleet.held(bad)[0].id;
+        let wrong = if is_evaluation { Output::Fitness } else { Output::Measures };
+        fleet.answer_with(bad, assignment, wrong, Ok(measures(0..1)));
+        assert!(fleet.held(bad).is_empty() && fleet.evaluated.is_empty(), "{is_evaluation}");
+        assert_eq!(fleet.quarantined.len(), 1);
     }
 }
 

@@ -1,0 +1,17 @@
+//! Letting a worker out of quarantine.
+
+use crate::driver::DriverEvent;
+
+use super::{Control, ControlError};
+
+impl Control {
+    /// Lets a worker out of quarantine: it is given items again.
+    pub async fn readmit(&self, name: &str) -> Result<(), ControlError> {
+        let out = name.to_owned();
+        self.store.try_write(move |store| store.readmit(&out)).await?;
+        let told = self
+            .ask(|reply| DriverEvent::WorkerReadmitted { name: name.to_owned(), reply })
+            .await?;
+        told.map_err(|there| ControlError::NotInQuarantine { name: name.to_owned(), there })
+    }
+}

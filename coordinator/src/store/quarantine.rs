@@ -1,0 +1,46 @@
+//! Workers that were proved faulty.
+
+use rusqlite::params;
+
+use super::{Result, Store};
+
+/// A worker that is given nothing until an operator says otherwise.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QuarantinedWorker {
+    /// What it calls itself.
+    pub name: String,
+    /// Why, for people.
+    pub reason: String,
+}
+
+impl Store {
+    /// Adds a worker; one that is there stays as it is.
+    pub fn quarantine(&mut self, worker: &QuarantinedWorker, now_ms: u64) -> Result<()> {
+        self.write(|transaction, _| {
+            transaction.execute(
+                "INSERT INTO quarantine (name, reason, since_ms) VALUES (?1, ?2, ?3)
+                 ON CONFLICT (name) DO NOTHING",
+                params![worker.name, worker.reason, now_ms],
+            )?;
+            Ok(())
+        })
+    }
+
+    /// Lets a worker out, if it is there.
+    pub fn readmit(&mut self, name: &str) -> Result<()> {
+        self.write(|transaction, _| {
+            transaction.execute("DELETE FROM quarantine WHERE name = ?1", [name])?;
+            Ok(())
+        })
+    }
+
+    /// The workers in quarantine, by name.
+    pub fn quarantined(&self) -> Result<Vec<QuarantinedWorker>> {
+        let mut statement =
+            self.connection.prepare("SELECT name, reason FROM quarantine ORDER BY name")?;
+        let worker = |row: &rusqlite::Row<'_>| {
+            Ok(QuarantinedWorker { name: row.get(0)?, reason: row.get(1)? })
+        };
+        Ok(statement.query_map([], worker)?.collect::<rusqlite::Result<_>>()?)
+    }
+}
