@@ -41,7 +41,8 @@ struct Args {
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     lease: u32,
     /// Share of the individuals, 0 to 1, that a second worker computes, too. If the bits
-    /// differ, one of the two is faulty, and the experiment is paused.
+    /// differ, the coordinator computes the trial itself, and the worker that was wrong gets
+    /// no items until it is readmitted.
     #[arg(long, default_value_t = 0.0, value_parser = fraction)]
     audit_fraction: f64,
     /// MiB of memory that unfinished experiments may take together, as estimated from their
