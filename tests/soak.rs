@@ -1,5 +1,6 @@
 //! Everything that can be killed, frozen, cut off or blocked is, at random and
-//! for a while, and every experiment comes to the digest of an undisturbed run.
+//! for a while, beside workers that lie, fail and hang, and every experiment comes to the
+//! digest of an undisturbed run.
 //!
 //! `SWARM_SOAK_SECONDS` says for how long, `SWARM_SOAK_SEED` repeats the choices
 //! of a run (though not its timing).
@@ -7,21 +8,28 @@
 
 use std::{
     collections::BTreeMap,
-    env,
+    env, fs,
     hash::{BuildHasher as _, Hasher as _, RandomState},
     io::{self, Write as _},
+    process::Command,
     str::FromStr,
     thread,
     time::{Duration, Instant},
 };
 
 use harness::{
-    CoordinatorProcess, Direction, Experiment, Proxy, Watch, WorkerProcess, undisturbed,
+    CoordinatorProcess, Direction, Experiment, HandWorker, Proxy, Watch, WorkerProcess, hello,
+    undisturbed,
 };
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng as _, SeedableRng as _},
 };
+use swarm_proto::v1::{
+    Heartbeat, Hello, ItemFailure, TrialFitness, item_result::Outcome, work_request::Message,
+    work_response,
+};
+use tokio::{runtime::Runtime, task::JoinHandle};
 
 const DEFAULT_SECONDS: u64 = 20;
 const GENERATIONS: u64 = 20;
@@ -43,9 +51,13 @@ enum Fault {
     CoordinatorStopped,
     CoordinatorFrozen,
     DatabaseBlocked,
+    RefereeKilled,
+    LiarJoined,
+    FailureJoined,
+    HungJoined,
 }
 
-const FAULTS: [Fault; 11] = [
+const FAULTS: [Fault; 15] = [
     Fault::WorkerKilled,
     Fault::WorkerStopped,
     Fault::WorkerFrozen,
@@ -57,6 +69,10 @@ const FAULTS: [Fault; 11] = [
     Fault::CoordinatorStopped,
     Fault::CoordinatorFrozen,
     Fault::DatabaseBlocked,
+    Fault::RefereeKilled,
+    Fault::LiarJoined,
+    Fault::FailureJoined,
+    Fault::HungJoined,
 ];
 
 /// A worker behind a network of its own.
@@ -79,6 +95,10 @@ struct Soak {
     coordinator: CoordinatorProcess,
     places: Vec<Place>,
     n_workers_started: usize,
+    /// Where the workers run that are no processes.
+    runtime: Runtime,
+    /// The latest bad workers of each kind: another takes the place of the one before.
+    intruders: BTreeMap<Fault, JoinHandle<()>>,
     experiment: Experiment,
     expected: Vec<String>,
     watch: Watch,
@@ -90,7 +110,8 @@ impl Soak {
     fn start(seed: u64) -> Self {
         let experiment = Experiment::tiny(GENERATIONS);
         let expected = undisturbed(&experiment);
-        let coordinator = CoordinatorProcess::start_with(&["--lease", LEASE]);
+        let coordinator =
+            CoordinatorProcess::start_with(&["--lease", LEASE, "--audit-fraction", "1"]);
         let places = (0..N_WORKERS)
             .map(|i| {
                 let network = Proxy::start(coordinator.address());
@@ -104,6 +125,8 @@ impl Soak {
             coordinator,
             places,
             n_workers_started: N_WORKERS,
+            runtime: Runtime::new().unwrap(),
+            intruders: BTreeMap::new(),
             experiment,
             expected,
             watch,
@@ -148,7 +171,6 @@ impl Soak {
 
     fn strike(&mut self, fault: Fault) {
         *self.faults.entry(fault).or_default() += 1;
-        let n_lines = self.coordinator.process.lines().len();
         match fault {
             Fault::WorkerKilled | Fault::WorkerStopped => {
                 self.n_workers_started += 1;
@@ -203,25 +225,46 @@ impl Soak {
                 self.pause();
                 database.execute_batch("ROLLBACK").unwrap();
             }
+            Fault::RefereeKilled => {
+                if !self.kill_referee() {
+                    *self.faults.get_mut(&fault).unwrap() -= 1;
+                }
+            }
+            Fault::LiarJoined | Fault::FailureJoined | Fault::HungJoined => {
+                self.n_workers_started += 1;
+                let name = format!("intruder-{}", self.n_workers_started);
+                let worker = intrude(self.coordinator.url(), name, fault, self.below(1 << 20));
+                let before = self.intruders.insert(fault, self.runtime.spawn(worker));
+                if let Some(before) = before {
+                    before.abort();
+                }
+            }
         }
         self.keep_busy();
-        if matches!(fault, Fault::WorkerKilled | Fault::NetworkCut) {
-            // What is lost with three workers in a row is given up, by design: let
-            // it be evaluated before the next worker is taken from it. Workers that hear
-            // nothing would hold it up.
-            self.pause();
-            self.places.iter_mut().for_each(Place::heal);
-            self.coordinator.process.find(n_lines, "progress", |line| {
-                line["message"] == "generation" || line["message"] == "experiment completed"
-            });
-        } else {
-            self.pause();
-        }
+        self.pause();
         for i in 0..N_WORKERS {
             if self.places[i].is_troubled && self.below(2) == 0 {
                 self.places[i].heal();
             }
         }
+    }
+
+    /// Kills the referee's process, if there is one.
+    fn kill_referee(&self) -> bool {
+        let id = self.coordinator.process.id();
+        let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children"));
+        // The thread that started it need not be the first.
+        let threads = fs::read_dir(format!("/proc/{id}/task")).into_iter().flatten().flatten();
+        let of_threads = threads.map(|thread| fs::read_to_string(thread.path().join("children")));
+        let ids: Vec<String> = of_threads
+            .chain([children])
+            .flatten()
+            .flat_map(|ids| ids.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+            .collect();
+        ids.iter().any(|id| {
+            let killed = Command::new("kill").args(["-KILL", id]).status();
+            killed.is_ok_and(|status| status.success())
+        })
     }
 
     /// Checks the experiment if it has ended, and starts it anew.
@@ -238,6 +281,44 @@ impl Soak {
             let watch = std::mem::replace(&mut self.watch, self.coordinator.watch(id));
             assert_eq!(watch.finish().digests(), self.expected);
             self.n_completed += 1;
+        }
+    }
+}
+
+/// A worker that is in the way: it lies, as no other does, says that items fail, or says
+/// nothing.
+async fn intrude(url: String, name: String, fault: Fault, salt: u64) {
+    let hello = Hello { name, slots: 2, ..hello() };
+    loop {
+        let Ok(mut worker) = HandWorker::connect(&url, hello.clone()).await else {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            continue;
+        };
+        let mut heart = tokio::time::interval(Duration::from_millis(200));
+        loop {
+            let message = tokio::select! {
+                _ = heart.tick() => {
+                    worker.say(Message::Heartbeat(Heartbeat {})).await;
+                    continue;
+                }
+                message = worker.receive() => message,
+            };
+            let Ok(message) = message else { break };
+            let work_response::Message::Assignments(batch) = message else { continue };
+            for assignment in batch.assignments {
+                let outcome = match fault {
+                    Fault::LiarJoined => {
+                        let value = 0.125 + salt as f64 * 1e-6;
+                        let values = vec![value; assignment.trial_count as usize];
+                        Outcome::Fitness(TrialFitness { values })
+                    }
+                    Fault::FailureJoined => {
+                        Outcome::Failure(ItemFailure { message: "it overflowed".to_owned() })
+                    }
+                    _ => continue,
+                };
+                worker.answer(assignment.assignment_id, outcome).await;
+            }
         }
     }
 }
@@ -266,8 +347,8 @@ fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
         for fault in soak.deck() {
             soak.strike(fault);
             // Every kind of fault is to happen at least once.
-            is_over = started.elapsed() > Duration::from_secs(seconds)
-                && soak.faults.len() == FAULTS.len();
+            let n_kinds = soak.faults.values().filter(|&&n| n > 0).count();
+            is_over = started.elapsed() > Duration::from_secs(seconds) && n_kinds == FAULTS.len();
             if is_over {
                 break;
             }
@@ -275,8 +356,10 @@ fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
     }
     soak.places.iter_mut().for_each(Place::heal);
     // The workers and the coordinator live until it is finished.
-    let Soak { watch, expected, places, coordinator, .. } = soak;
+    let Soak { watch, expected, places, coordinator, faults, runtime, .. } = soak;
     assert_eq!(watch.finish().digests(), expected);
     drop((places, coordinator));
-    say(&format!("soak: {} experiments came through {:?}", soak.n_completed + 1, soak.faults));
+    runtime.shutdown_background();
+    let (n_experiments, n_faults) = (soak.n_completed + 1, faults.values().sum::<usize>());
+    say(&format!("soak: {n_experiments} experiments came through {n_faults} faults: {faults:?}"));
 }

@@ -7,9 +7,9 @@ use harness::{
 };
 use serde_json::{Value, json};
 use swarm_proto::v1::{
-    EvaluateRequest, EvaluateResponse, TrialFitness, TrialMeasures, evaluate_response::Message,
-    evaluation_service_client::EvaluationServiceClient, item_result::Outcome as Answer,
-    work_response,
+    EvaluateRequest, EvaluateResponse, Hello, TrialFitness, TrialMeasures,
+    evaluate_response::Message, evaluation_service_client::EvaluationServiceClient,
+    item_result::Outcome as Answer, work_response,
 };
 use tempfile::TempDir;
 use tonic::{Code, Status, transport::Channel};
@@ -256,7 +256,7 @@ async fn requests_that_cannot_be_computed_are_refused_at_once() {
     }
 }
 
-#[tokio::test]
+#[tokio::test(flavor = "multi_thread")]
 async fn answers_of_the_wrong_size_are_refused_and_others_compute() {
     let coordinator = CoordinatorProcess::start();
     let subject = Subject::new();
@@ -285,12 +285,16 @@ async fn answers_of_the_wrong_size_are_refused_and_others_compute() {
             "it returned fitness where measures are due",
         ),
     ] {
-        let mut worker = HandWorker::connect(&url, hello()).await.unwrap();
+        let hello = Hello { name: expected.to_owned(), ..hello() };
+        let mut worker = HandWorker::connect(&url, hello).await.unwrap();
         let batch = worker.receive_assignments().await.unwrap();
         assert_eq!(batch.output(), swarm_proto::v1::Output::Measures);
         worker.answer(batch.assignments[0].assignment_id, wrong).await;
-        let end = worker.receive_end().await;
-        assert!(end.message().contains(expected), "{end}");
+        coordinator.process.wait_for("quarantine", |line| {
+            line["level"] == "ERROR"
+                && line["name"] == expected
+                && line["reason"].as_str().is_some_and(|reason| reason.contains(expected))
+        });
     }
     let _worker = WorkerProcess::start(&coordinator, "good");
     let trials = asking.await.unwrap();

@@ -123,6 +123,8 @@ pub struct Engine {
     /// The present virtual time: that of the job that was given workers last. A job
     /// that comes back from waiting starts here, so that nobody saves up time.
     virtual_now: u128,
+    /// When there were last two workers that can audit each other, or the engine began.
+    auditors_seen: Instant,
     questions: Questions,
     quarantine: Quarantine,
     crash_loops: CrashLoops,
@@ -145,6 +147,7 @@ impl Engine {
             jobs: BTreeMap::new(),
             ready_queue: BTreeSet::new(),
             virtual_now: 0,
+            auditors_seen: now,
             questions: Questions::default(),
             quarantine: Quarantine::default(),
             crash_loops: CrashLoops::default(),
@@ -291,10 +294,12 @@ impl Engine {
             let n_items_requeued = self.forget_worker(now, id, false);
             self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
         }
+        self.note_auditors(now);
         self.write_off_stalled(now);
         self.requeue_delayed(now);
         self.wake_rested(now);
         self.ask_again(now);
+        self.finish_waived(now);
         self.assign(now);
     }
 

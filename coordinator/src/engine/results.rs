@@ -19,6 +19,10 @@ use super::{
     worker::{AssignedItem, Worker},
 };
 
+/// An audit waits for so long for a second worker to come, or to come back: else one that
+/// lies would only have to be the first that is there after the coordinator's start.
+const AUDITOR_GRACE: Duration = Duration::from_secs(30);
+
 /// Why an item has no result yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoResult {
@@ -274,6 +278,15 @@ impl Engine {
         self.ask_referee(job, item, Doubt::Disagreement { parties });
     }
 
+    /// Notes when there were last two workers that can audit each other.
+    pub(super) fn note_auditors(&mut self, now: Instant) {
+        let mut auditors = self.workers.values().filter(|worker| worker.may_audit());
+        let first = auditors.next().map(Worker::name);
+        if auditors.any(|worker| Some(worker.name()) != first) {
+            self.auditors_seen = now;
+        }
+    }
+
     /// Finishes batches whose last audits no worker can do any more.
     pub(super) fn finish_waived(&mut self, now: Instant) {
         let known = |batch: &BatchInProgress| batch.is_known_throughout();
@@ -289,14 +302,16 @@ impl Engine {
     }
 
     /// Reports a batch of which nothing is left to do. An audit for which
-    /// there is no second worker is waived, and counted as such.
+    /// there is no second worker, and has been none for a while, is waived, and counted as
+    /// such.
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
+        let is_awaited = now < self.auditors_seen + AUDITOR_GRACE;
         let workers = &self.workers;
         let has_auditor = |batch: &BatchInProgress| {
             let mut auditors = workers.values().filter(|worker| worker.may_audit());
-            auditors.any(|worker| batch.has_audit_for(worker.name()))
+            is_awaited || auditors.any(|worker| batch.has_audit_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {
             return;

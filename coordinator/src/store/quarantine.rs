@@ -1,6 +1,6 @@
 //! Workers that were proved faulty.
 
-use rusqlite::params;
+use rusqlite::{Connection, params};
 
 use super::{Result, Store};
 
@@ -43,4 +43,19 @@ impl Store {
         };
         Ok(statement.query_map([], worker)?.collect::<rusqlite::Result<_>>()?)
     }
+}
+
+/// Copies what can be read of the quarantine to another database; older ones have none.
+pub fn copy(from: &Connection, to: &Connection) -> Result<()> {
+    let Ok(mut statement) = from.prepare("SELECT name, reason, since_ms FROM quarantine") else {
+        return Ok(());
+    };
+    let row = |row: &rusqlite::Row<'_>| {
+        Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, i64>(2)?))
+    };
+    for worker in statement.query_map([], row)?.map_while(rusqlite::Result::ok) {
+        let sql = "INSERT OR IGNORE INTO quarantine VALUES (?1, ?2, ?3)";
+        to.execute(sql, worker)?;
+    }
+    Ok(())
 }

@@ -7,7 +7,7 @@ use rusqlite::{Connection, Transaction, params};
 use super::{
     super::{
         ExperimentState, GenerationRecord, NewExperiment, Result, StoreError, add_notice,
-        add_state_event, champions, checkpoints, file, history, schema,
+        add_state_event, champions, checkpoints, file, history, quarantine, schema,
         seals::{self, Sealer},
     },
     backup::{abandon, prepare},
@@ -84,6 +84,7 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
         transaction.execute_batch("RELEASE experiment")?;
         experiments.push(Recovered { id, fate, problems: inspected.problems });
     }
+    quarantine::copy(&source.connection, &transaction)?;
     // Ids are not used again, those of lost experiments neither.
     if let Some(Recovered { id, .. }) = experiments.last() {
         transaction.execute("DELETE FROM sqlite_sequence WHERE name = 'experiments'", [])?;

@@ -186,12 +186,14 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
         "UPDATE generations SET best = 9 WHERE experiment_id = 1;
          UPDATE checkpoints SET state = '{}' WHERE experiment_id = 2;
          UPDATE experiments SET config = '{}' WHERE id = 3;
-         DELETE FROM events WHERE experiment_id = 4;",
+         DELETE FROM events WHERE experiment_id = 4;
+         INSERT INTO quarantine VALUES ('lab-2', 'it lies', 7);",
     );
     let to = directory.path().join("new");
     let recovery = recover(directory.path(), &to).unwrap();
     assert_eq!(fates(&recovery), [Fate::Restarted, Fate::Restarted, Fate::Lost, Fate::Kept]);
     let mut store = Store::open(&to).unwrap();
+    assert_eq!(store.quarantined().unwrap()[0].name, "lab-2");
     for id in [1, 2].map(ExperimentId) {
         let (experiment, checkpoint) = store.resumable(id).unwrap();
         assert_eq!(experiment.state, ExperimentState::Paused);

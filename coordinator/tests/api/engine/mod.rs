@@ -236,6 +236,7 @@ fn audits_are_waived_when_there_is_no_second_worker() {
     fleet.ask(EXPERIMENT, 0, 5, 1);
     assert!(fleet.run_until(HOUR, is_finished));
     assert_eq!(fleet.evaluated[0].1.n_unaudited, 5);
+    assert!(fleet.now() >= 30 * SECOND, "a second one may be about to come");
     // A second one that leaves in the middle of it.
     let second = fleet.join(1, 0.1);
     fleet.ask(EXPERIMENT, 1, 5, 1);
