@@ -84,6 +84,8 @@ fn after_a_restart_with_less_memory_experiments_wait_for_others_to_end() {
         let waits = is_about("experiment waits for memory", *id);
         let line = coordinator.process.wait_for("wait", waits);
         assert!(line["reason"].as_str().unwrap().contains("--memory-budget"), "{line}");
+        let explained = coordinator.swarmctl(&["explain", &id.to_string()]).expect_success();
+        assert_eq!(explained.json()["findings"][0]["kind"], "memory");
     }
     let started = is_about("experiment starts", ids[1]);
     assert!(!coordinator.process.lines().iter().any(&started));

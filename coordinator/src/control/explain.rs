@@ -4,6 +4,7 @@ use crate::{
     driver::DriverEvent,
     engine::JobActivity,
     ids::ExperimentId,
+    memory::Shortage,
     queries::{self, QueryError},
     store::{Event, ExperimentRecord},
 };
@@ -17,6 +18,8 @@ pub struct Explanation {
     pub experiment: ExperimentRecord,
     /// What the fleet does for it.
     pub activity: JobActivity,
+    /// How much memory it waits for, if it does.
+    pub shortage: Option<Shortage>,
     /// Its latest notices, oldest first.
     pub notices: Vec<Event>,
     /// Why the latest write did not reach the disk, if it did not.
@@ -29,7 +32,8 @@ impl Control {
     /// Says what an experiment is doing.
     pub async fn explain(&self, id: ExperimentId) -> Result<Explanation, ControlError> {
         self.find(id).await?;
-        let activity = self.ask(|reply| DriverEvent::ActivityRequested(id, reply)).await?;
+        let (activity, shortage) =
+            self.ask(|reply| DriverEvent::ActivityRequested(id, reply)).await?;
         let read = self.store.read(move |store| {
             let experiment = queries::experiment(store, id)?;
             let notices = queries::latest_notices(store, &experiment)?;
@@ -41,6 +45,7 @@ impl Control {
             store_trouble: self.store.trouble(),
             experiment,
             activity,
+            shortage,
             notices,
         })
     }

@@ -9,6 +9,7 @@ use tokio_util::sync::CancellationToken;
 use crate::{
     engine::{Assignment, Introduction, ItemResult, JobActivity, WorkerStatus},
     ids::{AssignmentId, ExperimentId, JobId, WorkerId},
+    memory::Shortage,
     runs::{Evaluation, Request, Runnable},
 };
 
@@ -60,8 +61,9 @@ pub enum DriverEvent {
     },
     /// A client wants a genotype evaluated.
     EvaluationRequested(Box<Evaluation>, EvaluationReply),
-    /// A client wants to know what the fleet does for an experiment.
-    ActivityRequested(ExperimentId, oneshot::Sender<JobActivity>),
+    /// A client wants to know what the fleet does for an experiment, and how much memory it
+    /// waits for, if it does.
+    ActivityRequested(ExperimentId, oneshot::Sender<(JobActivity, Option<Shortage>)>),
     /// A metrics endpoint wants the numbers of all.
     StatsRequested(oneshot::Sender<StatsSnapshot>),
 }

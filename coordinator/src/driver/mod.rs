@@ -183,7 +183,8 @@ impl Driver {
                 drop(reply.send(was_there.then_some(()).ok_or(names)));
             }
             DriverEvent::ActivityRequested(id, reply) => {
-                drop(reply.send(self.engine.activity(now, id.into())));
+                let activity = self.engine.activity(now, id.into());
+                drop(reply.send((activity, self.runs.shortage(id))));
             }
             DriverEvent::StatsRequested(reply) => drop(reply.send(self.stats())),
         }

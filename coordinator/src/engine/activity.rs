@@ -61,6 +61,8 @@ pub struct BatchActivity {
     pub n_episodes_left: usize,
     /// Items that no worker has.
     pub n_items_queued: usize,
+    /// Audits that no worker has; they need one of another name than the first.
+    pub n_audits_waiting: usize,
     /// Individuals that a worker was computing when it was lost.
     pub n_individuals_failing: usize,
     /// The workers that have the other items.
@@ -130,7 +132,8 @@ impl Engine {
             trial_set: batch.trial_set(),
             n_episodes: batch.n_episodes(),
             n_episodes_left: batch.n_episodes_left(),
-            n_items_queued: batch.n_queued(),
+            n_items_queued: batch.n_waiting() - batch.n_audits_waiting(),
+            n_audits_waiting: batch.n_audits_waiting(),
             n_individuals_failing: batch.losses.n_individuals(),
             held: held.collect(),
             running_for: batch.running_for(now),

@@ -344,9 +344,12 @@ impl BatchInProgress {
 
     /// Items that wait for a worker, audits included.
     pub fn n_waiting(&self) -> usize {
-        self.queue.len()
-            + self.suspects.len()
-            + self.audits.values().map(VecDeque::len).sum::<usize>()
+        self.queue.len() + self.suspects.len() + self.n_audits_waiting()
+    }
+
+    /// Audits that wait for a worker.
+    pub fn n_audits_waiting(&self) -> usize {
+        self.audits.values().map(VecDeque::len).sum()
     }
 
     /// Items that workers have.
@@ -492,9 +495,9 @@ impl BatchInProgress {
     }
 
     /// An audit by a worker has agreed.
-    pub fn count_audited(&mut self, item: &Item, auditor: &str) {
+    pub fn count_audited(&mut self, item: &Item, auditor: Arc<str>) {
         self.n_audited += 1;
-        self.confirmed.insert(auditor.into());
+        self.confirmed.insert(auditor);
         let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
         self.confirmed.extend(self.names.get(&first).map(Arc::clone));
     }
@@ -565,12 +568,12 @@ impl BatchInProgress {
     ) -> EvaluatedBatch {
         EvaluatedBatch {
             trial_set: self.batch.trial_set,
+            n_unaudited: self.n_audits_waiting(),
             values: self.values,
             duration: now.saturating_duration_since(self.started),
             n_workers,
             idle_share: fleet_time.idle_share_since(&self.fleet_time_at_start),
             n_audited: self.n_audited,
-            n_unaudited: self.audits.values().map(VecDeque::len).sum(),
             notices,
         }
     }

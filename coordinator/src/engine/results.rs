@@ -2,7 +2,6 @@
 
 use std::{
     num::NonZeroU64,
-    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -50,22 +49,19 @@ impl Engine {
         let (job, n_trials) = (assignment.job, assignment.item.trials.len());
         let batch = self.jobs[&job].batch.as_ref();
         let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
-        let name: Arc<str> = worker.name().into();
-        if let Ok(values) = &result.outcome
-            && values.len() != n_values
-            && batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set)
-        {
-            let reason = format!("it returned {} values for {n_trials} trials", values.len());
-            self.put_in_quarantine(now, &Party { id, name }, &reason);
-            return;
-        }
-        if result.outcome.is_ok() && !self.is_due(job, result.output) {
-            let reason = match result.output {
-                Output::Fitness => "it returned fitness where measures are due",
-                Output::Measures => "it returned measures where fitness is due",
-            };
-            self.put_in_quarantine(now, &Party { id, name }, reason);
-            return;
+        let is_wanted = batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set);
+        let impossible = match &result.outcome {
+            Ok(values) if is_wanted && values.len() != n_values => {
+                Some(format!("it returned {} values for {n_trials} trials", values.len()))
+            }
+            Ok(_) if !self.is_due(job, result.output) => Some(match result.output {
+                Output::Fitness => "it returned fitness where measures are due".to_owned(),
+                Output::Measures => "it returned measures where fitness is due".to_owned(),
+            }),
+            _ => None,
+        };
+        if let Some(reason) = impossible {
+            return self.put_in_quarantine(now, &self.party(id), &reason);
         }
         let assignment = if is_in_flight {
             self.take_assignment(id, result.id)
@@ -73,13 +69,13 @@ impl Engine {
             let taken = self.update_worker(id, |worker| worker.written_off.remove(&result.id));
             taken.expect("just seen")
         };
-        let busy = self.account(now, id, &assignment, result.compute_time);
+        let is_ok = result.outcome.is_ok();
+        let busy = self.account(now, id, &assignment, result.compute_time, is_ok);
         match result.outcome {
             Ok(values) => {
                 self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
                 self.crash_loops.on_result(self.workers[&id].name());
-                self.update_worker(id, |worker| worker.is_on_probation = false);
                 if is_in_flight {
                     self.accept(now, id, &assignment, &values);
                 } else {
@@ -101,14 +97,20 @@ impl Engine {
         batch.is_none_or(|batch| batch.output() == output)
     }
 
-    /// Learns how long things take; returns how long this took, as far as it can
-    /// be true.
+    /// A connected worker, as one whose word may be in doubt.
+    fn party(&self, id: WorkerId) -> Party {
+        Party { id, name: self.workers[&id].name().into() }
+    }
+
+    /// Learns how long things take, and that a worker is at work; returns how long this
+    /// took, as far as it can be true.
     fn account(
         &mut self,
         now: Instant,
         id: WorkerId,
         assignment: &AssignedItem,
         compute_time: Duration,
+        is_ok: bool,
     ) -> Duration {
         let work = &self.jobs[&assignment.job];
         let expected = work.expected(assignment.item.trials.len(), 1.0);
@@ -118,6 +120,7 @@ impl Engine {
             worker.learn(busy, expected);
             worker.last_result = Some(now);
             worker.is_stalled = false;
+            worker.is_on_probation &= !is_ok;
             (busy, pace)
         });
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
@@ -138,11 +141,11 @@ impl Engine {
             self.on_disagreement(now, job, id, item, disagreement);
             return;
         }
-        let name = self.workers[&id].name().to_owned();
         // What was to be audited may have been discarded meanwhile.
-        let n_new = self.take_values(job, id, &name, item, values, assignment.is_audit);
+        let n_new = self.take_values(job, id, item, values, assignment.is_audit);
         if assignment.is_audit && n_new == 0 {
-            self.batch_mut(job).count_audited(item, &name);
+            let auditor = self.party(id).name;
+            self.batch_mut(job).count_audited(item, auditor);
         }
         self.update_readiness(job);
         self.finish_if_evaluated(now, job);
@@ -154,13 +157,15 @@ impl Engine {
         &mut self,
         job: JobId,
         id: WorkerId,
-        name: &str,
         item: &Item,
         values: &[f64],
         may_be_queued: bool,
     ) -> usize {
         let is_audited = self.is_audited(job, item);
-        let batch = self.batch_mut(job);
+        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
+        let batch = work.batch.as_mut().expect("the caller has seen it");
+        // The referee is nobody's name.
+        let name = self.workers.get(&id).map_or("", Worker::name);
         let n_new = batch.accept(id, name, item, values);
         if n_new > 0 && is_audited {
             batch.push_audit(item.clone());
@@ -193,8 +198,7 @@ impl Engine {
         if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
             self.on_disagreement(now, job, id, item, disagreement);
         } else if !assignment.is_audit {
-            let name = self.workers[&id].name().to_owned();
-            self.take_values(job, id, &name, item, values, true);
+            self.take_values(job, id, item, values, true);
             self.update_readiness(job);
             self.finish_if_evaluated(now, job);
         }
@@ -228,8 +232,8 @@ impl Engine {
         message: String,
     ) {
         let (job, item) = (assignment.job, assignment.item.clone());
-        let name: Arc<str> = self.workers[&id].name().into();
-        if let Some(confirmed) = self.confirms(job, &item, &name, &message) {
+        let reporter = self.party(id);
+        if let Some(confirmed) = self.confirms(job, &item, &reporter.name, &message) {
             return self.fail(job, &item, &confirmed);
         }
         // A worker whose word is in doubt already says nothing new.
@@ -238,7 +242,6 @@ impl Engine {
             self.retry(now, assignment, NoResult::TakenBack);
         }
         if !is_doubted {
-            let reporter = Party { id, name };
             self.ask_referee(job, item, Doubt::Failure { reporter, message });
         }
     }
@@ -255,7 +258,7 @@ impl Engine {
     ) {
         let Disagreement { first, first_name, trial, values: [first_values, second_values] } =
             disagreement;
-        let second = Party { id: second, name: self.workers[&second].name().into() };
+        let second = self.party(second);
         let batch = self.jobs[&job].batch.as_ref().expect("just compared");
         if first == REFEREE {
             let reason = format!(

@@ -163,7 +163,7 @@ impl Engine {
                 self.put_in_quarantine(now, &party, &reason);
             }
             if values.len() == self.batch_mut(job).n_values(item.trials.len()) {
-                self.take_values(job, REFEREE, "referee", item, values, true);
+                self.take_values(job, REFEREE, item, values, true);
             }
             self.update_readiness(job);
             self.finish_if_evaluated(now, job);

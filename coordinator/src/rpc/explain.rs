@@ -17,7 +17,8 @@ use super::convert;
 
 /// An explanation for clients.
 pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
-    let Explanation { experiment, activity, notices, store_trouble, incompatible } = explanation;
+    let Explanation { experiment, activity, shortage, notices, store_trouble, incompatible } =
+        explanation;
     let rivals = activity.rivals.into_iter().filter_map(JobId::experiment);
     ExplainExperimentResponse {
         experiment: Some(convert::experiment(experiment)),
@@ -30,6 +31,7 @@ pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
         notices: notices.into_iter().map(convert::event).collect(),
         store_trouble: store_trouble.unwrap_or_default(),
         incompatible: incompatible.unwrap_or_default(),
+        shortage: shortage.map(|shortage| shortage.to_string()).unwrap_or_default(),
     }
 }
 
@@ -56,6 +58,7 @@ fn round(activity: BatchActivity) -> Option<Round> {
         episodes: activity.n_episodes as u64,
         episodes_left: activity.n_episodes_left as u64,
         items_queued: activity.n_items_queued as u32,
+        audits_waiting: activity.n_audits_waiting as u32,
         individuals_failing: activity.n_individuals_failing as u32,
         held: activity
             .held

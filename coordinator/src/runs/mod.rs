@@ -133,13 +133,17 @@ impl Runs {
 
     /// Tells the owner of a run that waits for memory.
     fn report_shortage(&mut self, id: ExperimentId) {
-        let in_use = self.memory_in_use();
-        let Some(run) = self.runs.get(&id).filter(|run| run.is_waiting()) else { return };
-        let Err(shortage) = Shortage::check(run.memory, in_use, self.memory_budget) else { return };
+        let Some(shortage) = self.shortage(id) else { return };
         let reason = format!("waits for memory: {shortage}");
         self.commands.push_back(Command::PublishWait { experiment: id, shortage });
         let change = Change::Notice(reason);
         self.change(PendingChange { experiment: id, change, requests: Vec::new() });
+    }
+
+    /// What a run waits for, if it waits for memory.
+    pub fn shortage(&self, id: ExperimentId) -> Option<Shortage> {
+        let run = self.runs.get(&id).filter(|run| run.is_waiting())?;
+        Shortage::check(run.memory, self.memory_in_use(), self.memory_budget).err()
     }
 
     /// Bytes of the runs that are loaded.

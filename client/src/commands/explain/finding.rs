@@ -31,6 +31,7 @@ pub enum Kind {
     Paused,
     Incompatible,
     StoreTrouble,
+    Memory,
     NoWorkers,
     NoWorkersAvailable,
     Quarantine,
@@ -39,6 +40,7 @@ pub enum Kind {
     RefereeTrouble,
     IndividualsFailing,
     Queued,
+    Audits,
     Barrier,
     Computing,
     BetweenGenerations,
@@ -87,11 +89,20 @@ pub fn findings(
         let steps = ["free space on its disk; it tries again by itself".to_owned()];
         findings.push(finding(Kind::StoreTrouble, what, steps));
     }
+    if !answer.shortage.is_empty() {
+        let what = format!("it waits for memory: {}", answer.shortage);
+        let steps = [
+            "see the others: swarmctl list".to_owned(),
+            "or cancel one: swarmctl cancel ID".to_owned(),
+        ];
+        findings.push(finding(Kind::Memory, what, steps));
+        return findings;
+    }
     findings.extend(of_workers(answer, address));
     findings.extend(of_withheld(answer));
     findings.extend(of_questions(answer));
     match &answer.round {
-        Some(round) => findings.extend(of_round(id, round, answer)),
+        Some(round) => findings.extend(of_round(id, round, answer, address)),
         None => {
             let what = "between generations: the algorithm is updated and the generation is stored";
             findings.push(finding(Kind::BetweenGenerations, what, []));
@@ -171,7 +182,12 @@ fn of_questions(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     findings
 }
 
-fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<Finding> {
+fn of_round(
+    id: u64,
+    round: &Round,
+    answer: &ExplainExperimentResponse,
+    address: &str,
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     if round.individuals_failing > 0 {
         let individuals = text::counted(round.individuals_failing.into(), "individual");
@@ -220,6 +236,13 @@ fn of_round(id: u64, round: &Round, answer: &ExplainExperimentResponse) -> Vec<F
             text::counted(round.held.len() as u64, "worker"),
         );
         findings.push(finding(Kind::Computing, what, look(round)));
+    } else if round.items_queued == 0 && round.audits_waiting > 0 {
+        let what = format!(
+            "waiting for a second worker to audit {}; without one, they are skipped after 30 s",
+            text::counted(round.audits_waiting.into(), "item"),
+        );
+        let steps = [format!("start another: worker --coordinator {address}")];
+        findings.push(finding(Kind::Audits, what, steps));
     }
     findings
 }
@@ -313,6 +336,11 @@ mod tests {
         assert_eq!(kinds(running(), &shared), [Kind::Queued]);
         let full = ExplainExperimentResponse { store_trouble: "disk".into(), ..healthy() };
         assert_eq!(kinds(running(), &full), [Kind::StoreTrouble, Kind::Computing]);
+        let round = Round { audits_waiting: 2, ..Round::default() };
+        let audited = ExplainExperimentResponse { round: Some(round), ..healthy() };
+        assert_eq!(kinds(running(), &audited), [Kind::Audits]);
+        let large = ExplainExperimentResponse { shortage: "9 MiB".into(), ..healthy() };
+        assert_eq!(kinds(running(), &large), [Kind::Memory]);
         let other = ExplainExperimentResponse { incompatible: "older".into(), ..healthy() };
         assert_eq!(kinds(running(), &other), [Kind::Incompatible]);
         let between = ExplainExperimentResponse { round: None, ..healthy() };
