@@ -358,6 +358,11 @@ fn any_mix_of_faults_comes_to_the_undisturbed_digest() {
     // The workers and the coordinator live until it is finished.
     let Soak { watch, expected, places, coordinator, faults, runtime, .. } = soak;
     assert_eq!(watch.finish().digests(), expected);
+    let database = coordinator.database();
+    let mut names = database.prepare("SELECT name FROM quarantine").unwrap();
+    let names = names.query_map([], |row| row.get::<_, String>(0)).unwrap();
+    let names: Vec<String> = names.map(Result::unwrap).collect();
+    assert!(names.iter().all(|name| name.starts_with("intruder-")), "wrongly accused: {names:?}");
     drop((places, coordinator));
     runtime.shutdown_background();
     let (n_experiments, n_faults) = (soak.n_completed + 1, faults.values().sum::<usize>());

@@ -44,6 +44,8 @@ pub const KEEPALIVE: Duration = Duration::from_secs(20);
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
 /// Time for which the referee's process is kept when it is not asked anything.
 pub const REFEREE_IDLE_TIME: Duration = Duration::from_secs(30);
+/// Time for the referee to compute an item.
+pub const REFEREE_TIMEOUT: Duration = Duration::from_secs(1800);
 /// Time for open streams to end at shutdown.
 pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 

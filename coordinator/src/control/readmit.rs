@@ -7,8 +7,6 @@ use super::{Control, ControlError};
 impl Control {
     /// Lets a worker out of quarantine: it is given items again.
     pub async fn readmit(&self, name: &str) -> Result<(), ControlError> {
-        let out = name.to_owned();
-        self.store.try_write(move |store| store.readmit(&out)).await?;
         let told = self
             .ask(|reply| DriverEvent::WorkerReadmitted { name: name.to_owned(), reply })
             .await?;

@@ -52,12 +52,12 @@ pub enum DriverEvent {
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
-    /// A client has let a worker out of quarantine, as far as the store is concerned.
+    /// A client lets a worker out of quarantine.
     WorkerReadmitted {
         /// What it calls itself.
         name: String,
-        /// Gets the names of those that are there if it is not.
-        reply: oneshot::Sender<Result<(), Vec<String>>>,
+        /// Answered when it is stored.
+        reply: ReadmissionReply,
     },
     /// A client wants a genotype evaluated.
     EvaluationRequested(Box<Evaluation>, EvaluationReply),
@@ -71,6 +71,9 @@ pub enum DriverEvent {
 /// Gets the numbers of all trials, one trial after the other, or why there are none.
 /// A dropped receiver ends the evaluation.
 pub type EvaluationReply = oneshot::Sender<Result<Vec<f64>, String>>;
+
+/// Gets the names of those that are in quarantine if the worker is not.
+pub type ReadmissionReply = oneshot::Sender<Result<(), Vec<String>>>;
 
 /// What a worker says after its introduction.
 #[derive(Debug)]

@@ -7,16 +7,20 @@
 //! may take long runs beside it, in [`tasks`].
 
 mod events;
+mod questions;
 mod stats;
 mod tasks;
 mod workers;
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    time::Duration,
+};
 
 use swarm_telemetry::Histogram;
 use tokio::{
     sync::{mpsc, oneshot},
-    task::{AbortHandle, JoinSet},
+    task::JoinSet,
     time::MissedTickBehavior,
 };
 use tokio_util::sync::CancellationToken;
@@ -31,12 +35,13 @@ use crate::{
     runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
     store::{ExperimentState, QuarantinedWorker},
-    text::printable,
 };
 
 pub use events::{
-    DriverEvent, EvaluationReply, EventSender, ToWorker, WorkerLink, WorkerMessage, channel,
+    DriverEvent, EvaluationReply, EventSender, ReadmissionReply, ToWorker, WorkerLink,
+    WorkerMessage, channel,
 };
+use questions::{Question, Questions};
 pub use stats::StatsSnapshot;
 use tasks::{Disk, Done};
 use workers::ConnectedWorkers;
@@ -61,10 +66,19 @@ pub struct Driver {
     /// The clients that wait for an evaluation.
     evaluations: BTreeMap<EvaluationId, EvaluationReply>,
     tasks: JoinSet<Done>,
-    referee: Referee,
-    /// What the referee is asked; aborted when the answer is not wanted any more.
-    questions: BTreeMap<QuestionId, AbortHandle>,
-    verdicts: JoinSet<(QuestionId, Verdict)>,
+    questions: Questions,
+    /// Who enters and leaves quarantine and is not stored yet; the first is being written.
+    quarantine_changes: VecDeque<QuarantineChange>,
+}
+
+/// Who enters or leaves quarantine.
+enum QuarantineChange {
+    Add(QuarantinedWorker),
+    /// The client is told when it is stored.
+    Remove {
+        name: String,
+        reply: ReadmissionReply,
+    },
 }
 
 /// How a loop works.
@@ -108,9 +122,8 @@ impl Driver {
             n_requests: 0,
             evaluations: BTreeMap::new(),
             tasks: JoinSet::new(),
-            referee,
-            questions: BTreeMap::new(),
-            verdicts: JoinSet::new(),
+            questions: Questions::new(referee),
+            quarantine_changes: VecDeque::new(),
         }
     }
 
@@ -123,9 +136,7 @@ impl Driver {
                 () = self.shutdown.cancelled() => break,
                 Some(event) = self.events.recv() => self.on_event(event),
                 Some(done) = self.tasks.join_next() => self.on_task_done(done),
-                Some(Ok((question, verdict))) = self.verdicts.join_next() => {
-                    self.questions.remove(&question);
-                    let verdict = verdict.map_text(|text| printable(&text));
+                (question, verdict) = self.questions.answer() => {
                     log_verdict(question, &verdict);
                     self.engine.on_verdict(clock::now(), question, verdict);
                 }
@@ -138,7 +149,7 @@ impl Driver {
         }
         // Dropping the links ends the workers' streams.
         self.workers.clear();
-        self.verdicts.shutdown().await;
+        self.questions.shutdown().await;
         self.runs.on_shutdown();
         while let Some(done) = self.tasks.join_next().await {
             self.on_task_done(done);
@@ -175,12 +186,13 @@ impl Driver {
                 drop(reply.send(self.engine.worker_status(now)));
             }
             DriverEvent::WorkerReadmitted { name, reply } => {
-                let was_there = self.engine.on_readmitted(now, &name);
-                if was_there {
+                if self.engine.on_readmitted(now, &name) {
                     info!(name, "worker is readmitted");
+                    self.change_quarantine(QuarantineChange::Remove { name, reply });
+                } else {
+                    let names = self.engine.quarantine().map(|(name, _)| name.to_owned());
+                    drop(reply.send(Err(names.collect())));
                 }
-                let names = self.engine.quarantine().map(|(name, _)| name.to_owned()).collect();
-                drop(reply.send(was_there.then_some(()).ok_or(names)));
             }
             DriverEvent::ActivityRequested(id, reply) => {
                 let activity = self.engine.activity(now, id.into());
@@ -212,12 +224,41 @@ impl Driver {
         }
     }
 
+    fn change_quarantine(&mut self, change: QuarantineChange) {
+        self.quarantine_changes.push_back(change);
+        if self.quarantine_changes.len() == 1 {
+            self.write_quarantine();
+        }
+    }
+
+    /// Stores the next change of the quarantine: they must not overtake each other.
+    fn write_quarantine(&mut self) {
+        if let Some(change) = self.quarantine_changes.front() {
+            let write = match change {
+                QuarantineChange::Add(worker) => tasks::QuarantineWrite::Add(worker.clone()),
+                QuarantineChange::Remove { name, .. } => {
+                    tasks::QuarantineWrite::Remove(name.clone())
+                }
+            };
+            self.tasks.spawn(tasks::write_quarantine(write, self.disk.clone()));
+        }
+    }
+
     fn on_task_done(&mut self, done: Result<Done, tokio::task::JoinError>) {
         match done {
             Ok(Done::Loaded(run, loaded)) => self.runs.on_loaded(run, loaded),
             Ok(Done::Concluded(run, conclusion)) => self.runs.on_concluded(run, conclusion),
             Ok(Done::Committed(run, outcome)) => self.runs.on_committed(run, outcome),
-            Ok(Done::QuarantineWritten) => {}
+            Ok(Done::QuarantineWritten) => {
+                if let Some(QuarantineChange::Remove { reply, .. }) =
+                    self.quarantine_changes.pop_front()
+                {
+                    // A client that has stopped waiting need not be told.
+                    drop(reply.send(Ok(())));
+                }
+                self.write_quarantine();
+            }
+            Ok(Done::QuarantineNotWritten) => self.quarantine_changes.clear(),
             Ok(Done::ChangeWritten(id, is_stored)) => self.runs.on_change_written(id, is_stored),
             // Its run, or its client, would wait for ever. At the next start every
             // experiment goes on from its last commit.
@@ -317,28 +358,20 @@ impl Driver {
             Command::FinishBatch { job: JobId::Evaluation(id), mut evaluated } => {
                 self.runs.on_evaluation_finished(id, Ok(evaluated.values.swap_remove(0)));
             }
-            Command::AskReferee { question, spec, trial_set, output, genotype, trials } => {
+            Command::AskReferee { question: id, spec, trial_set, output, genotype, trials } => {
                 let specification = spec;
-                let genotype = genotype.to_vec();
-                let request = RefereeRequest { specification, genotype, trial_set, trials, output };
-                let referee = self.referee.clone();
-                let asking = self
-                    .verdicts
-                    .spawn(async move { (question, referee.evaluate(&request).await) });
-                self.questions.insert(question, asking);
+                let request =
+                    RefereeRequest { specification, genotype: vec![], trial_set, trials, output };
+                self.questions.ask(Question { id, genotype, request });
             }
-            Command::WithdrawQuestion { question } => {
-                if let Some(asking) = self.questions.remove(&question) {
-                    asking.abort();
-                }
-            }
+            Command::WithdrawQuestion { question } => self.questions.withdraw(question),
             Command::Quarantine { name, reason } => {
                 error!(
                     name,
                     reason, "worker is faulty: it is given nothing until it is readmitted"
                 );
                 let worker = QuarantinedWorker { name, reason };
-                self.tasks.spawn(tasks::quarantine(worker, self.disk.clone()));
+                self.change_quarantine(QuarantineChange::Add(worker));
             }
             Command::FailJob { job: JobId::Evaluation(id), reason } => {
                 error!(evaluation = %id, reason, "evaluation failed");

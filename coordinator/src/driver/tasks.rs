@@ -32,8 +32,10 @@ pub enum Done {
     Concluded(RunId, Result<Next, String>),
     /// A commit is over.
     Committed(RunId, CommitOutcome),
-    /// That a worker is in quarantine is stored, or the coordinator stops.
+    /// A change of the quarantine is stored.
     QuarantineWritten,
+    /// The coordinator stops before it is.
+    QuarantineNotWritten,
     /// The write of a change is over; whether it is stored.
     ChangeWritten(ExperimentId, bool),
 }
@@ -170,14 +172,32 @@ pub async fn write_change(id: ExperimentId, change: Change, disk: Disk) -> Done 
     Done::ChangeWritten(id, is_stored)
 }
 
-/// Remembers that a worker is in quarantine.
-pub async fn quarantine(worker: QuarantinedWorker, disk: Disk) -> Done {
+/// A change of the quarantine.
+#[derive(Debug, Clone)]
+pub enum QuarantineWrite {
+    /// A worker is in it.
+    Add(QuarantinedWorker),
+    /// The worker of this name is not any more.
+    Remove(String),
+}
+
+/// Stores a change of the quarantine.
+pub async fn write_quarantine(change: QuarantineWrite, disk: Disk) -> Done {
     let now_ms = clock::unix_ms();
-    let what = format!("the quarantine of worker \"{}\"", worker.name);
-    // If the coordinator stops before it is written, the worker is found out again.
-    let write = move |store: &mut Store| store.quarantine(&worker, now_ms);
-    let _ = disk.store.write(&disk.shutdown, &what, Retry::Always, write).await;
-    Done::QuarantineWritten
+    let what = match &change {
+        QuarantineWrite::Add(worker) => format!("the quarantine of worker \"{}\"", worker.name),
+        QuarantineWrite::Remove(name) => format!("the readmission of worker \"{name}\""),
+    };
+    let write = move |store: &mut Store| match &change {
+        QuarantineWrite::Add(worker) => store.quarantine(worker, now_ms),
+        QuarantineWrite::Remove(name) => store.readmit(name),
+    };
+    // If the coordinator stops before it is written, a faulty worker is found out again, and a
+    // client that readmits one is not told that it is done.
+    match disk.store.write(&disk.shutdown, &what, Retry::Always, write).await {
+        Written::Yes => Done::QuarantineWritten,
+        Written::NotWanted | Written::Never(_) => Done::QuarantineNotWritten,
+    }
 }
 
 /// The line by which people follow a run.

@@ -184,8 +184,11 @@ impl BatchInProgress {
     pub fn discard(&mut self, name: &str) {
         self.audits.remove(name);
         self.confirmed.remove(name);
-        let by: BTreeSet<WorkerId> =
-            self.names.iter().filter(|(_, of)| ***of == *name).map(|(&id, _)| id).collect();
+        let its = self.names.extract_if(.., |_, of| **of == *name);
+        let by: BTreeSet<WorkerId> = its.map(|(id, _)| id).collect();
+        if by.is_empty() {
+            return;
+        }
         for individual in 0..self.values.len() as u32 {
             let is_its =
                 |trial: u32| by.contains(&self.evaluated_by[self.index(individual, trial)]);
@@ -203,18 +206,19 @@ impl BatchInProgress {
         }
     }
 
-    /// Takes what has become known of an individual out of the queues.
-    pub fn remove_known(&mut self, individual: u32) {
+    /// Takes what is known or held back of an individual out of the queues.
+    pub fn unqueue(&mut self, individual: u32) {
         let queues = [mem::take(&mut self.queue), mem::take(&mut self.suspects)];
         let [queue, suspects] = queues.map(|queue| {
-            let parts = queue.into_iter().flat_map(|item| {
+            let mut rest = VecDeque::with_capacity(queue.len());
+            for item in queue {
                 if item.individual == individual {
-                    self.parts(&item, |trial| !self.is_known(individual, trial))
+                    rest.extend(self.unclaimed(&item));
                 } else {
-                    vec![item]
+                    rest.push_back(item);
                 }
-            });
-            parts.collect::<VecDeque<Item>>()
+            }
+            rest
         });
         self.n_trials_queued = queue.iter().map(|item| item.trials.len()).sum();
         (self.queue, self.suspects) = (queue, suspects);
@@ -222,7 +226,9 @@ impl BatchInProgress {
 
     /// Gives an item to no worker until [`Self::release`].
     pub fn hold_back(&mut self, item: Item) {
+        let individual = item.individual;
         self.held_back.push(item);
+        self.unqueue(individual);
     }
 
     /// Takes back [`Self::hold_back`]; whether it was in force.
@@ -372,9 +378,16 @@ impl BatchInProgress {
         self.audits.keys().any(|first| **first != *name)
     }
 
-    /// Takes the first audit that a worker of this name may do.
-    pub fn pop_audit_for(&mut self, name: &str) -> Option<Item> {
-        let (first, items) = self.audits.iter_mut().find(|(first, _)| ***first != *name)?;
+    /// Whether there is one of values whose worker is not in doubt already.
+    pub fn has_clear_audit_for(&self, name: &str, doubted: &Doubted) -> bool {
+        self.audits.keys().any(|first| **first != *name && !doubted.contains_key(first))
+    }
+
+    /// Takes the first such audit.
+    pub fn pop_audit_for(&mut self, name: &str, doubted: &Doubted) -> Option<Item> {
+        let mut audits = self.audits.iter_mut();
+        let (first, items) =
+            audits.find(|(first, _)| ***first != *name && !doubted.contains_key(*first))?;
         let item = items.pop_front();
         if items.is_empty() {
             let first = Arc::clone(first);
@@ -433,12 +446,26 @@ impl BatchInProgress {
             .map(|holder| (holder.worker, holder.assignment_id))
     }
 
-    /// Queues an audit; the first worker is the one whose result is known.
-    pub fn push_audit(&mut self, item: Item) {
-        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
-        if let Some(name) = self.names.get(&first) {
-            self.audits.entry(Arc::clone(name)).or_default().push_back(item);
+    /// Queues an audit of what workers have computed of an item, in parts that are each
+    /// one worker's.
+    pub fn push_audit(&mut self, item: &Item) {
+        let mut start = item.trials.start;
+        while start < item.trials.end {
+            let by = |trial| self.evaluated_by[self.index(item.individual, trial)];
+            let first = by(start);
+            let end = (start..item.trials.end).find(|&trial| by(trial) != first);
+            let end = end.unwrap_or(item.trials.end);
+            if let Some(name) = self.names.get(&first) {
+                let part = Item { individual: item.individual, trials: start..end };
+                self.audits.entry(Arc::clone(name)).or_default().push_back(part);
+            }
+            start = end;
         }
+    }
+
+    /// The parts of an item without a result.
+    pub fn unknown(&self, item: &Item) -> Vec<Item> {
+        self.parts(item, |trial| !self.is_known(item.individual, trial))
     }
 
     /// The name of the worker whose values for an item are known.
@@ -620,6 +647,9 @@ impl BatchInProgress {
         }
     }
 }
+
+/// The names of workers whose word is in doubt, and for how many questions.
+pub type Doubted = BTreeMap<Arc<str>, usize>;
 
 /// Whether numbers agree in every bit.
 pub fn same_bits(a: &[f64], b: &[f64]) -> bool {

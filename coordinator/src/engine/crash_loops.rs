@@ -16,6 +16,9 @@ const REST_MAX: Duration = Duration::from_secs(30);
 /// A worker that stays away for so long is forgotten.
 const MEMORY: Duration = Duration::from_secs(600);
 
+/// Names above which those of long ago are forgotten.
+const N_REMEMBERED: usize = 1024;
+
 /// Losses by the worker's name, since its last result.
 #[derive(Debug, Default)]
 pub struct CrashLoops {
@@ -31,7 +34,9 @@ struct CrashLoop {
 impl CrashLoops {
     /// A worker was lost.
     pub fn on_lost(&mut self, now: Instant, name: &str) {
-        self.by_name.retain(|_, crash_loop| now < crash_loop.last + MEMORY);
+        if self.by_name.len() >= N_REMEMBERED {
+            self.by_name.retain(|_, crash_loop| now < crash_loop.last + MEMORY);
+        }
         let crash_loop =
             self.by_name.entry(name.to_owned()).or_insert(CrashLoop { n_losses: 0, last: now });
         crash_loop.n_losses += 1;

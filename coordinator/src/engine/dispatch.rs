@@ -79,7 +79,9 @@ impl Engine {
             let item = match source {
                 Source::Audits => {
                     let name = self.workers[&worker].name().to_owned();
-                    self.batch_mut(job).pop_audit_for(&name)
+                    let work = self.jobs.get_mut(&job).expect("just seen");
+                    let batch = work.batch.as_mut().expect("just seen");
+                    batch.pop_audit_for(&name, &self.doubted)
                 }
                 Source::Suspects => self.batch_mut(job).pop_suspect(),
                 Source::Queue => {
@@ -101,8 +103,9 @@ impl Engine {
         }
     }
 
-    /// The job whose item is next, the worker that gets it, and where it is. A job that waits for a free slot keeps its place: if others went on
-    /// handing out ahead, no slot would ever be free.
+    /// The job whose item is next, the worker that gets it, and where it is. A job whose
+    /// next item waits for a free slot ends the search: if later jobs were served ahead, no
+    /// slot would become free.
     fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
         let available = &self.load_index.available;
         let &(load, _, first) = available.first()?;
@@ -110,7 +113,9 @@ impl Engine {
             let Some(batch) = &self.jobs[&id].batch else { continue };
             if batch.has_audits() {
                 let mut workers = available.iter().map(|&(.., worker)| worker);
-                let may = |id: &WorkerId| batch.has_audit_for(self.workers[id].name());
+                let may = |id: &WorkerId| {
+                    batch.has_clear_audit_for(self.workers[id].name(), &self.doubted)
+                };
                 if let Some(auditor) = workers.find(may) {
                     return Some((id, auditor, Source::Audits));
                 }

@@ -26,6 +26,8 @@ const SUSPECT: usize = 2;
 pub struct LossRecord {
     /// By individual and trial, where there are any.
     by_trial: BTreeMap<(u32, u32), Vec<Loss>>,
+    /// The same by the process that was lost.
+    by_process: BTreeMap<NonZeroU64, Vec<(u32, u32)>>,
 }
 
 /// What is done with an item whose worker was lost.
@@ -61,7 +63,13 @@ impl LossRecord {
             let losses = self.by_trial.entry((item.individual, trial)).or_default();
             match losses.last() {
                 Some(last) if now <= last.at + SAME_LOSS => same_until = Some(last.at + SAME_LOSS),
-                _ => losses.push(Loss { at: now, process }),
+                _ => {
+                    losses.push(Loss { at: now, process });
+                    if let Some(process) = process {
+                        let trials = self.by_process.entry(process).or_default();
+                        trials.push((item.individual, trial));
+                    }
+                }
             }
         }
         if let Some(until) = same_until {
@@ -91,10 +99,14 @@ impl LossRecord {
 
     /// A process is back, so that nothing has taken it down.
     pub fn on_process_joined(&mut self, process: NonZeroU64) {
-        self.by_trial.retain(|_, losses| {
-            losses.retain(|loss| loss.process != Some(process));
-            !losses.is_empty()
-        });
+        for trial in self.by_process.remove(&process).unwrap_or_default() {
+            if let Some(losses) = self.by_trial.get_mut(&trial) {
+                losses.retain(|loss| loss.process != Some(process));
+                if losses.is_empty() {
+                    self.by_trial.remove(&trial);
+                }
+            }
+        }
     }
 }
 

@@ -30,9 +30,9 @@
 //!   the results of a batch.
 //! - Trouble with workers is settled by proof, and never fails a job. What an item comes
 //!   to is the same everywhere, so the *referee*, a process of the coordinator's, is asked
-//!   ([`questions`]): when a worker reports a failure; when two results for the same place
+//!   (`questions`): when a worker reports a failure; when two results for the same place
 //!   differ in their bits; when workers were lost again and again with the same item
-//!   ([`losses`]). If the item fails there, too, it fails its job, and no other. A worker
+//!   (`losses`). If the item fails there, too, it fails its job, and no other. A worker
 //!   whose word was wrong is put in quarantine, and what it computed for the batch is
 //!   computed again. To find such workers, a share of the individuals can be audited:
 //!   computed by a second worker, too, if there is one.
@@ -71,7 +71,7 @@ use crate::{
 };
 
 pub use activity::{BatchActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker};
-use batch::BatchInProgress;
+use batch::{BatchInProgress, Doubted};
 use crash_loops::CrashLoops;
 use dispatch::Outgoing;
 use fleet_time::FleetTime;
@@ -126,6 +126,7 @@ pub struct Engine {
     /// When there were last two workers that can audit each other, or the engine began.
     auditors_seen: Instant,
     questions: Questions,
+    doubted: Doubted,
     quarantine: Quarantine,
     crash_loops: CrashLoops,
     outgoing: Outgoing,
@@ -149,6 +150,7 @@ impl Engine {
             virtual_now: 0,
             auditors_seen: now,
             questions: Questions::default(),
+            doubted: Doubted::new(),
             quarantine: Quarantine::default(),
             crash_loops: CrashLoops::default(),
             outgoing: Outgoing::default(),
@@ -381,9 +383,16 @@ impl Engine {
         // one per slot. A worker that said goodbye was not taken down.
         let n_items = worker.in_flight.len();
         let n_computing = n_items - worker.n_waiting();
-        let n_suspects = if is_evidence && !worker.is_draining { n_computing } else { 0 };
+        let is_evidence = is_evidence && !worker.is_draining;
+        let n_suspects = if is_evidence { n_computing } else { 0 };
         let process = worker.introduction.process;
-        let lost = NoResult::WorkerLost { process, is_alone: n_computing == 1 };
+        let is_alone = n_computing + worker.written_off.len() == 1;
+        let lost = NoResult::WorkerLost { process, is_alone };
+        if is_evidence {
+            for assignment in worker.written_off.into_values() {
+                self.on_written_off_lost(now, &assignment, lost);
+            }
+        }
         // Later items first, so that the earliest ends up at the queue's front.
         for (age_rank, (assignment_id, assignment)) in
             worker.in_flight.into_iter().enumerate().rev()
@@ -422,13 +431,15 @@ impl Engine {
                 let ours = worker.in_flight.extract_if(.., |_, a| a.job == id);
                 audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
                 worker.written_off.retain(|_, assignment| assignment.job != id);
+                // Nothing is left that it could answer.
+                worker.is_stalled &= !worker.written_off.is_empty();
                 self.load_index.add(worker_id, worker);
                 self.commands.push_back(Command::SendEnd { worker: worker_id, job: id });
             }
         }
         if let Some(batch) = &mut work.batch {
             batch.requeue_all();
-            audits.into_iter().for_each(|item| batch.push_audit(item));
+            audits.iter().for_each(|item| batch.push_audit(item));
         }
     }
 

@@ -4,6 +4,9 @@ use std::{collections::BTreeMap, num::NonZeroU64};
 
 use super::Introduction;
 
+/// Most workers that are remembered; of more, only the connections get nothing.
+const N_MAX: usize = 4096;
+
 /// The faulty workers, by name: one that is started again is the same machine.
 #[derive(Debug, Default)]
 pub struct Quarantine {
@@ -18,17 +21,20 @@ struct Entry {
 }
 
 impl Quarantine {
-    /// Adds a worker; whether it was not there.
+    /// Adds a worker; whether it was not there, and there is room.
     pub fn add(&mut self, name: &str, process: Option<NonZeroU64>, reason: &str) -> bool {
-        let is_new = !self.by_name.contains_key(name);
+        let is_new = !self.by_name.contains_key(name) && self.by_name.len() < N_MAX;
+        if !is_new {
+            return false;
+        }
         let entry = Entry { process, reason: reason.to_owned() };
         self.by_name.entry(name.to_owned()).or_insert(entry);
         is_new
     }
 
-    /// Lets a worker out; whether it was there.
-    pub fn remove(&mut self, name: &str) -> bool {
-        self.by_name.remove(name).is_some()
+    /// Lets a worker out; the reason why it was there, if it was.
+    pub fn remove(&mut self, name: &str) -> Option<String> {
+        self.by_name.remove(name).map(|entry| entry.reason)
     }
 
     /// Why a worker is in quarantine, if it is.

@@ -20,6 +20,8 @@ use super::{Command, OpenQuestion, SharedGenotype, item::Item};
 /// Processes that an item must take down before it is to blame: one may be killed by
 /// chance, or by a system that is short of memory.
 const N_DEATHS: u32 = 3;
+/// Time between them: what kills one by chance is over by then.
+const DEATH_DELAY: Duration = Duration::from_secs(5);
 /// Time after which a referee that could not answer is asked again; doubles with each.
 const FIRST_DELAY: Duration = Duration::from_secs(1);
 /// The longest.
@@ -142,7 +144,7 @@ impl Question {
     /// The referee's process died over it; whether that is the item's fault.
     pub fn on_death(&mut self, now: Instant) -> bool {
         self.n_deaths += 1;
-        self.ask_again = Some(now + FIRST_DELAY);
+        self.ask_again = Some(now + DEATH_DELAY);
         self.n_deaths >= N_DEATHS
     }
 

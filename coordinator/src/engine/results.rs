@@ -15,12 +15,16 @@ use super::{
     item::Item,
     losses::AfterLoss,
     questions::{Doubt, Party},
+    verdicts::wrong,
     worker::{AssignedItem, Worker},
 };
 
 /// An audit waits for so long for a second worker to come, or to come back: else one that
 /// lies would only have to be the first that is there after the coordinator's start.
 const AUDITOR_GRACE: Duration = Duration::from_secs(30);
+
+/// Questions of a job, at a time, about items that workers were lost with.
+const LOSS_QUESTIONS_MAX: usize = 4;
 
 /// Why an item has no result yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +80,7 @@ impl Engine {
                 self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
                 self.crash_loops.on_result(self.workers[&id].name());
-                if is_in_flight {
+                if is_in_flight && is_wanted {
                     self.accept(now, id, &assignment, &values);
                 } else {
                     self.accept_late(now, id, &assignment, &values);
@@ -117,14 +121,18 @@ impl Engine {
         let (busy, pace) = self.update_worker(id, |worker| {
             let busy = worker.time.add_result(now, assignment.assigned, compute_time);
             let pace = worker.pace;
-            worker.learn(busy, expected);
+            if is_ok {
+                worker.learn(busy, expected);
+            }
             worker.last_result = Some(now);
             worker.is_stalled = false;
             worker.is_on_probation &= !is_ok;
             (busy, pace)
         });
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
-        work.learn(&assignment.item, busy, pace);
+        if is_ok {
+            work.learn(&assignment.item, busy, pace);
+        }
         self.correct_charge(assignment.job, assignment.charge, busy);
         busy
     }
@@ -133,7 +141,7 @@ impl Engine {
         let (job, item) = (assignment.job, &assignment.item);
         if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
             if assignment.is_audit {
-                self.batch_mut(job).push_audit(item.clone());
+                self.batch_mut(job).push_audit(item);
                 self.update_readiness(job);
             } else {
                 self.requeue(job, item);
@@ -145,7 +153,13 @@ impl Engine {
         let n_new = self.take_values(job, id, item, values, assignment.is_audit);
         if assignment.is_audit && n_new == 0 {
             let auditor = self.party(id).name;
-            self.batch_mut(job).count_audited(item, auditor);
+            let batch = self.batch_mut(job);
+            if batch.computed_by(item) == Some(&auditor) {
+                // What it was to audit is gone, and its own value in the place.
+                batch.push_audit(item);
+            } else {
+                batch.count_audited(item, auditor);
+            }
         }
         self.update_readiness(job);
         self.finish_if_evaluated(now, job);
@@ -166,12 +180,11 @@ impl Engine {
         let batch = work.batch.as_mut().expect("the caller has seen it");
         // The referee is nobody's name.
         let name = self.workers.get(&id).map_or("", Worker::name);
+        let new = if is_audited { batch.unknown(item) } else { Vec::new() };
         let n_new = batch.accept(id, name, item, values);
-        if n_new > 0 && is_audited {
-            batch.push_audit(item.clone());
-        }
-        if may_be_queued {
-            batch.remove_known(item.individual);
+        new.iter().for_each(|part| batch.push_audit(part));
+        if may_be_queued && n_new > 0 {
+            batch.unqueue(item.individual);
         }
         for (holder, assignment_id) in batch.redundant(item.individual) {
             self.recall(holder, assignment_id);
@@ -261,12 +274,8 @@ impl Engine {
         let second = self.party(second);
         let batch = self.jobs[&job].batch.as_ref().expect("just compared");
         if first == REFEREE {
-            let reason = format!(
-                "it returned {second_values:?} for trial {trial} of individual {} of {}, and \
-                 the referee {first_values:?}",
-                item.individual,
-                batch.name(),
-            );
+            let place = format!("trial {trial} of individual {}", item.individual);
+            let reason = wrong(&second_values, &first_values, &place, &batch.name());
             return self.put_in_quarantine(now, &second, &reason);
         }
         let is_doubted =
@@ -339,7 +348,7 @@ impl Engine {
         self.counters.n_items_requeued += 1;
         if is_audit {
             // It may have been the second worker that made an audit possible.
-            batch.push_audit(item);
+            batch.push_audit(&item);
             self.update_readiness(id);
             return;
         }
@@ -351,11 +360,44 @@ impl Engine {
         };
         match next {
             AfterLoss::Wait(until) => batch.delay(item, until),
-            AfterLoss::Ask if batch.duplicable(&item).as_ref() == Some(&item) => {
+            AfterLoss::Ask if self.may_ask_about_losses(id, &item) => {
                 self.ask_referee(id, item, Doubt::Losses);
             }
             AfterLoss::Ask | AfterLoss::Retry => self.requeue(id, &item),
         }
+    }
+
+    /// Others have what a lost worker was computing, but it may have taken the worker down.
+    pub(super) fn on_written_off_lost(
+        &mut self,
+        now: Instant,
+        assignment: &AssignedItem,
+        lost: NoResult,
+    ) {
+        let NoResult::WorkerLost { process, is_alone } = lost else { return };
+        let (job, item) = (assignment.job, &assignment.item);
+        let batch = self.jobs.get_mut(&job).and_then(|work| work.batch.as_mut());
+        let Some(batch) = batch.filter(|batch| batch.trial_set() == assignment.trial_set) else {
+            return;
+        };
+        let is_loss = !assignment.is_audit;
+        if is_loss
+            && batch.losses.add(now, item, process, is_alone) == AfterLoss::Ask
+            && self.may_ask_about_losses(job, item)
+        {
+            self.ask_referee(job, item.clone(), Doubt::Losses);
+            self.update_readiness(job);
+        }
+    }
+
+    /// Whether an item is to be computed by the referee because workers were lost with it. It
+    /// computes one at a time, and so is no help against many.
+    fn may_ask_about_losses(&self, job: JobId, item: &Item) -> bool {
+        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
+        let is_open = batch.is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
+        let questions = self.questions.of(job).map(|(_, question)| &question.doubt);
+        let n_asked = questions.filter(|doubt| matches!(doubt, Doubt::Losses)).count();
+        is_open && n_asked < LOSS_QUESTIONS_MAX
     }
 
     /// Queues items that had to wait for a while.

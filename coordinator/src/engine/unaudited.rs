@@ -2,6 +2,9 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive, sync::Arc};
 
+/// Names that are remembered; the latest ones, where there are more.
+const NAMES_MAX: usize = 10_000;
+
 /// The generations of an experiment that workers have contributed to since an audit agreed
 /// with them last, by the worker's name.
 #[derive(Debug, Default)]
@@ -20,6 +23,10 @@ impl Unaudited {
                 let first = self.by_name.get(&name).map_or(generation, |range| *range.start());
                 self.by_name.insert(name, first..=generation);
             }
+        }
+        if self.by_name.len() > NAMES_MAX {
+            // Names of processes that are gone, for the most part.
+            self.by_name.retain(|_, generations| *generations.end() == generation);
         }
     }
 

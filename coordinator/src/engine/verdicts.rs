@@ -1,6 +1,6 @@
 //! Asking the referee, and what follows from its answers.
 
-use std::{sync::Arc, time::Instant};
+use std::{collections::BTreeSet, sync::Arc, time::Instant};
 
 use sim_core::TrialSet;
 
@@ -23,19 +23,20 @@ impl Engine {
     pub fn on_verdict(&mut self, now: Instant, id: QuestionId, verdict: Verdict) {
         // It may have been withdrawn.
         let Some(mut question) = self.questions.take(id) else { return };
+        let is_of_losses = matches!(question.doubt, Doubt::Losses);
         match verdict {
-            Verdict::Unavailable(trouble) => {
+            // Of an item that no worker was lost with, that is no proof: the system may be
+            // short of memory.
+            Verdict::Died(trouble) | Verdict::Unavailable(trouble) if !is_of_losses => {
                 let is_first = question.trouble.is_none();
                 question.postpone(now, trouble);
-                if is_first && !matches!(question.doubt, Doubt::Disagreement { .. }) {
+                if is_first && matches!(question.doubt, Doubt::Failure { .. }) {
                     self.release(&question);
                 }
-                match question.doubt {
-                    // The next loss asks again.
-                    Doubt::Losses => {}
-                    _ => self.questions.put_back(id, question),
-                }
+                self.questions.put_back(id, question);
             }
+            // The next loss asks again.
+            Verdict::Unavailable(_) => self.release(&question),
             Verdict::Died(how) if question.on_death(now) => {
                 let failure = format!("it takes its process down ({how})");
                 self.settle_failure(now, id, &question, &failure);
@@ -57,7 +58,12 @@ impl Engine {
         let question = Question::new(job, spec, what, item.clone(), doubt);
         match question.doubt {
             Doubt::Disagreement { .. } => batch.n_disagreements += 1,
+            // An audit's is known.
+            Doubt::Failure { .. } | Doubt::Losses if batch.unknown(&item).is_empty() => {}
             Doubt::Failure { .. } | Doubt::Losses => batch.hold_back(item),
+        }
+        for party in question.parties() {
+            *self.doubted.entry(Arc::clone(&party.name)).or_default() += 1;
         }
         let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
         let (id, command) = self.questions.ask(question);
@@ -66,6 +72,7 @@ impl Engine {
                 self.update_worker(party, |worker| worker.question = Some(id));
             }
         }
+        self.update_readiness(job);
         self.commands.push_back(command);
     }
 
@@ -112,7 +119,8 @@ impl Engine {
         if let Doubt::Disagreement { parties } = &question.doubt {
             for (party, values) in parties {
                 let reason = format!(
-                    "it returned {values:?} for {} of {}, which fails: {failure}",
+                    "it returned {} for {} of {}, which fails: {failure}",
+                    first(values),
                     place(&question.item),
                     name(question.trial_set),
                 );
@@ -141,10 +149,7 @@ impl Engine {
             Doubt::Disagreement { parties } => {
                 for (party, returned) in parties {
                     if !same_bits(returned, values) {
-                        let reason = format!(
-                            "it returned {returned:?} for {place} of {batch}, and the referee \
-                             {values:?}"
-                        );
+                        let reason = wrong(returned, values, &place, &batch);
                         self.put_in_quarantine(now, party, &reason);
                     }
                 }
@@ -157,9 +162,8 @@ impl Engine {
                 && disagreement.first != REFEREE
             {
                 let party = Party { id: disagreement.first, name: disagreement.first_name };
-                let [returned, _] = disagreement.values;
-                let reason =
-                    format!("it returned {returned:?} for {place} of {batch}, and not {values:?}");
+                let [returned, right] = disagreement.values;
+                let reason = wrong(&returned, &right, &place, &batch);
                 self.put_in_quarantine(now, &party, &reason);
             }
             if values.len() == self.batch_mut(job).n_values(item.trials.len()) {
@@ -180,6 +184,12 @@ impl Engine {
     /// Whoever was in doubt because of a question is not any more.
     fn end_doubt(&mut self, id: QuestionId, question: &Question) {
         for party in question.parties() {
+            if let Some(n_questions) = self.doubted.get_mut(&party.name) {
+                *n_questions -= 1;
+                if *n_questions == 0 {
+                    self.doubted.remove(&party.name);
+                }
+            }
             let worker = self.workers.get(&party.id);
             if worker.is_some_and(|worker| worker.question == Some(id)) {
                 self.update_worker(party.id, |worker| worker.question = None);
@@ -213,23 +223,24 @@ impl Engine {
         let workers = self.workers.iter();
         let its =
             workers.filter(|(_, worker)| self.quarantine.reason(&worker.introduction).is_some());
-        let its: Vec<WorkerId> =
-            its.filter(|(_, worker)| worker.quarantined.is_none()).map(|(&id, _)| id).collect();
+        let its = its.map(|(&id, _)| id).chain([party.id]).collect::<BTreeSet<WorkerId>>();
         for id in its {
-            self.isolate(now, id);
+            if self.workers.get(&id).is_some_and(|worker| worker.quarantined.is_none()) {
+                self.isolate(now, id, reason);
+            }
         }
         self.discard(&party.name);
         self.finish_waived(now);
     }
 
     /// Takes everything back from a worker in quarantine.
-    fn isolate(&mut self, now: Instant, id: WorkerId) {
-        let reason = self.quarantine.reason(&self.workers[&id].introduction).map(str::to_owned);
+    fn isolate(&mut self, now: Instant, id: WorkerId, reason: &str) {
         let in_flight: Vec<_> = self.workers[&id].in_flight.keys().copied().collect();
         self.update_worker(id, |worker| {
-            worker.quarantined = reason;
+            worker.quarantined = Some(reason.to_owned());
             worker.question = None;
             worker.written_off.clear();
+            worker.is_stalled = false;
         });
         for assignment_id in in_flight.into_iter().rev() {
             let assignment = self.recall(id, assignment_id);
@@ -261,17 +272,15 @@ impl Engine {
 
     /// Lets a worker out of quarantine; whether it was there.
     pub fn on_readmitted(&mut self, now: Instant, name: &str) -> bool {
-        let was_there = self.quarantine.remove(name);
+        let Some(reason) = self.quarantine.remove(name) else { return false };
         let workers = self.workers.iter();
-        let out = workers.filter(|(_, worker)| {
-            worker.quarantined.is_some() && self.quarantine.reason(&worker.introduction).is_none()
-        });
+        let out = workers.filter(|(_, worker)| worker.quarantined.as_ref() == Some(&reason));
         for id in out.map(|(&id, _)| id).collect::<Vec<WorkerId>>() {
             self.update_worker(id, |worker| worker.quarantined = None);
         }
         self.finish_waived(now);
         self.assign(now);
-        was_there
+        true
     }
 
     /// A worker was found to be faulty before the engine began.
@@ -302,4 +311,17 @@ fn name(trial_set: TrialSet) -> String {
         }
         TrialSet::Evaluation => "the evaluation".to_owned(),
     }
+}
+
+/// What is wrong with numbers that a worker returned, by the first that differs.
+pub(super) fn wrong(returned: &[f64], right: &[f64], place: &str, batch: &str) -> String {
+    let mut pairs = returned.iter().zip(right);
+    let (returned, right) = pairs
+        .find(|(returned, right)| returned.to_bits() != right.to_bits())
+        .unwrap_or((&f64::NAN, &f64::NAN));
+    format!("it returned {returned:?} for {place} of {batch}, and the referee {right:?}")
+}
+
+fn first(values: &[f64]) -> String {
+    values.first().map_or_else(|| "nothing".to_owned(), |first| format!("{first:?}"))
 }

@@ -233,7 +233,7 @@ impl Worker {
             Some("its word is in doubt, and the referee is asked".to_owned())
         } else if let Some(until) = self.resting_until {
             let left = until.saturating_duration_since(now).as_secs_f64();
-            Some(format!("it was lost before it returned anything; {left:.1} s to wait"))
+            Some(format!("it was lost, and has returned nothing since; {left:.1} s to wait"))
         } else if self.is_stalled {
             let silent = self.last_result.map_or(self.time.joined(), |at| at);
             let seconds = now.saturating_duration_since(silent).as_secs();

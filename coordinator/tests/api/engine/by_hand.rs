@@ -138,7 +138,7 @@ fn a_poisonous_item_fails_its_experiment_by_name_and_no_other() {
         fleet.run_for(2 * SECOND);
         id = fleet.restart(id).unwrap();
     }
-    fleet.run_for(5 * SECOND);
+    fleet.run_for(15 * SECOND);
     assert_eq!(fleet.failed.len(), 1);
     let (failed, reason) = &fleet.failed[0];
     assert_eq!(*failed, EXPERIMENT);
@@ -410,6 +410,65 @@ fn a_worker_that_finishes_nothing_while_others_do_gets_nothing_until_it_does() {
     assert!(fleet.status()[0].n_in_flight > 0);
     fleet.run_by_hand();
     assert_evaluated(&fleet, 100, 1);
+}
+
+#[test]
+fn a_stalled_worker_is_served_again_when_what_it_had_is_not_wanted_any_more() {
+    let mut fleet = fleet();
+    let (hung, other) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
+    start(&mut fleet, EXPERIMENT, 100, 1);
+    for _ in 0..40 {
+        fleet.run_for(SECOND / 10);
+        fleet.step(other);
+    }
+    assert!(fleet.status()[0].waits.is_some());
+    fleet.tell(|engine, now| engine.on_job_ended(now, EXPERIMENT));
+    start(&mut fleet, JobId::Experiment(ExperimentId(2)), 100, 1);
+    assert!(fleet.status()[0].waits.is_none() && !fleet.held(hung).is_empty());
+}
+
+#[test]
+fn the_death_of_the_referee_is_no_proof_against_workers_that_were_not_lost() {
+    let mut fleet = fleet();
+    let (reporter, other) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
+    start(&mut fleet, EXPERIMENT, 4, 1);
+    let reported = fleet.held(reporter)[0].clone();
+    fleet.poisonous.insert(reported.genotype[0] as u64);
+    fleet.answer(reporter, reported.id, Err("out of memory".to_owned()));
+    fleet.run_for(60 * SECOND);
+    while fleet.step(other) {}
+    assert_evaluated(&fleet, 4, 1);
+    assert!(fleet.failed.is_empty() && fleet.quarantined.is_empty());
+}
+
+#[test]
+fn an_item_computed_by_two_is_audited_in_parts_by_others() {
+    let config = EngineConfig { audit_fraction: 1.0, ..EngineConfig::new(LEASE) };
+    let mut fleet = SimulatedFleet::new(MODEL, config);
+    fleet.submit(EXPERIMENT, 100);
+    fleet.ask(EXPERIMENT, 0, 1, 5);
+    let faulty = fleet.join_by_hand(1);
+    let whole = fleet.held(faulty)[0].clone();
+    assert_eq!(whole.trials, 0..5);
+    let other = fleet.join_by_hand(2);
+    // Nobody knows how long an item takes; it is late after a while.
+    fleet.run_for(6 * SECOND);
+    let copies = fleet.held(other);
+    assert_eq!(copies[0].trials.start, 0);
+    fleet.step(other);
+    let values =
+        whole.trials.map(|trial| fitness(&whole.genotype, trial) + f64::from(u8::from(trial == 4)));
+    fleet.answer(faulty, whole.id, Ok(values.collect()));
+    for _ in 0..100 {
+        fleet.run_for(SECOND / 2);
+        fleet.step(other);
+        // Audits of its own it does right.
+        let held = fleet.held(faulty);
+        assert!(held.iter().all(|assignment| !assignment.trials.contains(&4)), "its own");
+        fleet.step(faulty);
+    }
+    assert_evaluated(&fleet, 1, 5);
+    assert_eq!(fleet.quarantined[0].0, "worker-1");
 }
 
 #[test]

@@ -26,6 +26,7 @@ fn trouble() -> impl Strategy<Value = Trouble> {
     prop_oneof![
         2 => Just(Trouble::Of(Conduct::Hangs)),
         2 => Just(Trouble::Of(Conduct::Lies)),
+        1 => Just(Trouble::Of(Conduct::LiesAtTheEnd)),
         2 => Just(Trouble::Of(Conduct::Fails)),
         1 => Just(Trouble::Of(Conduct::Babbles)),
         2 => every.clone().prop_map(Trouble::Crashes),
@@ -63,10 +64,11 @@ impl Nuisance {
     }
 }
 
-/// Time that three generations take.
+/// Time that three generations take. The referee is not there before `referee_from`.
 fn time(
     honest: &[usize],
     troubles: &[(Trouble, usize)],
+    referee_from: Duration,
     n_individuals: usize,
     n_trials: u32,
 ) -> Result<Duration, TestCaseError> {
@@ -88,6 +90,7 @@ fn time(
         while fleet.evaluated.len() as u64 == generation {
             prop_assert!(fleet.failed.is_empty(), "{:?}", fleet.failed);
             prop_assert!(fleet.now() < 1000 * SECOND, "generation {generation} does not end");
+            fleet.has_referee = fleet.now() >= referee_from;
             nuisances.iter_mut().for_each(|nuisance| nuisance.act(&mut fleet));
             fleet.run_for(SECOND / 20);
         }
@@ -111,6 +114,7 @@ proptest! {
         troubles in prop::collection::vec((trouble(), 1..5usize), 1..6),
         n_individuals in 1..40usize,
         n_trials in 1..4u32,
+        referee_from in prop_oneof![3 => Just(0_u32), 1 => 0..5_u32],
     ) {
         let n_honest: usize = honest.iter().sum();
         let mut n_left = n_honest * 49 / 51;
@@ -122,8 +126,9 @@ proptest! {
                 (n_slots > 0).then_some((trouble, n_slots))
             })
             .collect();
-        let undisturbed = time(&honest, &[], n_individuals, n_trials)?;
-        let disturbed = time(&honest, &troubles, n_individuals, n_trials)?;
+        let referee_from = referee_from * SECOND;
+        let undisturbed = time(&honest, &[], referee_from, n_individuals, n_trials)?;
+        let disturbed = time(&honest, &troubles, referee_from, n_individuals, n_trials)?;
         let bound = 4 * undisturbed + 20 * SECOND;
         prop_assert!(disturbed < bound, "{disturbed:?} instead of {undisturbed:?}");
     }
@@ -148,6 +153,20 @@ fn hung_workers_with_most_of_the_slots_do_not_hold_up_two_honest_ones() {
         assert_right(&fleet, 20, 1);
     }
     assert!(fleet.now() < 60 * SECOND, "{:?}", fleet.now());
+}
+
+#[test]
+fn a_poisonous_item_that_takes_its_time_is_found_too() {
+    let mut fleet = fleet();
+    fleet.poisonous.insert(3);
+    fleet.poison_takes = 30;
+    for _ in 0..4 {
+        fleet.join(2, 1.0);
+    }
+    fleet.submit(EXPERIMENT, 100);
+    fleet.ask(EXPERIMENT, 0, 40, 1);
+    assert!(fleet.run_until(600 * SECOND, |fleet| !fleet.failed.is_empty()));
+    assert!(fleet.failed[0].1.contains("individual 3 of generation 0"), "{:?}", fleet.failed);
 }
 
 #[test]

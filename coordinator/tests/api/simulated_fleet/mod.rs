@@ -54,6 +54,8 @@ pub enum Conduct {
     Honest,
     /// It makes its values up, as no other does.
     Lies,
+    /// The same, on the last trial of an item only.
+    LiesAtTheEnd,
     /// It says that they fail.
     Fails,
     /// It returns nothing, but its heart beats.
@@ -99,6 +101,8 @@ pub struct SimulatedFleet {
     pub quarantined: Vec<(String, String)>,
     /// Genotypes that take whatever computes them down.
     pub poisonous: BTreeSet<u64>,
+    /// How many times longer than a result that takes.
+    pub poison_takes: u32,
     /// Genotypes that cannot be computed.
     pub failing: BTreeSet<u64>,
     pub has_referee: bool,
@@ -165,6 +169,7 @@ impl SimulatedFleet {
             failed: Vec::new(),
             quarantined: Vec::new(),
             poisonous: BTreeSet::new(),
+            poison_takes: 1,
             failing: BTreeSet::new(),
             has_referee: true,
             n_questions: 0,
@@ -498,12 +503,17 @@ impl SimulatedFleet {
             let time = model.time(&assignment.genotype, &assignment.trials).div_f64(worker.speed);
             let individual = assignment.genotype[0] as u64;
             if self.poisonous.contains(&individual) && worker.conduct != Conduct::Lies {
-                self.schedule(time, Happening::Death(id));
+                self.schedule(time * self.poison_takes, Happening::Death(id));
                 continue;
             }
-            let wrong = if worker.conduct == Conduct::Lies { 1e-9 * id.0 as f64 } else { 0.0 };
+            let last = assignment.trials.end - 1;
+            let wrong = |trial| match worker.conduct {
+                Conduct::Lies => 1e-9 * id.0 as f64,
+                Conduct::LiesAtTheEnd if trial == last => 1e-9 * id.0 as f64,
+                _ => 0.0,
+            };
             let values =
-                assignment.trials.clone().map(|t| fitness(&assignment.genotype, t) + wrong);
+                assignment.trials.clone().map(|t| fitness(&assignment.genotype, t) + wrong(t));
             let outcome = match worker.conduct {
                 Conduct::Fails => Err("it is too hot here".to_owned()),
                 Conduct::Babbles => Ok(vec![1.0; assignment.trials.len() + 1]),
