@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::worker::Worker;
+
 /// Time after a first loss in which a worker is given nothing; doubles with each.
 const FIRST_REST: Duration = Duration::from_millis(500);
 /// The longest.
@@ -44,8 +46,11 @@ impl CrashLoops {
     }
 
     /// A worker has returned a result.
-    pub fn on_result(&mut self, name: &str) {
-        self.by_name.remove(name);
+    pub fn on_result(&mut self, worker: &Worker) {
+        // Few have an entry: this is called for every result.
+        if worker.is_on_probation {
+            self.by_name.remove(worker.name());
+        }
     }
 
     /// When a worker that joins may be given an item, if it was lost before.

@@ -38,7 +38,8 @@ pub enum NoResult {
 impl Engine {
     pub(super) fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
-        let is_in_flight = worker.in_flight.contains_key(&result.id);
+        let is_in_flight =
+            worker.written_off.is_empty() || worker.in_flight.contains_key(&result.id);
         let assignment = worker.in_flight.get(&result.id);
         let Some(assignment) = assignment.or_else(|| worker.written_off.get(&result.id)) else {
             if let (Some(recalled), Ok(values)) = (worker.take_recalled(result.id), result.outcome)
@@ -50,36 +51,37 @@ impl Engine {
             // up. Neither can do harm.
             return;
         };
-        let (job, n_trials) = (assignment.job, assignment.item.trials.len());
-        let batch = self.jobs[&job].batch.as_ref();
+        let n_trials = assignment.item.trials.len();
+        let batch = self.jobs[&assignment.job].batch.as_ref();
         let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
         let is_wanted = batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set);
         let impossible = match &result.outcome {
             Ok(values) if is_wanted && values.len() != n_values => {
                 Some(format!("it returned {} values for {n_trials} trials", values.len()))
             }
-            Ok(_) if !self.is_due(job, result.output) => Some(match result.output {
-                Output::Fitness => "it returned fitness where measures are due".to_owned(),
-                Output::Measures => "it returned measures where fitness is due".to_owned(),
-            }),
+            Ok(_) if batch.is_some_and(|batch| batch.output() != result.output) => {
+                Some(match result.output {
+                    Output::Fitness => "it returned fitness where measures are due".to_owned(),
+                    Output::Measures => "it returned measures where fitness is due".to_owned(),
+                })
+            }
             _ => None,
         };
         if let Some(reason) = impossible {
             return self.put_in_quarantine(now, &self.party(id), &reason);
         }
-        let assignment = if is_in_flight {
-            self.take_assignment(id, result.id)
-        } else {
-            let taken = self.update_worker(id, |worker| worker.written_off.remove(&result.id));
-            taken.expect("just seen")
-        };
         let is_ok = result.outcome.is_ok();
-        let busy = self.account(now, id, &assignment, result.compute_time, is_ok);
+        if is_ok {
+            self.crash_loops.on_result(&self.workers[&id]);
+        }
+        let (assignment, busy) = self.end_assignment(now, id, &result);
+        if is_in_flight {
+            self.forget_holder(result.id, &assignment);
+        }
         match result.outcome {
             Ok(values) => {
                 self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
-                self.crash_loops.on_result(self.workers[&id].name());
                 if is_in_flight && is_wanted {
                     self.accept(now, id, &assignment, &values);
                 } else {
@@ -106,35 +108,38 @@ impl Engine {
         Party { id, name: self.workers[&id].name().into() }
     }
 
-    /// Learns how long things take, and that a worker is at work; returns how long this
-    /// took, as far as it can be true.
-    fn account(
+    /// Ends an assignment that is answered, and learns how long things take, and that its
+    /// worker is at work; returns the assignment and how long it took, as far as that can
+    /// be true. One change of the worker, as this is done for every result.
+    fn end_assignment(
         &mut self,
         now: Instant,
         id: WorkerId,
-        assignment: &AssignedItem,
-        compute_time: Duration,
-        is_ok: bool,
-    ) -> Duration {
-        let work = &self.jobs[&assignment.job];
-        let expected = work.expected(assignment.item.trials.len(), 1.0);
-        let (busy, pace) = self.update_worker(id, |worker| {
-            let busy = worker.time.add_result(now, assignment.assigned, compute_time);
-            let pace = worker.pace;
-            if is_ok {
-                worker.learn(busy, expected);
-            }
-            worker.last_result = Some(now);
-            worker.is_stalled = false;
-            worker.is_on_probation &= !is_ok;
-            (busy, pace)
-        });
+        result: &ItemResult,
+    ) -> (AssignedItem, Duration) {
+        let is_ok = result.outcome.is_ok();
+        let jobs = &self.jobs;
+        let worker = self.workers.get_mut(&id).expect("the caller has seen it");
+        self.load_index.remove(id, worker);
+        let assignment = worker.in_flight.remove(&result.id);
+        let assignment = assignment.or_else(|| worker.written_off.remove(&result.id));
+        let assignment = assignment.expect("the caller has seen it");
+        let n_trials = assignment.item.trials.len();
+        let busy = worker.time.add_result(now, assignment.assigned, result.compute_time);
+        let pace = worker.pace;
+        if is_ok {
+            worker.learn(busy, jobs[&assignment.job].expected(n_trials, 1.0));
+        }
+        worker.last_result = Some(now);
+        worker.is_stalled = false;
+        worker.is_on_probation &= !is_ok;
+        self.load_index.add(id, worker);
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
         if is_ok {
             work.learn(&assignment.item, busy, pace);
         }
         self.correct_charge(assignment.job, assignment.charge, busy);
-        busy
+        (assignment, busy)
     }
 
     fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, values: &[f64]) {
@@ -161,7 +166,11 @@ impl Engine {
                 batch.count_audited(item, auditor);
             }
         }
-        self.update_readiness(job);
+        if assignment.is_audit {
+            self.update_readiness(job);
+        } else {
+            self.make_ready(job);
+        }
         self.finish_if_evaluated(now, job);
     }
 

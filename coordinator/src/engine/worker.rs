@@ -170,7 +170,11 @@ impl Worker {
 
     /// Slots that may have an item.
     pub fn n_usable_slots(&self) -> usize {
-        if self.is_usable() { self.n_slots().min(self.n_credits()) } else { 0 }
+        match (self.is_usable(), self.is_on_probation) {
+            (false, _) => 0,
+            (true, true) => 1,
+            (true, false) => self.n_slots(),
+        }
     }
 
     /// Those that have none.
