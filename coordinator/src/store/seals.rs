@@ -1,14 +1,13 @@
 //! Seals: keyed digests of what runs depend on, so that a row that was changed by
 //! accident or by hand is found, and so is one that was moved to another place.
 //!
-//! A seal is HMAC-SHA256 of a row's content and its place, under a random key that is
+//! A seal is a keyed BLAKE3 hash of a row's content and its place, under a random key that is
 //! in the database itself, so that a copy can be checked without anything beside it.
 //! Whoever reads the key can make seals: they do not protect against an attacker who
 //! may write the database.
 
-use hmac::{Hmac, KeyInit as _, Mac as _};
+use blake3::Hasher;
 use rusqlite::{Connection, Transaction, params};
-use sha2::Sha256;
 
 use super::{GenerationRecord, Result, champions, checkpoints, history};
 use crate::ids::ExperimentId;
@@ -18,14 +17,13 @@ pub type Seal = [u8; 32];
 
 /// Makes the seals of a database.
 #[derive(Debug, Clone)]
-pub struct Sealer(Hmac<Sha256>);
+pub struct Sealer(Hasher);
 
 impl Sealer {
     /// The sealer of a database.
     pub fn of(connection: &Connection) -> rusqlite::Result<Self> {
         connection.query_row("SELECT seal_key FROM identity", [], |row| {
-            let key = row.get_ref(0)?.as_blob()?;
-            Ok(Self(Hmac::new_from_slice(key).expect("keys may have any length")))
+            Ok(Self(Hasher::new_keyed(&row.get(0)?)))
         })
     }
 
@@ -84,7 +82,7 @@ impl Sealer {
 }
 
 /// A seal of a row that is not complete yet.
-pub struct Unfinished(Hmac<Sha256>);
+pub struct Unfinished(Hasher);
 
 impl Unfinished {
     /// Adds text, or bytes, with their length.
@@ -107,7 +105,7 @@ impl Unfinished {
 
     /// The seal.
     pub fn finish(self) -> Seal {
-        self.0.finalize().into_bytes().into()
+        self.0.finalize().into()
     }
 }
 
