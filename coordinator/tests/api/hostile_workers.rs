@@ -331,7 +331,7 @@ fn introduction() -> impl Strategy<Value = Vec<u8>> {
 #[test]
 fn nothing_that_a_worker_sends_harms_the_coordinator() {
     let runtime = Runtime::new().unwrap();
-    let config = ProptestConfig { cases: 48, failure_persistence: None, ..Default::default() };
+    let config = ProptestConfig { cases: 32, failure_persistence: None, ..Default::default() };
     let strategy = (introduction(), vec(bytes(), 0..12));
     TestRunner::new(config)
         .run(&strategy, |(introduction, messages)| {
