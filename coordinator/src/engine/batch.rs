@@ -562,13 +562,7 @@ impl BatchInProgress {
 
     /// What it is called in messages.
     pub fn name(&self) -> String {
-        match self.batch.trial_set {
-            TrialSet::Generation(generation) => format!("generation {generation}"),
-            TrialSet::HeldOut(generation) => {
-                format!("the re-evaluation after generation {generation}")
-            }
-            TrialSet::Evaluation => "the evaluation".into(),
-        }
+        name_of(self.batch.trial_set)
     }
 
     /// Whether all fitness is known and undisputed, and no audit is under way, or waits for
@@ -654,4 +648,15 @@ pub type Doubted = BTreeMap<Arc<str>, usize>;
 /// Whether numbers agree in every bit.
 pub fn same_bits(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+/// What the batch of a trial set is called in messages.
+pub fn name_of(trial_set: TrialSet) -> String {
+    match trial_set {
+        TrialSet::Generation(generation) => format!("generation {generation}"),
+        TrialSet::HeldOut(generation) => {
+            format!("the re-evaluation after generation {generation}")
+        }
+        TrialSet::Evaluation => "the evaluation".into(),
+    }
 }

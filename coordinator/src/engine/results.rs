@@ -15,7 +15,7 @@ use super::{
     item::Item,
     losses::AfterLoss,
     questions::{Doubt, Party},
-    verdicts::wrong,
+    verdicts::{place, wrong},
     worker::{AssignedItem, Worker},
 };
 
@@ -282,9 +282,9 @@ impl Engine {
             disagreement;
         let second = self.party(second);
         let batch = self.jobs[&job].batch.as_ref().expect("just compared");
+        let item = Item { individual: item.individual, trials: trial..trial + 1 };
         if first == REFEREE {
-            let place = format!("trial {trial} of individual {}", item.individual);
-            let reason = wrong(&second_values, &first_values, &place, &batch.name());
+            let reason = wrong(&second_values, &first_values, &place(&item), &batch.name());
             return self.put_in_quarantine(now, &second, &reason);
         }
         let is_doubted =
@@ -295,7 +295,6 @@ impl Engine {
         }
         let first = Party { id: first, name: first_name };
         let parties = [(first, first_values), (second, second_values)];
-        let item = Item { individual: item.individual, trials: trial..trial + 1 };
         self.ask_referee(job, item, Doubt::Disagreement { parties });
     }
 
@@ -395,7 +394,6 @@ impl Engine {
             && self.may_ask_about_losses(job, item)
         {
             self.ask_referee(job, item.clone(), Doubt::Losses);
-            self.update_readiness(job);
         }
     }
 

@@ -2,8 +2,6 @@
 
 use std::{collections::BTreeSet, sync::Arc, time::Instant};
 
-use sim_core::TrialSet;
-
 use crate::{
     ids::{JobId, QuestionId, WorkerId},
     referee::Verdict,
@@ -11,7 +9,7 @@ use crate::{
 
 use super::{
     Command, Engine,
-    batch::{REFEREE, same_bits},
+    batch::{REFEREE, name_of, same_bits},
     item::Item,
     questions::{Doubt, Party, Question},
     results::NoResult,
@@ -94,6 +92,7 @@ impl Engine {
         let is_confirmed = questions.any(|question| match &question.doubt {
             Doubt::Failure { reporter, message: first } => {
                 question.trouble.is_some()
+                    && self.batch_of(question)
                     && *reporter.name != *name
                     && *first == message
                     && question.item.overlaps(item)
@@ -122,7 +121,7 @@ impl Engine {
                     "it returned {} for {} of {}, which fails: {failure}",
                     first(values),
                     place(&question.item),
-                    name(question.trial_set),
+                    name_of(question.trial_set),
                 );
                 self.put_in_quarantine(now, party, &reason);
             }
@@ -136,7 +135,7 @@ impl Engine {
     fn settle_values(&mut self, now: Instant, id: QuestionId, question: &Question, values: &[f64]) {
         self.end_doubt(id, question);
         let place = place(&question.item);
-        let batch = name(question.trial_set);
+        let batch = name_of(question.trial_set);
         match &question.doubt {
             Doubt::Losses => {}
             Doubt::Failure { reporter, message } => {
@@ -294,22 +293,13 @@ impl Engine {
     }
 }
 
-fn place(item: &Item) -> String {
+/// What an item is called in messages.
+pub(super) fn place(item: &Item) -> String {
     let (individual, trials) = (item.individual, &item.trials);
     if trials.len() == 1 {
         format!("trial {} of individual {individual}", trials.start)
     } else {
         format!("trials {}..{} of individual {individual}", trials.start, trials.end)
-    }
-}
-
-fn name(trial_set: TrialSet) -> String {
-    match trial_set {
-        TrialSet::Generation(generation) => format!("generation {generation}"),
-        TrialSet::HeldOut(generation) => {
-            format!("the re-evaluation after generation {generation}")
-        }
-        TrialSet::Evaluation => "the evaluation".to_owned(),
     }
 }
 

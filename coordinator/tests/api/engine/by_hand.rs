@@ -237,6 +237,24 @@ fn without_a_referee_a_second_worker_confirms_a_failure() {
 }
 
 #[test]
+fn failures_of_the_same_individual_in_two_generations_do_not_confirm_each_other() {
+    let mut fleet = fleet();
+    fleet.has_referee = false;
+    let workers = [(); 3].map(|()| fleet.join_by_hand(1));
+    start(&mut fleet, EXPERIMENT, 1, 1);
+    for generation in 0..2 {
+        let mut holders = workers.iter().filter(|&&id| !fleet.held(id).is_empty());
+        let reporter = *holders.next().unwrap();
+        let assignment = fleet.held(reporter)[0].id;
+        fleet.answer(reporter, assignment, Err("it overflowed".to_owned()));
+        fleet.run_for(SECOND);
+        fleet.run_by_hand();
+        assert_eq!((fleet.evaluated.len(), fleet.failed.len()), (generation + 1, 0));
+        fleet.ask(EXPERIMENT, generation as u64 + 1, 1, 1);
+    }
+}
+
+#[test]
 fn without_a_referee_work_goes_on_and_its_answer_is_waited_for() {
     let mut fleet = fleet();
     fleet.has_referee = false;
