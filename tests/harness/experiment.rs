@@ -31,7 +31,7 @@ impl Experiment {
         let algorithm = &mut value["algorithm"];
         algorithm["generations"] = json!(generations);
         algorithm["population_size"] = json!(12);
-        algorithm["evaluation_steps"] = json!(1000);
+        algorithm["evaluation_steps"] = json!(600);
         algorithm["num_evaluations"] = json!(3);
         algorithm["champion_trials"] = json!(8);
         Self::of(value)
