@@ -27,8 +27,12 @@ pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDes
     population["params"]["anyOf"] = variants.collect();
     // The parameters may stand in the population itself, too.
     if let Value::Object(population) = population {
-        for (key, value) in algorithms.iter().flat_map(properties) {
-            // The first description is the genetic algorithm's, which uses them all.
+        for (key, mut value) in algorithms.iter().flat_map(properties) {
+            // The first description is the genetic algorithm's, which uses them all. For
+            // the other algorithms, which ignore these keys, any value will do.
+            if GENETIC_KEYS.contains(&key.as_str()) {
+                value = json!({"description": value["description"]});
+            }
             population.entry(key).or_insert(value);
         }
     }
