@@ -52,7 +52,8 @@
 //!
 //! Serialising an [`ExperimentConfig`] gives its *canonical form*: all keys present
 //! in a fixed order, and itself a valid experiment file that reads back to an equal
-//! value. Workers get it, digests hash it.
+//! value. Workers get it, digests hash it. Keys that the format did not always have are
+//! left out where they have their default, so that older files keep their digests.
 //!
 //! Lengths are centimetres, times environment steps, angles radians, unless a
 //! field says otherwise.

@@ -162,7 +162,7 @@ impl Default for TopologySwitchConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("affected_robots, start, targets, switch_at")
+    transform = schema::optional("affected_robots, start, targets, switch_at, speed")
 )]
 pub struct UncontrollableRotationConfig {
     /// How many robots, drawn anew each trial.
@@ -176,4 +176,8 @@ pub struct UncontrollableRotationConfig {
     /// Step at which the next target applies; default 600.
     #[schemars(range(min = 1, max = limits::STEPS))]
     pub switch_at: u32,
+    /// Action of the right wheel while they turn, that of the left being its negative;
+    /// default 0.1: half a turn takes 50 steps with the default wheels.
+    #[schemars(range(min = 0, max = 1))]
+    pub speed: f64,
 }

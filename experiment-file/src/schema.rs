@@ -160,6 +160,11 @@ pub(super) fn amount(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "description": description})
 }
 
+/// A number in \[0, 1\].
+pub(super) fn share(description: &str) -> Value {
+    json!({"type": "number", "minimum": 0, "maximum": 1, "description": description})
+}
+
 /// The neuron model in the form of Appendix A.
 pub(super) fn neurons() -> Value {
     json!({

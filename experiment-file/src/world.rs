@@ -121,14 +121,45 @@ pub enum LightController {
     /// Circles the centre of the world (Eq. 5.7-5.8).
     #[schemars(transform = schema::optional(""))]
     LightOrbitController {},
-    /// Drifts to random targets (Eq. 6.4).
-    #[schemars(transform = schema::optional("every, step"))]
-    LightRndPosController {
-        /// Period at which the target is redrawn, steps; default 50.
-        every: u32,
-        /// alpha: share of the way to the target covered per step; default 0.03.
-        step: f64,
-    },
+    /// Goes to random targets (section 6.4).
+    #[schemars(transform = schema::optional(""))]
+    LightRndPosController(RandomTargetsConfig),
+}
+
+/// A light's way to random targets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    default,
+    deny_unknown_fields,
+    transform = schema::property("speed", schema::amount("Way per step, cm; default 3.")),
+    transform = schema::property("step", schema::share(
+        "alpha of Eq. 6.4: share of the remaining way covered per step, instead of `speed`."
+    ))
+)]
+pub struct RandomTargetsConfig {
+    /// Period at which the target is redrawn, steps; default 50.
+    #[schemars(range(min = 1, max = limits::STEPS))]
+    pub every: u32,
+    /// How fast it goes.
+    #[serde(flatten)]
+    #[schemars(skip)]
+    pub pace: Pace,
+}
+
+/// How far a light goes in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pace {
+    /// So far, cm: it passes its target and turns back.
+    Speed(f64),
+    /// This share of the way that is left (alpha of Eq. 6.4).
+    Step(f64),
+}
+
+impl Default for RandomTargetsConfig {
+    fn default() -> Self {
+        Self { every: 50, pace: Pace::Speed(3.0) }
+    }
 }
 
 /// Start of a light or ground area.

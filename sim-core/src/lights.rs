@@ -1,7 +1,7 @@
 //! Lights and how they move.
 
 use crate::torus::{Torus, Vec2, wrap_angle};
-use experiment_file::LightController;
+use experiment_file::{LightController, Pace, RandomTargetsConfig};
 use numeric::random::Stream;
 
 /// Probability per step that an orbiting light turns back.
@@ -31,10 +31,9 @@ enum Motion {
         radius: f64,
         sense: f64,
     },
-    /// Eq. 6.4.
-    Drift {
-        every: u32,
-        step: f64,
+    /// Section 6.4.
+    RandomTargets {
+        config: RandomTargetsConfig,
         target: Vec2,
     },
 }
@@ -53,8 +52,8 @@ impl LightPath {
                 let away = torus.displacement(torus.center(), position);
                 Motion::Orbit { angle: away.angle(), radius: away.norm(), sense: 1.0 }
             }
-            LightController::LightRndPosController { every, step } => {
-                Motion::Drift { every, step, target: position }
+            LightController::LightRndPosController(config) => {
+                Motion::RandomTargets { config, target: position }
             }
         };
         Self { stream, motion }
@@ -76,8 +75,8 @@ impl LightPath {
                     y: center.y + *radius * direction.y,
                 })
             }
-            Motion::Drift { every, step: share, target } => {
-                if step.is_multiple_of(*every) {
+            Motion::RandomTargets { config, target } => {
+                if step.is_multiple_of(config.every) {
                     let mut coordinate = |center: f64| {
                         center - 0.5 * TARGET_SQUARE + TARGET_SQUARE * self.stream.uniform()
                     };
@@ -85,7 +84,12 @@ impl LightPath {
                     *target = torus.wrap(Vec2 { x, y: coordinate(torus.center().y) });
                 }
                 let way = torus.displacement(position, *target);
-                torus.wrap(Vec2 { x: position.x + *share * way.x, y: position.y + *share * way.y })
+                let share = match (config.pace, way.norm()) {
+                    (Pace::Step(share), _) => share,
+                    (Pace::Speed(_), 0.0) => 0.0,
+                    (Pace::Speed(speed), distance) => speed / distance,
+                };
+                torus.wrap(Vec2 { x: position.x + share * way.x, y: position.y + share * way.y })
             }
         }
     }
@@ -136,25 +140,52 @@ mod tests {
         assert!((150..250).contains(&flips), "{flips}");
     }
 
-    #[test]
-    fn a_drifting_light_covers_its_share_of_the_way() {
-        let start = Vec2::new(500.0, 400.0);
-        let controller = LightController::LightRndPosController { every: 50, step: 0.1 };
-        let mut path = path(controller, start);
+    const START: Vec2 = Vec2::new(500.0, 400.0);
+
+    /// The path of a light, and its targets.
+    fn random_targets(pace: Pace) -> (impl FnMut(u32) -> Vec2, impl FnMut(u32) -> Vec2) {
+        let config = RandomTargetsConfig { every: 50, pace };
         let mut draws = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
-        let mut position = start;
-        let mut target = start;
-        for step in 0..200 {
+        let mut target = START;
+        let targets = move |step| {
             if step % 50 == 0 {
                 let x = 400.0 + 200.0 * draws.uniform();
                 target = Vec2::new(x, 300.0 + 200.0 * draws.uniform());
             }
+            target
+        };
+        (path(LightController::LightRndPosController(config), START), targets)
+    }
+
+    #[test]
+    fn a_light_at_a_share_of_the_way_per_step_slows_down() {
+        let (mut path, mut targets) = random_targets(Pace::Step(0.1));
+        let mut position = START;
+        for step in 0..200 {
+            let target = targets(step);
             position = Vec2::new(
                 position.x + 0.1 * (target.x - position.x),
                 position.y + 0.1 * (target.y - position.y),
             );
             assert!(TORUS.distance(path(step), position) < 1e-9, "step {step}");
         }
+    }
+
+    #[test]
+    fn a_light_of_constant_speed_goes_straight_to_its_target_and_oscillates_there() {
+        let (mut path, mut targets) = random_targets(Pace::Speed(3.0));
+        let mut position = START;
+        let mut n_at_target = 0;
+        for step in 0..200 {
+            let target = targets(step);
+            let before = position;
+            position = path(step);
+            assert!((TORUS.distance(before, position) - 3.0).abs() < 1e-9, "step {step}");
+            let [from, to] = [before, position].map(|point| TORUS.distance(point, target));
+            assert!((to - (from - 3.0).abs()).abs() < 1e-9, "step {step}");
+            n_at_target += usize::from(from < 3.0 && to < 3.0);
+        }
+        assert!(n_at_target > 20, "{n_at_target}");
     }
 
     #[test]

@@ -121,7 +121,7 @@ impl Senses {
                 vector(received.map(|received| received.receiving_direction))
             }
             SensorQuery::ReceiverSendingDirection => {
-                vector(received.map(|received| received.origin.sending_direction))
+                vector(received.map(|received| received.sending_direction))
             }
             SensorQuery::ReceiverState => {
                 Reading::Scalar([f64::from(swarm.modes[robot] == Mode::Send)])

@@ -45,6 +45,8 @@ pub(crate) struct Received {
     pub signal: f64,
     /// (cos, sin) of the receiving sector in the receiver's own frame.
     pub receiving_direction: Vec2,
+    /// (cos, sin) of the sending sector in the frame of the robot whose sector it is.
+    pub sending_direction: Vec2,
     /// Where it comes from, the sending direction filled in.
     pub origin: FrameOrigin,
 }

@@ -332,7 +332,8 @@ mod tests {
     use super::*;
     use crate::communication::FrameOrigin;
     use crate::testing::{experiment_a, robot};
-    use experiment_file::{ExperimentConfig, Initializer};
+    use experiment_file::{ExperimentConfig, Initializer, SendingDirection};
+    use std::f64::consts::FRAC_PI_2;
 
     /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
     fn line(n: u32) -> ExperimentConfig {
@@ -385,6 +386,30 @@ mod tests {
             assert!((received.receiving_direction.x + 1.0).abs() < 1e-15);
             assert!((received.signal - libm::exp(-0.05 * 90.0)).abs() < 1e-15);
             assert_eq!(trial.swarm.received_messages[2 * hop..2 * hop + 2], [1.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn the_sending_direction_is_that_of_the_robot_that_is_heard_or_of_the_originator() {
+        for (whose, expected) in
+            [(SendingDirection::Emitter, (0.0, -1.0)), (SendingDirection::Originator, (1.0, 0.0))]
+        {
+            // Robot 1 looks along y and relays robot 0's frame to robot 2, on its right.
+            let mut config = line(3);
+            let robot = robot(&mut config);
+            robot.sensors.wireless_receiver.as_mut().unwrap().sending_direction = whose;
+            let headings = [0.0, FRAC_PI_2, 0.0].map(|heading| vec![heading]);
+            robot.initializers.orientations = Initializer::Fixed { values: headings.to_vec() };
+            let simulation = Simulation::compile(&config).unwrap();
+            let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+            for _ in 0..3 {
+                step(&mut trial, &[Mode::Send, Mode::Relay, Mode::Relay], [1.0, 0.0]);
+            }
+            let received = trial.swarm.received[2].unwrap();
+            assert_eq!(received.origin.hops, 2);
+            let direction = received.sending_direction;
+            assert!((direction.x - expected.0).abs() < 1e-15, "{direction:?}");
+            assert!((direction.y - expected.1).abs() < 1e-15, "{direction:?}");
         }
     }
 

@@ -254,6 +254,7 @@ fn antenna(robot: &RobotConfig) -> Antenna {
             range: receiver.range,
             decay: Decay { rho: receiver.decay_rho, phi: receiver.decay_phi },
             max_hops: receiver.max_hops,
+            sending_direction: receiver.sending_direction,
         }),
     }
 }

@@ -110,6 +110,7 @@ fn perturbations(o: &mut Object<'_>, num_instances: u32) -> PerturbationsConfig 
                     targets.into_iter().map(Node::quantity).collect()
                 }),
                 switch_at: o.or("switch_at", 600, steps),
+                speed: o.or("speed", 0.1, Node::probability),
             })
         }),
     }

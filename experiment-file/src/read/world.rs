@@ -5,7 +5,8 @@ use super::robot::robot;
 use crate::world::DEFAULT_WORLD_SIZE;
 use crate::{
     GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, PositionInitializers, WorldConfig, limits,
+    LightSourceConfig, ObjectConfig, Pace, PositionInitializers, RandomTargetsConfig, WorldConfig,
+    limits,
 };
 
 pub(super) fn world(o: &mut Object<'_>) -> WorldConfig {
@@ -71,13 +72,25 @@ fn light_controller(node: Node<'_>) -> LightController {
         };
         o.inner("params", |o| match name {
             "light_orbit_controller" => LightController::LightOrbitController {},
-            "light_rnd_pos_controller" => LightController::LightRndPosController {
-                every: o.or("every", 50, |node| node.u32(1..=limits::STEPS)),
-                step: o.or("step", 0.03, Node::probability),
-            },
+            "light_rnd_pos_controller" => LightController::LightRndPosController(random_targets(o)),
             _ => LightController::Static {},
         })
     })
+}
+
+fn random_targets(o: &mut Object<'_>) -> RandomTargetsConfig {
+    let default = RandomTargetsConfig::default();
+    let speed = o.optional("speed");
+    let step = o.optional("step");
+    if let (Some(_), Some(step)) = (&speed, &step) {
+        step.problem("`speed` says the same");
+    }
+    let speed = speed.map(|node| Pace::Speed(node.amount()));
+    let step = step.map(|node| Pace::Step(node.probability()));
+    RandomTargetsConfig {
+        every: o.or("every", default.every, |node| node.u32(1..=limits::STEPS)),
+        pace: speed.or(step).unwrap_or(default.pace),
+    }
 }
 
 fn ground_area(o: &mut Object<'_>, center: [f64; 2]) -> GroundAreaConfig {

@@ -11,7 +11,7 @@ mod receiver;
 pub use distance::DistanceSensorConfig;
 pub use ground::GroundSensorConfig;
 pub use light::LightSensorConfig;
-pub use receiver::WirelessReceiverConfig;
+pub use receiver::{SendingDirection, WirelessReceiverConfig};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! `wireless_receiver`: frames of other robots.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::SensorConfig;
 use crate::node::{Node, Object};
@@ -29,6 +29,30 @@ pub struct WirelessReceiverConfig {
     /// Decay of the strength per radian; default 1.
     #[schemars(range(min = 0))]
     pub decay_phi: f64,
+    /// Whose sector the sending direction is; default `emitter`.
+    #[serde(skip_serializing_if = "SendingDirection::is_default")]
+    pub sending_direction: SendingDirection,
+}
+
+/// Of which robot the reading `wireless_receiver:sending_direction` gives the sector.
+/// The two differ for frames that were relayed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SendingDirection {
+    /// The robot that is heard: its sector that faces the listener (section 3.3.2).
+    #[default]
+    Emitter,
+    /// The robot whose message it is: its sector that faced the first robot to hear
+    /// the message.
+    Originator,
+}
+
+impl SendingDirection {
+    /// Whether the canonical form leaves it out.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 impl Default for WirelessReceiverConfig {
@@ -40,6 +64,7 @@ impl Default for WirelessReceiverConfig {
             max_hops: 10,
             decay_rho: 0.05,
             decay_phi: 1.0,
+            sending_direction: SendingDirection::default(),
         }
     }
 }
@@ -56,6 +81,9 @@ impl SensorConfig for WirelessReceiverConfig {
             max_hops: o.or("max_hops", default.max_hops, |node| node.u32(1..=limits::HOPS)),
             decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
             decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
+            sending_direction: o.or("sending_direction", default.sending_direction, |node| {
+                node.variant(&[]).unwrap_or_default()
+            }),
         }
     }
 

@@ -4,8 +4,8 @@ use super::validator::is_valid;
 use super::{BASE, accept, defaults, edited, read};
 use evolution::ALGORITHMS;
 use experiment_file::{
-    Activation, Initializer, LightController, LightSourceConfig, NeuronModel, ObjectConfig,
-    RobotController, UncontrollableRotationConfig, json_schema,
+    Activation, Initializer, LightController, LightSourceConfig, NeuronModel, ObjectConfig, Pace,
+    RandomTargetsConfig, RobotController, UncontrollableRotationConfig, json_schema,
 };
 
 #[test]
@@ -82,11 +82,15 @@ fn light_controllers_have_three_forms() {
         }
     };
     assert_eq!(controller("null"), LightController::Static {});
-    let random = LightController::LightRndPosController { every: 50, step: 0.03 };
-    assert_eq!(controller(r#""light_rnd_pos_controller""#), random);
-    let slow = r#"{"name": "light_rnd_pos_controller", "params": {"every": 90}}"#;
-    let random = LightController::LightRndPosController { every: 90, step: 0.03 };
-    assert_eq!(controller(slow), random);
+    let random =
+        |every, pace| LightController::LightRndPosController(RandomTargetsConfig { every, pace });
+    assert_eq!(controller(r#""light_rnd_pos_controller""#), random(50, Pace::Speed(3.0)));
+    let params = |params: &str| {
+        controller(&format!(r#"{{"name": "light_rnd_pos_controller", "params": {params}}}"#))
+    };
+    assert_eq!(params(r#"{"every": 90}"#), random(90, Pace::Speed(3.0)));
+    assert_eq!(params(r#"{"speed": 1.5}"#), random(50, Pace::Speed(1.5)));
+    assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, Pace::Step(0.1)));
 }
 
 #[test]
@@ -130,6 +134,7 @@ fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
                 start: 200,
                 targets,
                 switch_at: 600,
+                speed: 0.1,
             })
         );
     }

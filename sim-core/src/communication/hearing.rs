@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use crate::neighbours::{Neighbour, Neighbours};
 use crate::sensors::Decay;
 use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
+use experiment_file::SendingDirection;
 
 /// A border between sectors belongs to both in spite of rounding, radians.
 const BORDER: f64 = 1e-12;
@@ -30,6 +31,8 @@ pub(crate) struct Receiver {
     pub decay: Decay,
     /// Frames of so many hops are not accepted.
     pub max_hops: u32,
+    /// Whose sector the sending direction is.
+    pub sending_direction: SendingDirection,
 }
 
 /// The strongest emitter in a sector.
@@ -169,6 +172,7 @@ mod tests {
             range: 100.0,
             decay: Decay { rho: 0.05, phi: 1.0 },
             max_hops: 10,
+            sending_direction: SendingDirection::Emitter,
         }),
     };
 

@@ -9,6 +9,7 @@ use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
+use experiment_file::SendingDirection;
 use numeric::Isa;
 use numeric::random::Stream;
 
@@ -71,16 +72,21 @@ impl Radio {
                 continue;
             };
             message.copy_from_slice(ether.message(heard.emitter.robot));
-            // The first to hear a frame sees the direction in which it was sent.
-            let sending_direction = match origin.hops {
-                1 => self.hearing.sending_direction(robot, heard, &swarm.headings),
-                _ => origin.sending_direction,
+            let observed = self.hearing.sending_direction(robot, heard, &swarm.headings);
+            // The first to hear a frame sees the direction in which its message was sent.
+            let origin = match origin.hops {
+                1 => FrameOrigin { sending_direction: observed, ..*origin },
+                _ => *origin,
             };
             swarm.received[robot] = Some(Received {
                 sector,
                 signal: heard.strength(receiver.decay),
                 receiving_direction: self.hearing.direction(robot, sector),
-                origin: FrameOrigin { sending_direction, ..*origin },
+                sending_direction: match receiver.sending_direction {
+                    SendingDirection::Emitter => observed,
+                    SendingDirection::Originator => origin.sending_direction,
+                },
+                origin,
             });
         }
     }

@@ -6,8 +6,6 @@ use crate::torus::{angular_difference, wrap_angle};
 use experiment_file::UncontrollableRotationConfig;
 use numeric::random::Stream;
 
-/// Action of the right wheel, and minus that of the left, while turning.
-const TURNING: f64 = 0.3;
 /// Distance from the target within which a robot holds its heading, radians.
 const ARRIVED: f64 = 0.15;
 
@@ -19,6 +17,8 @@ pub(super) struct Rotation {
     /// In \[0, 2 pi).
     targets: Vec<f64>,
     switch_at: u32,
+    /// Action of the right wheel, and minus that of the left, while turning.
+    speed: f64,
 }
 
 impl Rotation {
@@ -33,6 +33,7 @@ impl Rotation {
             start: config.start,
             targets: config.targets.iter().map(|&target| wrap_angle(target)).collect(),
             switch_at: config.switch_at.max(1),
+            speed: config.speed,
         }
     }
 
@@ -46,7 +47,7 @@ impl Rotation {
         for ((wheels, heading), affected) in wheels.iter_mut().zip(headings).zip(&self.affected) {
             if *affected {
                 let arrived = angular_difference(*heading, target) <= ARRIVED;
-                *wheels = if arrived { [0.0; 2] } else { [TURNING, -TURNING] };
+                *wheels = if arrived { [0.0; 2] } else { [self.speed, -self.speed] };
             }
         }
     }
@@ -67,6 +68,7 @@ mod tests {
             start: 200,
             targets: vec![1.0, -1.0],
             switch_at: 600,
+            speed: 0.3,
         };
         let mut stream = Stream::new(0, 0, 0, Purpose::Perturbation, 3);
         let mut wheels = [OWN];

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use experiment_file::{
     Activation, DecodingConfig, ExperimentConfig, FitnessFunction, Initializer, ObjectConfig,
-    UncontrollableRotationConfig,
+    SendingDirection, UncontrollableRotationConfig,
 };
 
 use crate::configs::{experiment_c, experiment_d, receiver_mut, swarm_mut};
@@ -54,8 +54,12 @@ fn a_relaying_swarm_that_turns_agrees() {
     // Shorter than the swarm, so that frames need their hops; six sectors.
     receiver_mut(&mut config).range = 80.0;
     receiver_mut(&mut config).n_sectors = 6;
-    let episodes = assert_varied_agreement(&config);
-    assert!(episodes.iter().any(|episode| episode.witness.max_hops > 4));
+    let emitter = assert_varied_agreement(&config);
+    assert!(emitter.iter().any(|episode| episode.witness.max_hops > 4));
+    receiver_mut(&mut config).sending_direction = SendingDirection::Originator;
+    let originator = assert_varied_agreement(&config);
+    let differ = |(a, b): (&Episode, &Episode)| a.fitness != b.fitness;
+    assert!(emitter.iter().zip(&originator).any(differ));
 }
 
 #[test]
@@ -107,6 +111,7 @@ fn uncontrollable_robots_agree() {
             start: 20,
             targets: vec![0.1, PI, 5.0],
             switch_at: 30,
+            speed: 0.2,
         });
     let episodes = assert_varied_agreement(&config);
     let disturbed: Vec<f64> = episodes.iter().map(|episode| episode.fitness).collect();

@@ -3,8 +3,8 @@
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, PositionInitializers, SensorQuery, StimuliInhibitionConfig,
-    StimulusConfig, SynapseGroupConfig, WholeReceiver,
+    LightSourceConfig, ObjectConfig, Pace, PositionInitializers, RandomTargetsConfig, SensorQuery,
+    StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -74,6 +74,10 @@ fn light(
     })
 }
 
+fn random_targets(every: u32, pace: Pace) -> LightController {
+    LightController::LightRndPosController(RandomTargetsConfig { every, pace })
+}
+
 fn fitness(episodes: &[Episode]) -> Vec<f64> {
     episodes.iter().map(|episode| episode.fitness).collect()
 }
@@ -105,12 +109,7 @@ fn lights_on_every_path_agree() {
     let alone = fitness(&assert_varied_agreement(&config));
     let lights = [
         ("still", LightController::Static {}, "blue", 90.0),
-        (
-            "wanderers",
-            LightController::LightRndPosController { every: 20, step: 0.03 },
-            "red",
-            70.0,
-        ),
+        ("wanderers", random_targets(20, Pace::Speed(3.0)), "red", 70.0),
         ("orbiters", LightController::LightOrbitController {}, "red", 40.0),
     ];
     for (name, controller, color, range) in lights {
@@ -126,10 +125,11 @@ fn robots_near_a_light_on_every_path_agree() {
     for controller in [
         LightController::Static {},
         LightController::LightOrbitController {},
-        LightController::LightRndPosController { every: 30, step: 0.05 },
+        random_targets(30, Pace::Step(0.05)),
+        random_targets(30, Pace::Speed(4.0)),
     ] {
         let mut config = experiment_d();
-        config.algorithm.evaluation_steps = 300;
+        config.algorithm.evaluation_steps = 200;
         if let ObjectConfig::LightSource(light) = &mut config.world.objects["light_red"] {
             light.controller = controller;
         }

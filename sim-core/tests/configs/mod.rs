@@ -268,6 +268,7 @@ fn receiver() -> WirelessReceiverConfig {
         max_hops: 10,
         decay_rho: 0.05,
         decay_phi: 1.0,
+        sending_direction: SendingDirection::Emitter,
     }
 }
 

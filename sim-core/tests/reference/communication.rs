@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use experiment_file::WirelessTransmitterConfig;
+use experiment_file::{SendingDirection, WirelessTransmitterConfig};
 
 use super::torus::{Torus, Vector, angular_difference, sector_direction};
 use super::world::Robot;
@@ -14,8 +14,9 @@ pub struct Frame {
     /// None: a relaying robot had nothing to relay.
     pub originator: Option<usize>,
     pub hops: u32,
-    /// Carried from the second hop on; before that the receiver observes it.
-    pub sending_direction: Option<Vector>,
+    /// Of the originator. Carried from the second hop on; before that the receiver
+    /// observes it.
+    pub original_direction: Option<Vector>,
 }
 
 /// A frame as its receiver perceives it.
@@ -28,8 +29,10 @@ pub struct Reception {
     pub signal: f64,
     /// (cos, sin) of the receiving sector in the receiver's own frame.
     pub receiving_direction: Vector,
-    /// (cos, sin) of the first emitter's sector that faced its receiver.
+    /// (cos, sin) of the sector of the robot that is heard, or of the originator.
     pub sending_direction: Vector,
+    /// (cos, sin) of the originator's sector that faced the first robot to hear it.
+    pub original_direction: Vector,
     /// Number of sectors that held a valid frame.
     pub n_candidates: usize,
 }
@@ -37,7 +40,7 @@ pub struct Reception {
 impl Frame {
     /// Send mode: own message, first hop.
     pub fn sent(message: Vec<f64>, originator: usize) -> Self {
-        Self { message, originator: Some(originator), hops: 1, sending_direction: None }
+        Self { message, originator: Some(originator), hops: 1, original_direction: None }
     }
 
     /// Relay mode: a copy of what was received in this step, one hop further.
@@ -47,13 +50,13 @@ impl Frame {
                 message: reception.message.clone(),
                 originator: Some(reception.originator),
                 hops: reception.hops + 1,
-                sending_direction: Some(reception.sending_direction),
+                original_direction: Some(reception.original_direction),
             },
             None => Self {
                 message: vec![0.0; msg_length],
                 originator: None,
                 hops: 1,
-                sending_direction: None,
+                original_direction: None,
             },
         }
     }
@@ -153,15 +156,19 @@ pub fn receive(
     let n_candidates = candidates.len();
     let chosen = ((uniform * n_candidates as f64).floor() as usize).min(n_candidates - 1);
     let (j, signal, emitter, frame, originator) = candidates[chosen];
+    let observed = observed_sending_direction(&robots[emitter], own.position, torus);
+    let original_direction = frame.original_direction.unwrap_or(observed);
     Some(Reception {
         message: frame.message.clone(),
         originator,
         hops: frame.hops,
         signal,
         receiving_direction: unit(f64::from(j) * TAU / f64::from(config.n_sectors)),
-        sending_direction: frame
-            .sending_direction
-            .unwrap_or_else(|| observed_sending_direction(&robots[emitter], own.position, torus)),
+        sending_direction: match config.sending_direction {
+            SendingDirection::Emitter => observed,
+            SendingDirection::Originator => original_direction,
+        },
+        original_direction,
         n_candidates,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use experiment_file::{LightController, LightParams, LightSourceConfig};
+use experiment_file::{LightController, LightParams, LightSourceConfig, Pace};
 use numeric::random::Stream;
 
 use super::torus::{Torus, Vector, norm};
@@ -61,9 +61,9 @@ impl<'a> Light<'a> {
                     centre[1] + self.radius * self.angle.sin(),
                 ]);
             }
-            // Eq. 6.4
-            LightController::LightRndPosController { every, step } => {
-                if k.is_multiple_of(every) {
+            // Section 6.4
+            LightController::LightRndPosController(config) => {
+                if k.is_multiple_of(config.every) {
                     let x = centre[0] - TARGET_SQUARE_CM / 2.0
                         + TARGET_SQUARE_CM * self.stream.uniform();
                     let y = centre[1] - TARGET_SQUARE_CM / 2.0
@@ -71,8 +71,16 @@ impl<'a> Light<'a> {
                     self.target = torus.wrap([x, y]);
                 }
                 let way = torus.displacement(self.position, self.target);
-                self.position = torus
-                    .wrap([self.position[0] + step * way[0], self.position[1] + step * way[1]]);
+                let (length, distance) = match config.pace {
+                    Pace::Step(share) => (share * norm(way), norm(way)),
+                    Pace::Speed(speed) => (speed, norm(way)),
+                };
+                if distance > 0.0 {
+                    self.position = torus.wrap([
+                        self.position[0] + length * way[0] / distance,
+                        self.position[1] + length * way[1] / distance,
+                    ]);
+                }
             }
         }
     }

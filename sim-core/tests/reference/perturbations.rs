@@ -7,7 +7,6 @@ use numeric::random::Stream;
 
 use super::torus::angular_difference;
 
-const TURNING: [f64; 2] = [0.3, -0.3];
 const HELD_WITHIN_RAD: f64 = 0.15;
 
 /// `k` of `n` robots: partial Fisher-Yates.
@@ -47,7 +46,7 @@ pub fn rotation(config: &UncontrollableRotationConfig, k: u32, heading: f64) -> 
     }
     let target = ((k / config.switch_at) as usize).min(config.targets.len() - 1);
     let is_there = angular_difference(heading, config.targets[target]) <= HELD_WITHIN_RAD;
-    Some(if is_there { [0.0, 0.0] } else { TURNING })
+    Some(if is_there { [0.0, 0.0] } else { [config.speed, -config.speed] })
 }
 
 /// Consecutive steps in which the same robot was the only one with its LED on.

@@ -433,7 +433,7 @@ fn a_relayed_frame_moves_one_hop_per_step() {
         assert_eq!((reception.originator, reception.hops), (0, step as u32));
         assert_eq!(reception.message, [1.0, 0.0]);
         // Robot 0 heads east: its sector 0 faced robot 1, and every relay says so.
-        assert_eq!(reception.sending_direction, [1.0, 0.0]);
+        assert_eq!(reception.original_direction, [1.0, 0.0]);
         for (robot, heard) in simulation.robots.iter_mut().zip(&heard) {
             robot.on_air = Some(Frame::relayed(heard.as_ref(), 2));
         }

@@ -43,6 +43,10 @@ impl Robot {
             match kind {
                 "wireless_receiver" => {
                     insert(&mut sensor, "msg_length", json!(msg_length));
+                    if dice.chance(0.3) {
+                        let whose = dice.pick(&["emitter", "originator"]);
+                        insert(&mut sensor, "sending_direction", json!(whose));
+                    }
                     insert(&mut sensor, "max_hops", json!(dice.die(20)));
                     for (reading, n) in [
                         ("wireless_receiver:msg", msg_length),
@@ -184,6 +188,7 @@ impl Robot {
         }
         if self.actuators.contains(&"wheel_actuator") && dice.chance(0.3) {
             let targets = json!([dice.number(0.0, 6.0), dice.number(-6.0, 6.0)]);
+            let speed = dice.number(0.0, 1.0);
             let rotation = object(
                 dice,
                 [
@@ -191,6 +196,7 @@ impl Robot {
                     ("start", json!(every)),
                     ("targets", targets),
                     ("switch_at", json!(every)),
+                    ("speed", speed),
                 ],
             );
             insert(&mut perturbations, "uncontrollable_rotation", rotation);
@@ -207,8 +213,9 @@ fn light(dice: &mut Dice) -> Value {
         2 => json!("light_rnd_pos_controller"),
         3 => json!({"name": "static"}),
         _ => {
-            let step = dice.number(0.0, 1.0);
-            let params = object(dice, [("every", json!(n * 10)), ("step", step)]);
+            let pace = dice.pick(&["speed", "step"]);
+            let value = dice.number(0.0, 1.0);
+            let params = object(dice, [("every", json!(n * 10)), (pace, value)]);
             json!({"name": "light_rnd_pos_controller", "params": params})
         }
     };
