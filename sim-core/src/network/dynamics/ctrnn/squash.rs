@@ -23,9 +23,36 @@ pub(super) fn scale(activation: Activation) -> f64 {
     }
 }
 
+/// u = F(y) of neurons in W vectors of lanes, pair by pair.
+#[inline(always)]
+pub(super) fn squash<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    activation: Activation,
+    y: &[[S::f32s; W]; N],
+    u: &mut [[S::f32s; W]; N],
+) {
+    let pairs = y.as_chunks::<2>().0.iter().zip(u.as_chunks_mut::<2>().0);
+    match activation {
+        Activation::Sigmoid => {
+            for ([y0, y1], [u0, u1]) in pairs {
+                for vector in 0..W {
+                    [u0[vector], u1[vector]] = sigmoid(simd, y0[vector], y1[vector]);
+                }
+            }
+        }
+        Activation::Tanh => {
+            for ([y0, y1], [u0, u1]) in pairs {
+                for vector in 0..W {
+                    [u0[vector], u1[vector]] = tanh(simd, y0[vector], y1[vector]);
+                }
+            }
+        }
+    }
+}
+
 /// 1 / (1 + 2^y), twice.
 #[inline(always)]
-pub(super) fn sigmoid<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
+fn sigmoid<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
     let a = one_plus_exp2(simd, first);
     let b = one_plus_exp2(simd, second);
     let inverse = simd.div_f32s(simd.splat_f32s(1.0), simd.mul_f32s(a, b));
@@ -41,7 +68,7 @@ fn one_plus_exp2<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
 
 /// (2^y - 1) / (2^y + 1), twice.
 #[inline(always)]
-pub(super) fn tanh<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
+fn tanh<S: Simd>(simd: S, first: S::f32s, second: S::f32s) -> [S::f32s; 2] {
     let above_a = exp2_minus_one(simd, first);
     let above_b = exp2_minus_one(simd, second);
     let two = simd.splat_f32s(2.0);

@@ -1,10 +1,11 @@
 //! The network against its equations, and against itself on other processors.
 
 use super::*;
+use crate::network::connections::Source;
 use crate::network::dynamics::NetworkState;
 use crate::problems::Problems;
 use crate::testing::experiment_a;
-use experiment_file::ExperimentConfig;
+use experiment_file::{Activation, ExperimentConfig};
 
 /// The equation as it stands, in f64, for one robot.
 fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut [f64]) -> Vec<f64> {
@@ -48,15 +49,17 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Experiment A's network, and variants with every kind of pair: one ensemble of
-/// `tanh`, and an odd number of neurons.
-fn networks() -> [(Network, Phenotype); 3] {
+/// Experiment A's network, and variants with every kind of block: one ensemble of
+/// `tanh`, odd numbers of neurons, and more pairs of neurons than a vector has lanes.
+fn networks() -> [(Network, Phenotype); 4] {
     let mut tanh = experiment_a();
     tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);
     let mut odd = tanh.clone();
     odd.topology.ensembles["H1"].n = 7;
     odd.topology.ensembles["H2"].n = 9;
-    [experiment_a(), tanh, odd].map(|config| compiled(&config))
+    let mut large = odd.clone();
+    large.topology.ensembles["H1"].n = 39;
+    [experiment_a(), tanh, odd, large].map(|config| compiled(&config))
 }
 
 fn stimulus(step: usize, lane: usize, input: usize) -> f64 {
@@ -92,6 +95,8 @@ fn bits(
 #[test]
 fn every_lane_follows_the_equation() {
     for (network, phenotype) in networks() {
+        // Rounding errors add up over presynaptic neurons, and networks amplify them.
+        let tolerance = if network.n_neurons() > 40 { 1e-4 } else { 1e-5 };
         let n_lanes = 11;
         let mut state = NetworkState::new(Isa::best(), &network, &phenotype, n_lanes);
         let mut v = vec![vec![0.0; network.n_neurons()]; n_lanes];
@@ -102,7 +107,7 @@ fn every_lane_follows_the_equation() {
                 let u = reference(&network, &phenotype, &phi, v);
                 for (neuron, u) in u.into_iter().enumerate() {
                     let difference = (f64::from(state.activity().get(neuron, lane)) - u).abs();
-                    assert!(difference < 1e-5, "step {step}, lane {lane}: {difference}");
+                    assert!(difference < tolerance, "step {step}, lane {lane}: {difference}");
                 }
             }
         }
@@ -112,7 +117,7 @@ fn every_lane_follows_the_equation() {
 #[test]
 fn instruction_sets_agree_in_every_bit() {
     for network in networks() {
-        for n_lanes in [1, 15, 50, 100] {
+        for n_lanes in [1, 3, 6, 15, 50, 53, 100] {
             for lane in [0, n_lanes / 2, n_lanes - 1] {
                 let expected = bits(&network, Isa::best(), 0..n_lanes, lane);
                 for isa in Isa::available() {
@@ -128,7 +133,7 @@ fn a_lane_does_not_depend_on_its_place_or_its_neighbours() {
     for network in networks() {
         for isa in Isa::available() {
             let alone = bits(&network, isa, 70..71, 70);
-            for lanes in [70..71, 69..71, 60..80, 0..71, 37..170] {
+            for lanes in [70..71, 69..71, 67..71, 65..71, 60..80, 0..71, 37..170] {
                 assert_eq!(bits(&network, isa, lanes.clone(), 70), alone, "{isa}, {lanes:?}");
             }
         }

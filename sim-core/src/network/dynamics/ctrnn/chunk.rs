@@ -1,0 +1,229 @@
+//! The network in whole vectors of lanes: a weight is read once and applied to all
+//! lanes of some vectors.
+
+use std::mem;
+
+use pulp::{Simd, WithSimd};
+
+use super::aligned::Aligned;
+use super::kernel::{Blocks, Coupling, Kernel};
+use super::squash::squash;
+use crate::lanes::Lanes;
+use numeric::Isa;
+
+/// Vectors per row of a chunk, at most: the sums of four neurons then fit in registers.
+pub(super) const MAX_WIDTH: usize = 4;
+
+/// The state of a network in some neighbouring vectors of lanes.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    first_lane: usize,
+    /// Vectors per row.
+    width: usize,
+    /// Lanes per row.
+    n_lanes: usize,
+    /// y, `[row][lane]`
+    state: Aligned,
+    /// u, `[row][lane]`
+    activity: Aligned,
+    /// What bias and inputs add to y in a substep, `[row][lane]`.
+    drive: Aligned,
+    scratch: Aligned,
+}
+
+impl Chunk {
+    /// At rest.
+    pub fn new(kernel: &Kernel, first_lane: usize, width: usize, isa: Isa) -> Self {
+        let n_lanes = width * isa.vector_len();
+        let rows = || Aligned::new(kernel.n_rows() * n_lanes);
+        let (state, activity, drive, scratch) = (rows(), rows(), rows(), rows());
+        let mut chunk = Self { first_lane, width, n_lanes, state, activity, drive, scratch };
+        for (row, y) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(kernel.starts()) {
+            row.fill(y);
+        }
+        chunk.dispatch(isa, kernel, Task::Activate);
+        chunk
+    }
+
+    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    pub fn advance(&mut self, kernel: &Kernel, stimuli: &Lanes, isa: Isa) {
+        self.dispatch(isa, kernel, Task::Advance(stimuli));
+    }
+
+    /// Writes the activities of neurons, given as their rows: `[neuron][lane]`.
+    pub fn write_activity(&self, rows: &[usize], activity: &mut Lanes) {
+        for (neuron, &row) in rows.iter().enumerate() {
+            let lanes = &self.activity.values()[row * self.n_lanes..][..self.n_lanes];
+            activity.row_mut(neuron)[self.first_lane..][..self.n_lanes].copy_from_slice(lanes);
+        }
+    }
+
+    fn dispatch(&mut self, isa: Isa, kernel: &Kernel, task: Task<'_>) {
+        match self.width {
+            1 => isa.run(Work::<1> { kernel, chunk: self, task }),
+            2 => isa.run(Work::<2> { kernel, chunk: self, task }),
+            3 => isa.run(Work::<3> { kernel, chunk: self, task }),
+            4 => isa.run(Work::<4> { kernel, chunk: self, task }),
+            width => unreachable!("{width} vectors are more than MAX_WIDTH"),
+        }
+    }
+}
+
+/// What there is to do.
+enum Task<'a> {
+    /// u = F(y).
+    Activate,
+    /// An environment step with these stimuli.
+    Advance(&'a Lanes),
+}
+
+/// A task for a chunk of W vectors per row.
+struct Work<'a, const W: usize> {
+    kernel: &'a Kernel,
+    chunk: &'a mut Chunk,
+    task: Task<'a>,
+}
+
+impl<const W: usize> WithSimd for Work<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { kernel, chunk, task } = self;
+        match task {
+            Task::Activate => activate::<S, W>(simd, kernel, chunk),
+            Task::Advance(stimuli) => {
+                perceive::<S, W>(simd, kernel, chunk, stimuli);
+                for _ in 0..kernel.n_substeps {
+                    integrate::<S, W>(simd, kernel, chunk);
+                    mem::swap(&mut chunk.activity, &mut chunk.scratch);
+                }
+            }
+        }
+    }
+}
+
+// All that touches vectors is inlined into `with_simd`, which is compiled for the
+// vectors' instruction set; closures would not be, hence the plain loops.
+
+/// u = F(y).
+#[inline(always)]
+fn activate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
+    let (quads, pairs) = split(kernel, rows::<S, W>(chunk.state.values()));
+    let (quads_u, pairs_u) = split_mut(kernel, rows_mut::<S, W>(chunk.activity.values_mut()));
+    for ((block, y), u) in kernel.quads.blocks.iter().zip(quads).zip(quads_u) {
+        squash(simd, block.activation, y, u);
+    }
+    for ((block, y), u) in kernel.pairs.blocks.iter().zip(pairs).zip(pairs_u) {
+        squash(simd, block.activation, y, u);
+    }
+}
+
+/// Drive of this environment step.
+#[inline(always)]
+fn perceive<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk, stimuli: &Lanes) {
+    let first_lane = chunk.first_lane;
+    let (quads, pairs) = split_mut(kernel, rows_mut::<S, W>(chunk.drive.values_mut()));
+    perceive_blocks(simd, &kernel.quads, quads, stimuli, first_lane);
+    perceive_blocks(simd, &kernel.pairs, pairs, stimuli, first_lane);
+}
+
+#[inline(always)]
+fn perceive_blocks<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    Blocks { blocks, afferent, .. }: &Blocks<N>,
+    drives: &mut [[[S::f32s; W]; N]],
+    stimuli: &Lanes,
+    first_lane: usize,
+) {
+    for (block, drive) in blocks.iter().zip(drives) {
+        let mut sums = [[simd.splat_f32s(0.0); W]; N];
+        for (sums, drive) in sums.iter_mut().zip(block.drive) {
+            *sums = [simd.splat_f32s(drive); W];
+        }
+        for coupling in &afferent[block.afferent.clone()] {
+            let stimulus = &stimuli.row(coupling.pre)[first_lane..][..W * S::F32_LANES];
+            accumulate(simd, &mut sums, coupling, &rows::<S, W>(stimulus)[0]);
+        }
+        *drive = sums;
+    }
+}
+
+/// One Euler step, from `activity` to `scratch`. All of y is computed from the
+/// u before it.
+#[inline(always)]
+fn integrate<S: Simd, const W: usize>(simd: S, kernel: &Kernel, chunk: &mut Chunk) {
+    let before = rows::<S, W>(chunk.activity.values());
+    let (quads_u, pairs_u) = split_mut(kernel, rows_mut::<S, W>(chunk.scratch.values_mut()));
+    let (quads_y, pairs_y) = split_mut(kernel, rows_mut::<S, W>(chunk.state.values_mut()));
+    let (quads, pairs) = split(kernel, rows::<S, W>(chunk.drive.values()));
+    integrate_blocks(simd, &kernel.quads, before, quads, quads_y, quads_u);
+    integrate_blocks(simd, &kernel.pairs, before, pairs, pairs_y, pairs_u);
+}
+
+#[inline(always)]
+fn integrate_blocks<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    Blocks { blocks, recurrent, .. }: &Blocks<N>,
+    before: &[[S::f32s; W]],
+    drives: &[[[S::f32s; W]; N]],
+    states: &mut [[[S::f32s; W]; N]],
+    after: &mut [[[S::f32s; W]; N]],
+) {
+    for (((block, y), drive), u) in blocks.iter().zip(states).zip(drives).zip(after) {
+        let mut sums = *drive;
+        for coupling in &recurrent[block.recurrent.clone()] {
+            accumulate(simd, &mut sums, coupling, &before[coupling.pre]);
+        }
+        for neuron in 0..N {
+            let retention = simd.splat_f32s(block.retention[neuron]);
+            for vector in 0..W {
+                y[neuron][vector] =
+                    simd.mul_add_f32s(retention, y[neuron][vector], sums[neuron][vector]);
+            }
+        }
+        squash(simd, block.activation, y, u);
+    }
+}
+
+/// Adds what one row does to a block.
+#[inline(always)]
+fn accumulate<S: Simd, const W: usize, const N: usize>(
+    simd: S,
+    sums: &mut [[S::f32s; W]; N],
+    coupling: &Coupling<N>,
+    activity: &[S::f32s; W],
+) {
+    for (sums, weight) in sums.iter_mut().zip(coupling.weights) {
+        let weight = simd.splat_f32s(weight);
+        for (sum, u) in sums.iter_mut().zip(activity) {
+            *sum = simd.mul_add_f32s(weight, *u, *sum);
+        }
+    }
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+fn rows<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
+    S::as_simd_f32s(values).0.as_chunks().0
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+fn rows_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
+    S::as_mut_simd_f32s(values).0.as_chunks_mut().0
+}
+
+/// The rows of the blocks of four and of two.
+#[inline(always)]
+fn split<'a, T>(kernel: &Kernel, rows: &'a [T]) -> (&'a [[T; 4]], &'a [[T; 2]]) {
+    let (quads, pairs) = rows.split_at(4 * kernel.quads.blocks.len());
+    (quads.as_chunks().0, pairs.as_chunks().0)
+}
+
+/// The rows of the blocks of four and of two.
+#[inline(always)]
+fn split_mut<'a, T>(kernel: &Kernel, rows: &'a mut [T]) -> (&'a mut [[T; 4]], &'a mut [[T; 2]]) {
+    let (quads, pairs) = rows.split_at_mut(4 * kernel.quads.blocks.len());
+    (quads.as_chunks_mut().0, pairs.as_chunks_mut().0)
+}
