@@ -115,4 +115,4 @@ pub use torus::Vec2;
 /// Identifies the function that this crate computes. Raise the number after the
 /// version whenever any fitness bit may change: coordinator and workers work
 /// together only if they agree on it.
-pub const FINGERPRINT: &str = concat!("sim-core ", env!("CARGO_PKG_VERSION"), " format 2");
+pub const FINGERPRINT: &str = concat!("sim-core ", env!("CARGO_PKG_VERSION"), " format 3");
