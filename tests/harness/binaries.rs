@@ -13,9 +13,14 @@ use std::{
 /// call builds them all, into the directory and profile of the running test. It
 /// names a test, too: with one, libraries have the features that `cargo test
 /// --workspace` has given them, and need not be compiled a second time.
+///
+/// `SWARM_PROGRAMS` names a directory of programs that are built already, so that a
+/// benchmark can compare two versions in turns.
 pub fn binary(name: &str) -> PathBuf {
     static DIRECTORY: OnceLock<PathBuf> = OnceLock::new();
-    DIRECTORY.get_or_init(build).join(name)
+    let directory =
+        DIRECTORY.get_or_init(|| env::var_os("SWARM_PROGRAMS").map_or_else(build, PathBuf::from));
+    directory.join(name)
 }
 
 fn build() -> PathBuf {

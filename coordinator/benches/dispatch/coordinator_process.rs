@@ -1,8 +1,10 @@
 //! The coordinator's program, on a data directory and a port of its own.
 
 use std::{
+    env,
     fs::{self, File},
     net::TcpListener,
+    path::PathBuf,
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
 };
@@ -83,7 +85,12 @@ impl Drop for CoordinatorProcess {
 
 fn spawn(address: &str, data_dir: &TempDir) -> Child {
     let log = File::create(data_dir.path().join("log")).expect("a new directory can be written");
-    Command::new(env!("CARGO_BIN_EXE_coordinator"))
+    // As in the harness of the fleet tests: programs of another version.
+    let program = env::var_os("SWARM_PROGRAMS").map_or_else(
+        || env!("CARGO_BIN_EXE_coordinator").into(),
+        |programs| PathBuf::from(programs).join("coordinator"),
+    );
+    Command::new(program)
         .args(["--listen", address, "--log-format", "json", "--data-dir"])
         .arg(data_dir.path())
         .stdout(Stdio::null())
