@@ -2,10 +2,7 @@
 
 use experiment_file::{ConfigError, ExperimentConfig};
 
-use crate::{
-    priority::Priority,
-    store::{NewExperiment, checkpoint_json},
-};
+use crate::{priority::Priority, store::NewExperiment};
 use evolution::{ALGORITHMS, Digest, Evolution};
 
 /// What a client submits.
@@ -58,7 +55,7 @@ impl Submission {
             request_id: self.request_id,
             config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
             genotype_len: experiment.genotype_len(),
-            checkpoint: checkpoint_json(&evolution),
+            checkpoint: evolution.state(),
             priority: self.priority,
             config,
         };

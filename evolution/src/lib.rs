@@ -32,9 +32,9 @@
 //! - [`Setup`] starts an evolution of one population for any function;
 //!   [`Evolution::new`] starts that of an experiment file, with several populations
 //!   if it has them (cooperative coevolution).
-//! - [`Evolution::ask`] is a pure function of the state, and the state serialises.
-//!   So an evolution that is restored from a checkpoint asks for the same genotypes
-//!   as the one that was stored.
+//! - [`Evolution::ask`] is a pure function of the state, so an evolution that is
+//!   restored from a [`Checkpoint`] asks for the same genotypes as the one that was
+//!   stored.
 //! - Every random draw has an address (seed, generation, population), so results do
 //!   not depend on machine, threads or time. [`Evolution::digest`] is a hash of all
 //!   genotypes and fitness so far: equal digests mean equal runs, bit for bit.
@@ -47,6 +47,7 @@
 
 mod algorithms;
 mod champion;
+mod checkpoint;
 mod digest;
 mod ranking;
 mod setup;
@@ -60,12 +61,14 @@ use serde::{Deserialize, Serialize};
 
 pub use algorithms::ALGORITHMS;
 pub use champion::{Champion, ChampionSource, HeldOut, Reevaluation};
+pub use checkpoint::{Advance, Checkpoint, CheckpointError};
 pub use digest::Digest;
 pub use experiment_file::AlgorithmParams;
 pub use setup::{Setup, SetupError};
 pub use statistics::Statistics;
 
 use algorithms::{Algorithm, Sample, Strategy as _};
+use checkpoint::Step;
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
@@ -90,6 +93,9 @@ pub struct Evolution {
     digest: Digest,
     /// Covers every re-evaluation so far, and the generations before it.
     champion_digest: Digest,
+    /// What led here from the generation before; none if it was restored.
+    #[serde(skip)]
+    step: Option<Step>,
 }
 
 /// A generation whose fitness is to be computed.
@@ -165,6 +171,7 @@ impl Evolution {
             challenger: None,
             digest,
             champion_digest: Digest::default(),
+            step: None,
         }
     }
 
@@ -248,6 +255,7 @@ impl Evolution {
         }
         self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
+        self.step = Some(Step { trial_fitness: trial_fitness.to_vec(), reevaluations: Vec::new() });
         Ok(GenerationSummary {
             generation: index,
             statistics: Statistics::of(&fitness),
@@ -284,6 +292,9 @@ impl Evolution {
         let genotypes = reevaluation.candidates.iter().map(|candidate| &candidate.genotype[..]);
         self.champion_digest =
             self.champion_digest.next_champion(self.digest, genotypes, trial_fitness);
+        if let Some(step) = &mut self.step {
+            step.reevaluations.push(trial_fitness.to_vec());
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use coordinator::{
     priority::Priority,
     store::{GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
-use evolution::{Digest, Evolution};
+use evolution::{Advance, Digest, Evolution};
 use experiment_file::ExperimentConfig;
 use tempfile::TempDir;
 
@@ -22,7 +22,7 @@ const N_GENERATIONS: usize = 200;
 pub struct Alone {
     /// Tell and ask.
     pub evolution: f64,
-    /// The checkpoint as text, and the transaction.
+    /// The checkpoint as bytes, and the transaction.
     pub commit: f64,
     /// Appending as many bytes to a file, and waiting for the disk.
     pub sync: f64,
@@ -41,7 +41,7 @@ pub fn measure(file: &str) -> Alone {
         request_id: None,
         config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
         genotype_len: experiment.genotype_len(),
-        checkpoint: checkpoint(&evolution),
+        checkpoint: evolution.state(),
         priority: Priority::default(),
         config,
     };
@@ -68,10 +68,10 @@ pub fn measure(file: &str) -> Alone {
             idle_share: 0.5,
         };
         let started = now();
-        let state = checkpoint(&evolution);
+        let advance = evolution.advance();
         let commit = GenerationCommit {
             generation: &generation,
-            checkpoint: &state,
+            checkpoint: &advance,
             champion: evolution.champion(),
             digest: &generation.digest,
             notices: &[],
@@ -81,15 +81,12 @@ pub fn measure(file: &str) -> Alone {
         commits.push(ms(since(started)));
 
         let started = now();
-        scratch.write_all(state.as_bytes()).expect("it can be written");
+        let (Advance::State(bytes) | Advance::Step(bytes)) = advance;
+        scratch.write_all(&bytes).expect("it can be written");
         scratch.sync_data().expect("it can be written");
         syncs.push(ms(since(started)));
     }
     Alone { evolution: median(&evolutions), commit: median(&commits), sync: median(&syncs) }
-}
-
-fn checkpoint(evolution: &Evolution) -> String {
-    serde_json::to_string(evolution).expect("numbers and lists serialise")
 }
 
 #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]

@@ -16,9 +16,7 @@ use crate::{
     ids::ExperimentId,
     runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId, restore_evolution},
     shared_store::{Retry, SharedStore, Written},
-    store::{
-        GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError, checkpoint_json,
-    },
+    store::{GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError},
 };
 
 /// Pause before a checkpoint that could not be read is read again.
@@ -113,7 +111,7 @@ pub async fn commit(
     let (row, remarks, reason, link) =
         (generation.clone(), notices.clone(), completed.clone(), digest.clone());
     let what = format!("generation {} of experiment {id}", generation.generation);
-    let checkpoint = task::spawn_blocking(move || checkpoint_json(&evolution))
+    let checkpoint = task::spawn_blocking(move || evolution.advance())
         .await
         .expect("numbers and lists serialise");
     failpoint::reached("before commit");

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use evolution::{ALGORITHMS, Digest, Evolution};
+use evolution::{ALGORITHMS, Checkpoint, Digest, Evolution};
 use experiment_file::ExperimentConfig;
 
 use crate::{
@@ -45,9 +45,8 @@ impl Runnable {
         Self { id, spec, config, memory, latest: None, priority, is_paused: false }
     }
 
-    /// An experiment as the store has it, or what contradicts what. `checkpoint`:
-    /// evolution, as JSON.
-    pub fn restore(experiment: &ExperimentRecord, checkpoint: &str) -> Result<Self, String> {
+    /// An experiment as the store has it, or what contradicts what.
+    pub fn restore(experiment: &ExperimentRecord, checkpoint: &Checkpoint) -> Result<Self, String> {
         let (id, config) = (experiment.id, config(experiment)?);
         evolution(experiment, &config, checkpoint)?;
         let is_paused = experiment.state == ExperimentState::Paused;
@@ -57,11 +56,10 @@ impl Runnable {
     }
 }
 
-/// Evolution of an experiment as the store has it, or what contradicts what. `checkpoint`:
-/// evolution, as JSON.
+/// Evolution of an experiment as the store has it, or what contradicts what.
 pub fn restore_evolution(
     experiment: &ExperimentRecord,
-    checkpoint: &str,
+    checkpoint: &Checkpoint,
 ) -> Result<Evolution, String> {
     evolution(experiment, &config(experiment)?, checkpoint)
 }
@@ -75,7 +73,7 @@ fn config(experiment: &ExperimentRecord) -> Result<ExperimentConfig, String> {
 fn evolution(
     experiment: &ExperimentRecord,
     config: &ExperimentConfig,
-    checkpoint: &str,
+    checkpoint: &Checkpoint,
 ) -> Result<Evolution, String> {
     let config_digest = Digest::of_config(config, &experiment.fingerprint).to_string();
     if config_digest != experiment.config_digest {
@@ -84,7 +82,7 @@ fn evolution(
             experiment.config_digest
         ));
     }
-    let evolution: Evolution = serde_json::from_str(checkpoint)
+    let evolution = Evolution::restore(checkpoint)
         .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
     let (n_generations, link) = match &experiment.latest {
         Some(latest) => (latest.generation + 1, &latest.digest),
@@ -111,7 +109,7 @@ mod tests {
     use crate::submission::Submission;
 
     /// A new experiment and its checkpoint.
-    fn stored() -> (ExperimentRecord, String) {
+    fn stored() -> (ExperimentRecord, Checkpoint) {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
         let config_json = fs::read_to_string(path).unwrap();
         let new = Submission { config_json, ..Submission::default() }.check().unwrap().new;
@@ -130,7 +128,7 @@ mod tests {
             priority: Priority::default(),
             last_sequence: 1,
         };
-        (experiment, new.checkpoint)
+        (experiment, Checkpoint { state: new.checkpoint, steps: Vec::new() })
     }
 
     #[test]
@@ -157,8 +155,13 @@ mod tests {
         let what = Runnable::restore(&ahead, &checkpoint).unwrap_err();
         assert!(what.contains("its history has 1 generations"), "{what}");
 
-        let other = checkpoint.replace(&sound.config_digest, &"0".repeat(64));
-        let what = Runnable::restore(&sound, &other).unwrap_err();
+        let of_other_seed = Submission {
+            config_json: sound.config_json.clone(),
+            seed: Some(2),
+            ..Submission::default()
+        };
+        let state = of_other_seed.check().unwrap().new.checkpoint;
+        let what = Runnable::restore(&sound, &Checkpoint { state, steps: Vec::new() }).unwrap_err();
         assert!(what.contains("its history has 0 generations"), "{what}");
     }
 }

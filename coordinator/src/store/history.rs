@@ -123,17 +123,19 @@ pub fn seal(
     Ok(())
 }
 
-/// An experiment's history with its seals, in order.
-pub fn read_all(
+/// An experiment's history from a generation on, with its seals, in order.
+pub fn read_from(
     connection: &Connection,
     id: ExperimentId,
+    first: u64,
 ) -> rusqlite::Result<Vec<(GenerationRecord, Vec<u8>)>> {
     let mut statement = connection.prepare_cached(
         "SELECT seal, generation, best, mean, min, standard_deviation, digest,
                 duration_ms, episodes, workers, idle_share
-         FROM generations WHERE experiment_id = ?1 ORDER BY generation",
+         FROM generations WHERE experiment_id = ?1 AND generation >= ?2 ORDER BY generation",
     )?;
-    let rows = statement.query_map([id.0], |row| Ok((read_generation(row, 1)?, row.get(0)?)))?;
+    let read = |row: &Row<'_>| Ok((read_generation(row, 1)?, row.get(0)?));
+    let rows = statement.query_map([id.0, first], read)?;
     // No outer join: there is a generation in every row.
     rows.filter_map(|row| row.map(|(generation, seal)| Some((generation?, seal))).transpose())
         .collect()

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, TransactionBehavior, params};
 
 use crate::{failpoint, ids::ExperimentId, priority::Priority};
-use evolution::Champion;
+use evolution::{Advance, Champion};
 
 pub use error::StoreError;
 pub use inspection::{
@@ -31,7 +31,6 @@ pub use inspection::{
 pub use quarantine::QuarantinedWorker;
 pub use records::{
     Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
-    checkpoint_json,
 };
 
 use error::Result;
@@ -57,8 +56,8 @@ pub struct Store {
 pub struct GenerationCommit<'a> {
     /// History row.
     pub generation: &'a GenerationRecord,
-    /// Evolution after it, as JSON.
-    pub checkpoint: &'a str,
+    /// What it changes in the checkpoint.
+    pub checkpoint: &'a Advance,
     /// The champion so far.
     pub champion: Option<&'a Champion>,
     /// Covers all generations and re-evaluations so far.
@@ -106,7 +105,7 @@ impl Store {
             )?;
             let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
             seals::seal_experiment(transaction, sealer, id)?;
-            let seal = sealer.checkpoint(id, None, new.checkpoint.as_bytes());
+            let seal = sealer.checkpoint(id, None, &new.checkpoint);
             checkpoints::put(transaction, id, &new.checkpoint, seal)?;
             add_state_event(transaction, id, now_ms, ExperimentState::Running, "submitted")?;
             Ok((id, true))
@@ -133,7 +132,7 @@ impl Store {
     ) -> Result<()> {
         let generation = commit.generation;
         // Hashing takes longer than the rest, and needs no transaction.
-        let seal = self.sealer.checkpoint(id, Some(generation), commit.checkpoint.as_bytes());
+        let seal = self.sealer.advance(id, generation, commit.checkpoint);
         self.write(|transaction, sealer| {
             let state: String = transaction
                 .prepare_cached("SELECT state FROM experiments WHERE id = ?1")?
@@ -143,7 +142,8 @@ impl Store {
             }
             history::put(transaction, sealer, id, generation)?;
             failpoint::reached("history written");
-            checkpoints::put(transaction, id, commit.checkpoint, seal)?;
+            let number = generation.generation;
+            checkpoints::advance(transaction, id, number, commit.checkpoint, seal)?;
             transaction
                 .prepare_cached("UPDATE experiments SET digest = ?2 WHERE id = ?1")?
                 .execute(params![id.0, commit.digest])?;

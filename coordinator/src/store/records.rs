@@ -3,7 +3,7 @@
 use experiment_file::ExperimentConfig;
 
 use crate::{ids::ExperimentId, priority::Priority};
-use evolution::{Digest, Evolution, Statistics};
+use evolution::{Digest, Statistics};
 
 /// Where an experiment stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,8 +56,8 @@ pub struct NewExperiment {
     pub config_digest: Digest,
     /// Genes of a genotype.
     pub genotype_len: usize,
-    /// Evolution before its first generation, as JSON.
-    pub checkpoint: String,
+    /// Evolution before its first generation: the state of its first checkpoint.
+    pub checkpoint: Vec<u8>,
     /// Its share of the fleet.
     pub priority: Priority,
 }
@@ -139,9 +139,4 @@ pub enum EventKind {
     },
     /// Something worth a line in a log.
     Notice(String),
-}
-
-/// Evolution as the store keeps it: a checkpoint.
-pub fn checkpoint_json(evolution: &Evolution) -> String {
-    serde_json::to_string(evolution).expect("numbers and lists serialise")
 }

@@ -141,10 +141,34 @@ const MIGRATIONS: &[&str] = &[
         since_ms INTEGER NOT NULL
     ) STRICT, WITHOUT ROWID;
 ",
+    "
+    CREATE TABLE checkpoints_of_bytes (
+        experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+        -- Evolution after some generation, in the format of the crate `evolution`.
+        state BLOB NOT NULL,
+        seal BLOB NOT NULL DEFAULT x''
+    ) STRICT;
+    INSERT INTO checkpoints_of_bytes
+    SELECT experiment_id, CAST(state AS BLOB), seal FROM checkpoints;
+    DROP TABLE checkpoints;
+    ALTER TABLE checkpoints_of_bytes RENAME TO checkpoints;
+
+    -- What the generations since have added to that.
+    CREATE TABLE checkpoint_steps (
+        experiment_id INTEGER NOT NULL REFERENCES experiments (id),
+        generation INTEGER NOT NULL,
+        step BLOB NOT NULL,
+        seal BLOB NOT NULL,
+        PRIMARY KEY (experiment_id, generation)
+    ) STRICT, WITHOUT ROWID;
+",
 ];
 
 /// The first version with seals.
 pub const SEALED: i64 = 3;
+
+/// The first version with steps of checkpoints.
+const WITH_STEPS: i64 = 5;
 
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
@@ -182,13 +206,22 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
 }
 
 /// Lets a database of an older version be read as if it were of the latest, without
-/// changing it. Its seals are empty.
+/// changing it. Seals that it does not have are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
+    if version < WITH_STEPS {
+        // In the temporary schema, where names are looked up first.
+        connection.execute_batch(
+            "CREATE TEMP VIEW checkpoint_steps AS
+             SELECT 0 AS experiment_id, 0 AS generation, x'' AS step, x'' AS seal WHERE false",
+        )?;
+    }
+    if version >= SEALED {
+        return Ok(());
+    }
     let priority = if version < 2 { ", 100 AS priority" } else { "" };
     for (table, more) in
         [("experiments", priority), ("generations", ""), ("checkpoints", ""), ("champions", "")]
     {
-        // In the temporary schema, where names are looked up first.
         connection.execute_batch(&format!(
             "CREATE TEMP VIEW {table} AS SELECT *{more}, x'' AS seal FROM main.{table}"
         ))?;
@@ -223,7 +256,7 @@ mod tests {
         assert_eq!(text("SELECT count(*) || '' FROM checkpoints"), "0", "nothing can use it");
         connection.execute("UPDATE experiments SET state = 'paused'", []).unwrap();
         connection
-            .execute("INSERT INTO checkpoints (experiment_id, state) VALUES (9, '')", [])
+            .execute("INSERT INTO checkpoints (experiment_id, state) VALUES (9, x'')", [])
             .expect_err("references are checked again");
         connection
             .execute(

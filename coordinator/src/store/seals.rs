@@ -7,6 +7,7 @@
 //! may write the database.
 
 use blake3::Hasher;
+use evolution::Advance;
 use rusqlite::{Connection, Transaction, params};
 
 use super::{GenerationRecord, Result, champions, checkpoints, history};
@@ -44,7 +45,7 @@ impl Sealer {
             .finish()
     }
 
-    /// Of a checkpoint, which follows the `latest` generation.
+    /// Of a checkpoint's state, which follows the `latest` generation.
     pub fn checkpoint(
         &self,
         id: ExperimentId,
@@ -56,6 +57,19 @@ impl Sealer {
             .text(latest.map_or("", |latest| latest.digest.as_str()).as_bytes())
             .text(state)
             .finish()
+    }
+
+    /// Of a step of a checkpoint, which leads to a generation.
+    pub fn step(&self, id: ExperimentId, of: &GenerationRecord, step: &[u8]) -> Seal {
+        self.begin("step", id).number(of.generation).text(of.digest.as_bytes()).text(step).finish()
+    }
+
+    /// Of what a generation changes in a checkpoint.
+    pub fn advance(&self, id: ExperimentId, of: &GenerationRecord, advance: &Advance) -> Seal {
+        match advance {
+            Advance::State(state) => self.checkpoint(id, Some(of), state),
+            Advance::Step(step) => self.step(id, of, step),
+        }
     }
 
     /// Of a row of the history.
@@ -146,7 +160,7 @@ pub fn seal_all(transaction: &Transaction<'_>) -> Result<()> {
     for id in ids {
         let id = id?;
         seal_experiment(transaction, &sealer, id)?;
-        let history = history::read_all(transaction, id)?;
+        let history = history::read_from(transaction, id, 0)?;
         for (generation, _) in &history {
             history::seal(transaction, &sealer, id, generation)?;
         }

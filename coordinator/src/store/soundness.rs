@@ -1,17 +1,18 @@
 //! What a run continues from, and whether it is what was stored.
 
+use evolution::Checkpoint;
 use rusqlite::params;
 
 use super::{
-    ExperimentRecord, ExperimentState, Result, Store, StoreError, add_notice, add_state_event,
-    checkpoints, experiment, seals,
+    ExperimentRecord, ExperimentState, GenerationRecord, Result, Store, StoreError, add_notice,
+    add_state_event, checkpoints, experiment, history, seals,
 };
 use crate::ids::ExperimentId;
 
 impl Store {
-    /// An experiment and its checkpoint (evolution as JSON), both as they were stored;
+    /// An experiment and its checkpoint, both as they were stored;
     /// [`StoreError::Unsound`] if one of them is not.
-    pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, String)> {
+    pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, Checkpoint)> {
         self.read(|connection| {
             let unsound = |what: &str| self.unsound(id, what.to_owned());
             let found = match experiment(connection, id) {
@@ -24,15 +25,15 @@ impl Store {
             }
             let checkpoint = checkpoints::get(connection, id)?
                 .ok_or_else(|| unsound("its checkpoint is gone"))?;
-            let latest = found.latest.as_ref();
-            if checkpoint.seal != self.sealer.checkpoint(id, latest, &checkpoint.state) {
-                return Err(unsound(
-                    "its checkpoint, or the end of its history, is not what was stored",
-                ));
-            }
-            let state = String::from_utf8(checkpoint.state)
-                .map_err(|_| unsound("its checkpoint is not text"))?;
-            Ok((found, state))
+            let latest = found.latest.as_ref().map_or(0, |latest| latest.generation);
+            let first = latest.saturating_sub(checkpoint.n_steps() as u64);
+            let history = history::read_from(connection, id, first)?;
+            let history: Vec<GenerationRecord> = history.into_iter().map(|(of, _)| of).collect();
+            let checkpoint = checkpoint.check(Some(&self.sealer), id, &history);
+            let checkpoint = checkpoint.ok_or_else(|| {
+                unsound("its checkpoint, or the end of its history, is not what was stored")
+            })?;
+            Ok((found, checkpoint))
         })
     }
 

@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::submission::Submission;
-use evolution::{Champion, ChampionSource, Evolution, HeldOut, Statistics};
+use evolution::{Advance, Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Statistics};
 
 use super::*;
 
@@ -36,6 +36,21 @@ fn generation(generation: u64) -> GenerationRecord {
     }
 }
 
+/// Every second generation adds a step to the checkpoint.
+fn advance(number: u64) -> Advance {
+    match number % 2 {
+        0 => Advance::State(format!("after {number}").into()),
+        _ => Advance::Step(format!("to {number}").into()),
+    }
+}
+
+/// What [`advance`] leads to.
+pub fn checkpoint_after(number: u64) -> Checkpoint {
+    let state = format!("after {}", number / 2 * 2).into();
+    let steps = (number % 2 == 1).then(|| format!("to {number}").into());
+    Checkpoint { state, steps: steps.into_iter().collect() }
+}
+
 pub fn commit(
     store: &mut Store,
     id: ExperimentId,
@@ -54,7 +69,7 @@ pub fn commit(
         1000 + number,
         &GenerationCommit {
             generation: &generation(number),
-            checkpoint: &format!("after {number}"),
+            checkpoint: &advance(number),
             champion: Some(&champion),
             digest: "link",
             notices: &["look".to_owned()],
@@ -86,7 +101,7 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
     assert_eq!(experiment.latest, Some(generation(1)));
     assert_eq!(experiment.champion_fitness, Some(0.625));
     assert_eq!(experiment.digest, "link");
-    assert_eq!(store.resumable(id).unwrap().1, "after 1");
+    assert_eq!(store.resumable(id).unwrap().1, checkpoint_after(1));
     let champion = store.champion(id).unwrap().unwrap();
     assert_eq!(champion.genotype, [0.1, 1.0 / 3.0]);
     assert_eq!(champion.generation, 1);
@@ -110,7 +125,7 @@ fn a_champion_keeps_its_origin_and_its_held_out_fitness() {
             1,
             &GenerationCommit {
                 generation: &generation(4),
-                checkpoint: "",
+                checkpoint: &Advance::State(Vec::new()),
                 champion: Some(&champion),
                 digest: "link",
                 notices: &[],
@@ -129,9 +144,10 @@ fn a_new_experiment_can_be_resumed_before_its_first_generation() {
     let new = new_experiment(None);
     let (id, _) = store.create(&new, 5).unwrap();
     let checkpoint = store.resumable(id).unwrap().1;
-    let evolution: Evolution = serde_json::from_str(&checkpoint).unwrap();
+    assert_eq!(checkpoint.state, new.checkpoint);
+    let evolution = Evolution::restore(&checkpoint).unwrap();
     assert_eq!(evolution.n_generations(), 0);
-    assert_eq!(checkpoint_json(&evolution), checkpoint);
+    assert_eq!(evolution.state(), new.checkpoint);
     assert_eq!(store.champion(id).unwrap(), None);
 }
 
@@ -236,7 +252,7 @@ fn a_generation_that_cannot_be_committed_leaves_nothing_behind() {
     let before = store.events(id, 1, 100).unwrap();
     assert!(commit(&mut store, id, 0, None).is_err(), "a generation is committed once");
     assert_eq!(store.events(id, 1, 100).unwrap(), before);
-    assert_eq!(store.resumable(id).unwrap().1, "after 0");
+    assert_eq!(store.resumable(id).unwrap().1, checkpoint_after(0));
 }
 
 #[test]

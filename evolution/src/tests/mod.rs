@@ -230,27 +230,47 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
     }
 }
 
-/// Databases have checkpoints with these keys.
+/// Databases have checkpoints of this format: whoever changes it changes its version, too.
 #[test]
-fn a_checkpoint_keeps_its_keys() {
+fn the_format_of_checkpoints_stays() {
     let mut evolution = evolution(3, &[2]);
+    let generation = evolution.ask();
+    evolution.tell(generation, &[vec![0.0], vec![2.0], vec![1.0]]).unwrap();
+    let Advance::Step(step) = evolution.advance() else { panic!("a step is shorter") };
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    assert_eq!(
+        hex(&step),
+        "010301000000000000000001000000000000004001000000000000f03f00",
+        "version, individuals, trials and their fitness, re-evaluations"
+    );
+    // Lengths, and everything that is not drawn.
+    let state = evolution.state();
+    assert_eq!(state.len(), 248);
+    assert_eq!(
+        hex(&state[..6]),
+        "010b03010101",
+        "version, seed, P, generations, populations, SNES"
+    );
+}
+
+#[test]
+fn what_is_no_checkpoint_is_an_error() {
+    let mut evolution = evolution(3, &[2]);
+    let state = evolution.state();
     step(&mut evolution);
-    let checkpoint = serde_json::to_value(&evolution).unwrap();
-    let keys = |value: &serde_json::Value| -> Vec<String> {
-        value.as_object().unwrap().keys().cloned().collect()
+    let Advance::Step(step) = evolution.advance() else { panic!("a step is shorter") };
+    let restore = |state: &[u8], steps: &[&[u8]]| {
+        let steps = steps.iter().map(|step| step.to_vec()).collect();
+        Evolution::restore(&Checkpoint { state: state.to_vec(), steps })
     };
-    let expected = [
-        "challenger",
-        "champion",
-        "champion_digest",
-        "digest",
-        "n_generations",
-        "population_size",
-        "populations",
-        "seed",
-    ];
-    assert_eq!(keys(&checkpoint), expected);
-    let champion = &checkpoint["champion"];
-    assert_eq!(keys(champion), ["generation", "genotype", "held_out", "origin", "trial_fitness"]);
-    assert_eq!(keys(&champion["origin"]), ["Individual"]);
+    assert_eq!(restore(&state, &[&step]).unwrap(), evolution);
+    assert!(matches!(restore(b"", &[]), Err(CheckpointError::Malformed(_))));
+    assert!(matches!(restore(b"{}", &[]), Err(CheckpointError::Version { found: b'{' })));
+    assert!(matches!(restore(&state[..9], &[]), Err(CheckpointError::Malformed(_))));
+    assert!(matches!(restore(&state, &[&step[..9]]), Err(CheckpointError::Malformed(_))));
+    // Of two individuals, and without a finite fitness.
+    let misfit = restore(&state, &[&[1, 2, 0, 0, 0]]);
+    assert!(matches!(misfit, Err(CheckpointError::Step { generation: 0 })), "{misfit:?}");
+    let hopeless = restore(&state, &[&[1, 3, 0, 0, 0, 0]]);
+    assert!(matches!(hopeless, Err(CheckpointError::Evolution(_))), "{hopeless:?}");
 }

@@ -82,22 +82,44 @@ fn assert_state_is_finite(evolution: &Evolution, what: &impl std::fmt::Debug) {
 
 #[test]
 fn resuming_from_any_generation_gives_the_same_bits() {
-    const N_GENERATIONS: usize = 7;
+    const N_GENERATIONS: usize = 10;
+    let go_on = |evolution: &mut Evolution| {
+        step(evolution);
+        if evolution.n_generations() % 3 == 0 {
+            let reevaluation = evolution.reevaluation().unwrap();
+            let genotypes = reevaluation.candidates.iter().map(|it| it.genotype.clone());
+            let fitness = evaluate(&genotypes.collect::<Vec<_>>());
+            evolution.set_champion(&reevaluation, &fitness);
+        }
+    };
+    let (mut n_states, mut n_steps) = (0, 0);
     for variant in all() {
-        let mut uninterrupted = start(&variant, &[4, 3], 9);
+        let mut uninterrupted = start(&variant, &[14, 13], 5);
+        let mut latest = Checkpoint { state: uninterrupted.state(), steps: Vec::new() };
         let mut checkpoints = Vec::new();
         for _ in 0..N_GENERATIONS {
-            checkpoints.push(serde_json::to_string(&uninterrupted).unwrap());
-            step(&mut uninterrupted);
+            checkpoints.push(latest.clone());
+            go_on(&mut uninterrupted);
+            match uninterrupted.advance() {
+                Advance::State(state) => {
+                    latest = Checkpoint { state, steps: Vec::new() };
+                    n_states += 1;
+                }
+                Advance::Step(step) => {
+                    latest.steps.push(step);
+                    n_steps += 1;
+                }
+            }
         }
         for (g, checkpoint) in checkpoints.iter().enumerate() {
-            let mut resumed: Evolution = serde_json::from_str(checkpoint).unwrap();
+            let mut resumed = Evolution::restore(checkpoint).unwrap();
             for _ in g..N_GENERATIONS {
-                step(&mut resumed);
+                go_on(&mut resumed);
             }
             assert_eq!(resumed, uninterrupted, "{variant:?} from generation {g}");
         }
     }
+    assert!(n_states > 0 && n_steps > 0, "{n_states} states, {n_steps} steps");
 }
 
 #[test]

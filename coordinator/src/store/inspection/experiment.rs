@@ -1,6 +1,6 @@
 //! An experiment, read part by part: what of it can be read and is as it was stored.
 
-use evolution::{ALGORITHMS, Champion, Digest, Evolution};
+use evolution::{ALGORITHMS, Champion, Checkpoint, Digest, Evolution};
 use experiment_file::ExperimentConfig;
 use rusqlite::{Connection, Row};
 
@@ -25,7 +25,7 @@ pub struct Inspected {
     /// Its champion, if it has one.
     pub champion: Option<Option<Champion>>,
     /// Its checkpoint, if it has one.
-    pub checkpoint: Option<Option<String>>,
+    pub checkpoint: Option<Option<Checkpoint>>,
     /// All its events.
     pub events: Option<Vec<EventRow>>,
     /// What is wrong, one line each.
@@ -92,9 +92,8 @@ impl Inspected {
         let row = keep(&mut problems, read_row(connection, sealer, id));
         let history = keep(&mut problems, read_history(connection, sealer, id));
         let champion = keep(&mut problems, read_champion(connection, sealer, id));
-        let latest = history.as_ref().map(|history| history.last());
-        let checkpoint =
-            keep(&mut problems, read_checkpoint(connection, sealer, id, latest, row.as_ref()));
+        let checkpoint = read_checkpoint(connection, sealer, id, history.as_deref(), row.as_ref());
+        let checkpoint = keep(&mut problems, checkpoint);
         let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
         let mut inspected = Self { id, row, history, champion, checkpoint, events, problems };
         inspected.find_what_is_missing();
@@ -198,7 +197,7 @@ fn read_history(
     sealer: Option<&Sealer>,
     id: ExperimentId,
 ) -> Result<Vec<GenerationRecord>, String> {
-    let rows = history::read_all(connection, id).map_err(unreadable("its history"))?;
+    let rows = history::read_from(connection, id, 0).map_err(unreadable("its history"))?;
     let mut history = Vec::with_capacity(rows.len());
     for (number, (generation, seal)) in (0..).zip(rows) {
         if generation.generation != number {
@@ -223,28 +222,26 @@ fn read_champion(
     })
 }
 
-/// `latest`: the end of the history, if that can be read.
+/// `history`: if it can be read.
 fn read_checkpoint(
     connection: &Connection,
     sealer: Option<&Sealer>,
     id: ExperimentId,
-    latest: Option<Option<&GenerationRecord>>,
+    history: Option<&[GenerationRecord]>,
     row: Option<&ExperimentRow>,
-) -> Result<Option<String>, String> {
+) -> Result<Option<Checkpoint>, String> {
     let stored = checkpoints::get(connection, id).map_err(unreadable("its checkpoint"))?;
-    let Some(checkpoints::Stored { seal, state }) = stored else { return Ok(None) };
-    let Some(latest) = latest else {
+    let Some(stored) = stored else { return Ok(None) };
+    let Some(history) = history else {
         return Err("its checkpoint has no history to follow".to_owned());
     };
-    if sealer.is_some_and(|sealer| seal != sealer.checkpoint(id, latest, &state)) {
-        let what = "its checkpoint, or the end of its history, is not what was stored";
-        return Err(what.to_owned());
-    }
-    let state = String::from_utf8(state).map_err(|_| "its checkpoint is not text".to_owned())?;
+    let checkpoint = stored.check(sealer, id, history).ok_or_else(|| {
+        "its checkpoint, or the end of its history, is not what was stored".to_owned()
+    })?;
     if let Some(row) = row.filter(|row| row.fingerprint == sim_core::FINGERPRINT) {
-        let evolution: Evolution = serde_json::from_str(&state)
+        let evolution = Evolution::restore(&checkpoint)
             .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
-        let link = latest.map_or(&row.config_digest, |latest| &latest.digest);
+        let link = history.last().map_or(&row.config_digest, |latest| &latest.digest);
         if evolution.digest().to_string() != *link {
             return Err(format!(
                 "its checkpoint has the digest {}, and the history {link}",
@@ -252,7 +249,7 @@ fn read_checkpoint(
             ));
         }
     }
-    Ok(Some(state))
+    Ok(Some(checkpoint))
 }
 
 /// Events have no seals, as no result depends on them.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use evolution::Checkpoint;
 use rusqlite::{Connection, Transaction, params};
 
 use super::{
@@ -133,8 +134,13 @@ fn write_whole(
         champions::put(transaction, sealer, id, champion, latest, &row.digest)?;
     }
     if let Some(Some(checkpoint)) = &from.checkpoint {
-        let seal = sealer.checkpoint(id, history.last(), checkpoint.as_bytes());
-        checkpoints::put(transaction, id, checkpoint, seal)?;
+        let Checkpoint { state, steps } = checkpoint;
+        let (before, since) = history.split_at(history.len() - steps.len());
+        checkpoints::put(transaction, id, state, sealer.checkpoint(id, before.last(), state))?;
+        for (of, step) in since.iter().zip(steps) {
+            let seal = sealer.step(id, of, step);
+            checkpoints::add_step(transaction, id, of.generation, step, seal)?;
+        }
     }
     match &from.events {
         Some(events) => write_events(transaction, id, events)?,
@@ -174,7 +180,7 @@ fn write_beginning(
 ) -> Result<()> {
     let paused = ExperimentState::Paused;
     write_row(transaction, sealer, id, row, (paused, BEGINS_AGAIN, ""))?;
-    let seal = sealer.checkpoint(id, None, new.checkpoint.as_bytes());
+    let seal = sealer.checkpoint(id, None, &new.checkpoint);
     checkpoints::put(transaction, id, &new.checkpoint, seal)?;
     let at_ms = row.submitted_at_ms;
     add_state_event(transaction, id, at_ms, ExperimentState::Running, "submitted")?;

@@ -64,7 +64,8 @@ impl Source {
                 Ok(found) => sealer = Some(found),
                 Err(error) => damage.push(format!("the key of its seals is lost: {error}")),
             }
-        } else if version > 0 {
+        }
+        if version > 0 {
             schema::read_as_latest(&connection, version)?;
         }
         Ok(Self { connection, version, sealer, damage })

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use evolution::Evolution;
+use evolution::{Advance, Evolution};
 use rusqlite::Connection;
 use tempfile::TempDir;
 
@@ -10,14 +10,22 @@ use super::{
     super::{file, schema, tests::new_experiment},
     *,
 };
-use crate::store::{
-    ExperimentState, GenerationCommit, GenerationRecord, Store, StoreError, checkpoint_json,
-};
+use crate::store::{ExperimentState, GenerationCommit, GenerationRecord, Store, StoreError};
 
 /// Commits a generation of a real evolution, whose fitness is its index.
 fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
+    advance_by(Evolution::advance, store, id, completed);
+}
+
+/// `change`: what it changes in the checkpoint.
+fn advance_by(
+    change: impl Fn(&Evolution) -> Advance,
+    store: &mut Store,
+    id: ExperimentId,
+    completed: Option<&str>,
+) {
     let (_, checkpoint) = store.resumable(id).unwrap();
-    let mut evolution: Evolution = serde_json::from_str(&checkpoint).unwrap();
+    let mut evolution = Evolution::restore(&checkpoint).unwrap();
     let generation = evolution.ask();
     let fitness = vec![vec![generation.index as f64]; generation.genotypes.len()];
     let told = evolution.tell(generation, &fitness).unwrap();
@@ -32,7 +40,7 @@ fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
     };
     let commit = GenerationCommit {
         generation: &record,
-        checkpoint: &checkpoint_json(&evolution),
+        checkpoint: &change(&evolution),
         champion: evolution.champion(),
         digest: &record.digest,
         notices: &[],
@@ -129,7 +137,9 @@ fn every_edit_is_found_and_named() {
         ),
         ("UPDATE champions SET genotype = '[]' WHERE experiment_id = 1", 1, "its champion"),
         ("DELETE FROM champions WHERE experiment_id = 1", 1, "its champion is gone"),
-        ("UPDATE checkpoints SET state = '' WHERE experiment_id = 2", 2, "its checkpoint"),
+        ("UPDATE checkpoints SET state = x'' WHERE experiment_id = 2", 2, "its checkpoint"),
+        ("UPDATE checkpoint_steps SET step = x'' WHERE experiment_id = 2", 2, "its checkpoint"),
+        ("DELETE FROM checkpoint_steps WHERE experiment_id = 2", 2, "its checkpoint"),
         ("DELETE FROM checkpoints WHERE experiment_id = 2", 2, "its checkpoint is gone"),
         ("DELETE FROM events WHERE experiment_id = 2 AND sequence = 2", 2, "its events"),
     ] {
@@ -184,7 +194,7 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
     edit(
         directory.path(),
         "UPDATE generations SET best = 9 WHERE experiment_id = 1;
-         UPDATE checkpoints SET state = '{}' WHERE experiment_id = 2;
+         UPDATE checkpoints SET state = x'7b7d' WHERE experiment_id = 2;
          UPDATE experiments SET config = '{}' WHERE id = 3;
          DELETE FROM events WHERE experiment_id = 4;
          INSERT INTO quarantine VALUES ('lab-2', 'it lies', 7);",
@@ -199,7 +209,7 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
         assert_eq!(experiment.state, ExperimentState::Paused);
         assert!(experiment.reason.contains("resume it"), "{}", experiment.reason);
         assert!(experiment.latest.is_none());
-        assert_eq!(checkpoint, new_experiment(None).checkpoint);
+        assert_eq!(checkpoint.state, new_experiment(None).checkpoint);
         advance(&mut store, id, None);
     }
     assert_eq!(store.experiment(ExperimentId(4)).unwrap().unwrap().state, ExperimentState::Running);
@@ -279,9 +289,14 @@ fn a_database_that_was_cut_off_is_read_as_far_as_it_goes() {
 #[test]
 fn older_schemas_are_looked_at_and_recovered_without_a_change() {
     let directory = data_directory();
+    let mut store = Store::open(directory.path()).unwrap();
+    advance_by(|evolution| Advance::State(evolution.state()), &mut store, ExperimentId(2), None);
+    drop(store);
     edit(
         directory.path(),
-        "ALTER TABLE experiments DROP COLUMN seal;
+        "DELETE FROM checkpoints WHERE experiment_id = 1;
+         DROP TABLE checkpoint_steps;
+         ALTER TABLE experiments DROP COLUMN seal;
          ALTER TABLE generations DROP COLUMN seal;
          ALTER TABLE checkpoints DROP COLUMN seal;
          ALTER TABLE champions DROP COLUMN seal;
@@ -292,11 +307,11 @@ fn older_schemas_are_looked_at_and_recovered_without_a_change() {
     let before = fs::read(&path).unwrap();
     let inspection = inspect(directory.path()).unwrap();
     assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
-    assert_eq!((inspection.schema_version, inspection.n_generations), (2, 7));
+    assert_eq!((inspection.schema_version, inspection.n_generations), (2, 8));
     let to = directory.path().join("new");
     assert_eq!(fates(&recover(directory.path(), &to).unwrap()), [Fate::Kept; 4]);
     assert!(fs::read(&path).unwrap() == before);
-    edit(directory.path(), "UPDATE checkpoints SET state = replace(state, '0.1', '0.2')");
+    edit(directory.path(), "UPDATE checkpoints SET state = substr(state, 2)");
     edit(
         directory.path(),
         "UPDATE experiments SET config = replace(config, '\"seed\":1', '\"seed\":2')",
@@ -336,7 +351,7 @@ fn an_interrupted_backup_is_made_again() {
 #[test]
 fn there_is_no_backup_of_a_damaged_database() {
     let directory = data_directory();
-    edit(directory.path(), "UPDATE checkpoints SET state = '{}' WHERE experiment_id = 2");
+    edit(directory.path(), "UPDATE checkpoints SET state = x'7b7d' WHERE experiment_id = 2");
     let to = directory.path().join("backup");
     let Backup::Damaged(inspection) = backup(directory.path(), &to).unwrap() else { panic!() };
     assert_eq!(inspection.findings[0].experiment, Some(ExperimentId(2)));

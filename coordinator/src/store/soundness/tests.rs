@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{
-    tests::{commit, new_experiment},
+    tests::{checkpoint_after, commit, new_experiment},
     *,
 };
 
@@ -25,16 +25,21 @@ fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
         ("UPDATE experiments SET config_digest = 'd' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET fingerprint = 'f' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET seal = x'' WHERE id = 1", "configuration"),
-        ("UPDATE checkpoints SET state = 'after 2' WHERE experiment_id = 1", "checkpoint"),
-        (
-            "UPDATE checkpoints SET state = CAST(x'ff' AS TEXT) WHERE experiment_id = 1",
-            "checkpoint",
-        ),
+        ("UPDATE checkpoints SET state = x'ff' WHERE experiment_id = 1", "checkpoint"),
+        ("UPDATE checkpoint_steps SET step = x'ff' WHERE experiment_id = 1", "checkpoint"),
+        ("UPDATE checkpoint_steps SET generation = 2 WHERE experiment_id = 1", "checkpoint"),
+        ("DELETE FROM checkpoint_steps WHERE experiment_id = 1", "checkpoint"),
         ("DELETE FROM checkpoints WHERE experiment_id = 1", "checkpoint is gone"),
         (
             // The neighbour's, with its seal.
             "UPDATE checkpoints SET (state, seal) =
                     (SELECT state, seal FROM checkpoints WHERE experiment_id = 2)
+             WHERE experiment_id = 1",
+            "checkpoint",
+        ),
+        (
+            "UPDATE checkpoint_steps SET (step, seal) =
+                    (SELECT step, seal FROM checkpoint_steps WHERE experiment_id = 2)
              WHERE experiment_id = 1",
             "checkpoint",
         ),
@@ -45,7 +50,7 @@ fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
         let directory = tempfile::tempdir().unwrap();
         let (store, [edited, neighbour]) = two_experiments(directory.path());
         let sound = store.resumable(edited).unwrap();
-        assert_eq!(sound.1, "after 1");
+        assert_eq!(sound.1, checkpoint_after(1));
         store.connection.pragma_update(None, "ignore_check_constraints", true).unwrap();
         store.connection.execute_batch(edit).unwrap();
         match store.resumable(edited) {
@@ -69,6 +74,20 @@ fn an_earlier_checkpoint_of_the_same_experiment_is_not_taken_for_the_latest() {
     commit(&mut store, id, 2, None).unwrap();
     store.resumable(id).unwrap();
     let put_back = "INSERT OR REPLACE INTO checkpoints SELECT * FROM kept";
+    store.connection.execute_batch(put_back).unwrap();
+    assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })));
+}
+
+#[test]
+fn an_earlier_step_of_the_same_experiment_is_not_taken_for_the_latest() {
+    let directory = tempfile::tempdir().unwrap();
+    let (mut store, [id, _]) = two_experiments(directory.path());
+    store.connection.execute_batch("CREATE TABLE kept AS SELECT * FROM checkpoint_steps").unwrap();
+    commit(&mut store, id, 2, None).unwrap();
+    commit(&mut store, id, 3, None).unwrap();
+    store.resumable(id).unwrap();
+    let put_back = "UPDATE checkpoint_steps SET (step, seal) =
+                           (SELECT step, seal FROM kept WHERE kept.experiment_id = 1)";
     store.connection.execute_batch(put_back).unwrap();
     assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })));
 }
@@ -191,7 +210,7 @@ fn a_copy_of_a_database_in_use_is_refused_without_its_log() {
 fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = Store::open(directory.path()).unwrap();
-    let new = NewExperiment { checkpoint: "x".repeat(1 << 20), ..new_experiment(None) };
+    let new = NewExperiment { checkpoint: vec![0; 1 << 20], ..new_experiment(None) };
     let database = file::path_in(directory.path());
     let main_len = || fs::metadata(&database).unwrap().len();
     let mut n_folded = 0;
@@ -210,15 +229,21 @@ fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
 #[test]
 fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     let directory = tempfile::tempdir().unwrap();
-    let (store, [running, ended]) = two_experiments(directory.path());
+    let (mut store, [running, ended]) = two_experiments(directory.path());
+    commit(&mut store, running, 2, None).unwrap();
     drop(store);
     let database = Connection::open(file::path_in(directory.path())).unwrap();
     database
         .execute_batch(
             "ALTER TABLE experiments DROP COLUMN seal;
              ALTER TABLE generations DROP COLUMN seal;
-             ALTER TABLE checkpoints DROP COLUMN seal;
              ALTER TABLE champions DROP COLUMN seal;
+             CREATE TABLE texts (experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+                                 state TEXT NOT NULL) STRICT;
+             INSERT INTO texts SELECT experiment_id, CAST(state AS TEXT) FROM checkpoints;
+             DROP TABLE checkpoints;
+             ALTER TABLE texts RENAME TO checkpoints;
+             DROP TABLE checkpoint_steps;
              DROP TABLE identity;
              DROP TABLE quarantine;
              PRAGMA user_version = 2;
@@ -227,7 +252,7 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
         .unwrap();
     drop(database);
     let store = Store::open(directory.path()).unwrap();
-    assert_eq!(store.resumable(running).unwrap().1, "after 1");
+    assert_eq!(store.resumable(running).unwrap().1, checkpoint_after(2));
     store.champion(running).unwrap().unwrap();
     store.champion(ended).unwrap().unwrap();
     assert!(checkpoints::get(&store.connection, ended).unwrap().is_none());
