@@ -134,8 +134,11 @@ def run(args: argparse.Namespace) -> int:
     if experiment.generations_done > 0:
         by_id = pb.GetChampionRequest(experiment_id=experiment.id)
         champion = coordinator.call(stub.GetChampion, by_id)
-        fitness = experiment.champion_fitness  # as honest as it is known
-        print(f"champion of generation {champion.generation}: fitness {fitness:.6f}")
+        line = f"champion of generation {champion.generation}"
+        if champion.HasField("judged"):  # not if it was cancelled or has failed
+            judged = champion.judged
+            line += f": fitness {judged.mean:.6f}, 95 % {judged.low:.6f} to {judged.high:.6f}"
+        print(line)
     print(f"digest {experiment.digest}")
     if experiment.reason:
         remark(experiment.reason)

@@ -125,30 +125,33 @@ pub struct EndLine<'a> {
     champion_file: Option<&'a str>,
 }
 
-/// A champion without its genes. `fitness` is the best that is known of it: that
-/// on held-out trials, or, before the first re-evaluation, that for which it was
-/// chosen.
+/// A champion without its genes. `judged`: fitness on trials that selected nothing.
+/// `selection`: on those by which it was compared with other candidates.
+/// `fitness_when_chosen`: on those of its generation, for which it became one.
 #[derive(Debug, Serialize)]
 struct ChampionSummary {
-    fitness: Option<f64>,
+    judged: Option<Judged>,
+    selection: Option<Selection>,
     fitness_when_chosen: Option<f64>,
-    held_out: Option<HeldOut>,
     generation: u64,
     individual: Option<u32>,
 }
 
 impl From<&GetChampionResponse> for ChampionSummary {
     fn from(champion: &GetChampionResponse) -> Self {
-        let held_out = champion.held_out.as_ref();
         Self {
-            fitness: held_out.map(|held_out| held_out.mean).or(champion.fitness),
-            fitness_when_chosen: champion.fitness,
-            held_out: held_out.map(|held_out| HeldOut {
+            judged: champion.judged.as_ref().map(|judged| Judged {
+                mean: judged.mean,
+                ci95: [judged.low, judged.high],
+                trials: judged.trials,
+                generation: judged.generation,
+            }),
+            selection: champion.held_out.as_ref().map(|held_out| Selection {
                 mean: held_out.mean,
-                ci95: held_out.ci95,
                 trials: held_out.trials,
                 generation: held_out.generation,
             }),
+            fitness_when_chosen: champion.fitness,
             generation: champion.generation,
             individual: champion.individual,
         }
@@ -156,9 +159,17 @@ impl From<&GetChampionResponse> for ChampionSummary {
 }
 
 #[derive(Debug, Serialize)]
-struct HeldOut {
+struct Judged {
     mean: f64,
-    ci95: f64,
+    /// Lower and upper end.
+    ci95: [f64; 2],
+    trials: u32,
+    generation: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct Selection {
+    mean: f64,
     trials: u32,
     generation: u64,
 }
@@ -197,6 +208,7 @@ pub struct ExperimentDocument<'a> {
     priority: u32,
     submitted_at_ms: u64,
     champion_fitness: Option<f64>,
+    champion_selection_fitness: Option<f64>,
     config_digest: &'a str,
     latest: Option<GenerationLine<'a>>,
 }
@@ -217,6 +229,7 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
             priority: experiment.priority,
             submitted_at_ms: experiment.submitted_at_ms,
             champion_fitness: experiment.champion_fitness,
+            champion_selection_fitness: experiment.champion_selection_fitness,
             config_digest: &experiment.config_digest,
             latest: experiment
                 .latest
@@ -264,7 +277,7 @@ impl<'a> ChampionDocument<'a> {
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
-    use swarm_proto::v1::HeldOutFitness;
+    use swarm_proto::v1::{HeldOutFitness, JudgedFitness};
 
     use super::*;
 
@@ -290,6 +303,7 @@ mod tests {
             individual: Some(2),
             fitness: Some(1.25),
             held_out: None,
+            judged: None,
             trial_fitness: vec![1.0, 1.5],
             genotype: vec![0.1, 1.0 / 3.0],
             network_json: r#"{"neurons":[{"tau":0.1}]}"#.into(),
@@ -336,9 +350,9 @@ mod tests {
                 "state": "completed",
                 "digest": "1a2b",
                 "champion": {
-                    "fitness": 1.25,
+                    "judged": null,
+                    "selection": null,
                     "fitness_when_chosen": 1.25,
-                    "held_out": null,
                     "generation": 7,
                     "individual": 2,
                 },
@@ -347,13 +361,16 @@ mod tests {
     }
 
     #[test]
-    fn the_fitness_of_a_champion_is_that_on_held_out_trials() {
-        let held_out = HeldOutFitness { mean: 1.0, ci95: 0.125, trials: 50, generation: 9 };
-        let champion = GetChampionResponse { held_out: Some(held_out), ..champion() };
+    fn what_a_champion_is_worth_stays_apart_from_what_selected_it() {
+        let held_out = HeldOutFitness { mean: 1.5, ci95: 0.125, trials: 50, generation: 9 };
+        let judged =
+            JudgedFitness { mean: 1.0, low: 0.75, high: 1.125, trials: 200, generation: 9 };
+        let champion =
+            GetChampionResponse { held_out: Some(held_out), judged: Some(judged), ..champion() };
         let value = serde_json::to_value(ChampionSummary::from(&champion)).unwrap();
-        let held_out = json!({"mean": 1.0, "ci95": 0.125, "trials": 50, "generation": 9});
-        assert_eq!(value["held_out"], held_out);
-        assert_eq!(value["fitness"], 1.0);
+        let judged = json!({"mean": 1.0, "ci95": [0.75, 1.125], "trials": 200, "generation": 9});
+        assert_eq!(value["judged"], judged);
+        assert_eq!(value["selection"], json!({"mean": 1.5, "trials": 50, "generation": 9}));
         assert_eq!(value["fitness_when_chosen"], 1.25);
     }
 

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use swarm_proto::v1::{
-    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
+    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, HeldOutFitness,
+    JudgedFitness, event::Kind,
 };
 
 use swarm_telemetry::escape;
@@ -121,6 +122,7 @@ pub fn end(
     }
     if let Some(champion) = champion {
         lines.push(row("champion", &champion_line(champion)));
+        lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
     }
     if !experiment.digest.is_empty() {
         lines.push(row("digest", &experiment.digest));
@@ -134,16 +136,22 @@ fn champion_line(champion: &GetChampionResponse) -> String {
         Some(individual) => format!("individual {individual} of generation {generation}"),
         None => format!("mean after generation {generation}"),
     };
-    let chosen = champion.fitness.map(|fitness| format!("{fitness:.6} when chosen"));
-    match (&champion.held_out, chosen) {
-        (Some(held_out), chosen) => {
-            let chosen = chosen.map_or_else(String::new, |chosen| format!("{chosen}, "));
-            let (mean, ci95) = (held_out.mean, held_out.ci95);
-            let n = held_out.trials;
-            format!("{mean:.6} +- {ci95:.6} on {n} held-out trials ({chosen}{source})")
+    match &champion.judged {
+        Some(JudgedFitness { mean, low, high, trials, .. }) => {
+            format!("{mean:.6}, 95 % {low:.6} to {high:.6}, on {trials} new trials ({source})")
         }
-        (None, Some(chosen)) => format!("{chosen} ({source})"),
-        (None, None) => source,
+        None => format!("not judged ({source})"),
+    }
+}
+
+/// By which fitness a champion was selected, which is optimistic.
+fn selection_line(champion: &GetChampionResponse) -> Option<String> {
+    match (&champion.held_out, champion.fitness) {
+        (Some(HeldOutFitness { mean, trials, .. }), _) => {
+            Some(format!("{mean:.6} on the {trials} trials by which it was selected"))
+        }
+        (None, Some(fitness)) => Some(format!("{fitness:.6} in its generation")),
+        (None, None) => None,
     }
 }
 
@@ -186,8 +194,6 @@ pub fn shell_command(args: impl IntoIterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use swarm_proto::v1::HeldOutFitness;
-
     use super::*;
 
     fn summary(generation: u64) -> GenerationSummary {
@@ -254,6 +260,13 @@ mod tests {
             individual: Some(4),
             fitness: Some(2.0),
             held_out: Some(HeldOutFitness { mean: 1.5, ci95: 0.25, trials: 50, generation: 11 }),
+            judged: Some(JudgedFitness {
+                mean: 1.25,
+                low: 1.0,
+                high: 1.375,
+                trials: 200,
+                generation: 11,
+            }),
             ..GetChampionResponse::default()
         };
         let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion));
@@ -262,8 +275,16 @@ mod tests {
             "experiment 3 (leader) completed after 12 of 40 generations\n  \
              best of the first generation  0.500000\n  \
              mean of the last generation   0.456100\n  \
-             champion                      1.500000 +- 0.250000 on 50 held-out trials (2.000000 when chosen, individual 4 of generation 6)\n  \
+             champion                      1.250000, 95 % 1.000000 to 1.375000, on 200 new trials (individual 4 of generation 6)\n  \
+             champion, optimistic          1.500000 on the 50 trials by which it was selected\n  \
              digest                        1a2b3c4d5e6f7a8b"
+        );
+        let unjudged = GetChampionResponse { judged: None, held_out: None, ..champion };
+        let text = end(&experiment(ExperimentState::Cancelled), None, Some(&unjudged));
+        assert!(text.contains("champion                      not judged (individual 4"), "{text}");
+        assert!(
+            text.contains("champion, optimistic          2.000000 in its generation"),
+            "{text}"
         );
     }
 

@@ -36,6 +36,7 @@ struct Algorithm {
     population_size: u64,
     num_evaluations: u64,
     champion_trials: u64,
+    judgement_trials: u64,
 }
 
 /// Bytes that an experiment takes at the most, about. `config_json`: its canonical
@@ -55,7 +56,9 @@ pub fn estimate(config_json: &str, genotype_len: u64) -> u64 {
     let n_trials = algorithm.population_size.saturating_mul(algorithm.num_evaluations);
     [
         state,
-        n_trials.saturating_add(algorithm.champion_trials).saturating_mul(BYTES_PER_TRIAL),
+        n_trials
+            .saturating_add(algorithm.champion_trials.max(algorithm.judgement_trials))
+            .saturating_mul(BYTES_PER_TRIAL),
         algorithm.population_size.saturating_mul(BYTES_PER_INDIVIDUAL),
         CONFIG_COPIES * config_json.len() as u64,
         BYTES_PER_EXPERIMENT,
@@ -118,7 +121,7 @@ mod tests {
         format!(
             r#"{{"name": "x", "algorithm": {{"name": "{algorithm}",
                 "population_size": {population_size}, "num_evaluations": {n_trials},
-                "champion_trials": 50, "populations": {{}}}}, "world": {{}}}}"#
+                "champion_trials": 50, "judgement_trials": 200, "populations": {{}}}}, "world": {{}}}}"#
         )
     }
 

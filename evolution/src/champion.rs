@@ -1,15 +1,13 @@
-//! Champions, and their re-evaluation.
+//! Champions, and what is known of them.
 //!
 //! The best of many noisy estimates is optimistic: the noise of its trials took
-//! part in choosing it. So at intervals three candidates are evaluated on held-out
-//! trials, which no selection has used: the champion so far, the best individual
-//! since the last re-evaluation, and the mean of the distribution (where an
-//! algorithm has one). The one with the largest mean fitness there becomes the
-//! champion.
+//! part in choosing it. So candidates are compared on trials that no evolution
+//! has met ([`Reevaluation`](super::Reevaluation)), and what the winner is worth
+//! is measured on trials that compared nobody ([`Judgement`](super::Judgement)).
 
 use serde::{Deserialize, Serialize};
 
-use super::{Genotype, mean, ranking::ranking};
+use super::{Genotype, mean};
 
 /// A genotype worth keeping, and what is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,12 +19,16 @@ pub struct Champion {
     pub source: ChampionSource,
     /// Its genes.
     pub genotype: Genotype,
-    /// Fitness in the trials of its generation, for which it was chosen; none
+    /// Fitness in the trials of its generation, for which it became a candidate; none
     /// for a mean, which was not evaluated there.
     pub trial_fitness: Vec<f64>,
-    /// Fitness in trials that did not choose it; none before the first
-    /// re-evaluation.
+    /// Fitness in all the held-out trials by which it was compared with other
+    /// candidates; none before the first re-evaluation.
     pub held_out: Option<HeldOut>,
+    /// Fitness in trials that selected nothing, at the end of a run. Evolution goes on
+    /// without it, so no checkpoint has it.
+    #[serde(skip)]
+    pub judged: Option<Judged>,
 }
 
 /// Where a champion comes from.
@@ -38,102 +40,104 @@ pub enum ChampionSource {
     Mean,
 }
 
-/// Fitness in held-out trials.
+/// Fitness in held-out trials, those of several re-evaluations together. As these
+/// trials compared candidates, the winner's mean is optimistic.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Mean over the trials.
     pub mean: f64,
-    /// Half the width of the 95 % confidence interval of the mean, by the normal
-    /// approximation: 1.96 s / sqrt(n).
+    /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial. By it, candidates
+    /// are found to be close. It is no interval for what the winner is worth.
     pub ci95: f64,
     /// Number of trials n.
-    pub n_trials: u32,
-    /// Generation whose held-out trials these are.
+    pub n_trials: u64,
+    /// Generation of the latest of them.
     pub generation: u64,
 }
 
-/// Candidates to be evaluated on held-out trials.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reevaluation {
-    /// Generation whose held-out trials evaluate them.
+/// Fitness in trials that selected nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// Mean over the trials.
+    pub mean: f64,
+    /// Lower end of the 95 % confidence interval of the mean.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+    /// Number of trials.
+    pub n_trials: u32,
+    /// Generation after which it was judged, the last one of the run.
     pub generation: u64,
-    /// The champion so far, if it has been re-evaluated before, comes first.
-    pub candidates: Vec<Champion>,
 }
 
 impl Champion {
-    /// Mean fitness in the trials for which it was chosen: optimistic.
+    /// Mean fitness in the trials of its generation: optimistic.
     pub fn fitness(&self) -> Option<f64> {
         (!self.trial_fitness.is_empty()).then(|| mean(&self.trial_fitness))
     }
 }
 
-impl Reevaluation {
-    /// The candidate with the largest mean in the held-out trials; of equals, the
-    /// first. `trial_fitness[i][t]`: fitness of candidate i in trial t. None if
-    /// no mean is finite.
-    pub fn decide(&self, trial_fitness: &[Vec<f64>]) -> Option<Champion> {
-        let means: Vec<f64> = trial_fitness.iter().map(|trials| mean(trials)).collect();
-        let best = ranking(&means)[0];
-        means[best].is_finite().then(|| Champion {
-            held_out: Some(HeldOut {
-                mean: means[best],
-                ci95: ci95(&trial_fitness[best], means[best]),
-                n_trials: trial_fitness[best].len() as u32,
-                generation: self.generation,
-            }),
-            ..self.candidates[best].clone()
-        })
-    }
-}
+/// Quantile of the normal distribution, to the digits that are stored.
+const Z: f64 = 1.96;
 
-/// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single value.
-fn ci95(values: &[f64], mean: f64) -> f64 {
-    let n = values.len() as f64;
-    if values.len() < 2 {
-        return 0.0;
+impl HeldOut {
+    /// Of trials that belong to this generation.
+    pub fn of(values: &[f64], generation: u64) -> Self {
+        let mean = mean(values);
+        let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        Self::from_squares(mean, squares, values.len() as u64, generation)
     }
-    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-    1.96 * (squares / (n - 1.0) / n).sqrt()
+
+    /// Of these trials and later ones together (Chan, Golub & LeVeque 1983).
+    pub fn with(self, later: Self) -> Self {
+        let (n, n_later) = (self.n_trials as f64, later.n_trials as f64);
+        let (share, difference) = (n_later / (n + n_later), later.mean - self.mean);
+        let squares = self.squares() + later.squares() + difference * difference * n * share;
+        let n_trials = self.n_trials + later.n_trials;
+        Self::from_squares(self.mean + difference * share, squares, n_trials, later.generation)
+    }
+
+    /// Whether chance alone may make this mean smaller than that of `best`, at 95 %.
+    pub fn is_close_to(&self, best: &Self) -> bool {
+        let difference = best.mean - self.mean;
+        difference * difference < self.ci95 * self.ci95 + best.ci95 * best.ci95
+    }
+
+    fn from_squares(mean: f64, squares: f64, n_trials: u64, generation: u64) -> Self {
+        let n = n_trials as f64;
+        let ci95 = if n_trials < 2 { 0.0 } else { Z * (squares / (n - 1.0) / n).sqrt() };
+        Self { mean, ci95, n_trials, generation }
+    }
+
+    /// Sum of squared differences from the mean.
+    fn squares(&self) -> f64 {
+        let (n, error) = (self.n_trials as f64, self.ci95 / Z);
+        error * error * n * (n - 1.0)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn candidate(index: u32) -> Champion {
-        Champion {
-            generation: 9,
-            source: ChampionSource::Individual(index),
-            genotype: vec![0.5],
-            trial_fitness: vec![9.0],
-            held_out: None,
-        }
-    }
-
-    fn decide(trial_fitness: &[Vec<f64>]) -> Option<Champion> {
-        let candidates = (0..trial_fitness.len() as u32).map(candidate).collect();
-        Reevaluation { generation: 9, candidates }.decide(trial_fitness)
+    #[test]
+    fn trials_of_two_rounds_count_as_if_they_were_of_one() {
+        let (first, later) = ([1.0, 2.0, 4.0], [8.0, 3.0]);
+        let together = HeldOut::of(&first, 3).with(HeldOut::of(&later, 9));
+        let at_once = HeldOut::of(&[first.to_vec(), later.to_vec()].concat(), 9);
+        assert_eq!((together.n_trials, together.generation), (5, 9));
+        assert!((together.mean - at_once.mean).abs() < 1e-15, "{together:?}");
+        assert!((together.ci95 - at_once.ci95).abs() < 1e-14, "{together:?}");
+        // s^2 = 29.2 / 4, n = 5
+        assert!((at_once.ci95 - 1.96 * 1.46f64.sqrt()).abs() < 1e-14, "{at_once:?}");
     }
 
     #[test]
-    fn the_best_on_held_out_trials_wins_whatever_its_fitness_before() {
-        let winner = decide(&[vec![1.0, 2.0], vec![2.0, 4.0], vec![f64::NAN, 9.0]]).unwrap();
-        assert_eq!(winner.source, ChampionSource::Individual(1));
-        let held_out = winner.held_out.unwrap();
-        assert_eq!((held_out.mean, held_out.n_trials, held_out.generation), (3.0, 2, 9));
-        // s = sqrt(2), n = 2
-        assert!((held_out.ci95 - 1.96).abs() < 1e-15);
-        assert_eq!(winner.fitness(), Some(9.0));
-    }
-
-    #[test]
-    fn of_equals_the_first_stays() {
-        assert_eq!(decide(&[vec![1.0], vec![1.0]]).unwrap().source, ChampionSource::Individual(0));
-    }
-
-    #[test]
-    fn without_a_finite_mean_there_is_no_new_champion() {
-        assert_eq!(decide(&[vec![f64::NAN], vec![f64::INFINITY]]), None);
+    fn candidates_are_close_if_chance_may_have_ordered_them() {
+        let of = |mean, ci95| HeldOut { mean, ci95, n_trials: 50, generation: 0 };
+        assert!(of(1.0, 0.3).is_close_to(&of(1.49, 0.4)));
+        assert!(!of(1.0, 0.3).is_close_to(&of(1.51, 0.4)));
+        assert!(!of(1.0, 0.0).is_close_to(&of(1.0, 0.0)), "more trials would show nothing new");
+        assert!(!of(f64::NAN, f64::NAN).is_close_to(&of(1.0, 0.5)));
     }
 }

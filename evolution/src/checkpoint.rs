@@ -43,8 +43,9 @@ pub enum Advance {
 pub(crate) struct Step {
     /// Per individual the fitness of every trial.
     pub trial_fitness: Vec<Vec<f64>>,
-    /// Per re-evaluation after it the same of every candidate.
-    pub reevaluations: Vec<Vec<Vec<f64>>>,
+    /// Per block of the re-evaluation after it the same of every candidate that met it; none
+    /// if there was no re-evaluation.
+    pub blocks: Vec<Vec<Vec<f64>>>,
 }
 
 /// Why there is no evolution in a checkpoint. It is damaged, or of another version.
@@ -107,14 +108,20 @@ impl Evolution {
             return Err(misfit);
         }
         self.tell(generation, &step.trial_fitness)?;
-        for trial_fitness in &step.reevaluations {
-            match self.reevaluation() {
-                Some(it) if it.candidates.len() == trial_fitness.len() => {
-                    self.set_champion(&it, trial_fitness);
-                }
-                _ => return Err(misfit),
-            }
+        if step.blocks.is_empty() {
+            return Ok(());
         }
+        let Some(mut round) = self.reevaluation() else { return Err(misfit) };
+        for block in &step.blocks {
+            if round.genotypes().len() != block.len() {
+                return Err(misfit);
+            }
+            round.learn(block);
+        }
+        if !round.is_over() {
+            return Err(misfit);
+        }
+        self.set_champion(&round);
         Ok(())
     }
 }

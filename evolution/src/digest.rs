@@ -3,15 +3,17 @@
 //! Link -1 is SHA-256 of the UTF-8 text
 //! `swarmevo digest 1\n<fingerprint of the simulation>\n<canonical config>`, where the
 //! canonical configuration has its seed but not what cannot change a bit of a
-//! generation: the name is empty, `generations` is 0, `target_fitness` absent.
+//! generation: the name is empty, `generations` is 0, `target_fitness` and
+//! `judgement_trials` are absent.
 //! Link g is SHA-256 of link g-1 (32 bytes), g (u64), every gene of every
 //! individual, every fitness of every trial of every individual (f64, bit for
 //! bit); numbers little-endian, individuals in index order.
 //!
-//! Re-evaluations of champions have a chain of their own, which hangs on that one.
-//! It starts with 32 zero bytes; the next link is SHA-256 of the link before it,
-//! the link of the latest generation, every gene of every candidate, every fitness
-//! of every trial of every candidate.
+//! Re-evaluations of candidates have a chain of their own, which hangs on that one.
+//! It starts with 32 zero bytes; after each block of held-out trials, the next link is
+//! SHA-256 of the link before it, the link of the latest generation, every gene of
+//! every candidate that met the block, every fitness of every trial of each. The
+//! judgement of the champion adds a link in the same way.
 
 use std::{fmt, str::FromStr};
 
@@ -33,6 +35,7 @@ impl Digest {
         config.name.clear();
         config.algorithm.generations = 0;
         config.algorithm.target_fitness = None;
+        config.algorithm.judgement_trials = 0;
         let mut hash = Sha256::new();
         hash.update("swarmevo digest 1\n");
         hash.update(simulation);

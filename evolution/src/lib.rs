@@ -40,7 +40,8 @@
 //!   genotypes and fitness so far: equal digests mean equal runs, bit for bit.
 //! - The best of noisy evaluations is optimistic. [`Evolution::reevaluation`] names
 //!   candidates to evaluate again on held-out trials, and
-//!   [`Evolution::set_champion`] keeps the best of them.
+//!   [`Evolution::set_champion`] keeps the best of them. At the end of a run,
+//!   [`Evolution::judgement`] measures what it is worth on trials that selected nothing.
 //!
 //! An algorithm samples and updates, no more; statistics, champion, digest and the
 //! rule for fitness that is not finite are shared.
@@ -49,7 +50,10 @@ mod algorithms;
 mod champion;
 mod checkpoint;
 mod digest;
+mod interval;
+mod judgement;
 mod ranking;
+mod reevaluation;
 mod setup;
 mod statistics;
 
@@ -60,10 +64,12 @@ use numeric::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
 pub use algorithms::ALGORITHMS;
-pub use champion::{Champion, ChampionSource, HeldOut, Reevaluation};
+pub use champion::{Champion, ChampionSource, HeldOut, Judged};
 pub use checkpoint::{Advance, Checkpoint, CheckpointError};
 pub use digest::Digest;
 pub use experiment_file::AlgorithmParams;
+pub use judgement::Judgement;
+pub use reevaluation::Reevaluation;
 pub use setup::{Setup, SetupError};
 pub use statistics::Statistics;
 
@@ -248,6 +254,7 @@ impl Evolution {
                 genotype: genotypes[best].clone(),
                 trial_fitness: trial_fitness[best].clone(),
                 held_out: None,
+                judged: None,
             });
             if self.champion.as_ref().is_none_or(|champion| champion.held_out.is_none()) {
                 self.champion.clone_from(&self.challenger);
@@ -255,7 +262,7 @@ impl Evolution {
         }
         self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
-        self.step = Some(Step { trial_fitness: trial_fitness.to_vec(), reevaluations: Vec::new() });
+        self.step = Some(Step { trial_fitness: trial_fitness.to_vec(), blocks: Vec::new() });
         Ok(GenerationSummary {
             generation: index,
             statistics: Statistics::of(&fitness),
@@ -276,25 +283,32 @@ impl Evolution {
             genotype: means.concat(),
             trial_fitness: Vec::new(),
             held_out: None,
+            judged: None,
         });
         let candidates = incumbent.into_iter().chain(self.challenger.clone()).chain(mean).collect();
-        Some(Reevaluation { generation, candidates })
+        Some(Reevaluation::new(generation, candidates, self.digest, self.champion_digest))
     }
 
-    /// Makes the best of a [`reevaluation`](Self::reevaluation) the champion, by
-    /// `trial_fitness[i][t]`, the fitness of candidate i in held-out trial t. If
-    /// none of them has a finite mean, the champion stays.
-    pub fn set_champion(&mut self, reevaluation: &Reevaluation, trial_fitness: &[Vec<f64>]) {
-        if let Some(champion) = reevaluation.decide(trial_fitness) {
-            self.champion = Some(champion);
+    /// Makes the winner of a [`reevaluation`](Self::reevaluation) that is over the
+    /// champion. If no candidate has a finite mean, the champion stays.
+    pub fn set_champion(&mut self, reevaluation: &Reevaluation) {
+        let (winner, digest) = reevaluation.outcome();
+        if let Some(winner) = winner {
+            self.champion = Some(winner.clone());
         }
         self.challenger = None;
-        let genotypes = reevaluation.candidates.iter().map(|candidate| &candidate.genotype[..]);
-        self.champion_digest =
-            self.champion_digest.next_champion(self.digest, genotypes, trial_fitness);
         if let Some(step) = &mut self.step {
-            step.reevaluations.push(trial_fitness.to_vec());
+            step.blocks.extend_from_slice(reevaluation.blocks());
         }
+        self.champion_digest = digest;
+    }
+
+    /// The champion so far, to be judged on trials that select nothing; none before the
+    /// first generation. Evolution goes on as if nobody had judged.
+    pub fn judgement(&self) -> Option<Judgement> {
+        let generation = self.n_generations.checked_sub(1)?;
+        let champion = self.champion.clone()?;
+        Some(Judgement::new(generation, champion, self.digest, self.champion_digest))
     }
 }
 

@@ -9,7 +9,7 @@ use super::{AlgorithmParams, FitnessFunction, GenotypeQuery, NamedMap, limits, s
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("champion_every, champion_trials")
+    transform = schema::optional("champion_every, champion_trials, judgement_trials")
 )]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm, by the name in its
@@ -36,16 +36,26 @@ pub struct AlgorithmConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(default, with = "f64")]
     pub target_fitness: Option<f64>,
-    /// Generations between re-evaluations of the champion; default 10. There is
-    /// one at the end, too.
+    /// Generations between re-evaluations of candidates for the champion; default 10.
+    /// There is one at the end, too.
     #[schemars(range(min = 1, max = limits::GENERATIONS))]
     pub champion_every: u64,
-    /// Held-out trials of a re-evaluation; default 50.
+    /// Held-out trials of a re-evaluation; default 50. Candidates that are close get up
+    /// to four times as many.
     #[schemars(range(min = 1, max = limits::TRIALS))]
     pub champion_trials: u32,
+    /// Trials that judge the champion at the end and select nothing; default 200.
+    // 0 leaves the key out, for digests of generations alone.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 1, max = limits::TRIALS))]
+    pub judgement_trials: u32,
     /// Populations, in genotype order; several evolve cooperatively.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub populations: NamedMap<PopulationConfig>,
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 /// One population: its segment of the genotype and its algorithm's parameters.

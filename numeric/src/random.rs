@@ -67,11 +67,18 @@ pub enum Purpose {
 pub enum TrialSet {
     /// The trials that generation g of an evolution is selected by, g from 0.
     Generation(u64),
-    /// The held-out trials that belong to generation g: worlds and noise that
-    /// evolution never meets, for an honest look at what it found.
-    HeldOut(u64),
-    /// The trials of evaluations: the same for every run, neither of a generation
-    /// nor held out by one.
+    /// The held-out trials by which candidates are compared after generation g:
+    /// worlds and noise that evolution never meets.
+    HeldOut {
+        /// Generation g.
+        generation: u64,
+        /// Candidates that are close meet several blocks of them, counted from 0.
+        block: u8,
+    },
+    /// The trials that judge the champion after generation g, the last one: they
+    /// select nothing.
+    Judgement(u64),
+    /// The trials of evaluations: the same for every run and of no generation.
     Evaluation,
 }
 
@@ -79,17 +86,20 @@ impl TrialSet {
     /// The generation that the trials belong to; none for evaluations.
     pub const fn generation(self) -> Option<u64> {
         match self {
-            Self::Generation(generation) | Self::HeldOut(generation) => Some(generation),
+            Self::Generation(generation)
+            | Self::HeldOut { generation, .. }
+            | Self::Judgement(generation) => Some(generation),
             Self::Evaluation => None,
         }
     }
 
-    /// The kind of trials in one word, for logs: `selection`, `held-out` or
-    /// `evaluation`.
+    /// The kind of trials in one word, for logs: `selection`, `held-out`,
+    /// `judgement` or `evaluation`.
     pub const fn kind(self) -> &'static str {
         match self {
             Self::Generation(_) => "selection",
-            Self::HeldOut(_) => "held-out",
+            Self::HeldOut { .. } => "held-out",
+            Self::Judgement(_) => "judgement",
             Self::Evaluation => "evaluation",
         }
     }
@@ -99,15 +109,19 @@ impl TrialSet {
     const fn word(self) -> u64 {
         match self {
             Self::Generation(generation) => {
-                debug_assert!(generation < EVALUATION_BIT, "no run has so many generations");
+                debug_assert!(generation < BLOCK, "no run has so many generations");
                 generation
             }
-            Self::HeldOut(generation) => generation | HELD_OUT_BIT,
+            Self::HeldOut { generation, block } => {
+                generation | HELD_OUT_BIT | (block as u64 * BLOCK)
+            }
+            Self::Judgement(generation) => generation | HELD_OUT_BIT | EVALUATION_BIT,
             Self::Evaluation => EVALUATION_BIT,
         }
     }
 }
 
+const BLOCK: u64 = 1 << 48;
 const EVALUATION_BIT: u64 = 1 << 62;
 const HELD_OUT_BIT: u64 = 1 << 63;
 
@@ -122,7 +136,15 @@ impl fmt::Display for TrialSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Generation(generation) => write!(f, "generation {generation}"),
-            Self::HeldOut(generation) => write!(f, "held-out trials of generation {generation}"),
+            Self::HeldOut { generation, block: 0 } => {
+                write!(f, "held-out trials of generation {generation}")
+            }
+            Self::HeldOut { generation, block } => {
+                write!(f, "held-out trials of generation {generation}, block {block}")
+            }
+            Self::Judgement(generation) => {
+                write!(f, "judgement after generation {generation}")
+            }
             Self::Evaluation => f.write_str("evaluation"),
         }
     }
@@ -401,8 +423,10 @@ mod tests {
         for (trial_set, word) in [
             (TrialSet::Generation(0), 0),
             (TrialSet::Generation(39), 39),
-            (TrialSet::HeldOut(0), 9_223_372_036_854_775_808),
-            (TrialSet::HeldOut(39), 9_223_372_036_854_775_847),
+            (TrialSet::HeldOut { generation: 0, block: 0 }, 9_223_372_036_854_775_808),
+            (TrialSet::HeldOut { generation: 39, block: 0 }, 9_223_372_036_854_775_847),
+            (TrialSet::HeldOut { generation: 39, block: 2 }, 9_223_934_986_808_197_159),
+            (TrialSet::Judgement(39), 13_835_058_055_282_163_751),
             (TrialSet::Evaluation, 4_611_686_018_427_387_904),
         ] {
             assert_eq!(trial_set.word(), word, "{trial_set}");

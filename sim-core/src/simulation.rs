@@ -305,7 +305,10 @@ mod tests {
             positions
         };
         assert_ne!(start(TrialSet::Evaluation), start(TrialSet::Generation(0)));
-        assert_ne!(start(TrialSet::Evaluation), start(TrialSet::HeldOut(0)));
+        assert_ne!(
+            start(TrialSet::Evaluation),
+            start(TrialSet::HeldOut { generation: 0, block: 0 })
+        );
     }
 
     #[test]

@@ -16,8 +16,8 @@ const N_STARTS_MAX: u64 = 512;
 const N_PAIRS_MAX: u64 = 50_000_000;
 
 impl Simulation {
-    /// Tries where objects start in trials of a run: those of the re-evaluation at its
-    /// end, then those of its first generations, as far as that is quick. One where an
+    /// Tries where objects start in trials of a run: those of the judgement at its end,
+    /// then those of its first generations, as far as that is quick. One where an
     /// object finds no place would end the run.
     pub fn check_starts(&self, algorithm: &AlgorithmConfig) -> Result<(), ConfigError> {
         let n_pairs: u64 = self.world.sites().map(n_pairs_of_a_draw).sum();
@@ -26,13 +26,14 @@ impl Simulation {
         }
         let n_starts = (N_PAIRS_MAX / n_pairs).clamp(1, N_STARTS_MAX);
         let last = algorithm.generations.saturating_sub(1);
-        let held_out = (0..algorithm.champion_trials).map(|trial| (TrialSet::HeldOut(last), trial));
+        let judgement =
+            (0..algorithm.judgement_trials).map(|trial| (TrialSet::Judgement(last), trial));
         let generations = (0..=last).flat_map(|generation| {
             let trials = 0..algorithm.num_evaluations;
             trials.map(move |trial| (TrialSet::Generation(generation), trial))
         });
         let mut problems = Problems::default();
-        for (trial_set, trial) in held_out.chain(generations).take(n_starts as usize) {
+        for (trial_set, trial) in judgement.chain(generations).take(n_starts as usize) {
             if let Err(EvaluateError::Unplaceable { object, index, .. }) =
                 trial::try_places(self, trial_set, trial)
             {
@@ -93,9 +94,9 @@ mod tests {
             assert!(text.contains("initializers.positions: no place for number"), "{text}");
             assert!(text.contains("make the world larger"), "{text}");
             let genotype = vec![0.5; simulation.genotype_len()];
-            let sets = [TrialSet::HeldOut(2), TrialSet::Generation(1), TrialSet::Generation(2)];
+            let sets = [TrialSet::Judgement(2), TrialSet::Generation(1), TrialSet::Generation(2)];
             let is_real = sets.iter().any(|&set| {
-                let n_trials = if set == sets[0] { config.algorithm.champion_trials } else { 1 };
+                let n_trials = if set == sets[0] { config.algorithm.judgement_trials } else { 1 };
                 (0..n_trials)
                     .any(|trial| simulation.evaluate(&genotype, set, trial..trial + 1).is_err())
             });

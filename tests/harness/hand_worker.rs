@@ -3,9 +3,9 @@
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
-        Assignments, Hello, ItemResult, ItemResults, JobId, TrialFitness, WorkRequest,
-        WorkResponse, item_result::Outcome, job_id::Job, trial_set, work_request, work_response,
-        worker_service_client::WorkerServiceClient,
+        Assignments, HeldOutTrials, Hello, ItemResult, ItemResults, JobId, TrialFitness,
+        WorkRequest, WorkResponse, item_result::Outcome, job_id::Job, trial_set, work_request,
+        work_response, worker_service_client::WorkerServiceClient,
     },
 };
 use tokio::sync::mpsc;
@@ -38,7 +38,12 @@ pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
         Some(trial_set::TrialSet::Generation(generation)) => {
             sim_core::TrialSet::Generation(generation)
         }
-        Some(trial_set::TrialSet::HeldOut(generation)) => sim_core::TrialSet::HeldOut(generation),
+        Some(trial_set::TrialSet::HeldOut(HeldOutTrials { generation, block })) => {
+            sim_core::TrialSet::HeldOut { generation, block: block.try_into().unwrap() }
+        }
+        Some(trial_set::TrialSet::Judgement(generation)) => {
+            sim_core::TrialSet::Judgement(generation)
+        }
         other => panic!("no trial set of an experiment: {other:?}"),
     };
     (experiment_of(assignments.job), trial_set)

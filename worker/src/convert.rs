@@ -63,8 +63,14 @@ pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
         v1::trial_set::TrialSet::Generation(generation) => {
             TrialSet::Generation(checked_generation(generation)?)
         }
-        v1::trial_set::TrialSet::HeldOut(generation) => {
-            TrialSet::HeldOut(checked_generation(generation)?)
+        v1::trial_set::TrialSet::HeldOut(v1::HeldOutTrials { generation, block }) => {
+            TrialSet::HeldOut {
+                generation: checked_generation(generation)?,
+                block: u8::try_from(block).map_err(|_| format!("there is no block {block}"))?,
+            }
+        }
+        v1::trial_set::TrialSet::Judgement(generation) => {
+            TrialSet::Judgement(checked_generation(generation)?)
         }
         v1::trial_set::TrialSet::Evaluation(_) => TrialSet::Evaluation,
     };

@@ -8,9 +8,10 @@ use crate::{args::ExperimentId, connection::Connection, error::Error, json, prog
 
 /// Print the best genotype so far and the network that it encodes, as JSON.
 ///
-/// `fitness` is the mean on held-out trials, which selected nothing, once the
-/// champion has been re-evaluated on them; `fitness_when_chosen` is the fitness
-/// that made it the champion.
+/// `judged` says what it is worth: the mean, with its 95 % interval, on trials that
+/// selected nothing, once the run has ended. `selection` is the mean on the held-out
+/// trials by which it was compared with other candidates, and `fitness_when_chosen` that
+/// of its generation, for which it became one: both are optimistic.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct ChampionArgs {

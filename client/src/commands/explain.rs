@@ -62,10 +62,13 @@ impl Remote for ExplainArgs {
 
 /// What a batch evaluates: "generation 12", or the champion after it.
 fn batch_name(round: &Round) -> String {
-    if round.held_out {
-        format!("the re-evaluation of the champion after generation {}", round.generation)
+    let generation = round.generation;
+    if round.judgement {
+        format!("the judgement of the champion after generation {generation}")
+    } else if round.held_out {
+        format!("the re-evaluation of candidates for the champion after generation {generation}")
     } else {
-        format!("generation {}", round.generation)
+        format!("generation {generation}")
     }
 }
 

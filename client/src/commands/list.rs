@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Columns of the CSV: keys of [`ExperimentDocument`].
-const CSV_KEYS: [&str; 12] = [
+const CSV_KEYS: [&str; 13] = [
     "id",
     "name",
     "state",
@@ -23,6 +23,7 @@ const CSV_KEYS: [&str; 12] = [
     "generations_done",
     "generations",
     "champion_fitness",
+    "champion_selection_fitness",
     "seed",
     "algorithm",
     "priority",
@@ -31,6 +32,10 @@ const CSV_KEYS: [&str; 12] = [
 ];
 
 /// List all experiments.
+///
+/// `judged` is the mean fitness of the champion on trials that selected nothing, once the
+/// run has ended; `selection` that on the held-out trials by which it was selected, which
+/// is optimistic.
 #[derive(Debug, Args)]
 pub struct ListArgs {}
 
@@ -45,11 +50,14 @@ impl Remote for ListArgs {
 }
 
 fn table(experiments: &[Experiment]) -> Table {
+    let fitness =
+        |fitness: Option<f64>| fitness.map_or("-".into(), |fitness| format!("{fitness:.3}"));
     let mut table = Table::new([
         Column::number("id"),
         Column::new("state").painted(state_style),
         Column::number("generations"),
-        Column::number("champion"),
+        Column::number("selection"),
+        Column::number("judged"),
         Column::number("seed"),
         Column::new("algorithm"),
         Column::number("priority").wide(),
@@ -64,7 +72,8 @@ fn table(experiments: &[Experiment]) -> Table {
             experiment.id.to_string(),
             state_name(experiment.state()).into(),
             format!("{}/{}", experiment.generations_done, experiment.generations),
-            experiment.champion_fitness.map_or("-".into(), |fitness| format!("{fitness:.3}")),
+            fitness(experiment.champion_selection_fitness),
+            fitness(experiment.champion_fitness),
             experiment.seed.to_string(),
             experiment.algorithm.clone(),
             experiment.priority.to_string(),

@@ -4,7 +4,8 @@
 use clap::{CommandFactory as _, Parser as _};
 use swarm_proto::v1::{
     Event, Experiment, ExperimentState, ExplainExperimentResponse, GenerationSummary,
-    GetChampionResponse, HeldItems, HeldOutFitness, Notice, Round, Worker, event::Kind,
+    GetChampionResponse, HeldItems, HeldOutFitness, JudgedFitness, Notice, Round, Worker,
+    event::Kind,
 };
 
 use super::*;
@@ -73,7 +74,8 @@ fn script() -> Script {
             genotype_len: 455,
             submitted_at_ms: NOON_MS,
             latest: Some(summary(2)),
-            champion_fitness: Some(1.5),
+            champion_fitness: Some(1.25),
+            champion_selection_fitness: Some(1.5),
             config_digest: "c0".repeat(32),
             digest: "2".repeat(64),
             priority: 100,
@@ -90,6 +92,13 @@ fn script() -> Script {
             genotype: vec![0.25, 0.5],
             network_json: r#"{"neurons":[]}"#.into(),
             held_out: Some(HeldOutFitness { mean: 1.5, ci95: 0.25, trials: 50, generation: 2 }),
+            judged: Some(JudgedFitness {
+                mean: 1.25,
+                low: 1.0,
+                high: 1.375,
+                trials: 200,
+                generation: 2,
+            }),
         }),
         explanation: ExplainExperimentResponse {
             round: Some(Round {

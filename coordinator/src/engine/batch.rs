@@ -654,8 +654,11 @@ pub fn same_bits(a: &[f64], b: &[f64]) -> bool {
 pub fn name_of(trial_set: TrialSet) -> String {
     match trial_set {
         TrialSet::Generation(generation) => format!("generation {generation}"),
-        TrialSet::HeldOut(generation) => {
+        TrialSet::HeldOut { generation, .. } => {
             format!("the re-evaluation after generation {generation}")
+        }
+        TrialSet::Judgement(generation) => {
+            format!("the judgement after generation {generation}")
         }
         TrialSet::Evaluation => "the evaluation".into(),
     }

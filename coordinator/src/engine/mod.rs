@@ -360,8 +360,10 @@ impl Engine {
         };
         let (set, generation) = match batch.trial_set() {
             TrialSet::Generation(generation) => (0, generation),
-            TrialSet::HeldOut(generation) => (1, generation),
             TrialSet::Evaluation => (2, 0),
+            TrialSet::Judgement(generation) => (3, generation),
+            TrialSet::HeldOut { generation, block: 0 } => (1, generation),
+            TrialSet::HeldOut { generation, block } => (3 + u64::from(block), generation),
         };
         let place = [mix_in(number, kind), mix_in(generation, set), u64::from(item.individual)];
         let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));

@@ -32,7 +32,7 @@ pub(super) struct Request {
     /// Whether the steps are to be measured, too.
     #[prost(bool, tag = "7")]
     pub(super) measures: bool,
-    #[prost(oneof = "TrialSetCode", tags = "8, 9, 10")]
+    #[prost(oneof = "TrialSetCode", tags = "8, 9, 10, 11")]
     pub(super) trial_set: Option<TrialSetCode>,
 }
 
@@ -41,11 +41,22 @@ pub(super) struct Request {
 pub(super) enum TrialSetCode {
     #[prost(uint64, tag = "8")]
     Generation(u64),
-    #[prost(uint64, tag = "9")]
-    HeldOut(u64),
+    #[prost(message, tag = "9")]
+    HeldOut(HeldOutCode),
     /// The value means nothing.
     #[prost(bool, tag = "10")]
     Evaluation(bool),
+    #[prost(uint64, tag = "11")]
+    Judgement(u64),
+}
+
+/// A block of held-out trials on its way.
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(super) struct HeldOutCode {
+    #[prost(uint64, tag = "1")]
+    pub(super) generation: u64,
+    #[prost(uint32, tag = "2")]
+    pub(super) block: u32,
 }
 
 /// What the process says.
@@ -98,7 +109,10 @@ impl Request {
             measures: *output == Output::Measures,
             trial_set: Some(match *trial_set {
                 TrialSet::Generation(generation) => TrialSetCode::Generation(generation),
-                TrialSet::HeldOut(generation) => TrialSetCode::HeldOut(generation),
+                TrialSet::HeldOut { generation, block } => {
+                    TrialSetCode::HeldOut(HeldOutCode { generation, block: block.into() })
+                }
+                TrialSet::Judgement(generation) => TrialSetCode::Judgement(generation),
                 TrialSet::Evaluation => TrialSetCode::Evaluation(true),
             }),
         }
@@ -111,7 +125,10 @@ impl Request {
     pub(super) fn trial_set(&self) -> Option<TrialSet> {
         Some(match self.trial_set? {
             TrialSetCode::Generation(generation) => TrialSet::Generation(generation),
-            TrialSetCode::HeldOut(generation) => TrialSet::HeldOut(generation),
+            TrialSetCode::HeldOut(HeldOutCode { generation, block }) => {
+                TrialSet::HeldOut { generation, block: u8::try_from(block).ok()? }
+            }
+            TrialSetCode::Judgement(generation) => TrialSet::Judgement(generation),
             TrialSetCode::Evaluation(_) => TrialSet::Evaluation,
         })
     }

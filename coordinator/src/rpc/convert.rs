@@ -17,7 +17,7 @@ use crate::{
     store::{Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord},
     text::printable,
 };
-use evolution::{ChampionSource, HeldOut};
+use evolution::{ChampionSource, HeldOut, Judged};
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +70,11 @@ fn job(id: JobId) -> Option<v1::JobId> {
 fn trial_set(trial_set: TrialSet) -> Option<v1::TrialSet> {
     let trial_set = match trial_set {
         TrialSet::Generation(generation) => v1::trial_set::TrialSet::Generation(generation),
-        TrialSet::HeldOut(generation) => v1::trial_set::TrialSet::HeldOut(generation),
+        TrialSet::HeldOut { generation, block } => {
+            let trials = v1::HeldOutTrials { generation, block: block.into() };
+            v1::trial_set::TrialSet::HeldOut(trials)
+        }
+        TrialSet::Judgement(generation) => v1::trial_set::TrialSet::Judgement(generation),
         TrialSet::Evaluation => v1::trial_set::TrialSet::Evaluation(v1::EvaluationTrials {}),
     };
     Some(v1::TrialSet { trial_set: Some(trial_set) })
@@ -146,7 +150,8 @@ pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
         genotype_len: experiment.genotype_len as u32,
         submitted_at_ms: experiment.submitted_at_ms,
         latest: experiment.latest.map(generation),
-        champion_fitness: experiment.champion_fitness,
+        champion_fitness: experiment.judged_fitness,
+        champion_selection_fitness: experiment.held_out_fitness,
         config_digest: experiment.config_digest,
         digest: experiment.digest,
         priority: experiment.priority.weight(),
@@ -203,6 +208,7 @@ pub fn champion(report: ChampionReport) -> v1::GetChampionResponse {
         },
         fitness: champion.fitness(),
         held_out: champion.held_out.map(held_out),
+        judged: champion.judged.map(judged),
         trial_fitness: champion.trial_fitness,
         genotype: champion.genotype,
         network_json,
@@ -213,9 +219,14 @@ fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
     v1::HeldOutFitness {
         mean: held_out.mean,
         ci95: held_out.ci95,
-        trials: held_out.n_trials,
+        trials: u32::try_from(held_out.n_trials).unwrap_or(u32::MAX),
         generation: held_out.generation,
     }
+}
+
+fn judged(judged: Judged) -> v1::JudgedFitness {
+    let Judged { mean, low, high, n_trials, generation } = judged;
+    v1::JudgedFitness { mean, low, high, trials: n_trials, generation }
 }
 
 /// An event for clients.

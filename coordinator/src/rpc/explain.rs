@@ -54,7 +54,8 @@ fn round(activity: BatchActivity) -> Option<Round> {
     let ms = |duration: Duration| duration.as_millis() as u64;
     Some(Round {
         generation: activity.trial_set.generation()?,
-        held_out: matches!(activity.trial_set, TrialSet::HeldOut(_)),
+        held_out: matches!(activity.trial_set, TrialSet::HeldOut { .. }),
+        judgement: matches!(activity.trial_set, TrialSet::Judgement(_)),
         episodes: activity.n_episodes as u64,
         episodes_left: activity.n_episodes_left as u64,
         items_queued: activity.n_items_queued as u32,

@@ -1,5 +1,6 @@
 //! What the fleet evaluates for a run at once, and what comes of it: a generation,
-//! and from time to time candidates for the champion on held-out trials.
+//! from time to time candidates for the champion on held-out trials, and at the end
+//! the champion on trials that select nothing.
 
 use std::sync::Arc;
 
@@ -7,16 +8,21 @@ use experiment_file::ExperimentConfig;
 use sim_core::TrialSet;
 
 use crate::{engine::EvaluatedBatch, store::GenerationRecord};
-use evolution::{Champion, ChampionSource, Evolution, EvolutionError, Population, Reevaluation};
+use evolution::{
+    Champion, ChampionSource, Evolution, EvolutionError, Judgement, Population, Reevaluation,
+};
 
 /// A batch that the fleet evaluates, and what it is for.
 #[derive(Debug)]
 pub enum Round {
     /// The next generation.
     Generation(Arc<Evolution>, evolution::Generation),
-    /// Candidates on held-out trials, after a generation from which evolution has
-    /// updated and which is not committed yet.
+    /// Candidates on a block of held-out trials, after a generation from which evolution
+    /// has updated and which is not committed yet.
     Reevaluation(Box<UpdatedEvolution>, Reevaluation),
+    /// The champion on trials that select nothing, after the last generation, which is
+    /// not committed yet.
+    Judgement(Box<ReadyToCommit>, Judgement),
 }
 
 /// What comes after a round.
@@ -69,7 +75,8 @@ impl Round {
     pub fn trial_set(&self) -> TrialSet {
         match self {
             Self::Generation(_, generation) => TrialSet::Generation(generation.index),
-            Self::Reevaluation(_, reevaluation) => TrialSet::HeldOut(reevaluation.generation),
+            Self::Reevaluation(_, reevaluation) => reevaluation.trial_set(),
+            Self::Judgement(_, judgement) => judgement.trial_set(),
         }
     }
 
@@ -77,9 +84,8 @@ impl Round {
     pub fn genotypes(&self) -> Population {
         match self {
             Self::Generation(_, generation) => Arc::clone(&generation.genotypes),
-            Self::Reevaluation(_, Reevaluation { candidates, .. }) => {
-                candidates.iter().map(|candidate| candidate.genotype.clone()).collect()
-            }
+            Self::Reevaluation(_, reevaluation) => reevaluation.genotypes(),
+            Self::Judgement(_, judgement) => judgement.genotypes(),
         }
     }
 
@@ -88,6 +94,7 @@ impl Round {
         match self {
             Self::Generation(..) => config.algorithm.num_evaluations,
             Self::Reevaluation(..) => config.algorithm.champion_trials,
+            Self::Judgement(..) => config.algorithm.judgement_trials,
         }
     }
 
@@ -104,23 +111,42 @@ impl Round {
                 let evolution = Arc::unwrap_or_clone(evolution);
                 let updated = learn(config, evolution, generation, evaluated)?;
                 Ok(match updated.evolution.reevaluation() {
-                    Some(candidates)
+                    Some(reevaluation)
                         if updated.completed.is_some() || updated.is_scheduled(config) =>
                     {
-                        Next::Evaluate(Box::new(Self::Reevaluation(Box::new(updated), candidates)))
+                        let round = Self::Reevaluation(Box::new(updated), reevaluation);
+                        Next::Evaluate(Box::new(round))
                     }
                     _ => Next::Commit(Box::new(updated.into_ready(None))),
                 })
             }
-            Self::Reevaluation(mut updated, candidates) => {
-                let mut with_champion = updated.evolution.clone();
-                with_champion.set_champion(&candidates, &evaluated.values);
+            Self::Reevaluation(mut updated, mut reevaluation) => {
+                reevaluation.learn(&evaluated.values);
                 updated.notices.extend(evaluated.notices.iter().cloned());
+                if !reevaluation.is_over() {
+                    return Ok(Next::Evaluate(Box::new(Self::Reevaluation(updated, reevaluation))));
+                }
+                let mut with_champion = updated.evolution.clone();
+                with_champion.set_champion(&reevaluation);
                 updated.notices.extend(with_champion.champion().map(describe));
                 if updated.is_scheduled(config) {
                     updated.evolution = with_champion.clone();
                 }
-                Ok(Next::Commit(Box::new(updated.into_ready(Some(with_champion)))))
+                let is_last = updated.completed.is_some();
+                let judgement = with_champion.judgement().filter(|_| is_last);
+                let ready = Box::new(updated.into_ready(Some(with_champion)));
+                Ok(match judgement {
+                    Some(judgement) => Next::Evaluate(Box::new(Self::Judgement(ready, judgement))),
+                    None => Next::Commit(ready),
+                })
+            }
+            Self::Judgement(mut ready, judgement) => {
+                let (champion, digest) = judgement.decide(&evaluated.values);
+                ready.notices.extend(evaluated.notices.iter().cloned());
+                ready.notices.push(describe_judgement(&champion));
+                ready.digest = digest.to_string();
+                ready.champion = Some(champion);
+                Ok(Next::Commit(ready))
             }
         }
     }
@@ -187,23 +213,33 @@ fn learn(
     Ok(UpdatedEvolution { evolution, generation, notices, completed })
 }
 
-/// A champion after its re-evaluation, for the log.
+/// A champion after a re-evaluation, for the log.
 fn describe(champion: &Champion) -> String {
     let held_out = match &champion.held_out {
         Some(held_out) => format!(
-            "{:.6} +- {:.6} on {} held-out trials",
-            held_out.mean, held_out.ci95, held_out.n_trials
+            "selected with mean {:.6} on {} held-out trials, optimistic",
+            held_out.mean, held_out.n_trials
         ),
         None => "without finite fitness on held-out trials".to_owned(),
     };
     let generation = champion.generation;
-    match (champion.source, champion.fitness()) {
-        (ChampionSource::Individual(individual), Some(fitness)) => format!(
-            "champion: {held_out} ({fitness:.6} when chosen), \
-             individual {individual} of generation {generation}"
-        ),
-        _ => {
-            format!("champion: {held_out}, mean of the distribution after generation {generation}")
+    match champion.source {
+        ChampionSource::Individual(individual) => {
+            format!("champion: individual {individual} of generation {generation}, {held_out}")
         }
+        ChampionSource::Mean => {
+            format!("champion: mean of the distribution after generation {generation}, {held_out}")
+        }
+    }
+}
+
+/// What a champion is worth, for the log.
+fn describe_judgement(champion: &Champion) -> String {
+    match &champion.judged {
+        Some(judged) => format!(
+            "champion judged: {:.6} (95 %: {:.6} to {:.6}) on {} trials that selected nothing",
+            judged.mean, judged.low, judged.high, judged.n_trials
+        ),
+        None => "champion not judged: its fitness is not finite in every trial".to_owned(),
     }
 }

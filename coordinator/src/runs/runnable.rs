@@ -124,7 +124,8 @@ mod tests {
             submitted_at_ms: 0,
             latest: None,
             digest: String::new(),
-            champion_fitness: None,
+            held_out_fitness: None,
+            judged_fitness: None,
             priority: Priority::default(),
             last_sequence: 1,
         };

@@ -3,7 +3,7 @@
 use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
 
 use crate::ids::ExperimentId;
-use evolution::{Champion, ChampionSource, HeldOut};
+use evolution::{Champion, ChampionSource, HeldOut, Judged};
 
 use super::{
     StoreError,
@@ -24,9 +24,13 @@ pub fn put(
         ChampionSource::Individual(individual) => Some(individual),
         ChampionSource::Mean => None,
     };
-    let held_out = champion.held_out;
+    let Champion { held_out, judged, .. } = champion;
     let mut statement = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO champions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+        "INSERT OR REPLACE INTO champions
+                (experiment_id, generation, individual, trial_fitness, genotype, held_out_mean,
+                 held_out_ci95, held_out_trials, held_out_generation, seal, judged_mean,
+                 judged_low, judged_high, judged_trials, judged_generation)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
     )?;
     let (trial_fitness, genotype) = (to_json(&champion.trial_fitness), to_json(&champion.genotype));
     let seal = seal_of(sealer, id, champion, &trial_fitness, &genotype, latest, digest);
@@ -41,6 +45,11 @@ pub fn put(
         held_out.map(|held_out| held_out.n_trials),
         held_out.map(|held_out| held_out.generation),
         seal,
+        judged.map(|judged| judged.mean),
+        judged.map(|judged| judged.low),
+        judged.map(|judged| judged.high),
+        judged.map(|judged| judged.n_trials),
+        judged.map(|judged| judged.generation),
     ])?;
     Ok(())
 }
@@ -68,6 +77,10 @@ fn seal_of(
     }
     if let Some(HeldOut { mean, ci95, n_trials, generation }) = champion.held_out {
         seal = seal.text(b"held out").real(mean).real(ci95);
+        seal = seal.number(n_trials).number(generation);
+    }
+    if let Some(Judged { mean, low, high, n_trials, generation }) = champion.judged {
+        seal = seal.text(b"judged").real(mean).real(low).real(high);
         seal = seal.number(n_trials.into()).number(generation);
     }
     seal.finish()
@@ -90,7 +103,8 @@ impl Stored {
         let mut statement = connection.prepare_cached(
             "SELECT c.generation, individual, trial_fitness, genotype, held_out_mean,
                     held_out_ci95, held_out_trials, held_out_generation, c.seal, e.digest,
-                    (SELECT max(generation) FROM generations WHERE experiment_id = e.id)
+                    (SELECT max(generation) FROM generations WHERE experiment_id = e.id),
+                    judged_mean, judged_low, judged_high, judged_trials, judged_generation
              FROM champions c JOIN experiments e ON e.id = c.experiment_id
              WHERE c.experiment_id = ?1",
         )?;
@@ -108,12 +122,23 @@ impl Stored {
             }),
             None => None,
         };
+        let judged = match row.get(11)? {
+            Some(mean) => Some(Judged {
+                mean,
+                low: row.get(12)?,
+                high: row.get(13)?,
+                n_trials: row.get(14)?,
+                generation: row.get(15)?,
+            }),
+            None => None,
+        };
         let champion = Champion {
             generation: row.get(0)?,
             source: individual.map_or(ChampionSource::Mean, ChampionSource::Individual),
             genotype: Vec::new(),
             trial_fitness: Vec::new(),
             held_out,
+            judged,
         };
         Ok(Self {
             champion,
@@ -163,12 +188,6 @@ pub fn get(
     let list = |text: &str| serde_json::from_str(text).map_err(|error| corrupt(&error));
     let (trial_fitness, genotype) = (list(&stored.trial_fitness)?, list(&stored.genotype)?);
     Ok(Some(Champion { trial_fitness, genotype, ..stored.champion }))
-}
-
-/// Mean of a stored list; none if it is empty or damaged.
-pub fn mean(list: &str) -> Option<f64> {
-    let values: Vec<f64> = serde_json::from_str(list).ok()?;
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 fn to_json(values: &[f64]) -> String {

@@ -298,7 +298,7 @@ fn experiment(connection: &Connection, id: ExperimentId) -> Result<Option<Experi
 
 const SELECT_EXPERIMENT: &str =
     "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
-            e.submitted_at_ms, e.digest, c.held_out_mean, c.trial_fitness,
+            e.submitted_at_ms, e.digest, c.held_out_mean, c.judged_mean,
             g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
             g.duration_ms, g.episodes, g.workers, g.idle_share, e.priority,
             (SELECT max(sequence) FROM events WHERE experiment_id = e.id)
@@ -316,12 +316,6 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> 
     let Some(priority) = Priority::new(row.get(21)?) else {
         return Ok(Err(StoreError::Corrupt(format!("experiment {id} has no valid priority"))));
     };
-    let trial_fitness: Option<String> = row.get(10)?;
-    let champion_fitness = match (row.get(9)?, trial_fitness) {
-        (Some(held_out), _) => Some(held_out),
-        (None, Some(trial_fitness)) => champions::mean(&trial_fitness),
-        (None, None) => None,
-    };
     Ok(Ok(ExperimentRecord {
         id,
         config_json: row.get(1)?,
@@ -332,7 +326,8 @@ fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> 
         reason: row.get(6)?,
         submitted_at_ms: row.get(7)?,
         digest: row.get(8)?,
-        champion_fitness,
+        held_out_fitness: row.get(9)?,
+        judged_fitness: row.get(10)?,
         latest: history::read_generation(row, 11)?,
         priority,
         last_sequence: row.get::<_, Option<u64>>(22)?.unwrap_or_default(),

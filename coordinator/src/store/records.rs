@@ -86,9 +86,11 @@ pub struct ExperimentRecord {
     /// The link that the latest generation ended with, of the re-evaluations'
     /// digest chain or the generations'; empty before the first.
     pub digest: String,
-    /// Fitness of the champion so far: on held-out trials, or, before the first
-    /// re-evaluation, on those for which it was chosen.
-    pub champion_fitness: Option<f64>,
+    /// Mean fitness of the champion so far on the held-out trials by which it was
+    /// selected; none before the first re-evaluation.
+    pub held_out_fitness: Option<f64>,
+    /// Mean fitness of the champion on trials that selected nothing; none before the end.
+    pub judged_fitness: Option<f64>,
     /// Its share of the fleet.
     pub priority: Priority,
     /// Sequence number of its latest event.

@@ -162,6 +162,15 @@ const MIGRATIONS: &[&str] = &[
         PRIMARY KEY (experiment_id, generation)
     ) STRICT, WITHOUT ROWID;
 ",
+    "
+    -- Fitness on trials that selected nothing; NULL before the end of a run, and of champions
+    -- of older versions, whose held-out fitness is all that there is.
+    ALTER TABLE champions ADD COLUMN judged_mean REAL;
+    ALTER TABLE champions ADD COLUMN judged_low REAL;
+    ALTER TABLE champions ADD COLUMN judged_high REAL;
+    ALTER TABLE champions ADD COLUMN judged_trials INTEGER;
+    ALTER TABLE champions ADD COLUMN judged_generation INTEGER;
+",
 ];
 
 /// The first version with seals.
@@ -169,6 +178,9 @@ pub const SEALED: i64 = 3;
 
 /// The first version with steps of checkpoints.
 const WITH_STEPS: i64 = 5;
+
+/// The first version with judged champions.
+const JUDGED: i64 = 6;
 
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
@@ -184,10 +196,13 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     // A table that others refer to can be replaced only while nobody checks; the
     // pragma means nothing within a transaction.
     connection.pragma_update(None, "foreign_keys", false)?;
-    for (version, statements) in MIGRATIONS.iter().enumerate().skip(found) {
+    if found < MIGRATIONS.len() {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        transaction.execute_batch(statements)?;
-        if version as i64 + 1 == SEALED {
+        for statements in &MIGRATIONS[found..] {
+            transaction.execute_batch(statements)?;
+        }
+        // What seals cover is read from the latest tables.
+        if (found as i64) < SEALED {
             seals::seal_all(&transaction)?;
         }
         let n_dangling: i64 =
@@ -198,7 +213,7 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
                 "{n_dangling} rows refer to experiments that do not exist"
             )));
         }
-        transaction.pragma_update(None, "user_version", version as i64 + 1)?;
+        transaction.pragma_update(None, "user_version", VERSION)?;
         transaction.commit()?;
     }
     connection.pragma_update(None, "foreign_keys", true)?;
@@ -208,22 +223,26 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
 /// Lets a database of an older version be read as if it were of the latest, without
 /// changing it. Seals that it does not have are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
+    // In the temporary schema, where names are looked up first.
     if version < WITH_STEPS {
-        // In the temporary schema, where names are looked up first.
         connection.execute_batch(
             "CREATE TEMP VIEW checkpoint_steps AS
              SELECT 0 AS experiment_id, 0 AS generation, x'' AS step, x'' AS seal WHERE false",
         )?;
     }
-    if version >= SEALED {
-        return Ok(());
-    }
-    let priority = if version < 2 { ", 100 AS priority" } else { "" };
+    let if_before = |first, columns| if version < first { columns } else { "" };
+    let priority = if_before(2, ", 100 AS priority");
+    let seal = if_before(SEALED, ", x'' AS seal");
+    let judged = if_before(
+        JUDGED,
+        ", NULL AS judged_mean, NULL AS judged_low, NULL AS judged_high,
+         NULL AS judged_trials, NULL AS judged_generation",
+    );
     for (table, more) in
-        [("experiments", priority), ("generations", ""), ("checkpoints", ""), ("champions", "")]
+        [("experiments", priority), ("generations", ""), ("checkpoints", ""), ("champions", judged)]
     {
         connection.execute_batch(&format!(
-            "CREATE TEMP VIEW {table} AS SELECT *{more}, x'' AS seal FROM main.{table}"
+            "CREATE TEMP VIEW {table} AS SELECT *{more}{seal} FROM main.{table}"
         ))?;
     }
     Ok(())

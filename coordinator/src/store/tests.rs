@@ -3,7 +3,9 @@
 use std::fs;
 
 use crate::submission::Submission;
-use evolution::{Advance, Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Statistics};
+use evolution::{
+    Advance, Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Judged, Statistics,
+};
 
 use super::*;
 
@@ -63,6 +65,7 @@ pub fn commit(
         genotype: vec![0.1, 1.0 / 3.0],
         trial_fitness: vec![0.5, 0.75],
         held_out: None,
+        judged: None,
     };
     store.commit_generation(
         id,
@@ -77,6 +80,15 @@ pub fn commit(
         },
     )
 }
+
+/// Takes a database from version 6 to version 5.
+pub const WITHOUT_JUDGEMENTS: &str = "
+    ALTER TABLE champions DROP COLUMN judged_mean;
+    ALTER TABLE champions DROP COLUMN judged_low;
+    ALTER TABLE champions DROP COLUMN judged_high;
+    ALTER TABLE champions DROP COLUMN judged_trials;
+    ALTER TABLE champions DROP COLUMN judged_generation;
+    PRAGMA user_version = 5;";
 
 fn open() -> (tempfile::TempDir, Store) {
     let directory = tempfile::tempdir().unwrap();
@@ -99,7 +111,7 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
     assert!(experiment.config_json.contains(&u64::MAX.to_string()), "the seed keeps its value");
     assert_eq!(experiment.state, ExperimentState::Running);
     assert_eq!(experiment.latest, Some(generation(1)));
-    assert_eq!(experiment.champion_fitness, Some(0.625));
+    assert_eq!((experiment.held_out_fitness, experiment.judged_fitness), (None, None));
     assert_eq!(experiment.digest, "link");
     assert_eq!(store.resumable(id).unwrap().1, checkpoint_after(1));
     let champion = store.champion(id).unwrap().unwrap();
@@ -108,7 +120,7 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
 }
 
 #[test]
-fn a_champion_keeps_its_origin_and_its_held_out_fitness() {
+fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
     let (_directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     let held_out = HeldOut { mean: 0.1 + 0.2, ci95: 1.0 / 3.0, n_trials: 50, generation: 4 };
@@ -118,24 +130,31 @@ fn a_champion_keeps_its_origin_and_its_held_out_fitness() {
         genotype: vec![1.0 / 3.0],
         trial_fitness: Vec::new(),
         held_out: Some(held_out),
+        judged: None,
     };
-    store
-        .commit_generation(
-            id,
-            1,
-            &GenerationCommit {
-                generation: &generation(4),
-                checkpoint: &Advance::State(Vec::new()),
-                champion: Some(&champion),
-                digest: "link",
-                notices: &[],
-                completed: None,
-            },
-        )
-        .unwrap();
-    assert_eq!(store.champion(id).unwrap(), Some(champion));
-    let experiment = store.experiment(id).unwrap().unwrap();
-    assert_eq!(experiment.champion_fitness, Some(held_out.mean));
+    let judged = Judged { mean: 0.1, low: 0.1 / 3.0, high: 0.7, n_trials: 200, generation: 5 };
+    // The end of a run, and then more generations of it, by which the champion is another.
+    for (number, judged) in [(4, None), (5, Some(judged)), (6, None)] {
+        let champion = Champion { judged, ..champion.clone() };
+        store
+            .commit_generation(
+                id,
+                1,
+                &GenerationCommit {
+                    generation: &generation(number),
+                    checkpoint: &Advance::State(Vec::new()),
+                    champion: Some(&champion),
+                    digest: "link",
+                    notices: &[],
+                    completed: None,
+                },
+            )
+            .unwrap();
+        assert_eq!(store.champion(id).unwrap(), Some(champion));
+        let experiment = store.experiment(id).unwrap().unwrap();
+        assert_eq!(experiment.held_out_fitness, Some(held_out.mean));
+        assert_eq!(experiment.judged_fitness, judged.map(|judged| judged.mean));
+    }
 }
 
 #[test]

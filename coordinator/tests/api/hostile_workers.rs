@@ -76,6 +76,7 @@ impl Stage {
         algorithm["population_size"] = 4.into();
         algorithm["num_evaluations"] = N_TRIALS.into();
         algorithm["champion_trials"] = N_TRIALS.into();
+        algorithm["judgement_trials"] = N_TRIALS.into();
         algorithm["generations"] = 2.into();
         let config_json = config.to_string();
         let request = SubmitExperimentRequest { config_json, ..Default::default() };
@@ -117,7 +118,11 @@ impl Stage {
                 };
                 let trial_set = match batch.trial_set.unwrap().trial_set.unwrap() {
                     trial_set::TrialSet::Generation(generation) => TrialSet::Generation(generation),
-                    trial_set::TrialSet::HeldOut(generation) => TrialSet::HeldOut(generation),
+                    trial_set::TrialSet::HeldOut(trials) => TrialSet::HeldOut {
+                        generation: trials.generation,
+                        block: trials.block.try_into().unwrap(),
+                    },
+                    trial_set::TrialSet::Judgement(generation) => TrialSet::Judgement(generation),
                     trial_set::TrialSet::Evaluation(_) => TrialSet::Evaluation,
                 };
                 let simulation = simulation.as_ref().expect("the specification comes first");

@@ -144,7 +144,12 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
     for seed in [0, 1, 2, 3, 4, 5, 0, 5, 3, 4, 1, 1] {
         let config = config(|config| config.seed = seed);
         let simulation = Simulation::compile(&config).unwrap();
-        for trial_set in [TrialSet::Generation(3), TrialSet::HeldOut(3), TrialSet::Evaluation] {
+        for trial_set in [
+            TrialSet::Generation(3),
+            TrialSet::HeldOut { generation: 3, block: 1 },
+            TrialSet::Judgement(3),
+            TrialSet::Evaluation,
+        ] {
             for output in [Output::Fitness, Output::Measures] {
                 let request = RefereeRequest { trial_set, output, ..request(&config) };
                 let RefereeRequest { genotype, trials, .. } = request.clone();
@@ -163,7 +168,7 @@ async fn values_are_those_of_the_simulation_to_the_bit() {
         }
     }
     let stats = referee.stats();
-    assert_eq!((stats.n_values, stats.n_unavailable), (12 * 3 * 2, 0));
+    assert_eq!((stats.n_values, stats.n_unavailable), (12 * 4 * 2, 0));
     assert!(stats.busy > Duration::ZERO);
 }
 

@@ -3,6 +3,7 @@
 mod canonical;
 mod convergence;
 mod documentation;
+mod honesty;
 mod reference;
 mod suite;
 
@@ -78,6 +79,22 @@ fn the_champion_is_the_best_mean_so_far_and_the_first_of_equals() {
     assert_eq!(evolution.champion(), Some(&champion));
 }
 
+/// Has the candidates meet blocks until one of them is the champion; `fitness[i]`: of
+/// candidate i in every trial, alternately a little more and a little less.
+fn choose(evolution: &mut Evolution, fitness: &[f64]) {
+    let mut round = evolution.reevaluation().unwrap();
+    while !round.is_over() {
+        let of = |genotype: &Genotype| {
+            let genotypes = round.candidates().iter().map(|candidate| &candidate.genotype);
+            let i = genotypes.into_iter().position(|other| other == genotype).unwrap();
+            vec![fitness[i] - 0.1, fitness[i] + 0.1]
+        };
+        let block: Vec<Vec<f64>> = round.genotypes().iter().map(of).collect();
+        round.learn(&block);
+    }
+    evolution.set_champion(&round);
+}
+
 #[test]
 fn champions_are_kept_by_their_held_out_fitness() {
     let mut evolution = evolution(3, &[2]);
@@ -90,11 +107,11 @@ fn champions_are_kept_by_their_held_out_fitness() {
     tell(&mut evolution, 5.0);
 
     let first = evolution.reevaluation().unwrap();
-    let sources: Vec<ChampionSource> = first.candidates.iter().map(|c| c.source).collect();
+    let sources: Vec<ChampionSource> = first.candidates().iter().map(|c| c.source).collect();
     assert_eq!(sources, [ChampionSource::Individual(1), ChampionSource::Mean]);
-    assert_eq!((first.generation, first.candidates[0].generation), (1, 0));
+    assert_eq!(first.candidates()[0].generation, 0);
     let digest = evolution.digest();
-    evolution.set_champion(&first, &[vec![4.0, 6.0], vec![1.0, 1.0]]);
+    choose(&mut evolution, &[5.0, 1.0]);
     let champion = evolution.champion().unwrap().clone();
     assert_eq!(champion.held_out.unwrap().mean, 5.0);
     assert_eq!(evolution.digest(), digest, "the generations' chain is not touched");
@@ -103,19 +120,44 @@ fn champions_are_kept_by_their_held_out_fitness() {
     tell(&mut evolution, 99.0);
     assert_eq!(evolution.champion(), Some(&champion));
     let second = evolution.reevaluation().unwrap();
-    assert_eq!(second.candidates[0], champion);
-    assert_eq!(second.candidates[1].fitness(), Some(99.0));
+    assert_eq!(second.candidates()[0], champion);
+    assert_eq!(second.candidates()[1].fitness(), Some(99.0));
     let mut other = evolution.clone();
-    evolution.set_champion(&second, &[vec![3.0, 3.0], vec![2.0, 2.0], vec![7.0, 8.0]]);
+    choose(&mut evolution, &[3.0, 2.0, 7.0]);
     assert_eq!(evolution.champion().unwrap().source, ChampionSource::Mean);
-    other.set_champion(&second, &[vec![3.0, 3.0], vec![2.0, 2.0], vec![f64::NAN, 8.0]]);
-    assert_eq!(other.champion().unwrap().held_out.unwrap().mean, 3.0);
+    choose(&mut other, &[3.0, 2.0, f64::NAN]);
+    let kept = other.champion().unwrap().held_out.unwrap();
+    assert_eq!((kept.mean, kept.n_trials), (4.0, 4), "5 and 3, of two trials each");
     assert_ne!(other.champion_digest(), evolution.champion_digest());
 
     // Who has lost once does not come back: the next challenger is of later birth.
     tell(&mut evolution, 1.0);
     let third = evolution.reevaluation().unwrap();
-    assert_eq!((third.candidates[1].fitness(), third.candidates[1].generation), (Some(1.0), 3));
+    let challenger = &third.candidates()[1];
+    assert_eq!((challenger.fitness(), challenger.generation), (Some(1.0), 3));
+}
+
+#[test]
+fn a_judgement_changes_nothing_of_evolution_and_has_a_link_of_its_own() {
+    let mut evolution = evolution(3, &[2]);
+    assert_eq!(evolution.judgement(), None, "there is nobody before the first generation");
+    step(&mut evolution);
+    choose(&mut evolution, &[5.0, 1.0]);
+    let judgement = evolution.judgement().unwrap();
+    assert_eq!(judgement.trial_set(), numeric::random::TrialSet::Judgement(0));
+    let champion = evolution.champion().unwrap();
+    assert_eq!(*judgement.genotypes(), [champion.genotype.clone()]);
+
+    let (judged, digest) = judgement.clone().decide(&[vec![1.0, 2.0, 6.0]]);
+    let Judged { mean, low, high, n_trials, generation } = judged.judged.unwrap();
+    assert_eq!((mean, n_trials, generation), (3.0, 3, 0));
+    assert!(1.0 <= low && low < mean && mean < high && high <= 6.0, "{low} {high}");
+    assert_eq!(Champion { judged: None, ..judged }, *champion);
+    assert_ne!(digest, evolution.champion_digest());
+    assert_ne!(digest, judgement.clone().decide(&[vec![1.0, 2.0, 6.0f64.next_up()]]).1);
+
+    let unjudged = judgement.decide(&[vec![1.0, f64::NAN, 6.0]]).0;
+    assert_eq!(unjudged.judged, None, "no mean without a finite fitness in every trial");
 }
 
 #[test]
@@ -192,6 +234,7 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
             target_fitness: None,
             champion_every: 10,
             champion_trials: 50,
+            judgement_trials: 200,
             populations: populations
                 .iter()
                 .map(|name| ((*name).to_owned(), population()))

@@ -30,6 +30,7 @@ pub(super) fn algorithm(o: &mut Object<'_>, algorithms: Algorithms) -> Algorithm
         target_fitness: o.optional("target_fitness").map(Node::quantity),
         champion_every: o.or("champion_every", 10, |node| node.u64(1..=limits::GENERATIONS)),
         champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
+        judgement_trials: o.or("judgement_trials", 200, |node| node.u32(1..=limits::TRIALS)),
         populations: o
             .required("populations")
             .map(1, |_, node| node.object(|o| population(o, params))),

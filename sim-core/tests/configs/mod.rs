@@ -243,6 +243,7 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
         target_fitness: None,
         champion_every: 10,
         champion_trials: 50,
+        judgement_trials: 200,
         populations: named([(
             "p1",
             PopulationConfig {

@@ -43,7 +43,7 @@ async fn events_are_shown_once_and_in_order_however_often_the_stream_breaks() {
     assert_eq!(generations, [0, 1, 2]);
     assert_eq!(lines.len(), 4);
     assert_eq!(lines[3]["state"], "completed");
-    assert_eq!(lines[3]["champion"]["fitness"], 2.5);
+    assert_eq!(lines[3]["champion"]["fitness_when_chosen"], 2.5);
     assert_eq!(fake.script(|script| script.watched_from.clone()), [1, 3, 3, 4]);
 }
 

@@ -17,6 +17,54 @@ fn committing() -> (World, ExperimentId) {
     (world, id)
 }
 
+/// Has so many rounds evaluated and concluded.
+fn finish_rounds(world: &mut World, id: ExperimentId, n_rounds: usize) {
+    for _ in 0..n_rounds {
+        world.finish_batch(id);
+        world.finish_conclusion(0);
+    }
+}
+
+#[test]
+fn the_champion_is_judged_after_the_last_generation_and_before_that_is_stored() {
+    let mut world = World::new();
+    let id = world.submit(2);
+    world.finish_load(0);
+    finish_rounds(&mut world, id, 1);
+    let judged = |world: &World| world.commits[0].ready.champion.clone().unwrap().judged;
+    assert_eq!(judged(&world), None);
+    world.write_commit(0);
+    world.report_commit(0);
+    // Generation 1 and the re-evaluation of candidates.
+    finish_rounds(&mut world, id, 2);
+    assert!(world.commits.is_empty());
+    assert_eq!(
+        world.jobs[&id].batch.as_ref().map(|(genotypes, n)| (genotypes.len(), *n)),
+        Some((1, 3))
+    );
+    finish_rounds(&mut world, id, 1);
+    assert_eq!(judged(&world).map(|judged| (judged.n_trials, judged.generation)), Some((3, 1)));
+    let ready = &world.commits[0].ready;
+    assert_ne!(ready.digest, ready.evolution.champion_digest().to_string(), "it has a link");
+    assert_eq!(ready.evolution.champion().unwrap().judged, None, "evolution does not know it");
+    world.settle();
+    world.check_settled();
+}
+
+#[test]
+fn a_run_that_is_cancelled_while_its_champion_is_judged_has_no_judgement() {
+    let mut world = World::new();
+    let id = world.submit(1);
+    world.finish_load(0);
+    finish_rounds(&mut world, id, 2);
+    let request = world.request(id, Request::Cancel);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.answers[&request], Some(true));
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+    assert_eq!(world.store[&id].n_done(), 0, "the generation was not complete");
+}
+
 #[test]
 fn a_run_is_completed_and_forgotten() {
     let mut world = World::new();
@@ -133,10 +181,7 @@ fn completed_unnoticed() -> (World, ExperimentId) {
     let mut world = World::new();
     let id = world.submit(1);
     world.finish_load(0);
-    world.finish_batch(id);
-    world.finish_conclusion(0);
-    world.finish_batch(id);
-    world.finish_conclusion(0);
+    finish_rounds(&mut world, id, 3);
     world.write_commit(0);
     assert_eq!(world.store[&id].state, ExperimentState::Completed);
     (world, id)

@@ -77,6 +77,7 @@ pub fn config(seed: u64, generations: u64) -> ExperimentConfig {
     config.algorithm.num_evaluations = 1;
     config.algorithm.champion_every = 2;
     config.algorithm.champion_trials = 2;
+    config.algorithm.judgement_trials = 3;
     config
 }
 
@@ -85,10 +86,11 @@ pub fn evolution(config: &ExperimentConfig) -> Evolution {
     Evolution::new(config, std::slice::from_ref(&(0..3)), "test")
 }
 
-/// What the fleet makes of a batch: always the same.
+/// What the fleet makes of a batch: always the same, and so little noise that no
+/// candidates are close.
 pub fn evaluated(genotypes: &[Vec<f64>], n_trials: u32) -> EvaluatedBatch {
     let fitness = |genes: &Vec<f64>| {
-        (0..n_trials).map(|trial| genes.iter().sum::<f64>() + f64::from(trial)).collect()
+        (0..n_trials).map(|trial| genes.iter().sum::<f64>() + 1e-6 * f64::from(trial)).collect()
     };
     EvaluatedBatch {
         trial_set: TrialSet::Generation(0),

@@ -65,7 +65,7 @@ impl Source {
                 Err(error) => damage.push(format!("the key of its seals is lost: {error}")),
             }
         }
-        if version > 0 {
+        if (1..schema::VERSION).contains(&version) {
             schema::read_as_latest(&connection, version)?;
         }
         Ok(Self { connection, version, sealer, damage })

@@ -7,7 +7,10 @@ use rusqlite::Connection;
 use tempfile::TempDir;
 
 use super::{
-    super::{file, schema, tests::new_experiment},
+    super::{
+        file, schema,
+        tests::{WITHOUT_JUDGEMENTS, new_experiment},
+    },
     *,
 };
 use crate::store::{ExperimentState, GenerationCommit, GenerationRecord, Store, StoreError};
@@ -292,6 +295,10 @@ fn older_schemas_are_looked_at_and_recovered_without_a_change() {
     let mut store = Store::open(directory.path()).unwrap();
     advance_by(|evolution| Advance::State(evolution.state()), &mut store, ExperimentId(2), None);
     drop(store);
+    edit(directory.path(), WITHOUT_JUDGEMENTS);
+    let inspection = inspect(directory.path()).unwrap();
+    assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
+    assert_eq!((inspection.schema_version, inspection.n_generations), (5, 8));
     edit(
         directory.path(),
         "DELETE FROM checkpoints WHERE experiment_id = 1;

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{
-    tests::{checkpoint_after, commit, new_experiment},
+    tests::{WITHOUT_JUDGEMENTS, checkpoint_after, commit, new_experiment},
     *,
 };
 
@@ -97,6 +97,8 @@ fn an_edited_champion_is_damage() {
     for edit in [
         "UPDATE champions SET genotype = '[0.5,0.5]'",
         "UPDATE champions SET held_out_mean = 9",
+        "UPDATE champions SET judged_mean = 9, judged_low = 8, judged_high = 10, judged_trials = 2,
+                judged_generation = 1",
         "UPDATE experiments SET digest = 'd'",
         "DELETE FROM generations WHERE generation = 1",
     ] {
@@ -233,6 +235,7 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     commit(&mut store, running, 2, None).unwrap();
     drop(store);
     let database = Connection::open(file::path_in(directory.path())).unwrap();
+    database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
     database
         .execute_batch(
             "ALTER TABLE experiments DROP COLUMN seal;
@@ -256,6 +259,20 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     store.champion(running).unwrap().unwrap();
     store.champion(ended).unwrap().unwrap();
     assert!(checkpoints::get(&store.connection, ended).unwrap().is_none());
+}
+
+#[test]
+fn a_champion_of_a_version_that_judged_nobody_keeps_what_it_has() {
+    let directory = tempfile::tempdir().unwrap();
+    let (store, [id, _]) = two_experiments(directory.path());
+    let champion = store.champion(id).unwrap();
+    drop(store);
+    let database = Connection::open(file::path_in(directory.path())).unwrap();
+    database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
+    drop(database);
+    let store = Store::open(directory.path()).unwrap();
+    assert!(champion.as_ref().is_some_and(|champion| champion.judged.is_none()));
+    assert_eq!(store.champion(id).unwrap(), champion);
 }
 
 #[test]
