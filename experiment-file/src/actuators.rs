@@ -1,5 +1,7 @@
 //! What robots act with.
 
+use std::ops::Not;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
@@ -85,11 +87,34 @@ pub struct WirelessTransmitterConfig {
     /// Inverse temperature of the quantiser; default 100.
     #[schemars(range(min = 0))]
     pub beta: f64,
+    /// Steps at the start of an episode in which the robot sends, whatever its network
+    /// says; default 10.
+    #[serde(skip_serializing_if = "is_ten")]
+    #[schemars(range(max = limits::STEPS))]
+    pub sending_steps: u32,
+    /// Whether a frame with the message 0 is on the air before the first step; default
+    /// false.
+    #[serde(skip_serializing_if = "Not::not")]
+    pub initial_frame: bool,
+}
+
+/// Whether the canonical form leaves `sending_steps` out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_ten(sending_steps: &u32) -> bool {
+    *sending_steps == 10
 }
 
 impl Default for WirelessTransmitterConfig {
     fn default() -> Self {
-        Self { range: 100.0, msg_length: 2, quantize: true, n_symbols: 16, beta: 100.0 }
+        Self {
+            range: 100.0,
+            msg_length: 2,
+            quantize: true,
+            n_symbols: 16,
+            beta: 100.0,
+            sending_steps: 10,
+            initial_frame: false,
+        }
     }
 }
 

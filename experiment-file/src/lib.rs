@@ -76,6 +76,7 @@ mod read;
 mod report;
 mod robot;
 mod schema;
+mod semantics;
 mod sensors;
 mod topology;
 mod variant;
@@ -113,6 +114,7 @@ pub type NamedMap<T> = indexmap::IndexMap<String, T>;
     deny_unknown_fields,
     transform = schema::optional("name, seed"),
     transform = schema::property("$schema", json!({"type": "string"})),
+    transform = schema::property("semantics", schema::semantics()),
     transform = schema::property("checkpoint_file", json!({"type": ["string", "null"]})),
     transform = schema::ignored("num_processes, render")
 )]

@@ -40,6 +40,11 @@ impl<'a> Node<'a> {
         matches!(self.value, Some(Value::NullKeyword(_)))
     }
 
+    /// What `read` makes of the value; none for null.
+    pub(crate) fn or_null<T>(self, read: impl FnOnce(Self) -> T) -> Option<T> {
+        if self.is_null() { None } else { Some(read(self)) }
+    }
+
     pub(crate) fn is_string(&self) -> bool {
         matches!(self.value, Some(Value::StringLit(_)))
     }

@@ -160,9 +160,24 @@ pub(super) fn amount(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "description": description})
 }
 
+/// A quantity > 0, or null for none.
+pub(super) fn positive_or_null(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"type": ["number", "null"], "exclusiveMinimum": 0, "default": null})
+}
+
 /// A number in \[0, 1\].
 pub(super) fn share(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "maximum": 1, "description": description})
+}
+
+/// Whose defaults a file has.
+pub(super) fn semantics() -> Value {
+    json!({
+        "enum": ["thesis", "original"],
+        "default": "thesis",
+        "description": "Whose values the keys have that are left out: the thesis's, or those \
+                        of its Python simulator.",
+    })
 }
 
 /// The neuron model in the form of Appendix A.

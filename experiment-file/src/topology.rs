@@ -17,7 +17,7 @@ pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("dt, time_scale, seed, neuron_model"),
+    transform = schema::optional("dt, time_scale, seed, neuron_model, bias_in_gain, initial_rates, motor_tau"),
     transform = schema::property("encoding", schema::encoding()),
     transform = schema::property("neurons", schema::neurons()),
     transform = schema::property("synapse_model", json!({"const": "static_synapse"})),
@@ -36,6 +36,19 @@ pub struct TopologyConfig {
     /// How the neurons work; default `rate_model`.
     #[serde(skip_serializing_if = "NeuronModel::is_default")]
     pub neuron_model: NeuronModel,
+    /// Whether the gain multiplies the bias, u = F(g (v + beta)) (Eq. 2.2), or not,
+    /// u = F(g v + beta); default true.
+    #[serde(skip_serializing_if = "Clone::clone")]
+    #[schemars(extend("default" = true))]
+    pub bias_in_gain: bool,
+    /// What neurons show until their first substep; default `activation`.
+    #[serde(skip_serializing_if = "InitialRates::is_default")]
+    pub initial_rates: InitialRates,
+    /// Time constant of all neurons that an output reads, whatever the genotype says,
+    /// seconds; default null: that of the genotype.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "schema::positive_or_null")]
+    pub motor_tau: Option<f64>,
     /// Inputs, in the order in which they are stacked.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub stimuli: NamedMap<StimulusConfig>,
@@ -51,6 +64,25 @@ pub struct TopologyConfig {
     /// How activities become actions; one entry per output, same names.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub decoding: NamedMap<DecodingConfig>,
+}
+
+/// Activities u of rate neurons before the first substep of an episode; v is 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InitialRates {
+    /// What follows from v: F(g beta), or F(beta) without `bias_in_gain`.
+    #[default]
+    Activation,
+    /// 0.
+    Zero,
+}
+
+impl InitialRates {
+    /// Whether the canonical form leaves it out.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// One named input of the network.

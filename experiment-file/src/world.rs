@@ -120,10 +120,37 @@ pub enum LightController {
     Static {},
     /// Circles the centre of the world (Eq. 5.7-5.8).
     #[schemars(transform = schema::optional(""))]
-    LightOrbitController {},
+    LightOrbitController(OrbitConfig),
     /// Goes to random targets (section 6.4).
     #[schemars(transform = schema::optional(""))]
     LightRndPosController(RandomTargetsConfig),
+}
+
+/// A light's orbit, of radius 200 cm in the end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[schemars(default, deny_unknown_fields)]
+pub struct OrbitConfig {
+    /// Angle per step, radians; default 0.01.
+    #[serde(skip_serializing_if = "is_angle_of_thesis")]
+    #[schemars(range(min = 0))]
+    pub angle_step: f64,
+    /// What the radius grows by per step, cm; default null: a fiftieth of what it lacks
+    /// (Eq. 5.7).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "schema::positive_or_null")]
+    pub radius_step: Option<f64>,
+}
+
+impl Default for OrbitConfig {
+    fn default() -> Self {
+        Self { angle_step: 0.01, radius_step: None }
+    }
+}
+
+/// Whether the canonical form leaves `angle_step` out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_angle_of_thesis(angle_step: &f64) -> bool {
+    *angle_step == OrbitConfig::default().angle_step
 }
 
 /// A light's way to random targets.

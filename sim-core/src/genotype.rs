@@ -20,6 +20,8 @@ pub(crate) struct Codec {
     segments: Vec<Range<usize>>,
     /// Values of everything that no gene covers.
     defaults: Phenotype,
+    /// Neurons whose time constant is not the genotype's, and the time constant.
+    fixed_tau: Option<(Vec<usize>, f64)>,
     /// What no gene covers, in words.
     uncovered: Vec<String>,
 }
@@ -74,7 +76,10 @@ impl Codec {
         }
         let defaults = defaults(&config.topology, network, &coverage, problems);
         let uncovered = coverage.describe(network);
-        Self { genes, segments, defaults, uncovered }
+        let motor = network.ensembles.values().filter(|ensemble| ensemble.motor);
+        let motor: Vec<usize> = motor.flat_map(|ensemble| ensemble.neurons.clone()).collect();
+        let fixed_tau = network.motor_tau.map(|tau| (motor, tau));
+        Self { genes, segments, defaults, fixed_tau, uncovered }
     }
 
     /// Number of genes, d.
@@ -103,6 +108,9 @@ impl Codec {
                     phenotype.neurons[parameter][neuron] = value;
                 }
             }
+        }
+        if let Some((neurons, tau)) = &self.fixed_tau {
+            neurons.iter().for_each(|&neuron| phenotype.neurons["tau"][neuron] = *tau);
         }
         phenotype
     }
@@ -399,6 +407,9 @@ mod tests {
         );
         assert_eq!(codec.uncovered().len(), 11 + 3 * 5);
         assert!(codec.uncovered().contains(&"neurons:tau:OUT_LED stays 2".to_owned()));
+        config.topology.motor_tau = Some(0.5);
+        let (_, with_motor_tau, _) = compile(&config);
+        assert!(with_motor_tau.uncovered().contains(&"neurons:tau:OUT_LED stays 0.5".to_owned()));
         let low = codec.decode(&vec![0.0; codec.genotype_len()]);
         let high = codec.decode(&vec![1.0; codec.genotype_len()]);
         let fixed = network.groups["H1-H2"].synapses.clone();

@@ -1,13 +1,11 @@
 //! Lights and how they move.
 
 use crate::torus::{Torus, Vec2, wrap_angle};
-use experiment_file::{LightController, Pace, RandomTargetsConfig};
+use experiment_file::{LightController, OrbitConfig, Pace, RandomTargetsConfig};
 use numeric::random::Stream;
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
-/// Angle per step of an orbiting light, radians.
-const ORBIT_STEP: f64 = 0.01;
 /// Radius that an orbit tends to, cm.
 const ORBIT_RADIUS: f64 = 200.0;
 /// Time constant with which an orbit's radius tends to it, steps.
@@ -27,6 +25,7 @@ enum Motion {
     Static,
     /// Polar coordinates around the centre of the world (Eq. 5.7 and 5.8).
     Orbit {
+        config: OrbitConfig,
         angle: f64,
         radius: f64,
         sense: f64,
@@ -48,9 +47,9 @@ impl LightPath {
     ) -> Self {
         let motion = match *controller {
             LightController::Static {} => Motion::Static,
-            LightController::LightOrbitController {} => {
+            LightController::LightOrbitController(config) => {
                 let away = torus.displacement(torus.center(), position);
-                Motion::Orbit { angle: away.angle(), radius: away.norm(), sense: 1.0 }
+                Motion::Orbit { config, angle: away.angle(), radius: away.norm(), sense: 1.0 }
             }
             LightController::LightRndPosController(config) => {
                 Motion::RandomTargets { config, target: position }
@@ -63,12 +62,15 @@ impl LightPath {
     pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus) -> Vec2 {
         match &mut self.motion {
             Motion::Static => position,
-            Motion::Orbit { angle, radius, sense } => {
+            Motion::Orbit { config, angle, radius, sense } => {
                 if self.stream.bernoulli(FLIP_PROBABILITY) {
                     *sense = -*sense;
                 }
-                *angle = wrap_angle(*angle + *sense * ORBIT_STEP);
-                *radius += (ORBIT_RADIUS - *radius) / ORBIT_SETTLING;
+                *angle = wrap_angle(*angle + *sense * config.angle_step);
+                *radius = match config.radius_step {
+                    None => *radius + (ORBIT_RADIUS - *radius) / ORBIT_SETTLING,
+                    Some(step) => (*radius + step).min(ORBIT_RADIUS),
+                };
                 let (center, direction) = (torus.center(), Vec2::unit(*angle));
                 torus.wrap(Vec2 {
                     x: center.x + *radius * direction.x,
@@ -112,9 +114,26 @@ mod tests {
         }
     }
 
+    fn orbit(config: OrbitConfig) -> impl FnMut(u32) -> Vec2 {
+        path(LightController::LightOrbitController(config), Vec2::new(501.0, 400.0))
+    }
+
+    #[test]
+    fn an_orbit_may_grow_by_a_constant_step() {
+        let mut path = orbit(OrbitConfig { angle_step: 0.013, radius_step: Some(1.5) });
+        for step in 0..40 {
+            let (radius, angle) = (1.0 + 1.5 * f64::from(step + 1), 0.013 * f64::from(step + 1));
+            let expected =
+                Vec2::new(500.0 + radius * libm::cos(angle), 400.0 + radius * libm::sin(angle));
+            assert!(TORUS.distance(path(step), expected) < 1e-9, "step {step}");
+        }
+        let settled = (40..200).map(&mut path).last().unwrap();
+        assert!((TORUS.distance(settled, TORUS.center()) - 200.0).abs() < 1e-9);
+    }
+
     #[test]
     fn an_orbit_starts_where_the_light_is_and_settles_at_its_radius() {
-        let mut path = path(LightController::LightOrbitController {}, Vec2::new(501.0, 400.0));
+        let mut path = orbit(OrbitConfig::default());
         let mut radius = 1.0;
         for step in 0..40 {
             // The first flip of this stream comes later.
@@ -131,7 +150,7 @@ mod tests {
 
     #[test]
     fn an_orbit_flips_once_in_a_hundred_steps() {
-        let mut path = path(LightController::LightOrbitController {}, Vec2::new(501.0, 400.0));
+        let mut path = orbit(OrbitConfig::default());
         let angle = |p: Vec2| TORUS.displacement(TORUS.center(), p).angle();
         let angles: Vec<f64> = (0..20_000).map(|step| angle(path(step))).collect();
         let senses: Vec<bool> =

@@ -22,9 +22,6 @@ use experiment_file::SensorQuery;
 use numeric::Isa;
 use numeric::random::{Purpose, Stream, TrialSet};
 
-/// Steps at the start of an episode in which every robot sends.
-const N_FIRST_STEPS_SENDING: u32 = 10;
-
 /// State of a trial.
 pub(crate) struct Trial<'a> {
     world: &'a World,
@@ -252,8 +249,8 @@ impl<'a> Trial<'a> {
     pub fn act(&mut self, step: u32) -> Option<f64> {
         let world = self.world;
         // Frames have to spread before relaying them makes sense.
-        if step < N_FIRST_STEPS_SENDING {
-            self.swarm.modes.fill(Mode::Send);
+        for group in world.groups.iter().filter(|group| step < group.sending_steps) {
+            self.swarm.modes[group.robots.clone()].fill(Mode::Send);
         }
         // Perturbations rewrite actions.
         for (group, state) in world.groups.iter().zip(&mut self.groups) {
@@ -335,6 +332,9 @@ mod tests {
     use experiment_file::{ExperimentConfig, Initializer, SendingDirection};
     use std::f64::consts::FRAC_PI_2;
 
+    /// All of them send before this step.
+    const SENDING_STEPS: u32 = 10;
+
     /// Robots with heading 0 in a line, 90 cm apart: each hears its neighbours.
     fn line(n: u32) -> ExperimentConfig {
         let mut config = experiment_a();
@@ -350,12 +350,12 @@ mod tests {
 
     /// One step in which robots act as `modes` and `message` say.
     fn step(trial: &mut Trial<'_>, modes: &[Mode], message: [f64; 2]) {
-        trial.sense(N_FIRST_STEPS_SENDING).unwrap();
+        trial.sense(SENDING_STEPS).unwrap();
         trial.swarm.modes.copy_from_slice(modes);
         for own in trial.swarm.messages.chunks_exact_mut(2) {
             own.copy_from_slice(&message);
         }
-        trial.act(N_FIRST_STEPS_SENDING);
+        trial.act(SENDING_STEPS);
     }
 
     #[test]
@@ -422,6 +422,29 @@ mod tests {
             // On the air: the frames of step - 1.
             let heard = (1..=10).contains(&step);
             assert_eq!(trial.swarm.received[0].is_some(), heard, "step {step}");
+            trial.swarm.modes.fill(Mode::Relay);
+            trial.act(step);
+        }
+    }
+
+    #[test]
+    fn robots_may_be_heard_from_the_first_step_on_and_send_for_longer() {
+        let mut config = line(2);
+        let transmitter = &mut robot(&mut config).actuators.wireless_transmitter;
+        let transmitter = transmitter.as_mut().unwrap();
+        (transmitter.initial_frame, transmitter.sending_steps) = (true, 11);
+        let simulation = Simulation::compile(&config).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+        for step in 0..13 {
+            trial.sense(step).unwrap();
+            let received = trial.swarm.received[0];
+            assert_eq!(received.is_some(), step <= 11, "step {step}");
+            if step == 0 {
+                assert_eq!(trial.swarm.received_messages, [0.0; 4]);
+                let received = received.unwrap();
+                assert_eq!((received.origin.originator, received.origin.hops), (1, 1));
+                assert!((received.sending_direction.x + 1.0).abs() < 1e-15);
+            }
             trial.swarm.modes.fill(Mode::Relay);
             trial.act(step);
         }

@@ -58,6 +58,10 @@ pub(crate) struct RobotGroup {
     pub drive: Option<Drive>,
     /// What quantises their messages.
     pub quantiser: Option<Quantiser>,
+    /// Steps at the start of an episode in which they send, whatever their network says.
+    pub sending_steps: u32,
+    /// Whether each has a frame on the air before the first step.
+    pub initial_frame: bool,
     /// What goes wrong.
     pub perturbations: PerturbationsConfig,
 }
@@ -237,6 +241,8 @@ impl World {
             quantiser: transmitter
                 .filter(|transmitter| transmitter.quantize)
                 .map(|t| Quantiser::new(t.msg_length as usize, t.n_levels() as usize, t.beta)),
+            sending_steps: transmitter.map_or(0, |transmitter| transmitter.sending_steps),
+            initial_frame: transmitter.is_some_and(|transmitter| transmitter.initial_frame),
             perturbations: config.perturbations.clone(),
         };
         self.antennas.extend(group.robots.clone().map(|_| antenna(config)));

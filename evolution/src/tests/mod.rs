@@ -8,8 +8,8 @@ mod reference;
 mod suite;
 
 use experiment_file::{
-    AlgorithmConfig, AlgorithmDescription, AlgorithmParams, Domain, FitnessFunction, NamedMap,
-    NeuronModel, PopulationConfig, TopologyConfig, WorldConfig,
+    AlgorithmConfig, AlgorithmDescription, AlgorithmParams, Domain, FitnessFunction, InitialRates,
+    NamedMap, NeuronModel, PopulationConfig, TopologyConfig, WorldConfig,
 };
 
 use super::*;
@@ -217,6 +217,9 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
             time_scale: 20,
             seed: 821,
             neuron_model: NeuronModel::Rate,
+            bias_in_gain: true,
+            initial_rates: InitialRates::default(),
+            motor_tau: None,
             stimuli: NamedMap::new(),
             ensembles: NamedMap::new(),
             outputs: NamedMap::new(),

@@ -10,6 +10,16 @@ pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     groups(topology, report);
     outputs(topology, report);
     decoding(topology, report);
+    motor_tau(topology, report);
+}
+
+/// Euler steps beyond twice the time constant diverge.
+fn motor_tau(topology: &TopologyConfig, report: &Report<'_>) {
+    let Some(tau) = topology.motor_tau.filter(|tau| *tau < topology.dt / 2.0) else { return };
+    let [path, dt] = ["motor_tau", "dt"].map(|key| Path::from(["topology", key]));
+    report.conflict(&path, &[&dt], || {
+        format!("{tau} s is below dt / 2: the network would be unstable")
+    });
 }
 
 /// Synapse groups refer to stimuli and ensembles alike.

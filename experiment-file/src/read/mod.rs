@@ -15,6 +15,7 @@ use crate::node::{self, Node, Object};
 use jsonc_parser::ast::Value;
 
 use super::report::{Report, check_name};
+use super::semantics::Semantics;
 use super::{AlgorithmDescription, ExperimentConfig};
 
 /// The algorithms that a file may name.
@@ -45,6 +46,8 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
     o.optional("$schema").map(Node::string);
     let name = o.optional("name").map(Node::name);
     let checkpoint = o.optional("checkpoint_file").filter(|node| !node.is_null()).map(Node::name);
+    let semantics =
+        o.or("semantics", Semantics::default(), |node| node.variant(&[]).unwrap_or_default());
     let config = ExperimentConfig {
         name: name.or(checkpoint).unwrap_or_else(|| {
             if let Err(message) = check_name(default_name) {
@@ -56,9 +59,9 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
             default_name.to_owned()
         }),
         seed: o.or("seed", 0, |node| node.u64(0..=u64::MAX)),
-        topology: o.required("topology").object(topology::topology),
+        topology: o.required("topology").object(|o| topology::topology(o, semantics)),
         algorithm: o.required("algorithm").object(|o| algorithm::algorithm(o, algorithms)),
-        world: o.required("world").object(world::world),
+        world: o.required("world").object(|o| world::world(o, semantics)),
     };
     for key in ["num_processes", "render"] {
         o.ignored(key, "it concerns the original simulator's processes and window");

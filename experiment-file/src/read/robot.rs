@@ -2,6 +2,7 @@
 
 use super::node::{Node, Object};
 use super::world::{orientations, positions};
+use crate::semantics::Semantics;
 use crate::{
     ActuatorsConfig, InhibitedStimulus, LeaderFailureConfig, LedActuatorConfig,
     PerturbationsConfig, RobotConfig, RobotController, RobotInitializers, RobotParams, SensorQuery,
@@ -10,7 +11,7 @@ use crate::{
 };
 
 /// `center`: of the world.
-pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2]) -> RobotConfig {
+pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> RobotConfig {
     const UNSUPPORTED: [&str; 1] = ["cascade_controller"];
     let default = RobotParams::default();
     let num_instances = o.required("num_instances").u32(1..=limits::ROBOTS);
@@ -20,13 +21,13 @@ pub(super) fn robot(o: &mut Object<'_>, center: [f64; 2]) -> RobotConfig {
             .required("controller")
             .variant(&UNSUPPORTED)
             .unwrap_or(RobotController::NeuralController),
-        sensors: o.inner("sensors", SensorsConfig::read),
-        actuators: o.inner("actuators", actuators),
+        sensors: o.inner("sensors", |o| SensorsConfig::read(o, semantics)),
+        actuators: o.inner("actuators", |o| actuators(o, semantics)),
         initializers: o.required("initializers").object(|o| RobotInitializers {
             positions: positions(o.required("positions"), center),
             orientations: orientations(o.optional("orientations")),
         }),
-        perturbations: o.inner("perturbations", |o| perturbations(o, num_instances)),
+        perturbations: o.inner("perturbations", |o| perturbations(o, num_instances, semantics)),
         params: o.inner("params", |o| RobotParams {
             trainable: o.or("trainable", default.trainable, Node::bool),
         }),
@@ -37,13 +38,13 @@ fn message_length(node: Node<'_>) -> u32 {
     node.u32(1..=limits::MESSAGE_LENGTH)
 }
 
-fn actuators(o: &mut Object<'_>) -> ActuatorsConfig {
+fn actuators(o: &mut Object<'_>, semantics: Semantics) -> ActuatorsConfig {
     ActuatorsConfig {
         wheel_actuator: o.optional("wheel_actuator").map(|node| node.object(wheels)),
         led_actuator: o.optional("led_actuator").map(|node| node.object(|_| LedActuatorConfig {})),
         wireless_transmitter: o
             .optional("wireless_transmitter")
-            .map(|node| node.object(transmitter)),
+            .map(|node| node.object(|o| transmitter(o, semantics))),
     }
 }
 
@@ -69,8 +70,8 @@ fn wheels(o: &mut Object<'_>) -> WheelActuatorConfig {
     }
 }
 
-fn transmitter(o: &mut Object<'_>) -> WirelessTransmitterConfig {
-    let default = WirelessTransmitterConfig::default();
+fn transmitter(o: &mut Object<'_>, semantics: Semantics) -> WirelessTransmitterConfig {
+    let default: WirelessTransmitterConfig = semantics.defaults();
     WirelessTransmitterConfig {
         range: o.or("range", default.range, Node::positive),
         msg_length: o.or("msg_length", default.msg_length, message_length),
@@ -78,10 +79,17 @@ fn transmitter(o: &mut Object<'_>) -> WirelessTransmitterConfig {
         n_symbols: o
             .or("n_symbols", default.n_symbols, |node| node.u32(2..=limits::LATTICE_POINTS)),
         beta: o.or("beta", default.beta, Node::amount),
+        sending_steps: o
+            .or("sending_steps", default.sending_steps, |node| node.u32(0..=limits::STEPS)),
+        initial_frame: o.or("initial_frame", default.initial_frame, Node::bool),
     }
 }
 
-fn perturbations(o: &mut Object<'_>, num_instances: u32) -> PerturbationsConfig {
+fn perturbations(
+    o: &mut Object<'_>,
+    num_instances: u32,
+    semantics: Semantics,
+) -> PerturbationsConfig {
     PerturbationsConfig {
         leader_failure: o.optional("leader_failure").map(|node| node.object(leader_failure)),
         stimuli_inhibition: o.or("stimuli_inhibition", Vec::new(), |node| {
@@ -104,13 +112,14 @@ fn perturbations(o: &mut Object<'_>, num_instances: u32) -> PerturbationsConfig 
         uncontrollable_rotation: o.optional("uncontrollable_rotation").map(|node| {
             node.object(|o| UncontrollableRotationConfig {
                 affected_robots: affected_robots(o, num_instances),
-                start: o.or("start", 200, |node| node.u32(0..=limits::STEPS)),
+                start: o
+                    .or("start", semantics.rotation_start(), |node| node.u32(0..=limits::STEPS)),
                 targets: o.or("targets", default_targets(), |node| {
                     let targets = node.list(1..=limits::TARGETS);
                     targets.into_iter().map(Node::quantity).collect()
                 }),
                 switch_at: o.or("switch_at", 600, steps),
-                speed: o.or("speed", 0.1, Node::probability),
+                speed: o.or("speed", semantics.rotation_speed(), Node::probability),
             })
         }),
     }

@@ -2,6 +2,7 @@
 
 use super::node::{Node, Object};
 use crate::report::suggestion;
+use crate::semantics::Semantics;
 use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
 use crate::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
 use crate::{
@@ -9,7 +10,7 @@ use crate::{
     SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits, neuron,
 };
 
-pub(super) fn topology(o: &mut Object<'_>) -> TopologyConfig {
+pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
     let model = neuron_model(o);
     let stimuli = o.required("stimuli").map(1, |_, node| node.object(stimulus));
     if let Some(node) = o.optional("encoding") {
@@ -20,6 +21,11 @@ pub(super) fn topology(o: &mut Object<'_>) -> TopologyConfig {
         time_scale: o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE)),
         seed: o.or("seed", DEFAULT_CONNECTION_SEED, |node| node.u64(0..=u64::MAX)),
         neuron_model: model.unwrap_or_default(),
+        bias_in_gain: o.or("bias_in_gain", semantics.bias_in_gain(), Node::bool),
+        initial_rates: o.or("initial_rates", semantics.initial_rates(), |node| {
+            node.variant(&[]).unwrap_or_default()
+        }),
+        motor_tau: o.or("motor_tau", semantics.motor_tau(), |node| node.or_null(Node::positive)),
         stimuli,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
         outputs: o.required("outputs").map(1, |_, node| node.object(output)),

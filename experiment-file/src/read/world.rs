@@ -2,14 +2,15 @@
 
 use super::node::{Node, Object};
 use super::robot::robot;
+use crate::semantics::Semantics;
 use crate::world::DEFAULT_WORLD_SIZE;
 use crate::{
     GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, Pace, PositionInitializers, RandomTargetsConfig, WorldConfig,
-    limits,
+    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PositionInitializers, RandomTargetsConfig,
+    WorldConfig, limits,
 };
 
-pub(super) fn world(o: &mut Object<'_>) -> WorldConfig {
+pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
     for key in ["world_delay", "render_connections"] {
         o.ignored(key, "it concerns the original simulator's window");
     }
@@ -17,18 +18,19 @@ pub(super) fn world(o: &mut Object<'_>) -> WorldConfig {
     let height = o.or("height", DEFAULT_WORLD_SIZE, size);
     let width = o.or("width", DEFAULT_WORLD_SIZE, size);
     let center = [width / 2.0, height / 2.0];
-    let objects = o.required("objects").map(1, |_, node| node.object(|o| object(o, center)));
+    let objects =
+        o.required("objects").map(1, |_, node| node.object(|o| object(o, center, semantics)));
     WorldConfig { height, width, objects }
 }
 
-fn object(o: &mut Object<'_>, center: [f64; 2]) -> ObjectConfig {
+fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectConfig {
     const KNOWN: [&str; 3] = ["robot", "light_source", "ground_area"];
     for key in ["positions", "orientations"] {
         o.ignored(key, "`initializers` say where objects start");
     }
     match o.required("type").one_of(&KNOWN, &["food_area", "nest"]) {
-        Some("robot") => ObjectConfig::Robot(robot(o, center)),
-        Some("light_source") => ObjectConfig::LightSource(light_source(o, center)),
+        Some("robot") => ObjectConfig::Robot(robot(o, center, semantics)),
+        Some("light_source") => ObjectConfig::LightSource(light_source(o, center, semantics)),
         Some(_) => ObjectConfig::GroundArea(ground_area(o, center)),
         None => {
             o.accept_rest();
@@ -43,11 +45,12 @@ fn object(o: &mut Object<'_>, center: [f64; 2]) -> ObjectConfig {
     }
 }
 
-fn light_source(o: &mut Object<'_>, center: [f64; 2]) -> LightSourceConfig {
-    let default = LightParams::default();
+fn light_source(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> LightSourceConfig {
+    let default: LightParams = semantics.defaults();
     LightSourceConfig {
         num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
-        controller: o.or("controller", LightController::Static {}, light_controller),
+        controller: o
+            .or("controller", LightController::Static {}, |node| light_controller(node, semantics)),
         initializers: position_initializers(o, center),
         params: o.inner("params", |o| {
             o.ignored("static", "`controller` says how a light moves");
@@ -60,7 +63,7 @@ fn light_source(o: &mut Object<'_>, center: [f64; 2]) -> LightSourceConfig {
 }
 
 /// A name, an object of `name` and `params`, or null for none.
-fn light_controller(node: Node<'_>) -> LightController {
+fn light_controller(node: Node<'_>, semantics: Semantics) -> LightController {
     const KNOWN: [&str; 3] = ["static", "light_orbit_controller", "light_rnd_pos_controller"];
     if node.is_null() {
         return LightController::Static {};
@@ -71,11 +74,20 @@ fn light_controller(node: Node<'_>) -> LightController {
             return LightController::Static {};
         };
         o.inner("params", |o| match name {
-            "light_orbit_controller" => LightController::LightOrbitController {},
+            "light_orbit_controller" => {
+                LightController::LightOrbitController(orbit(o, semantics.defaults()))
+            }
             "light_rnd_pos_controller" => LightController::LightRndPosController(random_targets(o)),
             _ => LightController::Static {},
         })
     })
+}
+
+fn orbit(o: &mut Object<'_>, default: OrbitConfig) -> OrbitConfig {
+    OrbitConfig {
+        angle_step: o.or("angle_step", default.angle_step, Node::amount),
+        radius_step: o.or("radius_step", default.radius_step, |node| node.or_null(Node::positive)),
+    }
 }
 
 fn random_targets(o: &mut Object<'_>) -> RandomTargetsConfig {

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::SensorConfig;
 use crate::node::{Node, Object};
+use crate::semantics::Semantics;
 
 /// Ground sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -21,7 +22,7 @@ impl Default for GroundSensorConfig {
 }
 
 impl SensorConfig for GroundSensorConfig {
-    fn read(o: &mut Object<'_>) -> Self {
+    fn read(o: &mut Object<'_>, _: Semantics) -> Self {
         let default = Self::default();
         Self { color: o.or("color", default.color, Node::name) }
     }

@@ -1,10 +1,13 @@
 //! `light_sensor`: how bright lights of a colour are, per sector.
 
+use std::f64::consts::PI;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::SensorConfig;
 use crate::node::{Node, Object};
+use crate::semantics::Semantics;
 use crate::{limits, schema};
 
 /// Light sensor.
@@ -32,6 +35,11 @@ pub struct LightSensorConfig {
     /// Variance of the Gaussian noise; default 0.1.
     #[schemars(range(min = 0))]
     pub noise_variance: f64,
+    /// Largest angle between a sector's direction and what it sees, radians; default
+    /// pi: every sector sees everything.
+    #[serde(skip_serializing_if = "super::is_all_around")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = PI))]
+    pub aperture: f64,
 }
 
 impl Default for LightSensorConfig {
@@ -43,20 +51,24 @@ impl Default for LightSensorConfig {
             decay_rho: 0.05,
             decay_phi: 1.0,
             noise_variance: 0.1,
+            aperture: PI,
         }
     }
 }
 
 impl SensorConfig for LightSensorConfig {
-    fn read(o: &mut Object<'_>) -> Self {
-        let default = Self::default();
+    fn read(o: &mut Object<'_>, semantics: Semantics) -> Self {
+        let default: Self = semantics.defaults();
+        let n_sectors = o.or("n_sectors", default.n_sectors, super::sectors);
+        let aperture = semantics.light_aperture(n_sectors).min(PI);
         Self {
-            n_sectors: o.or("n_sectors", default.n_sectors, super::sectors),
+            n_sectors,
             range: o.or("range", default.range, Node::positive),
             color: o.or("color", default.color, Node::name),
             decay_rho: o.or("decay_rho", default.decay_rho, Node::amount),
             decay_phi: o.or("decay_phi", default.decay_phi, Node::amount),
             noise_variance: super::noise_variance(o, default.noise_variance),
+            aperture: o.or("aperture", aperture, super::aperture),
         }
     }
 

@@ -13,16 +13,20 @@ pub use ground::GroundSensorConfig;
 pub use light::LightSensorConfig;
 pub use receiver::{SendingDirection, WirelessReceiverConfig};
 
+use std::f64::consts::PI;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::limits::POSITIVE;
 use crate::node::{Node, Object};
+use crate::semantics::Semantics;
 use crate::{limits, schema};
 
 /// What is asked of the parameters of a kind of sensor.
 trait SensorConfig: Sized {
     /// Reads the parameters; those that the file leaves out have their defaults.
-    fn read(o: &mut Object<'_>) -> Self;
+    fn read(o: &mut Object<'_>, semantics: Semantics) -> Self;
 
     /// Sectors in which every other robot and every light may be: what a robot's
     /// sensor costs per step, for the budget of an episode.
@@ -108,11 +112,13 @@ macro_rules! sensors {
                 n_sectors
             }
 
-            pub(crate) fn read(o: &mut Object<'_>) -> Self {
+            pub(crate) fn read(o: &mut Object<'_>, semantics: Semantics) -> Self {
                 o.unsupported(&UNSUPPORTED);
                 $(
                     let $key = o.optional(stringify!($key));
-                    let $key = $key.map(|node| node.object(SensorConfig::read));
+                    let $key = $key.map(|node| {
+                        node.object(|o| SensorConfig::read(o, semantics))
+                    });
                 )*
                 Self { $($key),* }
             }
@@ -173,6 +179,16 @@ fn noise_variance(o: &mut Object<'_>, default: f64) -> f64 {
         sigma * sigma
     };
     variance.map(Node::amount).or_else(|| sigma.map(from_sigma)).unwrap_or(default)
+}
+
+/// Whether the canonical form leaves an aperture out: every sector sees everything.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_all_around(aperture: &f64) -> bool {
+    *aperture == PI
+}
+
+fn aperture(node: Node<'_>) -> f64 {
+    node.number(*POSITIVE.start()..=PI)
 }
 
 fn sectors(node: Node<'_>) -> u32 {

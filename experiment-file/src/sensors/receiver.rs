@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::SensorConfig;
 use crate::node::{Node, Object};
+use crate::semantics::Semantics;
 use crate::{limits, schema};
 
 /// Receiver of the wireless link (section 3.3).
@@ -70,8 +71,8 @@ impl Default for WirelessReceiverConfig {
 }
 
 impl SensorConfig for WirelessReceiverConfig {
-    fn read(o: &mut Object<'_>) -> Self {
-        let default = Self::default();
+    fn read(o: &mut Object<'_>, semantics: Semantics) -> Self {
+        let default: Self = semantics.defaults();
         o.ignored("noise_sigma", "reception has no noise");
         Self {
             n_sectors: o.or("n_sectors", default.n_sectors, super::sectors),

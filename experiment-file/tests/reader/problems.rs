@@ -22,6 +22,13 @@ fn one_mistake_has_one_answer() {
 /// An edit of the base, and the exact words it earns.
 #[rustfmt::skip]
 const MISTAKES: &[(&str, &str, &str)] = &[
+    // Semantics.
+    (r#""name": "base","#, r#""name": "base", "semantics": "originals","#,
+     "line 2: semantics: unknown name `originals`; did you mean `original`?"),
+    (r#""neuron_model": "rate_model","#, r#""motor_tau": 0.04,"#,
+     "line 9: topology.motor_tau: 0.04 s is below dt / 2: the network would be unstable"),
+    (r#""controller": null"#, r#""controller": {"name": "light_rnd_pos_controller", "params": {"speed": 1, "step": 0.1}}"#,
+     "line 63: world.objects.lamp.controller.params.step: `speed` says the same"),
     // Shape.
     (r#""name": "base","#, r#""name": "base", "name": "other","#,
      "line 2: name: duplicate key"),

@@ -1,11 +1,14 @@
 //! What a right file means: defaults, alternatives, the canonical form.
 
+use std::f64::consts::PI;
+
 use super::validator::is_valid;
 use super::{BASE, accept, defaults, edited, read};
 use evolution::ALGORITHMS;
 use experiment_file::{
-    Activation, Initializer, LightController, LightSourceConfig, NeuronModel, ObjectConfig, Pace,
-    RandomTargetsConfig, RobotController, UncontrollableRotationConfig, json_schema,
+    Activation, ExperimentConfig, InitialRates, Initializer, LightController, LightSourceConfig,
+    NeuronModel, ObjectConfig, OrbitConfig, Pace, RandomTargetsConfig, RobotController,
+    SendingDirection, UncontrollableRotationConfig, WirelessReceiverConfig, json_schema,
 };
 
 #[test]
@@ -91,6 +94,89 @@ fn light_controllers_have_three_forms() {
     assert_eq!(params(r#"{"every": 90}"#), random(90, Pace::Speed(3.0)));
     assert_eq!(params(r#"{"speed": 1.5}"#), random(50, Pace::Speed(1.5)));
     assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, Pace::Step(0.1)));
+}
+
+/// The base experiment with the defaults of the original simulator, and edits of it.
+fn original(edits: &[(&str, &str)]) -> ExperimentConfig {
+    let name = r#""name": "base","#;
+    let text = edited(name, r#""name": "base", "semantics": "original","#);
+    let text = text.replace(r#""light_sensor": {}"#, r#""light_sensor": {"n_sectors": 6}"#);
+    let text = text.replace("\"controller\": null", "\"controller\": \"light_orbit_controller\"");
+    let edit = |text: String, (from, to): &(&str, &str)| {
+        assert_eq!(text.matches(from).count(), 1, "{from:?} must occur once");
+        text.replace(from, to)
+    };
+    accept(&edits.iter().fold(text, edit))
+}
+
+fn lamp(config: &ExperimentConfig) -> &LightSourceConfig {
+    match &config.world.objects["lamp"] {
+        ObjectConfig::LightSource(light) => light,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn the_semantics_of_the_original_are_other_defaults() {
+    let config = original(&[]);
+    let topology = &config.topology;
+    assert!(!topology.bias_in_gain);
+    assert_eq!((topology.initial_rates, topology.motor_tau), (InitialRates::Zero, Some(0.5)));
+    let (_, bots) = config.robots().next().unwrap();
+    let light = bots.sensors.light_sensor.as_ref().unwrap();
+    let expected = (100.0, 0.005, 0.0, PI / 2.0);
+    assert_eq!((light.range, light.decay_rho, light.noise_variance, light.aperture), expected);
+    let receiver = bots.sensors.wireless_receiver.as_ref().unwrap();
+    let expected = (2, 100.0, 0.005, SendingDirection::Originator);
+    let WirelessReceiverConfig { n_sectors, range, decay_rho, sending_direction, .. } = *receiver;
+    assert_eq!((n_sectors, range, decay_rho, sending_direction), expected);
+    let transmitter = bots.actuators.wireless_transmitter.as_ref().unwrap();
+    assert_eq!((transmitter.sending_steps, transmitter.initial_frame), (11, true));
+    assert_eq!(lamp(&config).params.range, 150.0);
+    let orbit = OrbitConfig { angle_step: 0.013, radius_step: Some(1.0) };
+    assert_eq!(lamp(&config).controller, LightController::LightOrbitController(orbit));
+    // The canonical form says it without the word.
+    let canonical = config.to_canonical_json();
+    assert!(!canonical.contains("semantics"));
+    assert_eq!(accept(&canonical), config);
+    let file: serde_json::Value = serde_json::from_str(&canonical).unwrap();
+    assert!(is_valid(&json_schema(ALGORITHMS), &file));
+}
+
+#[test]
+fn what_a_file_states_it_has_under_any_semantics() {
+    let thesis = edited(r#""name": "base","#, r#""name": "base", "semantics": "thesis","#);
+    assert_eq!(accept(&thesis), accept(BASE));
+    let distance = r#""distance_sensor": {"n_sectors": 4, "range": 60, "decay_rho": 0.05,
+        "noise_variance": 0.1, "aperture": 3.141592653589793}"#;
+    let text =
+        BASE.replace(r#""light_sensor": {}"#, &format!(r#""light_sensor": {{}}, {distance}"#));
+    let text = text.replace("\"controller\": null", "\"controller\": \"light_orbit_controller\"");
+    let config = original(&[
+        (
+            r#""neuron_model": "rate_model","#,
+            r#""bias_in_gain": true, "initial_rates": "activation", "motor_tau": null,"#,
+        ),
+        (
+            r#""wireless_receiver": {}, "light_sensor": {"n_sectors": 6}"#,
+            &format!(
+                r#""wireless_receiver": {{"n_sectors": 4, "decay_rho": 0.05,
+                "sending_direction": "emitter"}}, "light_sensor": {{"n_sectors": 6, "range": 80,
+                "decay_rho": 0.05, "noise_variance": 0.1, "aperture": 3.141592653589793}},
+                {distance}"#
+            ),
+        ),
+        (
+            r#""wireless_transmitter": {}"#,
+            r#""wireless_transmitter": {"sending_steps": 10, "initial_frame": false}"#,
+        ),
+        (
+            r#""controller": "light_orbit_controller""#,
+            r#""params": {"range": 80}, "controller": {"name": "light_orbit_controller",
+            "params": {"angle_step": 0.01, "radius_step": null}}"#,
+        ),
+    ]);
+    assert_eq!(config, accept(&text));
 }
 
 #[test]

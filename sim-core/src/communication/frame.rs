@@ -15,8 +15,15 @@ pub(crate) struct FrameOrigin {
     pub sending_direction: Vec2,
 }
 
-/// All frames on the air. Frame r is robot r's; before the first step there is
-/// none, which for receivers is the same as frames without origin.
+impl FrameOrigin {
+    /// Of a robot's own message.
+    pub fn sent_by(originator: usize) -> Self {
+        Self { originator, hops: 1, sending_direction: Vec2::default() }
+    }
+}
+
+/// All frames on the air. Frame r is robot r's. Where there is none, it is the same for
+/// receivers as a frame without origin.
 #[derive(Debug, Clone)]
 pub(crate) struct Ether {
     origins: Vec<Option<FrameOrigin>>,

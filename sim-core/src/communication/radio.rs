@@ -7,7 +7,6 @@ use super::hearing::Hearing;
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
-use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
 use experiment_file::SendingDirection;
 use numeric::Isa;
@@ -28,10 +27,15 @@ pub(crate) struct Radio {
 }
 
 impl Radio {
-    /// No frame is on the air. One stream per robot for each purpose.
+    /// The air before the first step. One stream per robot for each purpose.
     pub fn new(world: &World, reception: Vec<Stream>, quantisation: Vec<Stream>) -> Self {
+        let mut ether = Ether::new(world.n_robots(), world.message_len);
+        let groups = world.groups.iter().filter(|group| group.initial_frame);
+        for robot in groups.flat_map(|group| group.robots.clone()) {
+            ether.emit(robot, Some(FrameOrigin::sent_by(robot)), &vec![0.0; world.message_len]);
+        }
         Self {
-            ether: Ether::new(world.n_robots(), world.message_len),
+            ether,
             hearing: Hearing::new(&world.antennas),
             reception,
             quantisation,
@@ -115,8 +119,7 @@ impl Radio {
         let message = swarm.message_range(robot);
         match swarm.modes[robot] {
             Mode::Send => {
-                let origin =
-                    FrameOrigin { originator: robot, hops: 1, sending_direction: Vec2::default() };
+                let origin = FrameOrigin::sent_by(robot);
                 self.ether.emit(robot, Some(origin), &swarm.messages[message]);
             }
             Mode::Relay => {

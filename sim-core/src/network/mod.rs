@@ -14,7 +14,7 @@ use crate::problems::Problems;
 use connections::{Synapse, SynapseGroup};
 use decoding::Output;
 use experiment_file::{
-    Activation, NamedMap, NeuronModel, NeuronParameter, SensorQuery, TopologyConfig,
+    Activation, InitialRates, NamedMap, NeuronModel, NeuronParameter, SensorQuery, TopologyConfig,
 };
 pub(crate) use phenotype::Phenotype;
 
@@ -27,6 +27,12 @@ pub(crate) struct Network {
     pub n_substeps: u32,
     /// How its neurons work.
     pub model: NeuronModel,
+    /// Whether the gain multiplies the bias.
+    pub bias_in_gain: bool,
+    /// Activities before the first substep.
+    pub initial_rates: InitialRates,
+    /// Time constant of motor neurons, seconds; none: as for all neurons.
+    pub motor_tau: Option<f64>,
     /// Inputs by name, in the order of their rows.
     pub stimuli: IndexMap<String, Stimulus>,
     /// Neurons by name of their ensemble, in their order.
@@ -83,12 +89,11 @@ impl Network {
             let neurons = n_neurons..n_neurons + ensemble.n as usize;
             n_neurons = neurons.end;
             let motor = config.outputs.values().any(|output| output.ensemble == *name);
-            let ensemble = Ensemble {
-                neurons,
-                activation: ensemble.activation,
-                defaults: ensemble.params.clone(),
-                motor,
-            };
+            let mut defaults = ensemble.params.clone();
+            if let Some(tau) = config.motor_tau.filter(|_| motor) {
+                defaults.insert("tau".to_owned(), tau);
+            }
+            let ensemble = Ensemble { neurons, activation: ensemble.activation, defaults, motor };
             (name.clone(), ensemble)
         });
         let ensembles: IndexMap<_, _> = ensembles.collect();
@@ -98,6 +103,9 @@ impl Network {
             dt: config.dt,
             n_substeps: config.time_scale,
             model: config.neuron_model,
+            bias_in_gain: config.bias_in_gain,
+            initial_rates: config.initial_rates,
+            motor_tau: config.motor_tau,
             stimuli,
             ensembles,
             groups,

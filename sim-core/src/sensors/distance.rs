@@ -11,6 +11,8 @@ pub(crate) struct DistanceSensor {
     /// Reach, cm.
     range: f64,
     decay: Decay,
+    /// Largest angle off a sector's direction at which it sees, radians.
+    aperture: f64,
     noise_deviation: f64,
 }
 
@@ -21,6 +23,7 @@ impl DistanceSensor {
             n_sectors: config.n_sectors as usize,
             range: config.range,
             decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
+            aperture: config.aperture,
             noise_deviation: config.noise_variance.sqrt(),
         }
     }
@@ -44,7 +47,7 @@ impl Sensor for DistanceSensor {
         let neighbours = surroundings.neighbours.of(from.robot).iter();
         for neighbour in neighbours.filter(|neighbour| neighbour.rho <= self.range) {
             let bearing = wrap_angle(neighbour.bearing - from.heading);
-            take_sectors(neighbour.rho, bearing, self.decay, reading, f64::max);
+            take_sectors(neighbour.rho, bearing, self.decay, self.aperture, reading, f64::max);
         }
     }
 }
@@ -64,6 +67,7 @@ mod tests {
             n_sectors: 4,
             range: 60.0,
             decay: Decay { rho: 0.05, phi: 1.0 },
+            aperture: PI,
             noise_deviation: 0.0,
         };
         let own = Vec2::new(990.0, 500.0);

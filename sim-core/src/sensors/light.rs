@@ -11,6 +11,8 @@ use experiment_file::LightSensorConfig;
 pub(crate) struct LightSensor {
     n_sectors: usize,
     decay: Decay,
+    /// Largest angle off a sector's direction at which it sees, radians.
+    aperture: f64,
     noise_deviation: f64,
     /// Lights of its colour, each with the distance within which it is seen, cm.
     lights: Vec<(usize, f64)>,
@@ -23,6 +25,7 @@ impl LightSensor {
         Self {
             n_sectors: config.n_sectors as usize,
             decay: Decay { rho: config.decay_rho, phi: config.decay_phi },
+            aperture: config.aperture,
             noise_deviation: config.noise_variance.sqrt(),
             lights: lights.map(|(light, range)| (light, range.min(config.range))).collect(),
         }
@@ -45,7 +48,9 @@ impl Sensor for LightSensor {
             let rho = away.norm();
             if rho <= reach {
                 let bearing = wrap_angle(away.angle() - from.heading);
-                take_sectors(rho, bearing, self.decay, reading, |sum, strength| sum + strength);
+                take_sectors(rho, bearing, self.decay, self.aperture, reading, |sum, strength| {
+                    sum + strength
+                });
             }
         }
     }
@@ -62,9 +67,14 @@ mod tests {
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 
     fn sense(lights: &[Vec2], reach: f64, heading: f64) -> Vec<f64> {
+        sense_within(PI, lights, reach, heading)
+    }
+
+    fn sense_within(aperture: f64, lights: &[Vec2], reach: f64, heading: f64) -> Vec<f64> {
         let sensor = LightSensor {
             n_sectors: 4,
             decay: Decay { rho: 0.05, phi: 1.0 },
+            aperture,
             noise_deviation: 0.0,
             lights: (0..lights.len()).map(|light| (light, reach)).collect(),
         };
@@ -89,6 +99,18 @@ mod tests {
         let strength = |phi: f64| libm::exp(-2.0 - phi);
         let expected = [FRAC_PI_2, 0.0, FRAC_PI_2, PI].map(strength);
         assert_near(&readings, &expected);
+    }
+
+    #[test]
+    fn a_sector_sees_within_its_aperture() {
+        let light = [Vec2::new(5.0, 45.0)];
+        let seen = |aperture| {
+            let readings = sense_within(aperture, &light, 80.0, 0.0);
+            readings.iter().map(|&reading| reading > 0.0).collect::<Vec<_>>()
+        };
+        assert_eq!(seen(1.5), [false, true, false, false]);
+        assert_eq!(seen(FRAC_PI_2), [true, true, true, false]);
+        assert_eq!(seen(PI), [true; 4]);
     }
 
     #[test]

@@ -178,17 +178,21 @@ pub(crate) struct Viewpoint {
 }
 
 /// Hands each sector's strength of something at distance `rho` and in direction
-/// `bearing`, in the robot's own frame, to `take`.
+/// `bearing`, in the robot's own frame, to `take`, if it is within `aperture` of the
+/// sector's direction.
 fn take_sectors(
     rho: f64,
     bearing: f64,
     decay: Decay,
+    aperture: f64,
     readings: &mut [f64],
     take: impl Fn(f64, f64) -> f64,
 ) {
     let n_sectors = readings.len();
     for (sector, reading) in readings.iter_mut().enumerate() {
         let phi = angular_difference(bearing, sector_angle(sector, n_sectors));
-        *reading = take(*reading, decay.strength(rho, phi));
+        if phi <= aperture {
+            *reading = take(*reading, decay.strength(rho, phi));
+        }
     }
 }

@@ -4,4 +4,5 @@ mod borderline;
 mod genotypes;
 mod leaders;
 mod movers;
+mod semantics;
 mod sensors;

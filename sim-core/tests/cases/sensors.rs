@@ -3,8 +3,8 @@
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, Pace, PositionInitializers, RandomTargetsConfig, SensorQuery,
-    StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
+    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PositionInitializers, RandomTargetsConfig,
+    SensorQuery, StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -25,6 +25,7 @@ fn all_sensors() -> ExperimentConfig {
         decay_rho: 0.02,
         decay_phi: 0.7,
         noise_variance: 0.02,
+        aperture: 0.8,
     });
     swarm.sensors.ground_sensor = Some(GroundSensorConfig { color: "black".into() });
     if let Some(light_sensor) = &mut swarm.sensors.light_sensor {
@@ -110,7 +111,7 @@ fn lights_on_every_path_agree() {
     let lights = [
         ("still", LightController::Static {}, "blue", 90.0),
         ("wanderers", random_targets(20, Pace::Speed(3.0)), "red", 70.0),
-        ("orbiters", LightController::LightOrbitController {}, "red", 40.0),
+        ("orbiters", LightController::LightOrbitController(OrbitConfig::default()), "red", 40.0),
     ];
     for (name, controller, color, range) in lights {
         let positions = Initializer::RandomUniform { low: 450.0, high: 550.0, size: 2 };
@@ -124,7 +125,7 @@ fn lights_on_every_path_agree() {
 fn robots_near_a_light_on_every_path_agree() {
     for controller in [
         LightController::Static {},
-        LightController::LightOrbitController {},
+        LightController::LightOrbitController(OrbitConfig::default()),
         random_targets(30, Pace::Step(0.05)),
         random_targets(30, Pace::Speed(4.0)),
     ] {

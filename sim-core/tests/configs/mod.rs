@@ -1,6 +1,6 @@
 //! The experiments of chapter 5 as plain values.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use experiment_file::*;
 use indexmap::IndexMap;
@@ -81,6 +81,7 @@ pub fn experiment_d() -> ExperimentConfig {
         decay_rho: 0.05,
         decay_phi: 1.0,
         noise_variance: 0.1,
+        aperture: PI,
     });
     robots.actuators.led_actuator = None;
     robots.actuators.wheel_actuator = Some(wheels());
@@ -94,7 +95,7 @@ pub fn experiment_d() -> ExperimentConfig {
     };
     let light = LightSourceConfig {
         num_instances: 1,
-        controller: LightController::LightOrbitController {},
+        controller: LightController::LightOrbitController(OrbitConfig::default()),
         initializers: PositionInitializers {
             positions: Initializer::RandomCircumference { radius: 1.0, center: [500.0, 500.0] },
         },
@@ -195,6 +196,9 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
         time_scale: 20,
         seed: 821,
         neuron_model: NeuronModel::Rate,
+        bias_in_gain: true,
+        initial_rates: InitialRates::Activation,
+        motor_tau: None,
         stimuli: stimuli
             .iter()
             .map(|&(name, n, sensor)| (name.to_owned(), StimulusConfig { n, sensor }))
@@ -280,6 +284,8 @@ fn transmitter() -> WirelessTransmitterConfig {
         quantize: true,
         n_symbols: 16,
         beta: 100.0,
+        sending_steps: 10,
+        initial_frame: false,
     }
 }
 

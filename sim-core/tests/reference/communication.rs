@@ -202,6 +202,7 @@ fn at_beta_100_the_quantiser_picks_the_nearest_symbol() {
         quantize: true,
         n_symbols: 16,
         beta: 100.0,
+        ..Default::default()
     };
     let points = lattice(2, 16);
     assert_eq!(points.len(), 16);

@@ -50,12 +50,15 @@ impl<'a> Light<'a> {
         match self.config.controller {
             LightController::Static {} => {}
             // Eq. 5.7-5.8
-            LightController::LightOrbitController {} => {
+            LightController::LightOrbitController(orbit) => {
                 if self.stream.uniform() < 0.01 {
                     self.sense = -self.sense;
                 }
-                self.angle += self.sense * 0.01;
-                self.radius += (ORBIT_RADIUS_CM - self.radius) / 50.0;
+                self.angle += self.sense * orbit.angle_step;
+                match orbit.radius_step {
+                    None => self.radius += (ORBIT_RADIUS_CM - self.radius) / 50.0,
+                    Some(step) => self.radius = (self.radius + step).min(ORBIT_RADIUS_CM),
+                }
                 self.position = torus.wrap([
                     centre[0] + self.radius * self.angle.cos(),
                     centre[1] + self.radius * self.angle.sin(),
@@ -88,13 +91,13 @@ impl<'a> Light<'a> {
 
 #[test]
 fn an_orbiting_light_spirals_outwards_from_the_centre() {
-    use experiment_file::{Initializer, PositionInitializers};
+    use experiment_file::{Initializer, OrbitConfig, PositionInitializers};
     use numeric::random::Purpose;
 
     let torus = Torus { width: 1000.0, height: 1000.0 };
     let config = LightSourceConfig {
         num_instances: 1,
-        controller: LightController::LightOrbitController {},
+        controller: LightController::LightOrbitController(OrbitConfig::default()),
         initializers: PositionInitializers {
             positions: Initializer::Fixed { values: vec![vec![500.0, 500.0]] },
         },

@@ -4,7 +4,8 @@
 use std::ops::Range;
 
 use experiment_file::{
-    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, SynapseSelector, TopologyConfig,
+    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, InitialRates, SynapseSelector,
+    TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -168,6 +169,8 @@ pub struct Network {
     pub gain: Vec<f64>,
     pub bias: Vec<f64>,
     activation: Vec<Activation>,
+    bias_in_gain: bool,
+    initial_rates: InitialRates,
 }
 
 impl Network {
@@ -203,6 +206,13 @@ impl Network {
             }
         }
 
+        if let Some(motor_tau) = topology.motor_tau {
+            for output in topology.outputs.values() {
+                let neurons = neurons_of(topology, &output.ensemble);
+                tau[neurons.expect("the output names an ensemble")].fill(motor_tau);
+            }
+        }
+
         let n = n_neurons(topology);
         let mut w_neurons = vec![vec![0.0; n]; n];
         let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
@@ -217,19 +227,34 @@ impl Network {
                 Pre::Neuron(neuron) => w_neurons[synapse.post][neuron] = weight,
             }
         }
-        let &TopologyConfig { dt, time_scale, .. } = topology;
-        Self { dt, time_scale, w_neurons, w_inputs, tau, gain, bias, activation }
+        let &TopologyConfig { dt, time_scale, bias_in_gain, initial_rates, .. } = topology;
+        Self {
+            dt,
+            time_scale,
+            w_neurons,
+            w_inputs,
+            tau,
+            gain,
+            bias,
+            activation,
+            bias_in_gain,
+            initial_rates,
+        }
     }
 
     pub fn n_neurons(&self) -> usize {
         self.tau.len()
     }
 
-    /// u = F(g * (v + beta))
+    /// u = F(g * (v + beta)), or F(g * v + beta)
     pub fn activities(&self, v: &[f64]) -> Vec<f64> {
         (0..v.len())
             .map(|i| {
-                let x = self.gain[i] * (v[i] + self.bias[i]);
+                let x = if self.bias_in_gain {
+                    self.gain[i] * (v[i] + self.bias[i])
+                } else {
+                    self.gain[i] * v[i] + self.bias[i]
+                };
                 match self.activation[i] {
                     Activation::Sigmoid => 1.0 / (1.0 + (-x).exp()),
                     Activation::Tanh => x.tanh(),
@@ -241,9 +266,12 @@ impl Network {
     /// One environment step: `time_scale` times
     /// v(t + dt) = v + (dt / tau) * (-v + W_N F(g * (v + beta)) + W_I phi),
     /// all neurons at once, phi held. Returns u after the last substep.
-    pub fn step(&self, v: &mut [f64], phi: &[f64]) -> Vec<f64> {
-        for _ in 0..self.time_scale {
-            let u = self.activities(v);
+    pub fn step(&self, v: &mut [f64], phi: &[f64], is_first_step: bool) -> Vec<f64> {
+        for substep in 0..self.time_scale {
+            let mut u = self.activities(v);
+            if is_first_step && substep == 0 && self.initial_rates == InitialRates::Zero {
+                u.fill(0.0);
+            }
             for (i, v) in v.iter_mut().enumerate() {
                 let from_neurons = dot(&self.w_neurons[i], &u);
                 let from_inputs = dot(&self.w_inputs[i], phi);
@@ -272,12 +300,14 @@ fn the_ctrnn_settles_at_its_fixed_point() {
         gain: vec![1.0, 1.0],
         bias: vec![0.0, 0.0],
         activation: vec![Activation::Sigmoid, Activation::Sigmoid],
+        bias_in_gain: true,
+        initial_rates: InitialRates::Activation,
     };
     let mut v = vec![0.0, 0.0];
-    network.step(&mut v, &[0.5]);
+    network.step(&mut v, &[0.5], true);
     assert!((v[0] - 1.5 * (1.0 - 0.95f64.powi(20))).abs() < 1e-14);
     for _ in 0..100 {
-        network.step(&mut v, &[0.5]);
+        network.step(&mut v, &[0.5], false);
     }
     assert!((v[0] - 1.5).abs() < 1e-12);
     assert!((v[1] - 2.0 / (1.0 + (-v[1]).exp())).abs() < 1e-12);
@@ -286,4 +316,6 @@ fn the_ctrnn_settles_at_its_fixed_point() {
     network.bias[1] = 0.5;
     network.gain[1] = 3.0;
     assert_eq!(network.activities(&[0.0, 0.0]), [0.5, 1.5f64.tanh()]);
+    network.bias_in_gain = false;
+    assert_eq!(network.activities(&[0.0, 0.0]), [0.5, 0.5f64.tanh()]);
 }

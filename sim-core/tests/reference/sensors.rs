@@ -62,6 +62,9 @@ pub fn light(
             }
             let bearing = torus.bearing(robot.position, light.position);
             let phi = angular_difference(sector, bearing);
+            if phi > config.aperture {
+                continue;
+            }
             sum += (-config.decay_rho * rho - config.decay_phi * phi).exp();
         }
         readings.push(with_noise(sum, config.noise_variance, noise));
@@ -88,6 +91,9 @@ pub fn distance(
                 continue;
             }
             let phi = angular_difference(sector, torus.bearing(own.position, other.position));
+            if phi > config.aperture {
+                continue;
+            }
             largest = largest.max((-config.decay_rho * rho - config.decay_phi * phi).exp());
         }
         readings.push(with_noise(largest, config.noise_variance, noise));

@@ -17,9 +17,6 @@ use super::sensors::{self, Readings};
 use super::torus::{Torus, Vector};
 use super::witness::Witness;
 
-/// Steps in which every robot sends, whatever its network says.
-const N_SENDING_STEPS: u32 = 10;
-
 /// A robot: what it is, where it is, what it did in the last step.
 pub struct Robot<'a> {
     pub config: &'a RobotConfig,
@@ -185,7 +182,14 @@ impl<'a> Simulation<'a> {
                 send: true,
                 led: 0,
                 wheels: [0.0, 0.0],
-                on_air: None,
+                on_air: config
+                    .actuators
+                    .wireless_transmitter
+                    .as_ref()
+                    .filter(|transmitter| transmitter.initial_frame)
+                    .map(|transmitter| {
+                        Frame::sent(vec![0.0; transmitter.msg_length as usize], number)
+                    }),
                 received: None,
                 is_faulty: false,
                 is_inhibited: inhibited.iter().map(|robots| robots[i]).collect(),
@@ -308,10 +312,12 @@ impl<'a> Simulation<'a> {
     fn control(&mut self, i: usize, phi: &[f64]) -> Actions {
         let robot = &mut self.robots[i];
         let msg_length = robot.msg_length();
-        let u = self.network.step(&mut robot.v, phi);
+        let u = self.network.step(&mut robot.v, phi, self.k == 0);
         let mut actions =
             actuators::decode(&self.config.topology, &u, msg_length, &mut robot.decoding);
-        if self.k < N_SENDING_STEPS {
+        if let Some(transmitter) = &robot.config.actuators.wireless_transmitter
+            && self.k < transmitter.sending_steps
+        {
             actions.send = Some(true);
         }
         actions

@@ -63,12 +63,14 @@ fn insert(object: &mut Value, key: &str, value: Value) {
 pub(super) fn experiment(dice: &mut Dice) -> Value {
     let robot = Robot::new(dice);
     let network = Network::new(dice, &robot);
+    let semantics = json!(dice.pick(&["thesis", "original"]));
     let mut file = object(
         dice,
         [
             ("name", json!("generated")),
             ("checkpoint_file", json!("chk")),
             ("seed", json!(u64::MAX)),
+            ("semantics", semantics),
         ],
     );
     insert(&mut file, "algorithm", algorithm(dice, &robot, &network));

@@ -35,18 +35,24 @@ impl Network {
         }
         let mut ensembles = json!({});
         for i in 0..dice.die(3) {
-            let size = dice.die(12);
+            let size = dice.die(8);
             network.ensemble(dice, &mut ensembles, &format!("H{i}"), size);
         }
         let outputs = network.outputs(dice, robot, &mut ensembles);
         let synapses = network.synapses(dice, &stimuli);
         let (seed, time_scale) = (dice.below(1 << 20), dice.die(30));
+        let bias_in_gain = json!(dice.chance(0.5));
+        let initial_rates = json!(dice.pick(&["activation", "zero"]));
+        let motor_tau = if dice.chance(0.3) { json!(null) } else { json!(0.7) };
         let dt = dice.number(0.01, 0.3);
         network.topology = object(
             dice,
             [
                 ("dt", dt),
                 ("time_scale", json!(time_scale)),
+                ("bias_in_gain", bias_in_gain),
+                ("initial_rates", initial_rates),
+                ("motor_tau", motor_tau),
                 ("seed", json!(seed)),
                 ("encoding", encoding),
                 ("neuron_model", json!("rate_model")),

@@ -149,9 +149,12 @@ impl Robot {
                     let [beta, range] = [dice.number(0.0, 200.0), dice.number(50.0, 150.0)];
                     let quantize = json!(dice.chance(0.5));
                     let symbols = json!(dice.pick(&[&16, &27, &64]));
+                    let [steps, frame] = [json!(dice.below(20)), json!(dice.chance(0.5))];
                     let mut transmitter = object(
                         dice,
                         [
+                            ("sending_steps", steps),
+                            ("initial_frame", frame),
                             ("beta", beta),
                             ("range", range),
                             ("quantize", quantize),
@@ -209,7 +212,11 @@ fn light(dice: &mut Dice) -> Value {
     let n = dice.die(3);
     let controller = match dice.below(5) {
         0 => json!(null),
-        1 => json!("light_orbit_controller"),
+        1 => {
+            let radius_step = if dice.chance(0.5) { json!(null) } else { json!(0.5) };
+            let params = object(dice, [("angle_step", json!(0.02)), ("radius_step", radius_step)]);
+            json!({"name": "light_orbit_controller", "params": params})
+        }
         2 => json!("light_rnd_pos_controller"),
         3 => json!({"name": "static"}),
         _ => {

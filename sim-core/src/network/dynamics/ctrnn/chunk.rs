@@ -9,6 +9,7 @@ use super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
+use experiment_file::InitialRates;
 use numeric::Isa;
 
 /// Vectors per row of a chunk, at most: the sums of four neurons then fit in registers.
@@ -41,7 +42,9 @@ impl Chunk {
         for (row, y) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(kernel.starts()) {
             row.fill(y);
         }
-        chunk.dispatch(isa, kernel, Task::Activate);
+        if kernel.initial_rates == InitialRates::Activation {
+            chunk.dispatch(isa, kernel, Task::Activate);
+        }
         chunk
     }
 

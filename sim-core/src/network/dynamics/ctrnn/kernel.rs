@@ -6,13 +6,15 @@ use std::ops::Range;
 use super::squash;
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
-use experiment_file::Activation;
+use experiment_file::{Activation, InitialRates};
 
 /// Neurons in blocks of four and, what is left of ensembles, of two. A neuron's row is its
 /// place, blocks of four first; rows 2k and 2k+1 are a pair, which shares a division.
 #[derive(Debug)]
 pub(super) struct Kernel {
     pub n_substeps: u32,
+    /// u at the start.
+    pub initial_rates: InitialRates,
     pub quads: Blocks<4>,
     pub pairs: Blocks<2>,
 }
@@ -78,6 +80,7 @@ impl Kernel {
         let wiring = Wiring { network, phenotype, incoming };
         let mut kernel = Self {
             n_substeps: network.n_substeps,
+            initial_rates: network.initial_rates,
             quads: Blocks::default(),
             pairs: Blocks::default(),
         };
@@ -132,10 +135,12 @@ impl<const N: usize> Blocks<N> {
         for (place, neuron) in members.into_iter().enumerate() {
             let Some(neuron) = neuron else { continue };
             let rate = network.dt / tau[neuron];
-            let scale = squash::scale(activation) * gain[neuron];
-            start[place] = (scale * bias[neuron]) as f32;
+            let squash_scale = squash::scale(activation);
+            let scale = squash_scale * gain[neuron];
+            let bias_scale = if network.bias_in_gain { scale } else { squash_scale };
+            start[place] = (bias_scale * bias[neuron]) as f32;
             retention[place] = (1.0 - rate) as f32;
-            drive[place] = (rate * scale * bias[neuron]) as f32;
+            drive[place] = (rate * bias_scale * bias[neuron]) as f32;
             for (couplings, incoming) in couplings.iter_mut().zip(&incoming[neuron]) {
                 for (&pre, weight) in incoming {
                     let weights = couplings.entry(pre).or_insert([0.0; N]);

@@ -11,7 +11,7 @@ use super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
-use experiment_file::Activation;
+use experiment_file::{Activation, InitialRates};
 use numeric::Isa;
 
 /// Lanes of a remainder, at most.
@@ -22,6 +22,8 @@ pub(super) const MAX_LANES: usize = 4;
 #[derive(Debug)]
 pub(super) struct Bundles {
     n_substeps: u32,
+    /// u at the start.
+    initial_rates: InitialRates,
     /// F of each bundle.
     activations: Vec<Activation>,
     /// Place of each row of the kernel among the values of a lane.
@@ -62,6 +64,7 @@ impl Bundles {
         let values = || Aligned::new(len);
         let mut bundles = Self {
             n_substeps: kernel.n_substeps,
+            initial_rates: kernel.initial_rates,
             activations,
             places,
             start: values(),
@@ -131,7 +134,9 @@ impl Remainder {
         for lane in remainder.state.values_mut().chunks_exact_mut(bundles.len()) {
             lane.copy_from_slice(bundles.start.values());
         }
-        remainder.dispatch(isa, bundles, Task::Activate);
+        if bundles.initial_rates == InitialRates::Activation {
+            remainder.dispatch(isa, bundles, Task::Activate);
+        }
         remainder
     }
 

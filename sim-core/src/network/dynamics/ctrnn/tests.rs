@@ -5,7 +5,7 @@ use crate::network::connections::Source;
 use crate::network::dynamics::NetworkState;
 use crate::problems::Problems;
 use crate::testing::experiment_a;
-use experiment_file::{Activation, ExperimentConfig};
+use experiment_file::{Activation, ExperimentConfig, InitialRates};
 
 /// The equation as it stands, in f64, for one robot.
 fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut [f64]) -> Vec<f64> {
@@ -13,7 +13,9 @@ fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut 
         let mut u = Vec::new();
         for ensemble in network.ensembles.values() {
             u.extend(ensemble.neurons.clone().map(|i| {
-                let x = phenotype.neurons["gain"][i] * (v[i] + phenotype.neurons["bias"][i]);
+                let [gain, bias] = ["gain", "bias"].map(|name| phenotype.neurons[name][i]);
+                let x =
+                    if network.bias_in_gain { gain * (v[i] + bias) } else { gain * v[i] + bias };
                 match ensemble.activation.unwrap() {
                     Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
                     Activation::Tanh => libm::tanh(x),
@@ -22,8 +24,12 @@ fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut 
         }
         u
     };
-    for _ in 0..network.n_substeps {
-        let u = activities(v);
+    let starts_at_zero = network.initial_rates == InitialRates::Zero && v.iter().all(|v| *v == 0.0);
+    for substep in 0..network.n_substeps {
+        let mut u = activities(v);
+        if starts_at_zero && substep == 0 {
+            u.fill(0.0);
+        }
         let mut drive = vec![0.0; v.len()];
         for (synapse, weight) in network.synapses.iter().zip(&phenotype.weights) {
             drive[synapse.post] += weight
@@ -50,8 +56,9 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
 }
 
 /// Experiment A's network, and variants with every kind of block: one ensemble of
-/// `tanh`, odd numbers of neurons, and more pairs of neurons than a vector has lanes.
-fn networks() -> [(Network, Phenotype); 4] {
+/// `tanh`, odd numbers of neurons, more pairs of neurons than a vector has lanes; and
+/// neurons like the original's.
+fn networks() -> [(Network, Phenotype); 5] {
     let mut tanh = experiment_a();
     tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);
     let mut odd = tanh.clone();
@@ -59,7 +66,10 @@ fn networks() -> [(Network, Phenotype); 4] {
     odd.topology.ensembles["H2"].n = 9;
     let mut large = odd.clone();
     large.topology.ensembles["H1"].n = 39;
-    [experiment_a(), tanh, odd, large].map(|config| compiled(&config))
+    let mut original = odd.clone();
+    original.topology.bias_in_gain = false;
+    original.topology.initial_rates = InitialRates::Zero;
+    [experiment_a(), tanh, odd, large, original].map(|config| compiled(&config))
 }
 
 fn stimulus(step: usize, lane: usize, input: usize) -> f64 {
