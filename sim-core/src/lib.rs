@@ -90,6 +90,7 @@ mod network;
 mod objects;
 mod output;
 mod perturbations;
+mod polar;
 mod problems;
 mod record;
 mod senses;

@@ -2,11 +2,13 @@
 //! on positions alone, so it is computed again only when a robot has moved.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
+use crate::polar::{self, Polar};
 use crate::torus::{Torus, Vec2, wrap_angle};
 
-/// Swarms up to this size are searched pair by pair.
-const MAX_SEARCHED_BY_PAIRS: usize = 64;
+/// Swarms up to this size are searched without a grid.
+const MAX_WITHOUT_GRID: usize = 64;
 /// Cells per axis, at most: memory, not speed.
 const MAX_CELLS: usize = 256;
 
@@ -29,86 +31,237 @@ impl Neighbour {
     }
 }
 
-/// The neighbours of every robot.
+/// The neighbours of every robot, robot by robot, each one's by their indices.
 #[derive(Debug, Clone)]
 pub(crate) struct Neighbours {
     /// Distance within which robots are neighbours, cm.
     reach: f64,
-    /// Per robot, by their indices.
-    of: Vec<Vec<Neighbour>>,
-    /// Robots per cell of a grid; empty for small swarms.
-    cells: Vec<Vec<usize>>,
+    /// The first neighbour of each robot, and the end.
+    first: Vec<usize>,
+    /// Who they are.
+    robots: Vec<u32>,
+    /// Where they are.
+    polar: Polar,
+    grid: Grid,
+    /// Scratch: those of one robot.
+    found: Vec<Found>,
+}
+
+/// A neighbour of some robot.
+#[derive(Debug, Clone, Copy, Default)]
+struct Found {
+    robot: u32,
+    /// How it is displaced.
+    away: Vec2,
+    rho: f64,
 }
 
 impl Neighbours {
     /// Before the first [`update`](Self::update): no robot has a neighbour.
     pub fn new(reach: f64, n_robots: usize) -> Self {
-        Self { reach, of: vec![Vec::new(); n_robots], cells: Vec::new() }
+        Self {
+            reach,
+            first: vec![0; n_robots + 1],
+            robots: Vec::new(),
+            polar: Polar::default(),
+            grid: Grid::default(),
+            found: Vec::new(),
+        }
+    }
+
+    /// Places of a robot's neighbours.
+    pub fn places(&self, robot: usize) -> Range<usize> {
+        self.first[robot]..self.first[robot + 1]
+    }
+
+    /// The neighbour at a place.
+    pub fn get(&self, place: usize) -> Neighbour {
+        Neighbour {
+            robot: self.robots[place] as usize,
+            rho: self.polar.rho[place],
+            bearing: self.polar.bearing[place],
+        }
     }
 
     /// The neighbours of a robot, by their indices.
-    pub fn of(&self, robot: usize) -> &[Neighbour] {
-        &self.of[robot]
+    pub fn of(&self, robot: usize) -> impl Iterator<Item = Neighbour> {
+        self.places(robot).map(|place| self.get(place))
+    }
+
+    /// Directions of the neighbours at some places.
+    pub fn bearings(&self, places: Range<usize>) -> &[f64] {
+        &self.polar.bearing[places]
+    }
+
+    /// Distances of the neighbours at some places.
+    pub fn distances(&self, places: Range<usize>) -> &[f64] {
+        &self.polar.rho[places]
     }
 
     /// Finds everybody's neighbours.
     pub fn update(&mut self, torus: &Torus, positions: &[Vec2]) {
-        self.of.iter_mut().for_each(Vec::clear);
         if self.reach == 0.0 {
             return; // no robot senses another one
         }
-        let n_columns = n_cells(torus.width, self.reach);
-        let n_rows = n_cells(torus.height, self.reach);
-        // With fewer than three cells, left and right neighbours are the same.
-        if positions.len() <= MAX_SEARCHED_BY_PAIRS || n_columns < 3 || n_rows < 3 {
-            for second in 1..positions.len() {
-                for first in 0..second {
-                    self.examine(torus, positions, first, second);
-                }
-            }
-        } else {
-            self.search_grid(torus, positions, n_columns, n_rows);
+        let n_robots = positions.len();
+        let has_grid = n_robots > MAX_WITHOUT_GRID && self.grid.sort(torus, self.reach, positions);
+        if !has_grid {
+            self.grid.keep(positions);
         }
+        let Self { reach, first, robots, polar: Polar { x, y, rho, .. }, grid, found } = self;
+        robots.clear();
+        x.clear();
+        y.clear();
+        rho.clear();
+        for (robot, &from) in positions.iter().enumerate() {
+            found.clear();
+            if has_grid {
+                for cells in grid.around(torus, from) {
+                    search(torus, *reach, from, grid.robots.slice(cells), found);
+                }
+                found.sort_unstable_by_key(|found| found.robot);
+            } else {
+                search(torus, *reach, from, grid.robots.slice(0..n_robots), found);
+            }
+            for other in found.iter().filter(|other| other.robot as usize != robot) {
+                robots.push(other.robot);
+                x.push(other.away.x);
+                y.push(other.away.y);
+                rho.push(other.rho);
+            }
+            first[robot + 1] = robots.len();
+        }
+        polar::bearings(&mut self.polar);
+    }
+}
+
+/// Robots and where they are.
+#[derive(Debug, Clone, Default)]
+struct Placed {
+    robots: Vec<u32>,
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+/// Some of them.
+#[derive(Clone, Copy)]
+struct PlacedSlice<'a> {
+    robots: &'a [u32],
+    x: &'a [f64],
+    y: &'a [f64],
+}
+
+impl Placed {
+    fn resize(&mut self, n: usize) {
+        self.robots.resize(n, 0);
+        self.x.resize(n, 0.0);
+        self.y.resize(n, 0.0);
     }
 
-    /// As above, but looks only into the cells around each robot's own.
-    fn search_grid(&mut self, torus: &Torus, positions: &[Vec2], n_columns: usize, n_rows: usize) {
-        let mut cells = std::mem::take(&mut self.cells);
-        cells.resize(n_columns * n_rows, Vec::new());
-        cells.iter_mut().for_each(Vec::clear);
-        let cell_of = |position: Vec2| {
-            let column = (position.x / torus.width * n_columns as f64) as usize;
-            let row = (position.y / torus.height * n_rows as f64) as usize;
-            (column.min(n_columns - 1), row.min(n_rows - 1))
-        };
-        for (robot, &position) in positions.iter().enumerate() {
-            let (column, row) = cell_of(position);
-            for row in [row + n_rows - 1, row, row + 1] {
-                for column in [column + n_columns - 1, column, column + 1] {
-                    // So far, cells hold robots of lower indices.
-                    for &other in &cells[row % n_rows * n_columns + column % n_columns] {
-                        self.examine(torus, positions, other, robot);
-                    }
-                }
-            }
-            cells[row * n_columns + column].push(robot);
-        }
-        for neighbours in &mut self.of {
-            neighbours.sort_unstable_by_key(|neighbour| neighbour.robot);
-        }
-        self.cells = cells;
+    fn set(&mut self, index: usize, robot: usize, position: Vec2) {
+        self.robots[index] = robot as u32;
+        (self.x[index], self.y[index]) = (position.x, position.y);
     }
 
-    /// Makes two robots each other's neighbours if they are near enough.
-    fn examine(&mut self, torus: &Torus, positions: &[Vec2], first: usize, second: usize) {
-        let away = torus.displacement(positions[first], positions[second]);
+    fn slice(&self, range: Range<usize>) -> PlacedSlice<'_> {
+        let Self { robots, x, y } = self;
+        PlacedSlice { robots: &robots[range.clone()], x: &x[range.clone()], y: &y[range] }
+    }
+}
+
+/// Adds those that are within `reach` of a position, which may be one of theirs.
+///
+/// Which ones are is not to be foreseen, so there is no branch: each is written down, and
+/// the next one over it unless it is near.
+fn search(torus: &Torus, reach: f64, from: Vec2, others: PlacedSlice<'_>, found: &mut Vec<Found>) {
+    let mut n_found = found.len();
+    found.resize(n_found + others.robots.len(), Found::default());
+    for ((&robot, &x), &y) in others.robots.iter().zip(others.x).zip(others.y) {
+        let away = torus.displacement(from, Vec2 { x, y });
         let rho = away.norm();
-        if rho <= self.reach {
-            let seen = Neighbour { robot: second, rho, bearing: away.angle() };
-            let back = Neighbour { robot: first, rho, bearing: seen.reverse_bearing() };
-            self.of[first].push(seen);
-            self.of[second].push(back);
+        found[n_found] = Found { robot, away, rho };
+        n_found += usize::from(rho <= reach);
+    }
+    found.truncate(n_found);
+}
+
+/// Robots by cells of the plane.
+#[derive(Debug, Clone, Default)]
+struct Grid {
+    n_columns: usize,
+    n_rows: usize,
+    /// The first robot of each cell, row by row, and the end.
+    first: Vec<usize>,
+    robots: Placed,
+}
+
+impl Grid {
+    /// Sorts robots into cells no shorter than `reach`. False if there are so few cells
+    /// that left and right neighbours are the same.
+    fn sort(&mut self, torus: &Torus, reach: f64, positions: &[Vec2]) -> bool {
+        (self.n_columns, self.n_rows) = (n_cells(torus.width, reach), n_cells(torus.height, reach));
+        if self.n_columns < 3 || self.n_rows < 3 {
+            return false;
         }
+        let mut first = std::mem::take(&mut self.first);
+        first.clear();
+        first.resize(self.n_columns * self.n_rows + 1, 0);
+        for &position in positions {
+            first[self.cell(torus, position)] += 1;
+        }
+        let mut n = 0;
+        for first in &mut first {
+            n += *first;
+            *first = n;
+        }
+        self.robots.resize(positions.len());
+        // Backwards, so that every cell's robots come in their order.
+        for (robot, &position) in positions.iter().enumerate().rev() {
+            let place = &mut first[self.cell(torus, position)];
+            *place -= 1;
+            self.robots.set(*place, robot, position);
+        }
+        self.first = first;
+        true
+    }
+
+    /// Keeps the robots as they are.
+    fn keep(&mut self, positions: &[Vec2]) {
+        self.robots.resize(positions.len());
+        for (robot, &position) in positions.iter().enumerate() {
+            self.robots.set(robot, robot, position);
+        }
+    }
+
+    /// Where the robots in the cells around a position are.
+    fn around(&self, torus: &Torus, position: Vec2) -> impl Iterator<Item = Range<usize>> {
+        let (column, row) = self.column_and_row(torus, position);
+        let rows = [row + self.n_rows - 1, row, row + 1];
+        rows.into_iter().flat_map(move |row| {
+            let row = row % self.n_rows * self.n_columns;
+            // Neighbouring cells of a row are neighbours in memory, but for the seam.
+            let last = self.n_columns - 1;
+            let (middle, beyond) = match column {
+                0 => (0..2, Some(last)),
+                column if column == last => (last - 1..last + 1, Some(0)),
+                column => (column - 1..column + 2, None),
+            };
+            let beyond = beyond.map(|column| column..column + 1);
+            std::iter::once(middle)
+                .chain(beyond)
+                .map(move |columns| self.first[row + columns.start]..self.first[row + columns.end])
+        })
+    }
+
+    fn cell(&self, torus: &Torus, position: Vec2) -> usize {
+        let (column, row) = self.column_and_row(torus, position);
+        row * self.n_columns + column
+    }
+
+    fn column_and_row(&self, torus: &Torus, position: Vec2) -> (usize, usize) {
+        let column = (position.x / torus.width * self.n_columns as f64) as usize;
+        let row = (position.y / torus.height * self.n_rows as f64) as usize;
+        (column.min(self.n_columns - 1), row.min(self.n_rows - 1))
     }
 }
 
@@ -136,20 +289,20 @@ mod tests {
     fn neighbours_see_each_other_across_the_seam() {
         let positions = [Vec2::new(990.0, 10.0), Vec2::new(20.0, 570.0), Vec2::new(500.0, 300.0)];
         let neighbours = neighbours(&positions, 50.0);
-        let [seen] = neighbours.of(0) else { panic!("one neighbour") };
+        let [seen] = neighbours.of(0).collect::<Vec<_>>()[..] else { panic!("one neighbour") };
         assert_eq!((seen.robot, seen.rho), (1, 50.0));
         assert!((seen.bearing - wrap_angle(libm::atan2(-40.0, 30.0))).abs() < 1e-15);
-        let [back] = neighbours.of(1) else { panic!("one neighbour") };
+        let [back] = neighbours.of(1).collect::<Vec<_>>()[..] else { panic!("one neighbour") };
         assert!((back.bearing - libm::atan2(40.0, -30.0)).abs() < 1e-15);
         assert!((back.reverse_bearing() - seen.bearing).abs() < 1e-15);
-        assert!(neighbours.of(2).is_empty());
+        assert_eq!(neighbours.of(2).count(), 0);
     }
 
     #[test]
     fn robots_at_one_point_see_each_other_at_0() {
         let neighbours = neighbours(&[Vec2::new(1.0, 1.0); 2], 50.0);
         let at = |robot| Neighbour { robot, rho: 0.0, bearing: 0.0 };
-        assert_eq!((neighbours.of(0), neighbours.of(1)), (&[at(1)][..], &[at(0)][..]));
+        assert!(neighbours.of(0).eq([at(1)]) && neighbours.of(1).eq([at(0)]));
         assert_eq!(at(1).reverse_bearing(), 0.0);
     }
 
@@ -162,7 +315,7 @@ mod tests {
             let positions: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
             let neighbours = neighbours(&positions, reach);
             for (robot, &position) in positions.iter().enumerate() {
-                let found: Vec<usize> = neighbours.of(robot).iter().map(|n| n.robot).collect();
+                let found: Vec<usize> = neighbours.of(robot).map(|n| n.robot).collect();
                 let others = (0..positions.len()).filter(|&other| {
                     other != robot && TORUS.distance(position, positions[other]) <= reach
                 });

@@ -4,6 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
+use crate::polar;
+
 /// A position, or a displacement, in the plane; cm.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Vec2 {
@@ -32,10 +34,7 @@ impl Vec2 {
 
     /// Signed angle in \[0, 2 pi); 0 for the zero vector.
     pub(crate) fn angle(self) -> f64 {
-        if self.x == 0.0 && self.y == 0.0 {
-            return 0.0; // atan2 would take the signs of the zeros for a direction
-        }
-        wrap_angle(libm::atan2(self.y, self.x))
+        polar::angle(self.x, self.y)
     }
 }
 
@@ -62,7 +61,13 @@ fn wrap(x: f64, period: f64) -> f64 {
         return x;
     }
     // Sums and differences of two angles; the same bits as below, but faster.
-    let rest = if (-period..0.0).contains(&x) { x + period } else { x.rem_euclid(period) };
+    let rest = if (-period..0.0).contains(&x) {
+        x + period
+    } else if (period..2.0 * period).contains(&x) {
+        x - period
+    } else {
+        x.rem_euclid(period)
+    };
     // A tiny negative x rounds up to the period itself.
     if rest < period { rest } else { 0.0 }
 }
@@ -115,13 +120,10 @@ impl Torus {
 /// least absolute value.
 fn shortest(difference: f64, period: f64) -> f64 {
     let half = 0.5 * period;
-    if difference > half {
-        difference - period
-    } else if difference < -half {
-        difference + period
-    } else {
-        difference
-    }
+    // Without a branch: where somebody is, is not to be foreseen.
+    let above = if difference > half { period } else { 0.0 };
+    let below = if difference < -half { period } else { 0.0 };
+    difference - above + below
 }
 
 #[cfg(test)]

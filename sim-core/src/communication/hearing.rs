@@ -2,11 +2,15 @@
 //! headings alone, so it is computed again only when a robot has moved or turned.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
 
 use crate::neighbours::{Neighbour, Neighbours};
 use crate::sensors::Decay;
 use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
 use experiment_file::SendingDirection;
+use numeric::Isa;
 
 /// A border between sectors belongs to both in spite of rounding, radians.
 const BORDER: f64 = 1e-12;
@@ -42,8 +46,6 @@ pub(crate) struct Heard {
     pub emitter: Neighbour,
     /// How far off the sector's direction it is, radians.
     phi: f64,
-    /// Logarithm of its strength.
-    log_strength: f64,
 }
 
 /// The strongest emitter in every sector of every robot. Every emitter puts a
@@ -58,6 +60,23 @@ pub(crate) struct Hearing {
     directions: Vec<Vec2>,
     /// First sector of each robot, and the end.
     first: Vec<usize>,
+    /// Scratch: every neighbour of every robot, as it hears them.
+    emitters: Emitters,
+}
+
+/// Robots as their neighbours hear them.
+#[derive(Debug, Clone, Default)]
+struct Emitters {
+    /// Direction in the listener's own frame.
+    bearings: Vec<f64>,
+    /// Sector whose direction is nearest.
+    sectors: Vec<f64>,
+    /// How far off that direction they are, radians.
+    phis: Vec<f64>,
+    /// Logarithm of their strength.
+    log_strengths: Vec<f64>,
+    /// The loudest in each sector of a robot: logarithm of its strength, and its index.
+    loudest: Vec<(f64, usize)>,
 }
 
 impl Hearing {
@@ -71,7 +90,8 @@ impl Hearing {
             first.push(angles.len());
         }
         let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
-        Self { sectors: vec![None; angles.len()], angles, directions, first }
+        let sectors = vec![None; angles.len()];
+        Self { sectors, angles, directions, first, emitters: Emitters::default() }
     }
 
     /// The sectors of one robot.
@@ -99,40 +119,118 @@ impl Hearing {
     /// Computes everything from who is near whom and from headings.
     pub fn update(&mut self, antennas: &[Antenna], neighbours: &Neighbours, headings: &[f64]) {
         self.sectors.fill(None);
-        for (robot, antenna) in antennas.iter().enumerate() {
-            let Some(receiver) = antenna.receiver else { continue };
-            let own = self.first[robot]..self.first[robot + 1];
-            let (sectors, angles) = (&mut self.sectors[own.clone()], &self.angles[own]);
-            let half_width = PI / receiver.n_sectors as f64;
-            let sectors_per_radian = receiver.n_sectors as f64 / TAU;
-            for &emitter in neighbours.of(robot) {
-                let Some(reach) = antennas[emitter.robot].emits_within else { continue };
-                if emitter.rho > receiver.range.min(reach) {
-                    continue;
-                }
-                let bearing = wrap_angle(emitter.bearing - headings[robot]);
-                let mut hear_in = |sector: usize, phi: f64| {
-                    let log_strength = receiver.decay.log_strength(emitter.rho, phi);
-                    let strongest = &mut sectors[sector];
-                    if strongest.is_none_or(|heard| log_strength > heard.log_strength) {
-                        *strongest = Some(Heard { emitter, phi, log_strength });
-                    }
-                };
-                let nearest = (bearing * sectors_per_radian + 0.5) as usize;
-                let nearest = if nearest < receiver.n_sectors { nearest } else { 0 };
-                let phi = angular_difference(bearing, angles[nearest]);
-                if phi < half_width - BORDER {
-                    hear_in(nearest, phi);
+        let mut robot = 0;
+        for group in antennas.chunk_by(|a, b| a.receiver == b.receiver) {
+            let robots = robot..robot + group.len();
+            robot = robots.end;
+            if let Some(receiver) = group[0].receiver {
+                self.update_group(robots, receiver, antennas, neighbours, headings);
+            }
+        }
+    }
+
+    /// As above, for robots whose receivers are alike.
+    fn update_group(
+        &mut self,
+        robots: Range<usize>,
+        receiver: Receiver,
+        antennas: &[Antenna],
+        neighbours: &Neighbours,
+        headings: &[f64],
+    ) {
+        let places = neighbours.places(robots.start).start..neighbours.places(robots.end - 1).end;
+        self.emitters.bearings.clear();
+        for robot in robots.clone() {
+            let bearings = neighbours.bearings(neighbours.places(robot));
+            self.emitters.bearings.extend(bearings.iter().map(|bearing| bearing - headings[robot]));
+        }
+        self.emitters.complete(receiver, neighbours.distances(places.clone()));
+        let half_width = PI / receiver.n_sectors as f64;
+        for robot in robots {
+            let angles = &self.angles[self.first[robot]..self.first[robot + 1]];
+            self.emitters.loudest.clear();
+            self.emitters.loudest.resize(angles.len(), (f64::NEG_INFINITY, 0));
+            for place in neighbours.places(robot) {
+                let emitter = neighbours.get(place);
+                let reach = antennas[emitter.robot].emits_within.unwrap_or(-1.0);
+                let is_heard = emitter.rho <= receiver.range.min(reach);
+                let index = place - places.start;
+                if self.emitters.phis[index] < half_width - BORDER {
+                    self.emitters.hear(self.emitters.sectors[index] as usize, index, is_heard);
                     continue;
                 }
                 // On a border.
                 for (sector, &angle) in angles.iter().enumerate() {
-                    let phi = angular_difference(bearing, angle);
+                    let phi = angular_difference(self.emitters.bearings[index], angle);
                     if phi <= half_width + BORDER {
-                        hear_in(sector, phi);
+                        self.emitters.hear(sector, index, is_heard);
                     }
                 }
             }
+            let sectors = &mut self.sectors[self.first[robot]..self.first[robot + 1]];
+            let loudest = self.emitters.loudest.iter().zip(angles);
+            for (heard, (&(log_strength, index), &angle)) in sectors.iter_mut().zip(loudest) {
+                let is_heard = log_strength > f64::NEG_INFINITY;
+                *heard = is_heard.then(|| Heard {
+                    emitter: neighbours.get(places.start + index),
+                    phi: angular_difference(self.emitters.bearings[index], angle),
+                });
+            }
+        }
+    }
+}
+
+impl Emitters {
+    /// Makes an emitter the loudest of a sector if it is heard and louder than those before.
+    /// That is not to be foreseen, so there is no branch.
+    fn hear(&mut self, sector: usize, index: usize, is_heard: bool) {
+        let loudest = &mut self.loudest[sector];
+        let log_strength = self.log_strengths[index];
+        let is_louder = is_heard & (log_strength > loudest.0);
+        loudest.0 = if is_louder { log_strength } else { loudest.0 };
+        loudest.1 = if is_louder { index } else { loudest.1 };
+    }
+
+    /// Completes what `bearings` begins: differences of two angles in \[0, 2 pi). `rho`: how
+    /// far they are, cm.
+    fn complete(&mut self, receiver: Receiver, rho: &[f64]) {
+        self.sectors.resize(rho.len(), 0.0);
+        self.phis.resize(rho.len(), 0.0);
+        self.log_strengths.resize(rho.len(), 0.0);
+        Isa::best().run(Complete { emitters: self, receiver, rho });
+    }
+}
+
+struct Complete<'a> {
+    emitters: &'a mut Emitters,
+    receiver: Receiver,
+    rho: &'a [f64],
+}
+
+impl WithSimd for Complete<'_> {
+    type Output = ();
+
+    /// Without a branch, the compiler computes several emitters at once.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Self { emitters, receiver, rho } = self;
+        let n_sectors = receiver.n_sectors as f64;
+        let sectors_per_radian = n_sectors / TAU;
+        let Emitters { bearings, sectors, phis, log_strengths, .. } = emitters;
+        let heard = sectors.iter_mut().zip(phis).zip(log_strengths);
+        for ((bearing, rho), ((sector, phi), log_strength)) in
+            bearings.iter_mut().zip(rho).zip(heard)
+        {
+            // wrap_angle, for a difference of two angles
+            let positive = if *bearing < 0.0 { *bearing + TAU } else { *bearing };
+            *bearing = if positive < TAU { positive } else { 0.0 };
+            let nearest = (*bearing * sectors_per_radian + 0.5).floor();
+            let nearest = if nearest < n_sectors { nearest } else { 0.0 };
+            // sector_angle and angular_difference
+            let difference = (*bearing - nearest * TAU / n_sectors).abs();
+            let off = if difference < TAU - difference { difference } else { TAU - difference };
+            (*sector, *phi) = (nearest, off);
+            *log_strength = receiver.decay.log_strength(*rho, off);
         }
     }
 }
@@ -211,7 +309,7 @@ mod tests {
     fn the_strongest_wins_its_sector_and_the_lower_index_wins_ties() {
         let robots = [(500.0, 500.0, 0.0), (560.0, 500.0, 0.0), (550.0, 500.0, 0.0)];
         assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(2));
-        let robots = [(500.0, 500.0, 0.0), (550.0, 520.0, 0.0), (550.0, 480.0, 0.0)];
+        let robots = [(500.0, 500.0, 0.0), (550.0, 520.0, 0.0), (550.0, 520.0, 0.0)];
         assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(1));
     }
 
@@ -240,7 +338,7 @@ mod tests {
     fn robots_at_one_point_hear_each_other_ahead() {
         let hearing = hearing(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
         assert_eq!(emitters(&hearing, 0), [Some(1), None, None, None]);
-        assert_eq!(hearing.of(0)[0].unwrap().log_strength, 0.0);
+        assert_eq!(hearing.of(0)[0].unwrap().strength(ANTENNA.receiver.unwrap().decay), 1.0);
     }
 
     #[test]
