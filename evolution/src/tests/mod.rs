@@ -146,7 +146,7 @@ fn a_judgement_changes_nothing_of_evolution_and_has_a_link_of_its_own() {
     let judgement = evolution.judgement().unwrap();
     assert_eq!(judgement.trial_set(), numeric::random::TrialSet::Judgement(0));
     let champion = evolution.champion().unwrap();
-    assert_eq!(*judgement.genotypes(), [champion.genotype.clone()]);
+    assert_eq!(judgement.genotypes()[0], champion.genotype);
 
     let (judged, digest) = judgement.clone().decide(&[vec![1.0, 2.0, 6.0]]);
     let Judged { mean, low, high, n_trials, generation } = judged.judged.unwrap();

@@ -86,7 +86,7 @@ fn resuming_from_any_generation_gives_the_same_bits() {
     let mut n_blocks_max = 0;
     let mut go_on = |evolution: &mut Evolution| {
         step(evolution);
-        if evolution.n_generations() % 3 == 0 {
+        if evolution.n_generations().is_multiple_of(3) {
             let mut round = evolution.reevaluation().unwrap();
             while !round.is_over() {
                 let noisy = |trials: &Vec<f64>| vec![trials[0] - 0.1, trials[0] + 0.1];
