@@ -39,7 +39,8 @@ pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
             sim_core::TrialSet::Generation(generation)
         }
         Some(trial_set::TrialSet::HeldOut(HeldOutTrials { generation, block })) => {
-            sim_core::TrialSet::HeldOut { generation, block: block.try_into().unwrap() }
+            let block = block.try_into().expect("there are few blocks");
+            sim_core::TrialSet::HeldOut { generation, block }
         }
         Some(trial_set::TrialSet::Judgement(generation)) => {
             sim_core::TrialSet::Judgement(generation)

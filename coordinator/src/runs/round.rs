@@ -19,10 +19,10 @@ pub enum Round {
     Generation(Arc<Evolution>, evolution::Generation),
     /// Candidates on a block of held-out trials, after a generation from which evolution
     /// has updated and which is not committed yet.
-    Reevaluation(Box<UpdatedEvolution>, Reevaluation),
+    Reevaluation(Box<UpdatedEvolution>, Box<Reevaluation>),
     /// The champion on trials that select nothing, after the last generation, which is
     /// not committed yet.
-    Judgement(Box<ReadyToCommit>, Judgement),
+    Judgement(Box<ReadyToCommit>, Box<Judgement>),
 }
 
 /// What comes after a round.
@@ -114,7 +114,7 @@ impl Round {
                     Some(reevaluation)
                         if updated.completed.is_some() || updated.is_scheduled(config) =>
                     {
-                        let round = Self::Reevaluation(Box::new(updated), reevaluation);
+                        let round = Self::Reevaluation(Box::new(updated), Box::new(reevaluation));
                         Next::Evaluate(Box::new(round))
                     }
                     _ => Next::Commit(Box::new(updated.into_ready(None))),
@@ -136,7 +136,9 @@ impl Round {
                 let judgement = with_champion.judgement().filter(|_| is_last);
                 let ready = Box::new(updated.into_ready(Some(with_champion)));
                 Ok(match judgement {
-                    Some(judgement) => Next::Evaluate(Box::new(Self::Judgement(ready, judgement))),
+                    Some(judgement) => {
+                        Next::Evaluate(Box::new(Self::Judgement(ready, Box::new(judgement))))
+                    }
                     None => Next::Commit(ready),
                 })
             }
