@@ -223,8 +223,8 @@ impl<'a> Trial<'a> {
     pub fn stimulate(&self, group: usize, first_lane: usize, stimuli: &mut Lanes) {
         let state = &self.groups[group];
         let group = &self.world.groups[group];
-        for (index, robot) in group.robots.clone().enumerate() {
-            for (query, inputs) in &group.stimuli {
+        for (query, inputs) in &group.stimuli {
+            for (index, robot) in group.robots.clone().enumerate() {
                 let inhibited = state.perturbations.inhibits(index, *query);
                 let reading = state.senses.reading(*query, &self.swarm, index, robot);
                 for (input, &value) in inputs.clone().zip(reading.values()) {

@@ -48,6 +48,16 @@ pub(crate) struct Heard {
     phi: f64,
 }
 
+/// What a listener observes of the frame that it takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Observed {
+    /// Strength of the frame.
+    pub signal: f64,
+    /// (cos, sin) of the emitter's sector that faces the listener, in the emitter's own
+    /// frame.
+    pub sending_direction: Vec2,
+}
+
 /// The strongest emitter in every sector of every robot. Every emitter puts a
 /// frame on the air in each step, so it is also the sector's frame.
 #[derive(Debug, Clone)]
@@ -60,6 +70,8 @@ pub(crate) struct Hearing {
     directions: Vec<Vec2>,
     /// First sector of each robot, and the end.
     first: Vec<usize>,
+    /// What [`observe`](Self::observe) has found, `[robot][sector]`.
+    observed: Vec<Option<Observed>>,
     /// Scratch: every neighbour of every robot, as it hears them.
     emitters: Emitters,
 }
@@ -90,8 +102,9 @@ impl Hearing {
             first.push(angles.len());
         }
         let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
-        let sectors = vec![None; angles.len()];
-        Self { sectors, angles, directions, first, emitters: Emitters::default() }
+        let (sectors, observed) = (vec![None; angles.len()], vec![None; angles.len()]);
+        let emitters = Emitters::default();
+        Self { sectors, angles, directions, first, observed, emitters }
     }
 
     /// The sectors of one robot.
@@ -104,9 +117,27 @@ impl Hearing {
         self.directions[self.first[robot] + sector]
     }
 
-    /// (cos, sin) of the emitter's sector that faces the listener, in the emitter's
-    /// own frame.
-    pub fn sending_direction(&self, listener: usize, heard: &Heard, headings: &[f64]) -> Vec2 {
+    /// What a robot observes of the emitter in one of its sectors, which must have one. It is
+    /// computed once: robots that stand hear the same all the time.
+    pub fn observe(
+        &mut self,
+        robot: usize,
+        sector: usize,
+        decay: Decay,
+        headings: &[f64],
+    ) -> Option<Observed> {
+        let index = self.first[robot] + sector;
+        if self.observed[index].is_none() {
+            self.observed[index] = self.sectors[index].as_ref().map(|heard| Observed {
+                signal: heard.strength(decay),
+                sending_direction: self.sending_direction(robot, heard, headings),
+            });
+        }
+        self.observed[index]
+    }
+
+    /// As [`Observed`] has it.
+    fn sending_direction(&self, listener: usize, heard: &Heard, headings: &[f64]) -> Vec2 {
         // What cannot listen has as many sectors as its listener.
         let emitter = heard.emitter.robot;
         let listens = self.first[emitter] < self.first[emitter + 1];
@@ -119,6 +150,7 @@ impl Hearing {
     /// Computes everything from who is near whom and from headings.
     pub fn update(&mut self, antennas: &[Antenna], neighbours: &Neighbours, headings: &[f64]) {
         self.sectors.fill(None);
+        self.observed.fill(None);
         let mut robot = 0;
         for group in antennas.chunk_by(|a, b| a.receiver == b.receiver) {
             let robots = robot..robot + group.len();
@@ -237,7 +269,7 @@ impl WithSimd for Complete<'_> {
 
 impl Heard {
     /// Strength of its frames.
-    pub fn strength(&self, decay: Decay) -> f64 {
+    fn strength(&self, decay: Decay) -> f64 {
         decay.strength(self.emitter.rho, self.phi)
     }
 }
@@ -245,6 +277,12 @@ impl Heard {
 /// The sector, of those with the given directions, that is nearest to an angle in
 /// \[0, 2 pi); on ties the one of the lower index.
 fn facing(angle: f64, sectors: &[f64]) -> usize {
+    let n_sectors = sectors.len() as f64;
+    let nearest = (angle * n_sectors / TAU + 0.5) as usize;
+    let nearest = if nearest < sectors.len() { nearest } else { 0 };
+    if angular_difference(angle, sectors[nearest]) < PI / n_sectors - BORDER {
+        return nearest;
+    }
     let mut nearest = (f64::INFINITY, 0);
     for (sector, &direction) in sectors.iter().enumerate() {
         let difference = angular_difference(angle, direction);

@@ -3,7 +3,7 @@
 
 use super::Mode;
 use super::frame::{Ether, FrameOrigin};
-use super::hearing::Hearing;
+use super::hearing::{Hearing, Observed};
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
@@ -68,26 +68,33 @@ impl Radio {
             let u = self.reception[robot].uniform();
             let count = valid.clone().count();
             let chosen = valid.nth(((u * count as f64) as usize).min(count.saturating_sub(1)));
+            let chosen =
+                chosen.map(|(sector, heard, &origin)| (sector, heard.emitter.robot, origin));
+            let chosen = chosen.and_then(|(sector, emitter, origin)| {
+                let (decay, headings) = (receiver.decay, &swarm.headings);
+                let observed = self.hearing.observe(robot, sector, decay, headings)?;
+                Some((sector, emitter, origin, observed))
+            });
             let message = swarm.message_range(robot);
             let message = &mut swarm.received_messages[message];
-            let Some((sector, heard, origin)) = chosen else {
+            let Some((sector, emitter, origin, Observed { signal, sending_direction })) = chosen
+            else {
                 swarm.received[robot] = None;
                 message.fill(0.0);
                 continue;
             };
-            message.copy_from_slice(ether.message(heard.emitter.robot));
-            let observed = self.hearing.sending_direction(robot, heard, &swarm.headings);
+            message.copy_from_slice(ether.message(emitter));
             // The first to hear a frame sees the direction in which its message was sent.
             let origin = match origin.hops {
-                1 => FrameOrigin { sending_direction: observed, ..*origin },
-                _ => *origin,
+                1 => FrameOrigin { sending_direction, ..origin },
+                _ => origin,
             };
             swarm.received[robot] = Some(Received {
                 sector,
-                signal: heard.strength(receiver.decay),
+                signal,
                 receiving_direction: self.hearing.direction(robot, sector),
                 sending_direction: match receiver.sending_direction {
-                    SendingDirection::Emitter => observed,
+                    SendingDirection::Emitter => sending_direction,
                     SendingDirection::Originator => origin.sending_direction,
                 },
                 origin,
