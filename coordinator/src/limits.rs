@@ -6,8 +6,6 @@
 
 use std::time::Duration;
 
-use swarm_proto::{ITEMS_PER_SLOT_MAX, SLOTS_MAX};
-
 /// Connections at the same time of those who have made a call that was let in: every
 /// worker and every call of a client on one of its own.
 pub const CONNECTIONS_MAX: usize = WORKERS_MAX + CLIENT_CALLS_MAX;
@@ -51,9 +49,9 @@ pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 
 /// Time for a new worker's stream to say `Hello`.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
-/// Results in one message: as many as the largest worker can hold items. On the
-/// wire an empty result takes two bytes, in memory fifty.
-pub const RESULTS_PER_MESSAGE_MAX: usize = ITEMS_PER_SLOT_MAX * SLOTS_MAX as usize;
+/// Results in one message; ours sends fewer. On the wire an empty result takes two bytes,
+/// in memory fifty.
+pub const RESULTS_PER_MESSAGE_MAX: usize = 1 << 16;
 /// Bytes of what a worker says about itself or its failures, where the rest is cut,
 /// and of a client's reason for a pause.
 pub const TEXT_LEN_MAX: usize = 512;

@@ -1,11 +1,11 @@
 //! What a generation costs the coordinator, apart from waiting for its fitness:
-//! ask and tell of 100 individuals with 455 genes, the size of experiment A.
+//! ask and tell of 100 individuals with 445 genes, the size of experiment A.
 
 use divan::{Bencher, counter::ItemsCount};
 use evolution::{AlgorithmParams, Evolution, Generation, Setup};
 
 const POPULATION_SIZE: u32 = 100;
-const N_GENES: usize = 455;
+const N_GENES: usize = 445;
 const N_TRIALS: usize = 5;
 
 fn main() {

@@ -126,11 +126,11 @@ impl Evolution {
     }
 }
 
-fn encode(value: &impl Serialize) -> Vec<u8> {
+pub(crate) fn encode(value: &impl Serialize) -> Vec<u8> {
     postcard::to_extend(value, vec![VERSION]).expect("numbers and lists serialise")
 }
 
-fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CheckpointError> {
+pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CheckpointError> {
     match bytes.split_first() {
         Some((&VERSION, rest)) => Ok(postcard::from_bytes(rest)?),
         Some((&found, _)) => Err(CheckpointError::Version { found }),

@@ -50,6 +50,7 @@ mod algorithms;
 mod champion;
 mod checkpoint;
 mod digest;
+mod distribution;
 mod interval;
 mod judgement;
 mod ranking;
@@ -60,13 +61,13 @@ mod statistics;
 use std::{ops::Range, sync::Arc};
 
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
 pub use algorithms::ALGORITHMS;
 pub use champion::{Champion, ChampionSource, HeldOut, Judged};
 pub use checkpoint::{Advance, Checkpoint, CheckpointError};
 pub use digest::Digest;
+pub use distribution::Distribution;
 pub use experiment_file::AlgorithmParams;
 pub use judgement::Judgement;
 pub use reevaluation::Reevaluation;
@@ -75,6 +76,7 @@ pub use statistics::Statistics;
 
 use algorithms::{Algorithm, Sample, Strategy as _};
 use checkpoint::Step;
+use distribution::stream_of;
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
@@ -210,8 +212,7 @@ impl Evolution {
             .iter()
             .enumerate()
             .map(|(idx, population)| {
-                let purpose = Purpose::Evolution;
-                let mut rng = Stream::new(self.seed, self.n_generations, 0, purpose, idx as u64);
+                let mut rng = stream_of(self.seed, self.n_generations, idx as u64);
                 population.sample(self.population_size, &mut rng)
             })
             .collect();

@@ -198,6 +198,11 @@ impl Stream {
         }
     }
 
+    /// Goes to draw `n` of the stream, from 0, wherever it is.
+    pub fn seek(&mut self, n: u64) {
+        self.0.set_word_pos(2 * u128::from(n));
+    }
+
     /// Standard normal.
     pub fn normal(&mut self) -> f64 {
         standard_normal_quantile(self.probability())

@@ -13,7 +13,7 @@ pub mod v1 {
 pub const PROTOCOL_VERSION: u32 = v1::ProtocolVersion::Current as u32;
 
 /// Most items per slot that a worker is given before it has answered any.
-pub const ITEMS_PER_SLOT_MAX: usize = 16;
+pub const ITEMS_PER_SLOT_MAX: usize = 64;
 
 /// Most slots of a worker.
 pub const SLOTS_MAX: u32 = 4096;

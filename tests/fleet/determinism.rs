@@ -47,6 +47,23 @@ fn separate_processes_and_one_process_give_the_same_bits() {
     assert_eq!(of_one_process.last().unwrap()["champion"], finished.last["champion"]);
 }
 
+/// Audits are sent genotypes that other workers have drawn, and the coordinator compares.
+#[test]
+fn genotypes_that_workers_draw_and_that_they_are_sent_give_the_same_bits() {
+    let experiment = Experiment::tiny(3);
+    let of_one = run_embedded(&experiment, 1, &[]);
+    let coordinator = CoordinatorProcess::start_with(&["--audit-fraction", "1"]);
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let finished = coordinator.watch(coordinator.submit(&experiment.path())).finish();
+    for (line, digest) in of_one.iter().zip(finished.digests()) {
+        assert_eq!(line["digest"], *digest);
+    }
+    let said =
+        |message: &str| coordinator.process.lines().iter().any(|it| it["message"] == message);
+    assert!(said("batch evaluated"));
+    assert!(!said("worker is faulty: it is given nothing until it is readmitted"));
+}
+
 #[test]
 fn more_generations_continue_a_completed_run_to_the_same_bits() {
     let experiment = Experiment::small(4);

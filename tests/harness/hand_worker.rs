@@ -1,5 +1,8 @@
 //! A worker whose every word is chosen by the test.
 
+use std::collections::BTreeMap;
+
+use evolution::Distribution;
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
@@ -55,6 +58,8 @@ pub fn trial_set_of(assignments: &Assignments) -> (u64, sim_core::TrialSet) {
 pub struct HandWorker {
     outbox: mpsc::Sender<WorkRequest>,
     inbox: Streaming<WorkResponse>,
+    /// The latest of each experiment.
+    distributions: BTreeMap<u64, Distribution>,
 }
 
 impl HandWorker {
@@ -66,14 +71,31 @@ impl HandWorker {
         let message = Some(work_request::Message::Hello(hello));
         outbox.try_send(WorkRequest { message }).expect("a new channel has room");
         let inbox = client.work(ReceiverStream::new(requests)).await?.into_inner();
-        Ok(Self { outbox, inbox })
+        Ok(Self { outbox, inbox, distributions: BTreeMap::new() })
     }
 
-    /// The next message.
+    /// The next message. Genotypes that it is to draw are in its assignments as if they had
+    /// been sent.
     pub async fn receive(&mut self) -> Result<work_response::Message, Status> {
         let response = self.inbox.message().await?;
         let response = response.ok_or_else(|| Status::unavailable("the stream has ended"))?;
-        Ok(response.message.expect("known kind"))
+        let mut message = response.message.expect("known kind");
+        match &mut message {
+            work_response::Message::Distribution(it) => {
+                let read = Distribution::from_bytes(&it.distribution).expect("of this version");
+                self.distributions.insert(experiment_of(it.job), read);
+            }
+            work_response::Message::Assignments(Assignments { job, assignments, .. }) => {
+                for assignment in assignments {
+                    let Some(individual) = assignment.individual else { continue };
+                    let distribution = &self.distributions[&experiment_of(*job)];
+                    let drawn = distribution.genotype(individual as usize);
+                    assignment.genotype = drawn.expect("there is such an individual");
+                }
+            }
+            _ => {}
+        }
+        Ok(message)
     }
 
     /// The next assignments.
@@ -103,7 +125,7 @@ impl HandWorker {
     /// Closes its side of the stream, behind all it has said, and waits for the
     /// coordinator to close the other.
     pub async fn hang_up(self) {
-        let Self { outbox, mut inbox } = self;
+        let Self { outbox, mut inbox, .. } = self;
         drop(outbox);
         while let Ok(Some(_)) = inbox.message().await {}
     }

@@ -1,7 +1,8 @@
 //! What the coordinator asks for, and what becomes of it.
 
-use std::{fmt, ops::Range, time::Duration};
+use std::{borrow::Cow, fmt, ops::Range, sync::Arc, time::Duration};
 
+use evolution::Distribution;
 use sim_core::{Output, TrialSet};
 
 /// What an assignment belongs to, under the coordinator's number.
@@ -22,8 +23,31 @@ pub(crate) struct Assignment {
     /// What is returned for a trial.
     pub(crate) output: Output,
     pub(crate) trials: Range<u32>,
-    /// Genes, unchecked.
-    pub(crate) genotype: Vec<f64>,
+    pub(crate) genotype: Genotype,
+}
+
+/// Where an assignment's genes come from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Genotype {
+    /// They were sent; unchecked.
+    Sent(Vec<f64>),
+    /// They are drawn from what the coordinator sent, as the genes of this individual.
+    Drawn(Arc<Distribution>, u32),
+}
+
+impl Genotype {
+    /// The genes, or why there are none.
+    pub(crate) fn genes(&self) -> Result<Cow<'_, [f64]>, String> {
+        match self {
+            Self::Sent(genes) => Ok(Cow::Borrowed(genes)),
+            Self::Drawn(distribution, individual) => {
+                let genes = distribution.genotype(*individual as usize);
+                let generation = distribution.generation();
+                let none = || format!("generation {generation} has no individual {individual}");
+                genes.map(Cow::Owned).ok_or_else(none)
+            }
+        }
+    }
 }
 
 /// The result of an assignment.

@@ -3,6 +3,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use evolution::Distribution;
 use experiment_file::limits;
 use sim_core::{Isa, Output, SpecifiedSimulation, TrialSet};
 use swarm_proto::{
@@ -12,11 +13,13 @@ use swarm_proto::{
 
 use crate::{
     WorkerConfig,
-    assignment::{Assignment, ItemResult, JobId},
+    assignment::{Assignment, Genotype, ItemResult, JobId},
     pool::Evaluator,
     stats::Stats,
 };
 
+/// Results in one message, so that no message outgrows what a coordinator accepts.
+pub(crate) const RESULTS_PER_MESSAGE_MAX: usize = 256;
 /// Numbers in one message of several results: 4 MiB.
 const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 
@@ -31,8 +34,13 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, stats: Arc<Stats>) -> Eva
             .as_ref()
             .map_err(String::clone)?;
         let Assignment { genotype, trial_set, trials, output, .. } = assignment;
-        let computed =
-            simulation.compute(genotype, *trial_set, trials.clone(), *output, keep_going)?;
+        let computed = simulation.compute(
+            &genotype.genes()?,
+            *trial_set,
+            trials.clone(),
+            *output,
+            keep_going,
+        )?;
         let n_episodes = computed.as_ref().map_or(0, |_| trials.len()) as u64;
         stats.add_robot_steps(n_episodes * simulation.robot_steps_per_episode());
         Ok(computed)
@@ -90,16 +98,26 @@ fn checked_generation(generation: u64) -> Result<u64, String> {
 }
 
 /// Reads an assignment, or fails it: the coordinator is not trusted to be right.
+/// `distribution`: the latest of the job.
 pub(crate) fn assignment(
     common: &Common,
+    distribution: Option<&Arc<Distribution>>,
     assignment: v1::Assignment,
 ) -> Result<Assignment, v1::ItemResult> {
-    let v1::Assignment { assignment_id: id, first_trial, trial_count, genotype } = assignment;
+    let v1::Assignment { assignment_id: id, first_trial, trial_count, genotype, individual } =
+        assignment;
     let Some(end) = first_trial.checked_add(trial_count) else {
         let message = format!("{trial_count} trials from {first_trial} on are too many");
         return Err(failure(id, message));
     };
     let &Common { job, trial_set, output } = common;
+    let genotype = match (individual, distribution) {
+        (None, _) => Genotype::Sent(genotype),
+        (Some(individual), Some(of)) if trial_set == TrialSet::Generation(of.generation()) => {
+            Genotype::Drawn(Arc::clone(of), individual)
+        }
+        (Some(_), _) => return Err(failure(id, format!("no distribution of {trial_set} came"))),
+    };
     Ok(Assignment { id, job, trial_set, output, trials: first_trial..end, genotype })
 }
 
@@ -124,7 +142,7 @@ pub(crate) fn result(result: ItemResult) -> v1::ItemResult {
 /// Takes as many of the first results as fit into one message, and at least one.
 pub(crate) fn next_message(ready: &mut Vec<v1::ItemResult>) -> v1::WorkRequest {
     let mut n_values = 0;
-    let n_fitting = ready.iter().take_while(|result| {
+    let n_fitting = ready.iter().take(RESULTS_PER_MESSAGE_MAX).take_while(|result| {
         n_values += match &result.outcome {
             Some(v1::item_result::Outcome::Measures(measures)) => measures.values.len(),
             Some(v1::item_result::Outcome::Fitness(fitness)) => fitness.values.len(),

@@ -30,10 +30,12 @@ pub(crate) type Evaluator =
 pub(crate) struct Queued {
     pub(crate) assignment: Assignment,
     pub(crate) evaluator: Evaluator,
-    /// Where the result goes; if nobody listens there any more, nowhere. Once
-    /// all assignments of a channel are done or dropped, the channel ends.
-    pub(crate) reply: mpsc::Sender<ItemResult>,
+    pub(crate) reply: Reply,
 }
+
+/// Where results go; if nobody listens there any more, nowhere. Once all assignments of a
+/// channel are done or dropped, the channel ends.
+pub(crate) type Reply = mpsc::Sender<ItemResult>;
 
 /// A fixed number of threads that share a bounded queue. Dropping the pool drops
 /// the queue; the threads end once they have finished what they are computing.
@@ -55,6 +57,8 @@ struct Queue {
     waiting: VecDeque<Queued>,
     /// What the slots are computing.
     running: Vec<Arc<Running>>,
+    /// Slots that wait to be woken.
+    n_idle: usize,
     closed: bool,
 }
 
@@ -92,16 +96,23 @@ impl Pool {
         self.capacity
     }
 
-    /// Queues an assignment, or gives it back if the queue is full.
-    pub(crate) fn submit(&self, queued: Queued) -> Result<(), Queued> {
+    /// Assignments that wait for a slot.
+    pub(crate) fn n_queued(&self) -> usize {
+        self.shared.lock().waiting.len()
+    }
+
+    /// Queues assignments, all at once, so that idle slots are woken once; gives those back
+    /// that there is no room for.
+    pub(crate) fn submit(&self, queued: Vec<Queued>) -> Vec<Queued> {
         let mut queue = self.shared.lock();
-        if queue.waiting.len() >= self.capacity {
-            return Err(queued);
+        let n_waiting = queue.waiting.len();
+        let mut queued = queued.into_iter();
+        queue.waiting.extend(queued.by_ref().take(self.capacity.saturating_sub(n_waiting)));
+        for _ in (n_waiting..queue.waiting.len()).take(queue.n_idle) {
+            self.shared.changed.notify_one();
         }
-        queue.waiting.push_back(queued);
         self.shared.report(&queue);
-        self.shared.changed.notify_one();
-        Ok(())
+        queued.collect()
     }
 
     /// Drops all assignments that wait, and returns their number. What is being computed
@@ -163,11 +174,13 @@ impl Shared {
     }
 
     /// Waits for an assignment; none once the pool is closed.
-    fn next(&self) -> Option<(Arc<Running>, Evaluator, mpsc::Sender<ItemResult>)> {
-        let mut queue = self
-            .changed
-            .wait_while(self.lock(), |queue| queue.waiting.is_empty() && !queue.closed)
-            .expect("nothing panics while it holds the queue");
+    fn next(&self) -> Option<(Arc<Running>, Evaluator, Reply)> {
+        let mut queue = self.lock();
+        while queue.waiting.is_empty() && !queue.closed {
+            queue.n_idle += 1;
+            queue = self.changed.wait(queue).expect("nothing panics while it holds the queue");
+            queue.n_idle -= 1;
+        }
         let Queued { assignment, evaluator, reply } = queue.waiting.pop_front()?;
         let running = Arc::new(Running { assignment, cancelled: AtomicBool::new(false) });
         queue.running.push(Arc::clone(&running));
@@ -203,13 +216,12 @@ fn compute(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc as std_mpsc;
+    use std::{sync::mpsc as std_mpsc, time::Duration};
 
     use sim_core::{Output, TrialSet};
 
     use super::*;
-    use crate::assignment::JobId;
-    use std::time::Duration;
+    use crate::assignment::{Genotype, JobId};
 
     fn assignment(id: u64) -> Assignment {
         Assignment {
@@ -218,11 +230,11 @@ mod tests {
             trial_set: TrialSet::Generation(0),
             output: Output::Fitness,
             trials: 0..1,
-            genotype: vec![id as f64],
+            genotype: Genotype::Sent(vec![id as f64]),
         }
     }
 
-    fn queued(id: u64, evaluator: &Evaluator, reply: &mpsc::Sender<ItemResult>) -> Queued {
+    fn queued(id: u64, evaluator: &Evaluator, reply: &Reply) -> Queued {
         Queued {
             assignment: assignment(id),
             evaluator: Arc::clone(evaluator),
@@ -231,7 +243,7 @@ mod tests {
     }
 
     fn submit(pool: &Pool, queued: Queued) {
-        assert!(pool.submit(queued).is_ok(), "the queue has room");
+        assert!(pool.submit(vec![queued]).is_empty(), "the queue has room");
     }
 
     /// All results of a channel that ends, by item.
@@ -253,7 +265,8 @@ mod tests {
         let evaluator: Evaluator = Arc::new(move |assignment, keep_going| {
             started.send(assignment.id).map_err(|error| error.to_string())?;
             permits.lock().unwrap().recv().map_err(|error| error.to_string())?;
-            Ok(keep_going().then(|| assignment.genotype.clone()))
+            let genes = assignment.genotype.genes()?;
+            Ok(keep_going().then(|| genes.into_owned()))
         });
         (evaluator, starts, permit)
     }
@@ -262,7 +275,8 @@ mod tests {
     fn every_item_gets_its_own_outcome() {
         let pool = Pool::start(4, Arc::default()).unwrap();
         let (reply, results) = mpsc::channel(8);
-        let evaluator: Evaluator = Arc::new(|assignment, _| Ok(Some(assignment.genotype.clone())));
+        let evaluator: Evaluator =
+            Arc::new(|assignment, _| Ok(Some(assignment.genotype.genes()?.into_owned())));
         for id in 0..8 {
             submit(&pool, queued(id, &evaluator, &reply));
         }
@@ -280,14 +294,12 @@ mod tests {
             1 => panic!("robot {}", assignment.id),
             _ => Ok(Some(vec![])),
         });
-        submit(&pool, queued(0, &evaluator, &reply));
-        submit(&pool, queued(1, &evaluator, &reply));
-        let mut received = results;
-        assert!(received.blocking_recv().is_some());
-        submit(&pool, queued(2, &evaluator, &reply));
+        let all = (0..3).map(|id| queued(id, &evaluator, &reply)).collect();
+        assert!(pool.submit(all).is_empty());
         drop(reply);
-        let rest = collect(received);
-        assert_eq!(rest, [(1, Err("panicked: robot 1".into())), (2, Ok(vec![]))]);
+        let failed = |what: &str| Err(format!("panicked: {what}"));
+        let expected = [(0, failed("no such robot")), (1, failed("robot 1")), (2, Ok(vec![]))];
+        assert_eq!(collect(results), expected);
     }
 
     #[test]
@@ -365,10 +377,9 @@ mod tests {
         for id in 1..=pool.capacity() as u64 {
             submit(&pool, queued(id, &evaluator, &reply));
         }
-        assert_eq!(
-            pool.submit(queued(99, &evaluator, &reply)).map_err(|queued| queued.assignment),
-            Err(assignment(99))
-        );
+        let back = pool.submit(vec![queued(99, &evaluator, &reply)]);
+        let back = back.into_iter().map(|queued| queued.assignment).collect::<Vec<_>>();
+        assert_eq!(back, [assignment(99)]);
     }
 
     #[test]
@@ -388,13 +399,14 @@ mod tests {
     #[test]
     fn results_that_nobody_waits_for_do_not_block_a_slot() {
         let pool = Pool::start(1, Arc::default()).unwrap();
-        let evaluator: Evaluator = Arc::new(|assignment, _| Ok(Some(assignment.genotype.clone())));
+        let evaluator: Evaluator =
+            Arc::new(|assignment, _| Ok(Some(assignment.genotype.genes()?.into_owned())));
         let (gone, receiver) = mpsc::channel(1);
         drop(receiver);
         submit(&pool, queued(0, &evaluator, &gone));
         submit(&pool, queued(1, &evaluator, &gone));
         let (reply, results) = mpsc::channel(1);
-        while pool.submit(queued(2, &evaluator, &reply)).is_err() {
+        while !pool.submit(vec![queued(2, &evaluator, &reply)]).is_empty() {
             thread::yield_now();
         }
         drop(reply);

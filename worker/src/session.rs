@@ -7,6 +7,7 @@ use std::{
     time::Duration,
 };
 
+use evolution::Distribution;
 use swarm_proto::v1::{
     self, WorkRequest, WorkResponse, work_response::Message,
     worker_service_client::WorkerServiceClient,
@@ -16,7 +17,7 @@ use swarm_transport::{
 };
 use tokio::{
     sync::mpsc,
-    time::{Instant, MissedTickBehavior, interval_at, timeout},
+    time::{Instant, MissedTickBehavior, interval_at, sleep_until, timeout},
 };
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -28,14 +29,14 @@ use tracing::{debug, info};
 use crate::{
     WorkerConfig,
     assignment::{ItemResult, JobId},
-    convert,
-    pool::{Evaluator, Pool, Queued},
+    convert::{self, RESULTS_PER_MESSAGE_MAX},
+    pool::{Evaluator, Pool, Queued, Reply},
 };
 
 /// Messages that wait for the network.
 const OUTBOUND_MESSAGES_MAX: usize = 16;
-/// Results in one message, so that no message outgrows what a coordinator accepts.
-const RESULTS_PER_MESSAGE_MAX: usize = 256;
+/// How long results of items that take less than this wait for others at the most.
+const HELD_MAX: Duration = Duration::from_millis(1);
 /// How long the coordinator may take to answer `Hello`.
 const WELCOME_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long it may take to confirm the end of a drained stream.
@@ -129,9 +130,10 @@ impl Session {
         let mut state = SessionState {
             pool,
             evaluator,
-            evaluators: BTreeMap::new(),
+            jobs: BTreeMap::new(),
             reply: Some(reply),
             ready: Vec::new(),
+            held_until: None,
         };
         let period = Duration::from_millis(u64::from(welcome.heartbeat_interval_ms.max(1)));
         let mut heartbeat = interval_at(Instant::now() + period, period);
@@ -173,12 +175,15 @@ impl Session {
                     if has_room && !all_computed =>
                 {
                     all_computed = n == 0;
-                    state.ready.extend(computed.drain(..).map(convert::result));
+                    state.on_computed(computed.drain(..));
                 }
-                permit = outbound.reserve(), if !state.ready.is_empty() => match permit {
-                    Ok(permit) => permit.send(convert::next_message(&mut state.ready)),
-                    Err(_) => return Ended::Lost { reason: STOPPED_READING.into(), worked },
-                },
+                permit = room(&outbound, state.held_until), if !state.ready.is_empty() => {
+                    match permit {
+                        Ok(permit) => permit.send(convert::next_message(&mut state.ready)),
+                        Err(_) => return Ended::Lost { reason: STOPPED_READING.into(), worked },
+                    }
+                    state.held_until = None;
+                }
             }
         }
 
@@ -193,18 +198,38 @@ impl Session {
     }
 }
 
+/// Waits for the end of a delay, and for room for a message.
+async fn room(
+    outbound: &mpsc::Sender<WorkRequest>,
+    held_until: Option<Instant>,
+) -> Result<mpsc::Permit<'_, WorkRequest>, mpsc::error::SendError<()>> {
+    if let Some(until) = held_until {
+        sleep_until(until).await;
+    }
+    outbound.reserve().await
+}
+
 const STOPPED_READING: &str = "the coordinator stopped reading";
+
+/// What assignments of a job need beside themselves.
+struct Job {
+    evaluator: Evaluator,
+    /// What genotypes of its latest generation are drawn from.
+    distribution: Option<Arc<Distribution>>,
+}
 
 /// The state of a session: specifications, and results to be sent.
 struct SessionState<'a> {
     pool: &'a Pool,
     evaluator: &'a (dyn Fn(String) -> Evaluator + Sync),
     /// The jobs whose specification has come, and not their end.
-    evaluators: BTreeMap<JobId, Evaluator>,
+    jobs: BTreeMap<JobId, Job>,
     /// Where slots put results; none once no more assignments are taken.
-    reply: Option<mpsc::Sender<ItemResult>>,
+    reply: Option<Reply>,
     /// Results that wait for the network.
     ready: Vec<v1::ItemResult>,
+    /// Until when they wait for others.
+    held_until: Option<Instant>,
 }
 
 impl SessionState<'_> {
@@ -218,17 +243,38 @@ impl SessionState<'_> {
         info!(dropped, "draining");
     }
 
+    /// Results of short items wait until there are as many of them as items in the queue, so
+    /// that few messages are sent and slots do not run out of items.
+    fn on_computed(&mut self, computed: impl Iterator<Item = ItemResult>) {
+        let mut are_short = true;
+        let computed = computed.inspect(|result| are_short &= result.duration < HELD_MAX);
+        self.ready.extend(computed.map(convert::result));
+        self.held_until = if are_short && self.ready.len() < self.pool.n_queued() {
+            self.held_until.or_else(|| Some(Instant::now() + HELD_MAX))
+        } else {
+            None
+        };
+    }
+
     fn on_message(&mut self, message: Message) {
         match message {
             Message::Spec(v1::JobSpec { job, config_json }) => {
                 if let Some(job) = convert::job(job) {
-                    self.evaluators.insert(job, (self.evaluator)(config_json));
+                    let evaluator = (self.evaluator)(config_json);
+                    self.jobs.insert(job, Job { evaluator, distribution: None });
                 }
+            }
+            Message::Distribution(v1::Distribution { job, distribution }) => {
+                let Some(job) = convert::job(job).and_then(|id| self.jobs.get_mut(&id)) else {
+                    return;
+                };
+                // Without one, the assignments that need it fail.
+                job.distribution = Distribution::from_bytes(&distribution).ok().map(Arc::new);
             }
             Message::Assignments(assignments) => self.on_assignments(assignments),
             Message::EndJob(v1::EndJob { job }) => {
                 let Some(job) = convert::job(job) else { return };
-                self.evaluators.remove(&job);
+                self.jobs.remove(&job);
                 let dropped = self.pool.cancel(|assignment| assignment.job == job);
                 debug!(%job, dropped, "job ended");
             }
@@ -246,24 +292,28 @@ impl SessionState<'_> {
     fn on_assignments(&mut self, assignments: v1::Assignments) {
         let Some(reply) = &self.reply else { return };
         let common = convert::common(&assignments).and_then(|common| {
-            let evaluator = self.evaluators.get(&common.job);
-            let evaluator =
-                evaluator.ok_or_else(|| format!("no specification of {} came", common.job));
-            Ok((common, Arc::clone(evaluator?)))
+            let job = self.jobs.get(&common.job);
+            let job = job.ok_or_else(|| format!("no specification of {} came", common.job))?;
+            Ok((common, job))
         });
+        let mut queued = Vec::with_capacity(assignments.assignments.len());
         for assignment in assignments.assignments {
-            let id = assignment.assignment_id;
-            let queued = common.as_ref().map_err(|message| convert::failure(id, message.clone()));
-            let queued = queued.and_then(|(common, evaluator)| {
-                let assignment = convert::assignment(common, assignment)?;
+            let read = common
+                .as_ref()
+                .map_err(|message| convert::failure(assignment.assignment_id, message.clone()));
+            let read = read.and_then(|(common, Job { evaluator, distribution })| {
+                let assignment = convert::assignment(common, distribution.as_ref(), assignment)?;
                 let (evaluator, reply) = (Arc::clone(evaluator), reply.clone());
-                self.pool.submit(Queued { assignment, evaluator, reply }).map_err(|_| {
-                    let message =
-                        format!("more than {} assignments are queued", self.pool.capacity());
-                    convert::failure(id, message)
-                })
+                Ok(Queued { assignment, evaluator, reply })
             });
-            self.ready.extend(queued.err());
+            match read {
+                Ok(one) => queued.push(one),
+                Err(failure) => self.ready.push(failure),
+            }
+        }
+        for Queued { assignment, .. } in self.pool.submit(queued) {
+            let message = format!("more than {} assignments are queued", self.pool.capacity());
+            self.ready.push(convert::failure(assignment.id, message));
         }
     }
 }

@@ -8,6 +8,7 @@ use std::{
 };
 
 use anyhow::bail;
+use evolution::Distribution;
 use swarm_proto::{
     PROTOCOL_VERSION,
     v1::{
@@ -123,9 +124,18 @@ async fn work(url: &str, name: String, n_slots: u32, diary: &Diary) -> anyhow::R
         .await?
         .max_decoding_message_size(MESSAGE_LEN_MAX);
     let mut inbound = client.work(ReceiverStream::new(requests)).await?.into_inner();
+    let mut distribution = None;
     while let Some(WorkResponse { message }) = inbound.message().await? {
         let received = now();
-        let Some(work_response::Message::Assignments(batch)) = message else { continue };
+        let batch = match message {
+            Some(work_response::Message::Distribution(message)) => {
+                distribution = Some(Distribution::from_bytes(&message.distribution)?);
+                continue;
+            }
+            Some(work_response::Message::Assignments(batch)) => batch,
+            _ => continue,
+        };
+        let answer = |assignment| answer(assignment, distribution.as_ref());
         let results = batch.assignments.iter().map(answer).collect();
         let results = work_request::Message::Results(ItemResults { results });
         outbox.send(WorkRequest { message: Some(results) }).await?;
@@ -140,8 +150,10 @@ async fn work(url: &str, name: String, n_slots: u32, diary: &Diary) -> anyhow::R
 }
 
 /// Any fitness will do, as long as it depends on the genotype alone.
-fn answer(assignment: &v1::Assignment) -> ItemResult {
-    let values = vec![assignment.genotype[0]; assignment.trial_count as usize];
+fn answer(assignment: &v1::Assignment, distribution: Option<&Distribution>) -> ItemResult {
+    let drawn = assignment.individual.and_then(|i| distribution?.genotype(i as usize));
+    let genotype = drawn.as_ref().unwrap_or(&assignment.genotype);
+    let values = vec![genotype[0]; assignment.trial_count as usize];
     let outcome = Some(Outcome::Fitness(TrialFitness { values }));
     ItemResult { assignment_id: assignment.assignment_id, outcome, compute_us: 0 }
 }

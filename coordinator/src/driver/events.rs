@@ -102,6 +102,8 @@ pub enum ToWorker {
     Welcome(WorkerId),
     /// A job's specification.
     Spec(JobId, Arc<str>),
+    /// What a worker draws genotypes of a job's batch from.
+    Distribution(JobId, Arc<[u8]>),
     /// Items of a job's batch.
     Assignments {
         /// The job whose batch it is.

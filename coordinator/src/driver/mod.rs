@@ -335,6 +335,9 @@ impl Driver {
         use engine::Command;
         match command {
             Command::SendSpec { worker, job, spec } => self.send(worker, ToWorker::Spec(job, spec)),
+            Command::SendDistribution { worker, job, distribution } => {
+                self.send(worker, ToWorker::Distribution(job, distribution));
+            }
             Command::SendAssignments { worker, job, trial_set, output, assignments } => {
                 debug!(
                     %worker, %job, generation = trial_set.generation(), trials = trial_set.kind(),

@@ -145,6 +145,11 @@ impl BatchInProgress {
         self.batch.trial_set
     }
 
+    /// What workers can draw its genotypes from.
+    pub fn distribution(&self) -> Option<&Arc<[u8]>> {
+        self.batch.distribution.as_ref()
+    }
+
     /// What workers return for a trial.
     pub fn output(&self) -> Output {
         self.batch.output

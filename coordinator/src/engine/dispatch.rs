@@ -30,6 +30,8 @@ use super::{
 const MOVING_COST: Duration = Duration::from_millis(20);
 /// Workers that are looked at when the first is not suitable.
 const N_LOOKED_AT: usize = 8;
+/// Bytes of a distribution that fit into a message with room to spare.
+const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
 /// Time after which an item is late whose like nobody has computed yet.
 const UNKNOWN_LATE: Duration = Duration::from_secs(5);
 
@@ -247,7 +249,9 @@ impl Engine {
         }
         let (trial_set, output) = (batch.trial_set(), batch.output());
         let genotype = batch.genotype(item.individual);
-        let assignment = Assignment { id, trials: item.trials.clone(), genotype };
+        // Audits are sent genotypes, so that they compare the two ways, too.
+        let is_drawn = !is_audit && batch.distribution().is_some();
+        let assignment = Assignment { id, trials: item.trials.clone(), genotype, is_drawn };
         let outgoing = self.outgoing.assignments.entry((worker_id, job));
         outgoing.or_insert_with(|| (trial_set, output, Vec::new())).2.push(assignment);
         let assigned = AssignedItem {
@@ -295,6 +299,37 @@ impl Engine {
         assignment
     }
 
+    /// Has a worker draw the genotypes of its assignments where that is possible, if it has
+    /// the distribution, or if that is shorter than the genotypes that it is expected to be
+    /// given of the batch; else has them sent.
+    fn choose_way(&mut self, id: WorkerId, job: JobId, assignments: &mut [Assignment]) {
+        let drawn: Vec<&mut Assignment> = assignments.iter_mut().filter(|it| it.is_drawn).collect();
+        let [first, ..] = &drawn[..] else { return };
+        let batch = self.jobs[&job].batch.as_ref();
+        let Some((batch, distribution)) =
+            batch.and_then(|batch| Some((batch, batch.distribution()?)))
+        else {
+            return;
+        };
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let trial_set = Some(batch.trial_set());
+        if worker.known_jobs.get(&job) == Some(&trial_set) {
+            return;
+        }
+        let share = worker.n_slots() as f64 / self.load_index.n_usable_slots.max(1) as f64;
+        let n_expected = drawn.len() as f64 + batch.n_queued() as f64 * share.min(1.0);
+        let is_shorter = distribution.len() as f64
+            <= (n_expected * size_of_val(&first.genotype[..]) as f64)
+                .min(DISTRIBUTION_LEN_MAX as f64);
+        if is_shorter {
+            worker.known_jobs.insert(job, trial_set);
+            let distribution = Arc::clone(distribution);
+            self.commands.push_back(Command::SendDistribution { worker: id, job, distribution });
+        } else {
+            drawn.into_iter().for_each(|assignment| assignment.is_drawn = false);
+        }
+    }
+
     /// Turns what has been put together into commands.
     fn send(&mut self) {
         let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
@@ -303,13 +338,14 @@ impl Engine {
                 self.commands.push_back(Command::SendDrop { worker, assignments });
             }
         }
-        for ((worker, job), (trial_set, output, assignments)) in assignments {
-            let is_new =
-                self.workers.get_mut(&worker).is_some_and(|worker| worker.known_jobs.insert(job));
-            if is_new {
+        for ((worker, job), (trial_set, output, mut assignments)) in assignments {
+            let known = self.workers.get_mut(&worker).map(|worker| &mut worker.known_jobs);
+            if let Some(known) = known.filter(|known| !known.contains_key(&job)) {
+                known.insert(job, None);
                 let spec = Arc::clone(&self.jobs[&job].spec);
                 self.commands.push_back(Command::SendSpec { worker, job, spec });
             }
+            self.choose_way(worker, job, &mut assignments);
             let send = Command::SendAssignments { worker, job, trial_set, output, assignments };
             self.commands.push_back(send);
         }

@@ -20,6 +20,8 @@ pub struct Batch {
     pub trial_set: TrialSet,
     /// The genotypes, by individual.
     pub genotypes: Population,
+    /// What workers can draw the genotypes from by themselves, if they can.
+    pub distribution: Option<Arc<[u8]>>,
     /// Trials per genotype: trials 0 to `n_trials` - 1 of the set.
     pub n_trials: u32,
     /// What workers return for a trial.
@@ -31,7 +33,14 @@ pub struct Batch {
 impl Batch {
     /// The fitness of genotypes, one number per trial.
     pub fn fitness(trial_set: TrialSet, genotypes: Population, n_trials: u32) -> Self {
-        Self { trial_set, genotypes, n_trials, output: Output::Fitness, values_per_trial: 1 }
+        Self {
+            trial_set,
+            genotypes,
+            distribution: None,
+            n_trials,
+            output: Output::Fitness,
+            values_per_trial: 1,
+        }
     }
 
     /// The measures of one genotype on trials of evaluations, `values_per_trial`
@@ -40,6 +49,7 @@ impl Batch {
         Self {
             trial_set: TrialSet::Evaluation,
             genotypes: vec![genotype].into(),
+            distribution: None,
             n_trials,
             output: Output::Measures,
             values_per_trial,
@@ -58,6 +68,15 @@ pub enum Command {
         job: JobId,
         /// As given to [`Engine::on_job_started`](super::Engine::on_job_started).
         spec: Arc<str>,
+    },
+    /// Send a worker what it draws genotypes of a job's batch from.
+    SendDistribution {
+        /// The worker.
+        worker: WorkerId,
+        /// The job whose batch it is.
+        job: JobId,
+        /// As given to [`Engine::on_batch_requested`](super::Engine::on_batch_requested).
+        distribution: Arc<[u8]>,
     },
     /// Send a worker items of one batch.
     SendAssignments {
@@ -149,6 +168,8 @@ pub struct Assignment {
     pub trials: Range<u32>,
     /// The genotype.
     pub genotype: SharedGenotype,
+    /// Whether the worker draws it, from the latest distribution of the job that it was sent.
+    pub is_drawn: bool,
 }
 
 /// One genotype of a population, without a copy of its genes.

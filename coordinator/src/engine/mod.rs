@@ -428,7 +428,7 @@ impl Engine {
         let mut audits = Vec::new();
         for (&worker_id, worker) in &mut self.workers {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
-            if worker.known_jobs.remove(&id) {
+            if worker.known_jobs.remove(&id).is_some() {
                 self.load_index.remove(worker_id, worker);
                 let ours = worker.in_flight.extract_if(.., |_, a| a.job == id);
                 audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
@@ -465,7 +465,7 @@ impl Engine {
         for (&id, worker) in &self.workers {
             load_index.add(id, worker);
             for (&assignment_id, assignment) in &worker.in_flight {
-                assert!(worker.known_jobs.contains(&assignment.job));
+                assert!(worker.known_jobs.contains_key(&assignment.job));
                 let entry = (id, assignment.item.clone(), assignment.is_audit);
                 in_flight.entry(assignment.job).or_default().insert(assignment_id, entry);
             }

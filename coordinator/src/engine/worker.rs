@@ -1,7 +1,7 @@
 //! A connected worker, as the engine sees it.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     time::{Duration, Instant},
 };
 
@@ -40,8 +40,9 @@ pub struct Worker {
     pub is_stalled: bool,
     /// When it last returned something.
     pub last_result: Option<Instant>,
-    /// Jobs whose specification it has.
-    pub known_jobs: BTreeSet<JobId>,
+    /// Jobs whose specification it has, each with the trial set of the batch whose
+    /// distribution it has.
+    pub known_jobs: BTreeMap<JobId, Option<TrialSet>>,
     /// What it has been given and has not answered; oldest first, as ids grow.
     pub in_flight: BTreeMap<AssignmentId, AssignedItem>,
     /// What it was computing when it was found to be stalled. Others have been given it, but
@@ -93,7 +94,7 @@ impl Worker {
             is_on_probation: false,
             is_stalled: false,
             last_result: None,
-            known_jobs: BTreeSet::new(),
+            known_jobs: BTreeMap::new(),
             in_flight: BTreeMap::new(),
             written_off: BTreeMap::new(),
             recalled: VecDeque::new(),

@@ -39,6 +39,10 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
         ToWorker::Spec(id, config_json) => {
             Message::Spec(v1::JobSpec { job: job(id), config_json: config_json.to_string() })
         }
+        ToWorker::Distribution(id, distribution) => Message::Distribution(v1::Distribution {
+            job: job(id),
+            distribution: distribution.to_vec(),
+        }),
         ToWorker::Assignments { job: id, trial_set: set, output: wanted, assignments } => {
             Message::Assignments(v1::Assignments {
                 job: job(id),
@@ -92,7 +96,8 @@ fn assignment(assignment: &Assignment) -> v1::Assignment {
         assignment_id: assignment.id.0,
         first_trial: assignment.trials.start,
         trial_count: assignment.trials.end - assignment.trials.start,
-        genotype: assignment.genotype.to_vec(),
+        genotype: if assignment.is_drawn { Vec::new() } else { assignment.genotype.to_vec() },
+        individual: assignment.is_drawn.then_some(assignment.genotype.individual),
     }
 }
 

@@ -332,6 +332,7 @@ impl Runs {
         let Some(run) = self.runs.get_mut(&id) else { return };
         let n_trials = round.n_trials(&run.config);
         let batch = Batch::fitness(round.trial_set(), round.genotypes(), n_trials);
+        let batch = Batch { distribution: round.distribution(), ..batch };
         self.commands.push_back(Command::Evaluate { job: id.into(), batch });
         run.stage = Stage::Evaluating(round);
     }

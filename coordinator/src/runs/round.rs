@@ -89,6 +89,14 @@ impl Round {
         }
     }
 
+    /// What the genotypes are drawn from, if workers can draw them.
+    pub fn distribution(&self) -> Option<Arc<[u8]>> {
+        match self {
+            Self::Generation(evolution, _) => evolution.distribution().map(Into::into),
+            Self::Reevaluation(..) | Self::Judgement(..) => None,
+        }
+    }
+
     /// Trials of each genotype.
     pub fn n_trials(&self, config: &ExperimentConfig) -> u32 {
         match self {

@@ -9,6 +9,7 @@ use std::{
 };
 
 use coordinator::Coordinator;
+use evolution::Distribution;
 use experiment_file::ExperimentConfig;
 use proptest::{collection::vec, prelude::*, test_runner::TestRunner};
 use prost::{
@@ -102,7 +103,7 @@ impl Stage {
         worker.say(work_request::Message::Hello(hello)).await;
         let working = async {
             let mut inbox = worker.inbox().await.unwrap();
-            let mut simulation = None;
+            let (mut simulation, mut distribution) = (None, None);
             while self.experiment(experiment_id).await.state() == ExperimentState::Running {
                 let received =
                     tokio::time::timeout(Duration::from_millis(20), inbox.message()).await;
@@ -111,6 +112,10 @@ impl Stage {
                     Some(work_response::Message::Spec(spec)) => {
                         let config = ExperimentConfig::from_canonical_json(&spec.config_json);
                         simulation = Some(Simulation::compile(&config.unwrap()).unwrap());
+                        continue;
+                    }
+                    Some(work_response::Message::Distribution(message)) => {
+                        distribution = Distribution::from_bytes(&message.distribution).ok();
                         continue;
                     }
                     Some(work_response::Message::Assignments(batch)) => batch,
@@ -126,7 +131,11 @@ impl Stage {
                     trial_set::TrialSet::Evaluation(_) => TrialSet::Evaluation,
                 };
                 let simulation = simulation.as_ref().expect("the specification comes first");
-                for assignment in batch.assignments {
+                for mut assignment in batch.assignments {
+                    if let Some(individual) = assignment.individual {
+                        let distribution = distribution.as_ref().expect("it comes first");
+                        assignment.genotype = distribution.genotype(individual as usize).unwrap();
+                    }
                     let first = assignment.first_trial;
                     let trials = first..first + assignment.trial_count;
                     let values =

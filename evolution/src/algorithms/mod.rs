@@ -109,6 +109,23 @@ pub trait Strategy {
     /// the stream.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
 
+    /// Whether [`individual`](Self::individual) draws.
+    fn draws_one_by_one(&self) -> bool {
+        false
+    }
+
+    /// The individual of this index, below `population_size`, of the sample that
+    /// [`sample`](Self::sample) draws from the same stream; none where one is not drawn
+    /// without the others.
+    fn individual(
+        &self,
+        _index: usize,
+        _population_size: usize,
+        _rng: &mut Stream,
+    ) -> Option<Genotype> {
+        None
+    }
+
     /// Learns from a generation that [`sample`](Self::sample) drew from this
     /// state.
     ///
@@ -141,6 +158,19 @@ impl Strategy for Algorithm {
         self.strategy().sample(population_size, rng)
     }
 
+    fn draws_one_by_one(&self) -> bool {
+        self.strategy().draws_one_by_one()
+    }
+
+    fn individual(
+        &self,
+        index: usize,
+        population_size: usize,
+        rng: &mut Stream,
+    ) -> Option<Genotype> {
+        self.strategy().individual(index, population_size, rng)
+    }
+
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
         self.strategy_mut().learn(sample, ranking, fitness);
     }
@@ -154,6 +184,14 @@ fn draw_normals(n: usize, d: usize, rng: &mut Stream) -> Vec<Vec<f64>> {
         vector
     };
     iter::repeat_with(vector).take(n).collect()
+}
+
+/// The vector of this index that [`draw_normals`] draws from a stream at its beginning.
+fn draw_normal(index: usize, d: usize, rng: &mut Stream) -> Vec<f64> {
+    rng.seek(index as u64 * d as u64);
+    let mut vector = vec![0.0; d];
+    rng.fill_normal(&mut vector);
+    vector
 }
 
 /// `x` in \[0, 1\], by reflection at both ends.

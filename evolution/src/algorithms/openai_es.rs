@@ -9,7 +9,8 @@ use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
-use super::{Described, Sample, Strategy, draw_normals, parameters::MU_INIT};
+use super::{Described, Sample, Strategy, draw_normal, draw_normals, parameters::MU_INIT};
+use crate::Genotype;
 
 /// A Gaussian whose mean mu, kept in \[0, 1\], learns, and whose standard
 /// deviation sigma is the same for all genes and constant.
@@ -73,6 +74,12 @@ impl Described for OpenAiEs {
     }
 }
 
+impl OpenAiEs {
+    fn genotype(&self, e: &[f64]) -> Genotype {
+        self.mu.iter().zip(e).map(|(mu, e)| (mu + self.sigma * e).clamp(0.0, 1.0)).collect()
+    }
+}
+
 impl Strategy for OpenAiEs {
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mu)
@@ -89,11 +96,22 @@ impl Strategy for OpenAiEs {
             normals.extend([e, mirrored]);
         }
         normals.resize(population_size, vec![0.0; d]);
-        let genotypes = normals
-            .iter()
-            .map(|e| (0..d).map(|j| (self.mu[j] + self.sigma * e[j]).clamp(0.0, 1.0)).collect())
-            .collect();
+        let genotypes = normals.iter().map(|e| self.genotype(e)).collect();
         Sample::new(genotypes, normals)
+    }
+
+    fn draws_one_by_one(&self) -> bool {
+        true
+    }
+
+    fn individual(&self, index: usize, n: usize, rng: &mut Stream) -> Option<Genotype> {
+        let d = self.mu.len();
+        let is_mean = !n.is_multiple_of(2) && index + 1 == n;
+        let mut e = if is_mean { vec![0.0; d] } else { draw_normal(index / 2, d, rng) };
+        if !index.is_multiple_of(2) {
+            e.iter_mut().for_each(|e| *e = -*e);
+        }
+        Some(self.genotype(&e))
     }
 
     /// With the centred ranks c = 1/2 (best) to -1/2 (worst), evenly spaced:

@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::{
     Described, Sample, Strategy,
     cumulation::{Cumulation, Rates, damping},
-    draw_normals, mirror,
+    draw_normal, draw_normals, mirror,
     parameters::{MU_INIT, SIGMA_INIT},
 };
+use crate::Genotype;
 
 /// A Gaussian with mean m and covariance sigma^2 diag(C), of points in all of
 /// R^d that are mirrored into genotypes, as in CMA-ES.
@@ -47,6 +48,18 @@ impl Described for SepCmaEs {
     }
 }
 
+impl SepCmaEs {
+    /// sigma * C^(1/2).
+    fn deviations(&self) -> Vec<f64> {
+        self.variances.iter().map(|c| self.cumulation.sigma * c.sqrt()).collect()
+    }
+
+    fn genotype(&self, deviations: &[f64], z: &[f64]) -> Genotype {
+        let genes = self.mean.iter().zip(deviations).zip(z);
+        genes.map(|((mean, deviation), z)| mirror(mean + deviation * z)).collect()
+    }
+}
+
 impl Strategy for SepCmaEs {
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mean)
@@ -54,15 +67,18 @@ impl Strategy for SepCmaEs {
 
     /// x_i = m + sigma * C^(1/2) z_i, z_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let deviation = |c: &f64| self.cumulation.sigma * c.sqrt();
-        let deviations: Vec<f64> = self.variances.iter().map(deviation).collect();
+        let deviations = self.deviations();
         let normals = draw_normals(population_size, self.mean.len(), rng);
-        let gene = |j: usize, z: &f64| mirror(self.mean[j] + deviations[j] * z);
-        let genotypes = normals
-            .iter()
-            .map(|z| z.iter().enumerate().map(|(j, z)| gene(j, z)).collect())
-            .collect();
+        let genotypes = normals.iter().map(|z| self.genotype(&deviations, z)).collect();
         Sample::new(genotypes, normals)
+    }
+
+    fn draws_one_by_one(&self) -> bool {
+        true
+    }
+
+    fn individual(&self, index: usize, _: usize, rng: &mut Stream) -> Option<Genotype> {
+        Some(self.genotype(&self.deviations(), &draw_normal(index, self.mean.len(), rng)))
     }
 
     /// As CMA-ES with the better half as parents (Eq. 41 to 47 of its tutorial),

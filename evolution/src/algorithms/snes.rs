@@ -9,10 +9,10 @@ use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Described, Sample, Strategy, draw_normals, finite_exp,
+    Described, Sample, Strategy, draw_normal, draw_normals, finite_exp,
     parameters::{ETA_MU, MU_INIT, SIGMA_INIT},
 };
-use crate::ranking::utility_per_individual;
+use crate::{Genotype, ranking::utility_per_individual};
 
 /// A Gaussian with a diagonal covariance, per gene: mean mu and standard
 /// deviation sigma, both kept in \[0, 1\] (section 3.4.3).
@@ -50,6 +50,13 @@ impl Described for Snes {
     }
 }
 
+impl Snes {
+    fn genotype(&self, s: &[f64]) -> Genotype {
+        let genes = self.mu.iter().zip(&self.sigma).zip(s);
+        genes.map(|((mu, sigma), s)| (mu + sigma * s).clamp(0.0, 1.0)).collect()
+    }
+}
+
 impl Strategy for Snes {
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mu)
@@ -57,13 +64,17 @@ impl Strategy for Snes {
 
     /// g_i = clip(mu + sigma * s_i), s_i ~ N(0, I).
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let d = self.mu.len();
-        let normals = draw_normals(population_size, d, rng);
-        let genotypes = normals
-            .iter()
-            .map(|s| (0..d).map(|j| (self.mu[j] + self.sigma[j] * s[j]).clamp(0.0, 1.0)).collect())
-            .collect();
+        let normals = draw_normals(population_size, self.mu.len(), rng);
+        let genotypes = normals.iter().map(|s| self.genotype(s)).collect();
         Sample::new(genotypes, normals)
+    }
+
+    fn draws_one_by_one(&self) -> bool {
+        true
+    }
+
+    fn individual(&self, index: usize, _: usize, rng: &mut Stream) -> Option<Genotype> {
+        Some(self.genotype(&draw_normal(index, self.mu.len(), rng)))
     }
 
     /// mu += eta_mu * sigma * sum_i u_i s_i;

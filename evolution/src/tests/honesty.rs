@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use numeric::random::TrialSet;
+use numeric::random::{Purpose, Stream, TrialSet};
 
 use super::*;
 

@@ -128,6 +128,31 @@ fn resuming_from_any_generation_gives_the_same_bits() {
 }
 
 #[test]
+fn an_individual_drawn_alone_has_the_bits_of_its_generation() {
+    let mut n_drawn = 0;
+    for variant in all() {
+        for population_size in [6, 7] {
+            let mut evolution = start(&variant, &[9, 40], population_size);
+            step(&mut evolution);
+            let Some(bytes) = evolution.distribution() else { continue };
+            n_drawn += 1;
+            let distribution = Distribution::from_bytes(&bytes).unwrap();
+            let generation = evolution.ask();
+            assert_eq!(distribution.generation(), generation.index);
+            // In no order.
+            for i in (0..population_size).rev() {
+                let bits = |genes: &[f64]| genes.iter().map(|gene| gene.to_bits()).collect();
+                let (drawn, asked): (Vec<u64>, Vec<u64>) =
+                    (bits(&distribution.genotype(i).unwrap()), bits(&generation.genotypes[i]));
+                assert_eq!(drawn, asked, "{variant:?} individual {i} of {population_size}");
+            }
+            assert_eq!(distribution.genotype(population_size), None);
+        }
+    }
+    assert_eq!(n_drawn, 6, "SNES, sep-CMA-ES and OpenAI-ES draw individuals one by one");
+}
+
+#[test]
 fn every_generation_has_all_its_individuals_and_new_ones() {
     for variant in all() {
         for population_size in [4, 11] {

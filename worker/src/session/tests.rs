@@ -105,6 +105,7 @@ impl Conversation {
                 first_trial: 1,
                 trial_count: 2,
                 genotype: vec![0.1, 0.2, assignment_id as f64],
+                individual: None,
             })
             .collect();
         self.send(Message::Assignments(of_experiment(experiment, assignments))).await;
@@ -177,7 +178,7 @@ fn serve(listener: TcpListener) -> mpsc::Receiver<Conversation> {
 fn arithmetic(config_json: String) -> Evaluator {
     Arc::new(move |assignment, _| {
         let factor: f64 = config_json.parse().map_err(|_| format!("`{config_json}`?"))?;
-        let sum: f64 = assignment.genotype.iter().sum();
+        let sum: f64 = assignment.genotype.genes()?.iter().sum();
         let TrialSet::Generation(generation) = assignment.trial_set else {
             return Err(format!("{}?", assignment.trial_set));
         };
@@ -247,6 +248,49 @@ async fn results_are_what_was_computed_to_the_bit() {
 }
 
 #[tokio::test]
+async fn genotypes_are_drawn_to_the_bit_from_the_distribution_of_their_generation() {
+    let setup = evolution::Setup { seed: 3, ..evolution::Setup::new("SNES", 4) };
+    let mut evolution = setup.start().unwrap();
+    for _ in 0..5 {
+        let generation = evolution.ask();
+        let fitness: Vec<Vec<f64>> = generation.genotypes.iter().map(|g| vec![g[0]]).collect();
+        evolution.tell(generation, &fitness).unwrap();
+    }
+    let drawn = |assignment_id, individual| v1::Assignment {
+        assignment_id,
+        first_trial: 1,
+        trial_count: 1,
+        individual: Some(individual),
+        ..v1::Assignment::default()
+    };
+    let distribution = |bytes| v1::Distribution { job: job(1), distribution: bytes };
+    let mut stage = Stage::new(1, |_| -> Evaluator {
+        Arc::new(|assignment, _| Ok(Some(assignment.genotype.genes()?.into_owned())))
+    })
+    .await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send(Message::Assignments(of_experiment(1, vec![drawn(1, 7)]))).await;
+    assert!(failure(&coordinator.results(1).await[0]).contains("no distribution of generation 5"));
+    coordinator.send(Message::Distribution(distribution(evolution.distribution().unwrap()))).await;
+    let assignments = vec![drawn(2, 7), drawn(3, 0), drawn(4, 20)];
+    coordinator.send(Message::Assignments(of_experiment(1, assignments))).await;
+    let results = coordinator.results(3).await;
+    let asked = evolution.ask().genotypes;
+    for (result, individual) in results.iter().zip([7, 0]) {
+        let bits = |genes: &[f64]| genes.iter().map(|gene| gene.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(fitness(result)), bits(&asked[individual]));
+    }
+    assert_eq!(failure(&results[2]), "generation 5 has no individual 20");
+    coordinator.send(Message::Distribution(distribution(vec![9]))).await;
+    coordinator.send(Message::Assignments(of_experiment(1, vec![drawn(5, 7)]))).await;
+    assert!(failure(&coordinator.results(1).await[0]).contains("no distribution of generation 5"));
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
 async fn an_item_that_cannot_be_computed_fails_alone() {
     fn panics_on_item_1(_: String) -> Evaluator {
         Arc::new(|assignment, _| match assignment.id {
@@ -270,6 +314,7 @@ async fn an_item_that_cannot_be_computed_fails_alone() {
         first_trial: u32::MAX,
         trial_count: 2,
         genotype: vec![],
+        individual: None,
     };
     coordinator.send(Message::Assignments(of_experiment(1, vec![endless]))).await;
     assert!(failure(&coordinator.results(1).await[0]).contains("trials"));

@@ -7,7 +7,7 @@ use coordinator::{
     ids::{AssignmentId, ExperimentId, JobId, WorkerId},
 };
 
-use super::{EXPERIMENT, LEASE, MODEL, SECOND, assert_right, fleet};
+use super::{EXPERIMENT, LEASE, MODEL, SECOND, assert_right, auditing_fleet, fleet};
 use crate::simulated_fleet::{SimulatedFleet, fitness};
 
 /// Its engine neither splits nor duplicates, so that items can be counted.
@@ -36,6 +36,42 @@ fn fitness_is_in_index_order_whoever_computed_it() {
     fleet.run_by_hand();
     assert_evaluated(&fleet, 50, 4);
     assert_eq!(fleet.n_items_sent, 50);
+}
+
+#[test]
+fn a_worker_is_sent_a_distribution_once_per_generation_and_draws_from_it() {
+    let mut fleet = plain_fleet();
+    fleet.join_by_hand(2);
+    start(&mut fleet, EXPERIMENT, 20, 1);
+    fleet.run_by_hand();
+    assert_evaluated(&fleet, 20, 1);
+    assert_eq!((fleet.n_distributions_sent, fleet.n_items_drawn), (1, 20));
+    fleet.ask(EXPERIMENT, 1, 20, 1);
+    fleet.run_by_hand();
+    assert_eq!((fleet.n_distributions_sent, fleet.n_items_drawn), (2, 40));
+}
+
+#[test]
+fn where_they_are_shorter_than_the_distribution_genotypes_are_sent() {
+    let mut fleet = plain_fleet();
+    for _ in 0..10 {
+        fleet.join_by_hand(1);
+    }
+    start(&mut fleet, EXPERIMENT, 20, 1);
+    fleet.run_by_hand();
+    assert_evaluated(&fleet, 20, 1);
+    assert_eq!((fleet.n_distributions_sent, fleet.n_items_drawn), (0, 0), "two are shorter");
+}
+
+#[test]
+fn audits_are_sent_genotypes_so_that_they_compare_both_ways() {
+    let mut fleet = auditing_fleet(1.0);
+    fleet.join_by_hand(1);
+    fleet.join_by_hand(1);
+    start(&mut fleet, EXPERIMENT, 20, 1);
+    fleet.run_by_hand();
+    assert_evaluated(&fleet, 20, 1);
+    assert_eq!((fleet.n_items_sent, fleet.n_items_drawn), (40, 20));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::{
     collections::{BTreeMap, BTreeSet, BinaryHeap, VecDeque},
     num::NonZeroU64,
     ops::Range,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -47,6 +48,12 @@ pub struct FleetModel {
     pub checks: bool,
 }
 
+/// Stands for what the genotypes of a trial set are drawn from; as long as five of them.
+fn distribution(trial_set: TrialSet) -> Arc<[u8]> {
+    let generation = trial_set.generation().expect("nothing else is drawn");
+    generation.to_le_bytes().repeat(5).into()
+}
+
 /// What a worker does with its items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Conduct {
@@ -70,6 +77,7 @@ struct Worker {
     introduction: Introduction,
     speed: f64,
     queue: VecDeque<(JobId, Assignment)>,
+    distributions: BTreeMap<JobId, Arc<[u8]>>,
     running: BTreeMap<AssignmentId, JobId>,
     /// Computed, but wanted no more.
     dropped: BTreeSet<AssignmentId>,
@@ -110,6 +118,9 @@ pub struct SimulatedFleet {
     pub n_questions: usize,
     pub n_items_sent: usize,
     pub n_items_dropped: usize,
+    /// Items whose genotype the worker draws.
+    pub n_items_drawn: usize,
+    pub n_distributions_sent: usize,
     /// Time that workers computed, in all.
     pub computed: Duration,
     model: FleetModel,
@@ -175,6 +186,8 @@ impl SimulatedFleet {
             n_questions: 0,
             n_items_sent: 0,
             n_items_dropped: 0,
+            n_items_drawn: 0,
+            n_distributions_sent: 0,
             computed: Duration::ZERO,
             model,
             origin,
@@ -250,6 +263,7 @@ impl SimulatedFleet {
             introduction,
             speed,
             queue: VecDeque::new(),
+            distributions: BTreeMap::new(),
             running: BTreeMap::new(),
             dropped: BTreeSet::new(),
             stalled_until: Duration::ZERO,
@@ -372,7 +386,9 @@ impl SimulatedFleet {
 
     pub fn ask(&mut self, id: JobId, generation: u64, population_size: usize, n_trials: u32) {
         let genotypes = population(population_size);
-        let batch = Batch::fitness(TrialSet::Generation(generation), genotypes, n_trials);
+        let trial_set = TrialSet::Generation(generation);
+        let batch = Batch::fitness(trial_set, genotypes, n_trials);
+        let batch = Batch { distribution: Some(distribution(trial_set)), ..batch };
         self.engine.on_batch_requested(self.instant(), id, batch);
         self.carry_out();
     }
@@ -460,7 +476,14 @@ impl SimulatedFleet {
     fn arrive(&mut self, id: WorkerId, message: Command) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         match message {
-            Command::SendAssignments { job, assignments, .. } => {
+            Command::SendDistribution { job, distribution, .. } => {
+                worker.distributions.insert(job, distribution);
+            }
+            Command::SendAssignments { job, trial_set, assignments, .. } => {
+                if assignments.iter().any(|assignment| assignment.is_drawn) {
+                    let known = worker.distributions.get(&job);
+                    assert_eq!(known, Some(&distribution(trial_set)), "what it draws from");
+                }
                 worker.queue.extend(assignments.into_iter().map(|assignment| (job, assignment)));
             }
             Command::SendDrop { assignments, .. } => {
@@ -476,6 +499,7 @@ impl SimulatedFleet {
                 }
             }
             Command::SendEnd { job, .. } => {
+                worker.distributions.remove(&job);
                 worker.queue.retain(|(of, _)| *of != job);
                 if self.model.stops {
                     let ours = worker.running.extract_if(.., |_, of| *of == job);
@@ -552,10 +576,15 @@ impl SimulatedFleet {
             match command {
                 Command::SendAssignments { worker, ref assignments, .. } => {
                     self.n_items_sent += assignments.len();
+                    self.n_items_drawn += assignments.iter().filter(|it| it.is_drawn).count();
                     self.post(worker, command);
                 }
                 Command::SendDrop { worker, ref assignments } => {
                     self.n_items_dropped += assignments.len();
+                    self.post(worker, command);
+                }
+                Command::SendDistribution { worker, .. } => {
+                    self.n_distributions_sent += 1;
                     self.post(worker, command);
                 }
                 Command::SendEnd { worker, .. } | Command::SendSpec { worker, .. } => {
