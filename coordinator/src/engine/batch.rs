@@ -247,10 +247,11 @@ impl BatchInProgress {
         self.delayed.push((until, item));
     }
 
-    /// Items whose time has come.
-    pub fn take_due(&mut self, now: Instant) -> Vec<Item> {
-        let due = self.delayed.extract_if(.., |(until, _)| *until < now);
-        due.map(|(_, item)| item).collect()
+    /// An item whose time has come. One at a time: an item that waits twice, because two
+    /// copies were lost, is held back until the second one is taken, too.
+    pub fn take_due(&mut self, now: Instant) -> Option<Item> {
+        let index = self.delayed.iter().position(|(until, _)| *until < now)?;
+        Some(self.delayed.remove(index).1)
     }
 
     fn is_held_back(&self, individual: u32, trial: u32) -> bool {

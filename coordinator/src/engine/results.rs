@@ -411,8 +411,9 @@ impl Engine {
     pub(super) fn requeue_delayed(&mut self, now: Instant) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
-            let batch = self.jobs.get_mut(&id).and_then(|work| work.batch.as_mut());
-            for item in batch.map(|batch| batch.take_due(now)).unwrap_or_default() {
+            let take_due =
+                |engine: &mut Self| engine.jobs.get_mut(&id)?.batch.as_mut()?.take_due(now);
+            while let Some(item) = take_due(self) {
                 self.requeue(id, &item);
             }
         }

@@ -348,3 +348,32 @@ proptest! {
         prop_assert!(fleet.failed.is_empty() && fleet.quarantined.is_empty());
     }
 }
+
+/// Two copies of an item are lost within a second, and so it waits twice. Found by the
+/// property above.
+#[test]
+fn an_item_of_which_two_copies_are_lost_is_queued_once() {
+    let config = EngineConfig { audit_fraction: 0.3, ..EngineConfig::new(LEASE) };
+    let mut fleet = SimulatedFleet::new(FleetModel { stops: false, ..MODEL }, config);
+    fleet.submit(EXPERIMENT, 100);
+    fleet.ask(EXPERIMENT, 0, 8, 5);
+    let stalled = fleet.join(3, 0.1);
+    fleet.run_for(SECOND / 3);
+    fleet.stall(stalled, 5 * SECOND);
+    let second = fleet.join(2, 1.980_273_145_185_609_5);
+    fleet.run_for(SECOND / 3);
+    let third = fleet.join(3, 0.1);
+    fleet.run_for(SECOND / 3);
+    fleet.kill(third);
+    fleet.join(1, 0.1);
+    fleet.kill(second);
+    fleet.run_for(SECOND / 3);
+    let returned = fleet.flap(stalled).expect("it is connected");
+    fleet.join(2, 1.622_897_392_274_333);
+    fleet.join(3, 0.107_233_302_589_703_01);
+    fleet.run_for(SECOND / 3);
+    fleet.kill(returned);
+    fleet.join(2, 1.0);
+    assert!(fleet.run_until(HOUR, is_finished));
+    assert_right(&fleet, 8, 5);
+}
