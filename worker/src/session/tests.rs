@@ -371,6 +371,23 @@ async fn dropped_items_are_not_computed() {
 }
 
 #[tokio::test]
+async fn a_result_does_not_wait_for_the_end_of_the_next_item() {
+    let (gated, mut starts, permit) = gated();
+    let mut stage = Stage::new(1, gated).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, "").await;
+    coordinator.send_assignments(1, 1..=4).await;
+    permit.send(()).unwrap();
+    assert_eq!(coordinator.results(1).await[0].assignment_id, 1, "two more wait for the slot");
+    assert_eq!((starts.recv().await, starts.recv().await), (Some(1), Some(2)));
+    (0..3).for_each(|_| permit.send(()).unwrap());
+    assert_eq!(coordinator.results(3).await.len(), 3);
+    drop(coordinator);
+    stage.end().await;
+}
+
+#[tokio::test]
 async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
     let drop_one = Message::DropAssignments(v1::DropAssignments { assignment_ids: vec![1] });
     let end = Message::EndJob(v1::EndJob { job: job(1) });
