@@ -21,8 +21,21 @@ const LEASE: Duration = Duration::from_secs(10);
 const N_TRIALS: u32 = 5;
 /// The first one teaches the engine how long things take.
 const N_GENERATIONS: u64 = 4;
-const TRIAL: Duration = Duration::from_millis(100);
 const CALL_OVERHEAD: f64 = 0.4;
+
+/// What things cost.
+#[derive(Debug, Clone, Copy)]
+struct Costs {
+    /// A trial on a worker of speed 1.
+    trial: Duration,
+    /// One way between coordinator and worker.
+    latency: Duration,
+}
+
+const LONG: Costs = Costs { trial: Duration::from_millis(100), latency: Duration::from_millis(1) };
+/// As measured, in a local network.
+const EXPERIMENT_A: Costs =
+    Costs { trial: Duration::from_micros(900), latency: Duration::from_micros(200) };
 
 fn main() {
     let plain = EngineConfig { split: false, duplicate: false, ..EngineConfig::new(LEASE) };
@@ -30,18 +43,23 @@ fn main() {
     let both = EngineConfig { duplicate: true, ..split };
     println!("parallel efficiency; whole: items of all trials; split: by trial; both: split,");
     println!("and moved and duplicated");
-    for population_size in [100, 10_000] {
-        for stalled in [0.0, 0.01] {
-            println!("\nP = {population_size}, {} % of the workers stall", 100.0 * stalled);
-            println!("workers   whole   split    both   limit");
-            for n_workers in [1, 10, 100, 1_000, 10_000] {
-                let measured = [plain, split, both]
-                    .map(|config| efficiency(config, population_size, n_workers, stalled));
-                print!("{n_workers:>7}");
-                for share in measured.into_iter().chain([limit(population_size, n_workers)]) {
-                    print!(" {:>6.1}%", 100.0 * share);
+    for costs in [LONG, EXPERIMENT_A] {
+        for population_size in [100, 10_000] {
+            for stalled in [0.0, 0.01] {
+                print!("\ntrials of {:?}, {:?} each way, ", costs.trial, costs.latency);
+                println!("P = {population_size}, {} % of the workers stall", 100.0 * stalled);
+                println!("workers   whole   split    both   limit");
+                for n_workers in [1, 10, 100, 1_000, 10_000] {
+                    let measured = [plain, split, both].map(|config| {
+                        costs.efficiency(config, population_size, n_workers, stalled)
+                    });
+                    print!("{n_workers:>7}");
+                    let limit = costs.limit(population_size, n_workers);
+                    for share in measured.into_iter().chain([limit]) {
+                        print!(" {:>6.1}%", 100.0 * share);
+                    }
+                    println!();
                 }
-                println!();
             }
         }
     }
@@ -53,58 +71,66 @@ fn speed(worker: usize) -> f64 {
     0.5 + uniform(worker as u64)
 }
 
-/// Time of all work on a worker of speed 1, if no item is split.
-fn work(population_size: usize) -> Duration {
-    TRIAL.mul_f64(population_size as f64 * (f64::from(N_TRIALS) + CALL_OVERHEAD))
-}
-
 fn total_speed(n_workers: usize) -> f64 {
     (0..n_workers).map(speed).sum()
 }
 
-/// No generation takes less than the work divided by the workers' speeds, nor
-/// less than one trial on the fastest worker.
-fn limit(population_size: usize, n_workers: usize) -> f64 {
-    let ideal = work(population_size).div_f64(total_speed(n_workers));
-    let fastest = (0..n_workers).map(speed).fold(0.0, f64::max);
-    let one_trial = TRIAL.mul_f64((1.0 + CALL_OVERHEAD) / fastest);
-    ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
-}
+impl Costs {
+    /// Time of all work on a worker of speed 1, if no item is split.
+    fn work(self, population_size: usize) -> Duration {
+        self.trial.mul_f64(population_size as f64 * (f64::from(N_TRIALS) + CALL_OVERHEAD))
+    }
 
-/// The time that generations would take if no slot were ever idle, by the time
-/// that they take.
-fn efficiency(config: EngineConfig, population_size: usize, n_workers: usize, stalled: f64) -> f64 {
-    let model = FleetModel {
-        latency: Duration::from_millis(1),
-        trial: TRIAL,
-        dispersion: 0.3,
-        stops: false,
-        checks: false,
-    };
-    let mut fleet = SimulatedFleet::new(model, config);
-    for worker in 0..n_workers {
-        fleet.join(1, speed(worker));
+    /// No generation takes less than the work divided by the workers' speeds, nor
+    /// less than one trial on the fastest worker.
+    fn limit(self, population_size: usize, n_workers: usize) -> f64 {
+        let ideal = self.work(population_size).div_f64(total_speed(n_workers));
+        let fastest = (0..n_workers).map(speed).fold(0.0, f64::max);
+        let one_trial = self.trial.mul_f64((1.0 + CALL_OVERHEAD) / fastest);
+        ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
     }
-    fleet.submit(EXPERIMENT, 100);
-    let mut measured_from = Duration::ZERO;
-    for generation in 0..N_GENERATIONS {
-        if generation == 1 {
-            measured_from = fleet.now();
+
+    /// The time that generations would take if no slot were ever idle, by the time
+    /// that they take.
+    fn efficiency(
+        self,
+        config: EngineConfig,
+        population_size: usize,
+        n_workers: usize,
+        stalled: f64,
+    ) -> f64 {
+        let model = FleetModel {
+            latency: self.latency,
+            trial: self.trial,
+            dispersion: 0.3,
+            stops: false,
+            checks: false,
+        };
+        let mut fleet = SimulatedFleet::new(model, config);
+        for worker in 0..n_workers {
+            fleet.join(1, speed(worker));
         }
-        fleet.ask(EXPERIMENT, generation, population_size, N_TRIALS);
-        let ids = fleet.worker_ids();
-        let n_stalled = (stalled * n_workers as f64) as usize;
-        for i in 0..n_stalled {
-            let place = generation << 32 | i as u64;
-            let id = ids[(uniform(place) * ids.len() as f64) as usize];
-            fleet.stall(id, Duration::from_secs(30));
+        fleet.submit(EXPERIMENT, 100);
+        let mut measured_from = Duration::ZERO;
+        for generation in 0..N_GENERATIONS {
+            if generation == 1 {
+                measured_from = fleet.now();
+            }
+            fleet.ask(EXPERIMENT, generation, population_size, N_TRIALS);
+            let ids = fleet.worker_ids();
+            let n_stalled = (stalled * n_workers as f64) as usize;
+            for i in 0..n_stalled {
+                let place = generation << 32 | i as u64;
+                let id = ids[(uniform(place) * ids.len() as f64) as usize];
+                fleet.stall(id, Duration::from_secs(30));
+            }
+            let n_evaluated = generation as usize + 1;
+            let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_evaluated;
+            assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
         }
-        let n_evaluated = generation as usize + 1;
-        let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_evaluated;
-        assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
+        let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;
+        self.work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / taken
     }
-    let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;
-    work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / taken
 }
 
 /// Items per second of one core, if workers and network cost nothing.
