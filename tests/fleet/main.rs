@@ -7,6 +7,7 @@ mod budgets;
 mod command_line;
 mod determinism;
 mod evaluation;
+mod explain;
 mod faults;
 mod health;
 mod metrics;

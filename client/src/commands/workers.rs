@@ -76,7 +76,7 @@ impl<'a> From<&'a Worker> for Record<'a> {
 #[derive(Debug, Args)]
 pub struct WorkersArgs {
     /// Let this worker out of quarantine: it gets items again.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
     readmit: Option<String>,
 }
 

@@ -31,7 +31,7 @@ pub struct JobActivity {
 pub struct WithheldWorker {
     /// The worker.
     pub worker: WorkerId,
-    /// What it calls itself.
+    /// What it calls itself, or the name under which it is in quarantine.
     pub name: String,
     /// Why.
     pub reason: String,
@@ -63,7 +63,8 @@ pub struct BatchActivity {
     pub n_items_queued: usize,
     /// Audits that no worker has; they need one of another name than the first.
     pub n_audits_waiting: usize,
-    /// Individuals that a worker was computing when it was lost.
+    /// Individuals that a worker was computing when it was lost, and that have no result
+    /// since.
     pub n_individuals_failing: usize,
     /// The workers that have the other items.
     pub held: Vec<HeldItems>,
@@ -106,7 +107,8 @@ impl Engine {
             let quarantined = worker.quarantined.clone();
             let is_quarantined = quarantined.is_some();
             let reason = quarantined.or_else(|| worker.waits(now))?;
-            let name = worker.name().to_owned();
+            let name =
+                self.quarantine.name(&worker.introduction).unwrap_or(worker.name()).to_owned();
             (!worker.is_draining).then_some(WithheldWorker {
                 worker: id,
                 name,
@@ -134,7 +136,7 @@ impl Engine {
             n_episodes_left: batch.n_episodes_left(),
             n_items_queued: batch.n_waiting() - batch.n_audits_waiting(),
             n_audits_waiting: batch.n_audits_waiting(),
-            n_individuals_failing: batch.losses.n_individuals(),
+            n_individuals_failing: batch.n_individuals_failing(),
             held: held.collect(),
             running_for: batch.running_for(now),
         }

@@ -561,6 +561,12 @@ impl BatchInProgress {
         self.n_trials_left
     }
 
+    /// Individuals with trials that a worker was computing when it was lost, and that have
+    /// no result since.
+    pub fn n_individuals_failing(&self) -> usize {
+        self.losses.n_individuals(|individual, trial| !self.is_known(individual, trial))
+    }
+
     /// Time since it began.
     pub fn running_for(&self, now: Instant) -> Duration {
         now.saturating_duration_since(self.started)

@@ -91,10 +91,11 @@ impl LossRecord {
         losses.max().unwrap_or(0)
     }
 
-    /// Individuals that were being computed at a loss.
-    pub fn n_individuals(&self) -> usize {
-        let individuals: BTreeSet<u32> = self.by_trial.keys().map(|&(i, _)| i).collect();
-        individuals.len()
+    /// Individuals with trials that were being computed at a loss and that satisfy a condition.
+    pub fn n_individuals(&self, is_counted: impl Fn(u32, u32) -> bool) -> usize {
+        let trials =
+            self.by_trial.keys().filter(|&&(individual, trial)| is_counted(individual, trial));
+        trials.map(|&(individual, _)| individual).collect::<BTreeSet<u32>>().len()
     }
 
     /// A process is back, so that nothing has taken it down.

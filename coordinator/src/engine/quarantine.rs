@@ -32,17 +32,28 @@ impl Quarantine {
         is_new
     }
 
-    /// Lets a worker out; the reason why it was there, if it was.
-    pub fn remove(&mut self, name: &str) -> Option<String> {
-        self.by_name.remove(name).map(|entry| entry.reason)
+    /// Lets a worker out of quarantine; whether it was there.
+    pub fn remove(&mut self, name: &str) -> bool {
+        self.by_name.remove(name).is_some()
     }
 
     /// Why a worker is in quarantine, if it is.
     pub fn reason(&self, introduction: &Introduction) -> Option<&str> {
-        let by_name = self.by_name.get(&introduction.name);
-        let is_its =
-            |entry: &&Entry| entry.process.is_some() && entry.process == introduction.process;
-        by_name.or_else(|| self.by_name.values().find(is_its)).map(|entry| &*entry.reason)
+        self.entry(introduction).map(|(_, entry)| &*entry.reason)
+    }
+
+    /// The name under which a worker is in quarantine, if it is: that under which it is
+    /// readmitted.
+    pub fn name(&self, introduction: &Introduction) -> Option<&str> {
+        self.entry(introduction).map(|(name, _)| &**name)
+    }
+
+    fn entry(&self, introduction: &Introduction) -> Option<(&String, &Entry)> {
+        let is_its = |(_, entry): &(&String, &Entry)| {
+            entry.process.is_some() && entry.process == introduction.process
+        };
+        let by_name = self.by_name.get_key_value(&introduction.name);
+        by_name.or_else(|| self.by_name.iter().find(is_its))
     }
 
     /// The names and the reasons.

@@ -271,11 +271,19 @@ impl Engine {
 
     /// Lets a worker out of quarantine; whether it was there.
     pub fn on_readmitted(&mut self, now: Instant, name: &str) -> bool {
-        let Some(reason) = self.quarantine.remove(name) else { return false };
         let workers = self.workers.iter();
-        let out = workers.filter(|(_, worker)| worker.quarantined.as_ref() == Some(&reason));
-        for id in out.map(|(&id, _)| id).collect::<Vec<WorkerId>>() {
-            self.update_worker(id, |worker| worker.quarantined = None);
+        let its = workers
+            .filter(|(_, worker)| self.quarantine.name(&worker.introduction) == Some(name))
+            .map(|(&id, _)| id)
+            .collect::<Vec<WorkerId>>();
+        if !self.quarantine.remove(name) {
+            return false;
+        }
+        for id in its {
+            // It may be there under another name as well.
+            let reason = self.quarantine.reason(&self.workers[&id].introduction);
+            let reason = reason.map(str::to_owned);
+            self.update_worker(id, |worker| worker.quarantined = reason);
         }
         self.finish_waived(now);
         self.assign(now);

@@ -235,14 +235,19 @@ impl Worker {
     /// Why it is given nothing for a while.
     pub fn waits(&self, now: Instant) -> Option<String> {
         if self.question.is_some() {
-            Some("its word is in doubt, and the referee is asked".to_owned())
+            Some("its word is in doubt until the referee has answered".to_owned())
         } else if let Some(until) = self.resting_until {
             let left = until.saturating_duration_since(now).as_secs_f64();
-            Some(format!("it was lost, and has returned nothing since; {left:.1} s to wait"))
+            Some(format!(
+                "it was lost, and has returned nothing since; it gets an item in {left:.1} s"
+            ))
         } else if self.is_stalled {
             let silent = self.last_result.map_or(self.time.joined(), |at| at);
             let seconds = now.saturating_duration_since(silent).as_secs();
-            Some(format!("it has returned nothing for {seconds} s while others have"))
+            Some(format!(
+                "it has returned nothing for {seconds} s while others have; it gets items when it \
+                 does"
+            ))
         } else {
             None
         }

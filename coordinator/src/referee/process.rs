@@ -70,8 +70,8 @@ impl Process {
         let mut child = command.spawn().map_err(|error| {
             format!(
                 "the referee process {name} cannot be started ({error}); \
-                 free memory or processes on the coordinator's machine, or start the \
-                 coordinator again if its program has been moved"
+                 give the coordinator more of what that says is short, be it memory, processes \
+                 or open files, or start it again if its program has been moved"
             )
         })?;
         let (Some(input), Some(output), Some(errors)) =

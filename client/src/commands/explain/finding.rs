@@ -1,6 +1,6 @@
 //! The findings about an experiment's progress, with the next steps.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -143,17 +143,20 @@ fn of_withheld(answer: &ExplainExperimentResponse) -> Vec<Finding> {
         let steps = [
             "check the machine (memory, overheating) and the worker's program; the others go on"
                 .to_owned(),
-            format!("then let it out: swarmctl workers --readmit {}", first.worker_name),
+            format!(
+                "then let it in again: swarmctl workers --readmit {}",
+                quoted(&first.worker_name)
+            ),
         ];
         findings.push(finding(Kind::Quarantine, what, steps));
     }
     if !waiting.is_empty() {
         let workers = text::counted(waiting.len() as u64, "worker");
-        let what = format!("{workers} with nothing to do for a while:{}", list(&waiting));
+        let what = format!("{workers} given nothing for a while:{}", list(&waiting));
         let steps = [
-            "nothing has to be done: others do their items, and they get some when they answer"
-                .to_owned(),
-            "a worker that stays so hangs or crashes: read its log; restarting it is safe"
+            "nothing has to be done: each gets items again as its line says".to_owned(),
+            "one that has returned nothing for long hangs: read its log and restart it, which is \
+             safe"
                 .to_owned(),
         ];
         findings.push(finding(Kind::WorkersWaiting, what, steps));
@@ -176,7 +179,9 @@ fn of_questions(answer: &ExplainExperimentResponse) -> Vec<Finding> {
     )];
     if let Some(question) = answer.questions.iter().find(|question| !question.trouble.is_empty()) {
         let what = format!("it cannot do so at present: {}", question.trouble);
-        let steps = ["mend that on the coordinator's machine; it tries again by itself".to_owned()];
+        let steps =
+            ["mend that on the coordinator's machine; it tries again by itself, within a minute"
+                .to_owned()];
         findings.push(finding(Kind::RefereeTrouble, what, steps));
     }
     findings
@@ -193,7 +198,7 @@ fn of_round(
         let individuals = text::counted(round.individuals_failing.into(), "individual");
         let what = format!(
             "workers were lost while they computed {individuals}; if one takes the coordinator's \
-             own process down as well, the experiment fails"
+             referee down as well, the experiment fails"
         );
         let steps = [
             "find out why workers are lost: read their logs, and whether their machine is short \
@@ -238,7 +243,8 @@ fn of_round(
         findings.push(finding(Kind::Computing, what, look(round)));
     } else if round.items_queued == 0 && round.audits_waiting > 0 {
         let what = format!(
-            "waiting for a second worker to audit {}; without one, they are skipped after 30 s",
+            "waiting for a worker of another name to audit {}; without one, they are skipped after \
+             30 s",
             text::counted(round.audits_waiting.into(), "item"),
         );
         let steps = [format!("start another: worker --coordinator {address}")];
@@ -262,6 +268,12 @@ fn look(round: &Round) -> Vec<String> {
             .into(),
         "stopping or killing a worker is safe: other workers get its items".into(),
     ]
+}
+
+/// A worker's name as one word of a shell's command.
+fn quoted(name: &str) -> String {
+    // Only text with the character 0 cannot be one, and the coordinator sends none.
+    shlex::try_quote(name).map_or_else(|_| "NAME".to_owned(), Cow::into_owned)
 }
 
 fn history(id: u64) -> String {

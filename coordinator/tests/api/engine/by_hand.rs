@@ -258,6 +258,23 @@ fn a_failure_that_the_referee_contradicts_puts_its_reporter_in_quarantine() {
 }
 
 #[test]
+fn one_of_two_workers_in_quarantine_for_the_same_reason_is_readmitted_and_the_other_is_not() {
+    let mut fleet = fleet();
+    let workers = [fleet.join_by_hand(1), fleet.join_by_hand(1)];
+    start(&mut fleet, EXPERIMENT, 4, 2);
+    for id in workers {
+        let assignment = fleet.held(id)[0].id;
+        fleet.answer(id, assignment, Ok(vec![1.0]));
+    }
+    let reasons = fleet.status().into_iter().map(|worker| worker.quarantined.unwrap());
+    let reasons: Vec<String> = reasons.collect();
+    assert_eq!(reasons[0], reasons[1]);
+    fleet.tell(|engine, now| assert!(engine.on_readmitted(now, "worker-1")));
+    let quarantined = fleet.status().into_iter().filter(|worker| worker.quarantined.is_some());
+    assert_eq!(quarantined.map(|worker| worker.id).collect::<Vec<_>>(), [workers[1]]);
+}
+
+#[test]
 fn without_a_referee_a_second_worker_confirms_a_failure() {
     let mut fleet = fleet();
     fleet.has_referee = false;
