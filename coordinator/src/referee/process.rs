@@ -71,7 +71,7 @@ impl Process {
             format!(
                 "the referee process {name} cannot be started ({error}); \
                  give the coordinator more of what that says is short, be it memory, processes \
-                 or open files, or start it again if its program has been moved"
+                 or open files; if its program has been moved, start the coordinator again"
             )
         })?;
         let (Some(input), Some(output), Some(errors)) =
