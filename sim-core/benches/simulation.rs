@@ -45,6 +45,9 @@ fn main() {
     if wants("kernel") {
         kernel(&isas);
     }
+    if wants("lanes") {
+        lanes(best);
+    }
     if wants("episodes") {
         episodes(best);
     }
@@ -88,6 +91,20 @@ fn kernel(isas: &[Isa]) {
             reference / per_lane_substep,
             100.0 * n_synapses as f64 * peak / per_lane_substep,
         );
+    }
+}
+
+/// The network in whole vectors of lanes, and in lanes that do not fill one.
+fn lanes(isa: Isa) {
+    println!("\nlanes ({isa}): network of experiment A, ns per substep");
+    let config = experiment_a();
+    let simulation = compile(&config, isa);
+    let genotype = genotype(&config, 1);
+    let (_, n_substeps) = network_size(&simulation);
+    for n_lanes in [1, 2, 4, 10, 16, 32, 48, 50, 64] {
+        let mut load = NetworkLoad::new(&simulation, &genotype, n_lanes).expect("a valid genotype");
+        let [step] = medians([&mut || seconds_per(|| load.step())]);
+        println!("{n_lanes:4} {:8.1}", step / f64::from(n_substeps) * 1e9);
     }
 }
 

@@ -56,14 +56,16 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
 }
 
 /// Experiment A's network, and variants with every kind of block: one ensemble of
-/// `tanh`, odd numbers of neurons, more pairs of neurons than a vector has lanes; and
-/// neurons like the original's.
+/// `tanh`, odd numbers of neurons, two groups of synapses that join the same neurons, more
+/// pairs of neurons than a vector has lanes; and neurons like the original's.
 fn networks() -> [(Network, Phenotype); 5] {
     let mut tanh = experiment_a();
     tanh.topology.ensembles["H2"].activation = Some(Activation::Tanh);
     let mut odd = tanh.clone();
     odd.topology.ensembles["H1"].n = 7;
     odd.topology.ensembles["H2"].n = 9;
+    let again = odd.topology.synapses["H1-H1"].clone();
+    odd.topology.synapses.insert("H1-H1 again".into(), again);
     let mut large = odd.clone();
     large.topology.ensembles["H1"].n = 39;
     let mut original = odd.clone();
