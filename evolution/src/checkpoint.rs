@@ -1,139 +1,133 @@
 //! Checkpoints: what evolution goes on from, as bytes.
 //!
-//! A checkpoint is a *state* and the *steps* since it. The state is everything. A step is
-//! the fitness that evolution was told for one generation: `ask` and `tell` are functions,
-//! so the state after the generation follows from it. Where a step is much shorter (a GA's
-//! state is its population, CMA-ES's a matrix), most generations add a step, and few a
-//! state.
+//! A checkpoint is a *keyframe* and the entries of the [fitness log](super::Told) since. A
+//! keyframe is everything that evolution is; an entry is what it was told of one generation,
+//! from which the next state follows. Where keyframes are far apart they take little room, and
+//! going through the entries takes long: [`Evolution::is_keyframe_due`] weighs one against the
+//! other.
 //!
-//! State and steps begin with a byte for the version of their format; the rest is in the
+//! A keyframe begins with a byte for the version of its format; the rest is in the
 //! format of postcard (fields in order, without names; numbers as little-endian IEEE 754).
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use experiment_file::Keeps;
+use serde::{Serialize, de::DeserializeOwned};
 
-use super::{Evolution, EvolutionError};
+use super::{Algorithm, Evolution, EvolutionError, Told, algorithms::Strategy as _};
 
-/// Version of the format.
-const VERSION: u8 = 1;
+/// Version of the format of keyframes.
+pub(crate) const VERSION: u8 = 1;
 
-/// The state is written anew after so many generations at the latest: whoever resumes takes
-/// fewer steps than that.
-const STEPS_MAX: u64 = 8;
+/// Going through the generations between two keyframes takes about so long, ns.
+const REPLAY_NS: u64 = 600_000_000;
+
+/// Most generations between two keyframes, if those take no more room than
+/// [`ROOM_PER_GENERATION`].
+const GENERATIONS_MAX: u64 = 150;
+
+/// Bytes that keyframes may take per generation, if the log takes less. For large
+/// populations and matrices this is what keeps them apart.
+const ROOM_PER_GENERATION: u64 = 128 << 10;
 
 /// What an evolution can be restored from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Checkpoint {
     /// Evolution after some generation.
-    pub state: Vec<u8>,
-    /// The generations since, in order.
-    pub steps: Vec<Vec<u8>>,
-}
-
-/// What a generation changes in a checkpoint.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Advance {
-    /// Replaces the checkpoint.
-    State(Vec<u8>),
-    /// Is added to its steps.
-    Step(Vec<u8>),
-}
-
-/// What evolution was told in one generation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Step {
-    /// Per individual the fitness of every trial.
-    pub trial_fitness: Vec<Vec<f64>>,
-    /// Per block of the re-evaluation after it the same of every candidate that met it; none
-    /// if there was no re-evaluation.
-    pub blocks: Vec<Vec<Vec<f64>>>,
+    pub keyframe: Vec<u8>,
+    /// The entries of the log since, in order.
+    pub log: Vec<Vec<u8>>,
 }
 
 /// Why there is no evolution in a checkpoint. It is damaged, or of another version.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// Written by another version.
-    #[error("it has the format {found}, and this program reads {VERSION}")]
+    #[error("it has the format {found}, and this program reads {supported}")]
     Version {
         /// Its first byte.
         found: u8,
+        /// What it would have to be.
+        supported: u8,
     },
     /// Cut off, or no such values.
     #[error("it cannot be read: {0}")]
     Malformed(#[from] postcard::Error),
-    /// A step of another experiment, say.
-    #[error("the step of generation {generation} does not fit")]
-    Step {
+    /// An entry of the log of another experiment, say.
+    #[error("the fitness of generation {generation} does not fit")]
+    Misfit {
         /// Index of the generation.
         generation: u64,
     },
-    /// A step that evolution cannot have taken.
+    /// Fitness that evolution cannot have learnt from.
     #[error(transparent)]
     Evolution(#[from] EvolutionError),
 }
 
 impl Evolution {
-    /// Everything, for a new checkpoint.
-    pub fn state(&self) -> Vec<u8> {
-        encode(self)
+    /// Everything, for a keyframe.
+    pub fn keyframe(&self) -> Vec<u8> {
+        encode(VERSION, self)
     }
 
-    fn state_len(&self) -> usize {
-        postcard::experimental::serialized_size(self).expect("numbers and lists serialise")
+    /// Whether the latest generation is one after which a keyframe is kept. `entry_len`:
+    /// bytes of its entry in the log.
+    pub fn is_keyframe_due(&self, entry_len: usize) -> bool {
+        self.n_generations.is_multiple_of(self.keyframe_interval(entry_len as u64))
     }
 
-    /// What the latest generation changes in the checkpoint that the generation before it
-    /// left.
-    pub fn advance(&self) -> Advance {
-        let is_due = self.n_generations.is_multiple_of(STEPS_MAX);
-        match self.step.as_ref().filter(|_| !is_due).map(encode) {
-            Some(step) if 2 * step.len() < self.state_len() => Advance::Step(step),
-            _ => Advance::State(self.state()),
-        }
+    /// Generations from a keyframe to the next.
+    fn keyframe_interval(&self, entry_len: u64) -> u64 {
+        let sum = |number: fn(&Algorithm, u64) -> u64| {
+            let of_each = self.populations.iter().map(|it| number(it, self.population_size as u64));
+            of_each.sum::<u64>().max(1)
+        };
+        let for_time = (REPLAY_NS / sum(generation_ns)).clamp(1, GENERATIONS_MAX);
+        let for_room = sum(state_len) / entry_len.max(ROOM_PER_GENERATION);
+        for_time.max(for_room)
     }
 
     /// The evolution that a checkpoint is of.
     pub fn restore(checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
-        let mut evolution: Self = decode(&checkpoint.state)?;
-        for step in &checkpoint.steps {
-            evolution.take(decode(step)?)?;
+        let mut evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
+        for entry in &checkpoint.log {
+            evolution.replay(&Told::from_bytes(entry)?)?;
         }
         Ok(evolution)
     }
+}
 
-    /// Goes through a generation again.
-    fn take(&mut self, step: Step) -> Result<(), CheckpointError> {
-        let generation = self.ask();
-        let misfit = CheckpointError::Step { generation: generation.index };
-        if step.trial_fitness.len() != generation.genotypes.len() {
-            return Err(misfit);
-        }
-        self.tell(generation, &step.trial_fitness)?;
-        if step.blocks.is_empty() {
-            return Ok(());
-        }
-        let Some(mut round) = self.reevaluation() else { return Err(misfit) };
-        for block in &step.blocks {
-            if round.genotypes().len() != block.len() {
-                return Err(misfit);
-            }
-            round.learn(block);
-        }
-        if !round.is_over() {
-            return Err(misfit);
-        }
-        self.set_champion(&round);
-        Ok(())
+/// About how long asking and telling take, ns (`cargo bench -p evolution`).
+fn generation_ns(algorithm: &Algorithm, population_size: u64) -> u64 {
+    let d = algorithm.n_genes() as u64;
+    let drawn = 20 * population_size * d;
+    match algorithm.keeps() {
+        Keeps::Vectors | Keeps::Population => drawn,
+        // Of a decomposition and products with the matrix.
+        Keeps::Matrix => drawn + d * d * (d + population_size) / 2,
     }
 }
 
-pub(crate) fn encode(value: &impl Serialize) -> Vec<u8> {
-    postcard::to_extend(value, vec![VERSION]).expect("numbers and lists serialise")
+/// About how many bytes a state has.
+fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
+    let d = algorithm.n_genes() as u64;
+    let n_numbers = match algorithm.keeps() {
+        Keeps::Vectors => 6 * d,
+        Keeps::Matrix => d * d,
+        Keeps::Population => population_size * d,
+    };
+    n_numbers * size_of::<f64>() as u64
 }
 
-pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CheckpointError> {
+pub(crate) fn encode(version: u8, value: &impl Serialize) -> Vec<u8> {
+    postcard::to_extend(value, vec![version]).expect("numbers and lists serialise")
+}
+
+pub(crate) fn decode<T: DeserializeOwned>(
+    supported: u8,
+    bytes: &[u8],
+) -> Result<T, CheckpointError> {
     match bytes.split_first() {
-        Some((&VERSION, rest)) => Ok(postcard::from_bytes(rest)?),
-        Some((&found, _)) => Err(CheckpointError::Version { found }),
+        Some((&found, rest)) if found == supported => Ok(postcard::from_bytes(rest)?),
+        Some((&found, _)) => Err(CheckpointError::Version { found, supported }),
         None => Err(CheckpointError::Malformed(postcard::Error::DeserializeUnexpectedEnd)),
     }
 }

@@ -9,6 +9,10 @@
 //! individual, every fitness of every trial of every individual (f64, bit for
 //! bit); numbers little-endian, individuals in index order.
 //!
+//! A fork continues the chain of its parent. If anything is changed that link -1 covers, the
+//! parent's last link is followed by one that is SHA-256 of `swarmevo fork digest 1\n`, that
+//! link, and link -1 of the changed configuration.
+//!
 //! Re-evaluations of candidates have a chain of their own, which hangs on that one.
 //! It starts with 32 zero bytes; after each block of held-out trials, the next link is
 //! SHA-256 of the link before it, the link of the latest generation, every gene of
@@ -50,6 +54,17 @@ impl Digest {
         let mut hash = Sha256::new();
         hash.update("swarmevo setup digest 1\n");
         hash.update(setup);
+        Self(hash.finalize().into())
+    }
+
+    /// The link on which a fork begins that continues after this one under another
+    /// configuration; `config`: link -1 of that.
+    #[must_use]
+    pub fn forked(self, config: Self) -> Self {
+        let mut hash = Sha256::new();
+        hash.update("swarmevo fork digest 1\n");
+        hash.update(self.0);
+        hash.update(config.0);
         Self(hash.finalize().into())
     }
 

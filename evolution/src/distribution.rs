@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Algorithm, CheckpointError, Evolution, Genotype,
     algorithms::Strategy as _,
-    checkpoint::{decode, encode},
+    checkpoint::{VERSION, decode, encode},
 };
 
 /// What the genotypes of one generation are drawn from.
@@ -24,19 +24,19 @@ pub struct Distribution {
 }
 
 impl Evolution {
-    /// What the next generation is drawn from, as bytes in the format of checkpoints; none if
+    /// What the next generation is drawn from, as bytes in the format of keyframes; none if
     /// an algorithm does not draw individuals one by one.
     pub fn distribution(&self) -> Option<Vec<u8>> {
         let are_single = self.populations.iter().all(Algorithm::draws_one_by_one);
         let Self { seed, population_size, n_generations, populations, .. } = self;
-        are_single.then(|| encode(&(seed, population_size, n_generations, populations)))
+        are_single.then(|| encode(VERSION, &(seed, population_size, n_generations, populations)))
     }
 }
 
 impl Distribution {
     /// Reads what [`Evolution::distribution`] wrote.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CheckpointError> {
-        decode(bytes)
+        decode(VERSION, bytes)
     }
 
     /// The generation that is drawn from it.

@@ -51,12 +51,17 @@ mod champion;
 mod checkpoint;
 mod digest;
 mod distribution;
-mod interval;
+mod dynamics;
+mod fork;
+pub mod interval;
 mod judgement;
+mod lineage;
 mod ranking;
 mod reevaluation;
+mod replay;
 mod setup;
 mod statistics;
+mod told;
 
 use std::{ops::Range, sync::Arc};
 
@@ -65,17 +70,21 @@ use serde::{Deserialize, Serialize};
 
 pub use algorithms::ALGORITHMS;
 pub use champion::{Champion, ChampionSource, HeldOut, Judged};
-pub use checkpoint::{Advance, Checkpoint, CheckpointError};
+pub use checkpoint::{Checkpoint, CheckpointError};
 pub use digest::Digest;
 pub use distribution::Distribution;
+pub use dynamics::Dynamics;
 pub use experiment_file::AlgorithmParams;
+pub use fork::{Fork, ForkError};
 pub use judgement::Judgement;
+pub use lineage::{Ancestor, Birth, BirthOf, GeneSource, Operator, Parents, Pedigree};
 pub use reevaluation::Reevaluation;
+pub use replay::{Outcome, Replay, Round};
 pub use setup::{Setup, SetupError};
 pub use statistics::Statistics;
+pub use told::{End, Told};
 
 use algorithms::{Algorithm, Sample, Strategy as _};
-use checkpoint::Step;
 use distribution::stream_of;
 
 /// Genes in \[0, 1\].
@@ -101,9 +110,6 @@ pub struct Evolution {
     digest: Digest,
     /// Covers every re-evaluation so far, and the generations before it.
     champion_digest: Digest,
-    /// What led here from the generation before; none if it was restored.
-    #[serde(skip)]
-    step: Option<Step>,
 }
 
 /// A generation whose fitness is to be computed.
@@ -179,7 +185,6 @@ impl Evolution {
             challenger: None,
             digest,
             champion_digest: Digest::default(),
-            step: None,
         }
     }
 
@@ -203,6 +208,21 @@ impl Evolution {
     /// generations before them, too.
     pub fn champion_digest(&self) -> Digest {
         self.champion_digest
+    }
+
+    /// Whether another one has the same seed, as many individuals, and populations with the
+    /// same numbers of genes.
+    pub fn has_shape_of(&self, other: &Self) -> bool {
+        let n_genes = |it: &Self| it.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>();
+        (self.seed, self.population_size) == (other.seed, other.population_size)
+            && n_genes(self) == n_genes(other)
+    }
+
+    /// The mean of the distribution after the latest generation, as a genotype; none if a
+    /// population's algorithm has no distribution.
+    pub fn mean(&self) -> Option<Genotype> {
+        let means: Option<Vec<Genotype>> = self.populations.iter().map(Algorithm::mean).collect();
+        means.map(|means| means.concat())
     }
 
     /// Draws the next generation. Asking twice gives the same.
@@ -263,7 +283,6 @@ impl Evolution {
         }
         self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
-        self.step = Some(Step { trial_fitness: trial_fitness.to_vec(), blocks: Vec::new() });
         Ok(GenerationSummary {
             generation: index,
             statistics: Statistics::of(&fitness),
@@ -277,11 +296,10 @@ impl Evolution {
     pub fn reevaluation(&self) -> Option<Reevaluation> {
         let generation = self.n_generations.checked_sub(1)?;
         let incumbent = self.champion.clone().filter(|champion| champion.held_out.is_some());
-        let means: Option<Vec<Genotype>> = self.populations.iter().map(Algorithm::mean).collect();
-        let mean = means.map(|means| Champion {
+        let mean = self.mean().map(|genotype| Champion {
             generation,
             source: ChampionSource::Mean,
-            genotype: means.concat(),
+            genotype,
             trial_fitness: Vec::new(),
             held_out: None,
             judged: None,
@@ -298,9 +316,6 @@ impl Evolution {
             self.champion = Some(winner.clone());
         }
         self.challenger = None;
-        if let Some(step) = &mut self.step {
-            step.blocks.extend_from_slice(reevaluation.blocks());
-        }
         self.champion_digest = digest;
     }
 

@@ -80,8 +80,8 @@ impl Reevaluation {
         self.participants = self.next_participants();
     }
 
-    /// The fitness of all blocks so far.
-    pub(crate) fn blocks(&self) -> &[Vec<Vec<f64>>] {
+    /// The fitness of all blocks so far, as [`learn`](Self::learn) took it.
+    pub fn blocks(&self) -> &[Vec<Vec<f64>>] {
         &self.blocks
     }
 

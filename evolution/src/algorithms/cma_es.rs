@@ -68,6 +68,16 @@ impl CmaEs {
 }
 
 impl Strategy for CmaEs {
+    fn n_genes(&self) -> usize {
+        self.mean.len()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        let sigma = self.cumulation.sigma;
+        let covariance = self.covariance.to_dense();
+        Some(covariance.diagonal().iter().map(|variance| sigma * variance.sqrt()).collect())
+    }
+
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mean)
     }

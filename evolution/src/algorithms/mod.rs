@@ -18,16 +18,16 @@ mod xnes;
 
 use std::iter;
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
-use super::{Genotype, Population};
+use super::{Birth, Genotype, Population};
 /// Declares the algorithms: the state of each, its description, its start.
 macro_rules! registry {
     ($($(#[$doc:meta])* $module:ident::$name:ident,)*) => {
         /// The algorithms, each with its state. A variant's name is part of the
-        /// format of checkpoints.
+        /// format of keyframes.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub enum Algorithm {
             $($(#[$doc])* $name($module::$name),)*
@@ -45,6 +45,13 @@ macro_rules! registry {
                     return Some(Self::$name(Described::start(params, d)));
                 })*
                 None
+            }
+
+            /// The largest of what it keeps between generations.
+            pub fn keeps(&self) -> Keeps {
+                match self {
+                    $(Self::$name(_) => <$module::$name as Described>::DESCRIPTION.keeps,)*
+                }
             }
 
             fn strategy(&self) -> &dyn Strategy {
@@ -100,8 +107,17 @@ impl Sample {
 /// An algorithm between two generations. Its state is plain numbers: whoever
 /// restores it draws and learns the same bits.
 pub trait Strategy {
+    /// Genes of an individual.
+    fn n_genes(&self) -> usize;
+
     /// The mean of the distribution, if the algorithm has one.
     fn mean(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// The standard deviation of every gene, before it is put back into \[0, 1\], if the
+    /// algorithm has a distribution.
+    fn deviations(&self) -> Option<Vec<f64>> {
         None
     }
 
@@ -123,6 +139,12 @@ pub trait Strategy {
         _population_size: usize,
         _rng: &mut Stream,
     ) -> Option<Genotype> {
+        None
+    }
+
+    /// From whom the individuals come that [`sample`](Self::sample) draws from the same
+    /// stream; none if they have no parents.
+    fn births(&self, _population_size: usize, _rng: &mut Stream) -> Option<Vec<Birth>> {
         None
     }
 
@@ -154,6 +176,14 @@ impl Algorithm {
 }
 
 impl Strategy for Algorithm {
+    fn n_genes(&self) -> usize {
+        self.strategy().n_genes()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        self.strategy().deviations()
+    }
+
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         self.strategy().sample(population_size, rng)
     }
@@ -169,6 +199,10 @@ impl Strategy for Algorithm {
         rng: &mut Stream,
     ) -> Option<Genotype> {
         self.strategy().individual(index, population_size, rng)
+    }
+
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        self.strategy().births(population_size, rng)
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {

@@ -81,6 +81,14 @@ impl OpenAiEs {
 }
 
 impl Strategy for OpenAiEs {
+    fn n_genes(&self) -> usize {
+        self.mu.len()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        Some(vec![self.sigma; self.mu.len()])
+    }
+
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mu)
     }

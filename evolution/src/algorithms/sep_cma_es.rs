@@ -61,6 +61,15 @@ impl SepCmaEs {
 }
 
 impl Strategy for SepCmaEs {
+    fn n_genes(&self) -> usize {
+        self.mean.len()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        let sigma = self.cumulation.sigma;
+        Some(self.variances.iter().map(|variance| sigma * variance.sqrt()).collect())
+    }
+
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mean)
     }

@@ -58,6 +58,14 @@ impl Snes {
 }
 
 impl Strategy for Snes {
+    fn n_genes(&self) -> usize {
+        self.mu.len()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        Some(self.sigma.clone())
+    }
+
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mu)
     }

@@ -75,6 +75,17 @@ impl Xnes {
 }
 
 impl Strategy for Xnes {
+    fn n_genes(&self) -> usize {
+        self.mu.len()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        let d = self.mu.len();
+        let row = |j: usize| self.shape.iter().skip(j).step_by(d);
+        let length = |j| row(j).map(|b| b * b).sum::<f64>().sqrt();
+        Some((0..d).map(|j| self.sigma * length(j)).collect())
+    }
+
     fn mean(&self) -> Option<&[f64]> {
         Some(&self.mu)
     }

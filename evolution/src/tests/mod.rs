@@ -3,7 +3,9 @@
 mod canonical;
 mod convergence;
 mod documentation;
+mod fork;
 mod honesty;
+mod lineage;
 mod reference;
 mod suite;
 
@@ -276,24 +278,27 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
     }
 }
 
-/// Databases have checkpoints of this format: whoever changes it changes its version, too.
+/// Databases have keyframes and logs of this format: whoever changes one changes its version,
+/// too, and reads the former.
 #[test]
-fn the_format_of_checkpoints_stays() {
-    let mut evolution = evolution(3, &[2]);
-    let generation = evolution.ask();
-    evolution.tell(generation, &[vec![0.0], vec![2.0], vec![1.0]]).unwrap();
-    let Advance::Step(step) = evolution.advance() else { panic!("a step is shorter") };
+fn the_formats_of_keyframes_and_of_the_log_stay() {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let told = Told::of(vec![vec![0.0], vec![2.0], vec![1.0]]);
     assert_eq!(
-        hex(&step),
-        "010301000000000000000001000000000000004001000000000000f03f00",
-        "version, individuals, trials and their fitness, re-evaluations"
+        hex(&told.to_bytes()),
+        "020301000000000000000001000000000000004001000000000000f03f000000",
+        "version, individuals, trials and their fitness, re-evaluations; those at the end, judgement"
     );
+    let without_end = [&[1], &told.to_bytes()[1..30]].concat();
+    assert_eq!(Told::from_bytes(&without_end).unwrap(), told);
+
+    let mut evolution = evolution(3, &[2]);
+    evolution.replay(&told).unwrap();
     // Lengths, and everything that is not drawn.
-    let state = evolution.state();
-    assert_eq!(state.len(), 248);
+    let keyframe = evolution.keyframe();
+    assert_eq!(keyframe.len(), 248);
     assert_eq!(
-        hex(&state[..6]),
+        hex(&keyframe[..6]),
         "010b03010101",
         "version, seed, P, generations, populations, SNES"
     );
@@ -302,21 +307,51 @@ fn the_format_of_checkpoints_stays() {
 #[test]
 fn what_is_no_checkpoint_is_an_error() {
     let mut evolution = evolution(3, &[2]);
-    let state = evolution.state();
-    step(&mut evolution);
-    let Advance::Step(step) = evolution.advance() else { panic!("a step is shorter") };
-    let restore = |state: &[u8], steps: &[&[u8]]| {
-        let steps = steps.iter().map(|step| step.to_vec()).collect();
-        Evolution::restore(&Checkpoint { state: state.to_vec(), steps })
+    let keyframe = evolution.keyframe();
+    let told = Told::of(evaluate(&evolution.ask().genotypes));
+    evolution.replay(&told).unwrap();
+    let entry = told.to_bytes();
+    let restore = |keyframe: &[u8], log: &[&[u8]]| {
+        let log = log.iter().map(|entry| entry.to_vec()).collect();
+        Evolution::restore(&Checkpoint { keyframe: keyframe.to_vec(), log })
     };
-    assert_eq!(restore(&state, &[&step]).unwrap(), evolution);
+    assert_eq!(restore(&keyframe, &[&entry]).unwrap(), evolution);
     assert!(matches!(restore(b"", &[]), Err(CheckpointError::Malformed(_))));
-    assert!(matches!(restore(b"{}", &[]), Err(CheckpointError::Version { found: b'{' })));
-    assert!(matches!(restore(&state[..9], &[]), Err(CheckpointError::Malformed(_))));
-    assert!(matches!(restore(&state, &[&step[..9]]), Err(CheckpointError::Malformed(_))));
+    assert!(matches!(restore(b"{}", &[]), Err(CheckpointError::Version { found: b'{', .. })));
+    assert!(matches!(restore(&keyframe[..9], &[]), Err(CheckpointError::Malformed(_))));
+    assert!(matches!(restore(&keyframe, &[&entry[..9]]), Err(CheckpointError::Malformed(_))));
+    assert!(matches!(restore(&keyframe, &[&[3]]), Err(CheckpointError::Version { found: 3, .. })));
     // Of two individuals, and without a finite fitness.
-    let misfit = restore(&state, &[&[1, 2, 0, 0, 0]]);
-    assert!(matches!(misfit, Err(CheckpointError::Step { generation: 0 })), "{misfit:?}");
-    let hopeless = restore(&state, &[&[1, 3, 0, 0, 0, 0]]);
+    let misfit = restore(&keyframe, &[&[1, 2, 0, 0, 0]]);
+    assert!(matches!(misfit, Err(CheckpointError::Misfit { generation: 0 })), "{misfit:?}");
+    let hopeless = restore(&keyframe, &[&[1, 3, 0, 0, 0, 0]]);
     assert!(matches!(hopeless, Err(CheckpointError::Evolution(_))), "{hopeless:?}");
+}
+
+/// At the size of experiment A; `docs/data.md` has these numbers.
+#[test]
+fn keyframes_are_as_far_apart_as_time_and_room_allow() {
+    let interval = |algorithm: &str, population_size: usize, d: usize, n_trials: usize| {
+        let population = Algorithm::new(algorithm, &AlgorithmParams::default(), d).unwrap();
+        let mut evolution = evolution_of(vec![population], population_size);
+        let entry_len = population_size * (1 + 8 * n_trials);
+        let is_due = |evolution: &Evolution| evolution.is_keyframe_due(entry_len);
+        while !{
+            evolution.n_generations += 1;
+            is_due(&evolution)
+        } {}
+        evolution.n_generations
+    };
+    for (algorithm, expected) in [
+        ("GA", 150),
+        ("SNES", 150),
+        ("openaiES", 150),
+        ("sep-CMA-ES", 150),
+        ("CMA-ES", 12),
+        ("xNES", 12),
+    ] {
+        assert_eq!(interval(algorithm, 100, 455, 5), expected, "{algorithm}");
+    }
+    assert_eq!(interval("GA", 10_000, 455, 5), 88, "keyframes take as much room as the log");
+    assert_eq!(interval("CMA-ES", 100, 1000, 5), 61, "keyframes take 128 KiB per generation");
 }

@@ -13,7 +13,7 @@ use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{Described, Sample, Strategy};
-use crate::Genotype;
+use crate::{Birth, Genotype, Parents};
 use crossover::Crossover;
 use mutation::Mutation;
 use selection::Selection;
@@ -84,11 +84,12 @@ impl Described for Ga {
 }
 
 impl Ga {
-    /// The elite, then children. Each phase draws for all individuals before the
-    /// next one begins.
-    fn breed(&self, population_size: usize, rng: &mut Stream) -> Vec<Genotype> {
-        let mut population: Vec<Genotype> =
-            self.ranked.iter().take(self.n_elite).cloned().collect();
+    /// The elite, then children, all with their parents. Each phase draws for all individuals
+    /// before the next one begins.
+    fn breed(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        let elite = self.ranked.iter().take(self.n_elite).enumerate();
+        let mut population: Vec<(Genotype, Parents)> =
+            elite.map(|(rank, genes)| (genes.clone(), Parents::Elite(rank))).collect();
         let n_children = population_size - population.len();
         let mut parents = self.selection.select(n_children, &self.fitness, rng);
         shuffle(&mut parents, rng);
@@ -96,31 +97,53 @@ impl Ga {
         for pair in parents.chunks(2) {
             match *pair {
                 [a, b] if rng.bernoulli(self.crossover_prob) => {
-                    children.extend(self.crossover.cross(&self.ranked[a], &self.ranked[b], rng));
+                    let crossed = self.crossover.cross(&self.ranked[a], &self.ranked[b], rng);
+                    children.extend(crossed.map(|genes| (genes, Parents::Two(a, b))));
                 }
-                _ => children.extend(pair.iter().map(|&parent| self.ranked[parent].clone())),
+                _ => children
+                    .extend(pair.iter().map(|&one| (self.ranked[one].clone(), Parents::One(one)))),
             }
         }
-        for child in &mut children {
+        for (child, _) in &mut children {
             self.mutation.mutate(child, self.mutation_prob, rng);
             child.iter_mut().for_each(|gene| *gene = gene.clamp(0.0, 1.0));
         }
         population.extend(children);
         population
     }
+
+    /// The first generation, U(0, 1)^d.
+    fn begin(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        let mut genes = || (0..self.d).map(|_| rng.uniform()).collect();
+        (0..population_size).map(|_| (genes(), Parents::None)).collect()
+    }
+
+    fn draw(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        match self.ranked.is_empty() {
+            true => self.begin(population_size, rng),
+            false => self.breed(population_size, rng),
+        }
+    }
 }
 
 impl Strategy for Ga {
+    fn n_genes(&self) -> usize {
+        self.d
+    }
+
     /// The first generation is U(0, 1)^d. Later ones: the elite unchanged, then
     /// children of selected parents; a pair that does not cross, and an odd parent
     /// out, is its own children; every child mutates and is clipped to \[0, 1\].
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
-        let genotypes = if self.ranked.is_empty() {
-            (0..population_size).map(|_| (0..self.d).map(|_| rng.uniform()).collect()).collect()
-        } else {
-            self.breed(population_size, rng)
-        };
+        let drawn = self.draw(population_size, rng).into_iter();
+        let genotypes = drawn.map(|(genes, _)| genes).collect();
         Sample::new(genotypes, Vec::new())
+    }
+
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        let drawn = self.draw(population_size, rng).into_iter();
+        let parent = |rank: usize| &self.ranked[rank];
+        Some(drawn.map(|(genes, parents)| Birth::of(parents, &genes, parent)).collect())
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {

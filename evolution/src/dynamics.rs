@@ -1,0 +1,153 @@
+//! How evolution moves: what a generation did to the distribution, and how far its trials agree.
+
+use super::{CheckpointError, Digest, Evolution, Told, algorithms::Strategy as _};
+
+/// What a generation did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dynamics {
+    /// Its link of the digest chain.
+    pub digest: Digest,
+    /// Euclidean distance from the mean of the distribution before it to the one after it; none
+    /// without a distribution.
+    pub mean_step: Option<f64>,
+    /// Least, first quartile, median, third quartile and largest of the genes' standard
+    /// deviations after it; none without a distribution.
+    pub deviations: Option<[f64; 5]>,
+    /// Mean over all pairs of trials of Spearman's rank correlation between the individuals'
+    /// fitness in the two: 1 if all trials rank them alike, 0 if selection by a trial was luck.
+    /// None with fewer than two trials, or where a trial tells nobody apart.
+    pub rank_correlation: Option<f64>,
+}
+
+impl Evolution {
+    /// Goes through a generation again, and says what it did.
+    pub fn dynamics(&mut self, told: &Told) -> Result<Dynamics, CheckpointError> {
+        let before = self.mean();
+        let digest = self.replay(told)?.summary.digest;
+        let mean_step = before.zip(self.mean()).map(|(before, after)| {
+            let squares = before.iter().zip(&after).map(|(a, b)| (a - b) * (a - b));
+            squares.sum::<f64>().sqrt()
+        });
+        let of_each = self.populations.iter().map(|it| it.deviations());
+        let deviations: Option<Vec<Vec<f64>>> = of_each.collect();
+        Ok(Dynamics {
+            digest,
+            mean_step,
+            deviations: deviations.map(|it| quantiles(it.concat())),
+            rank_correlation: rank_correlation(&told.trial_fitness),
+        })
+    }
+}
+
+/// At 0, 1/4, 1/2, 3/4 and 1, by linear interpolation.
+fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
+    values.sort_by(f64::total_cmp);
+    let last = values.len() - 1;
+    [0, 1, 2, 3, 4].map(|quarter| {
+        let position = last * quarter;
+        let (below, rest) = (position / 4, (position % 4) as f64 / 4.0);
+        values[below] + rest * (values[last.min(below + 1)] - values[below])
+    })
+}
+
+/// `trial_fitness[i][t]`: of individual i in trial t. Individuals whose fitness is not finite in
+/// every trial are left out.
+fn rank_correlation(trial_fitness: &[Vec<f64>]) -> Option<f64> {
+    let finite: Vec<&Vec<f64>> =
+        trial_fitness.iter().filter(|trials| trials.iter().all(|it| it.is_finite())).collect();
+    let n_trials = finite.first()?.len();
+    let deviations: Vec<Vec<f64>> = (0..n_trials)
+        .filter_map(|trial| deviations_of_ranks(finite.iter().map(|of| of[trial]).collect()))
+        .collect();
+    if deviations.len() < n_trials || n_trials < 2 {
+        return None;
+    }
+    let mut sum = 0.0;
+    for (t, a) in deviations.iter().enumerate() {
+        for b in &deviations[..t] {
+            sum += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+    Some(sum / (n_trials * (n_trials - 1) / 2) as f64)
+}
+
+/// Ranks, equal values sharing theirs, minus their mean, scaled to length 1; none if all are
+/// equal.
+fn deviations_of_ranks(values: Vec<f64>) -> Option<Vec<f64>> {
+    let rank = |value: f64| {
+        let below = values.iter().filter(|&&other| other < value).count() as f64;
+        let equal = values.iter().filter(|&&other| other == value).count() as f64;
+        below + (equal - 1.0) / 2.0
+    };
+    let middle = (values.len() as f64 - 1.0) / 2.0;
+    let deviations: Vec<f64> = values.iter().map(|&value| rank(value) - middle).collect();
+    let length = deviations.iter().map(|it| it * it).sum::<f64>().sqrt();
+    (length > 0.0).then(|| deviations.into_iter().map(|it| it / length).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ALGORITHMS, Setup};
+
+    #[test]
+    fn trials_that_rank_alike_correlate_and_opposite_ones_do_not() {
+        let of = |trials: [[f64; 4]; 2]| {
+            let told: Vec<Vec<f64>> = (0..4).map(|i| vec![trials[0][i], trials[1][i]]).collect();
+            rank_correlation(&told)
+        };
+        let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
+        assert!(near(of([[1.0, 2.0, 3.0, 4.0], [1.0, 8.0, 9.0, 70.0]]), 1.0));
+        assert!(near(of([[1.0, 2.0, 3.0, 4.0], [4.0, 3.0, 2.0, 1.0]]), -1.0));
+        // Ranks 0, 1.5, 1.5, 3 and 0, 2, 1, 3: 4.5 / sqrt(4.5 * 5).
+        assert!(near(of([[1.0, 2.0, 2.0, 4.0], [1.0, 3.0, 2.0, 4.0]]), 0.948_683_298_050_513_8));
+        assert_eq!(of([[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 3.0, 4.0]]), None);
+        assert_eq!(rank_correlation(&[vec![1.0], vec![2.0]]), None);
+        assert_eq!(rank_correlation(&[vec![f64::NAN, 1.0]]), None);
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        assert_eq!(quantiles(vec![5.0, 1.0, 2.0, 4.0, 3.0]), [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(quantiles(vec![7.0]), [7.0; 5]);
+        assert_eq!(quantiles(vec![0.0, 1.0]), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    }
+
+    #[test]
+    fn every_distribution_says_how_far_it_went_and_how_wide_it_is() {
+        for algorithm in ALGORITHMS {
+            let mut evolution = Setup::new(algorithm.name, 6).start().unwrap();
+            let mut same = evolution.clone();
+            for _ in 0..3 {
+                let genotypes = evolution.ask().genotypes;
+                let told =
+                    Told::of(genotypes.iter().map(|genes| vec![genes[0], genes[1]]).collect());
+                let before = evolution.mean();
+                let found = evolution.dynamics(&told).unwrap();
+                same.replay(&told).unwrap();
+                assert_eq!((&same, found.digest), (&evolution, evolution.digest()));
+                let moved = before.zip(evolution.mean());
+                assert_eq!(found.mean_step.is_some(), moved.is_some(), "{}", algorithm.name);
+                assert_eq!(found.mean_step.is_some(), found.deviations.is_some());
+                assert!(found.mean_step.is_none_or(|step| step > 0.0 && step < 2.5));
+                let deviations = found.deviations.unwrap_or([1.0; 5]);
+                assert!(deviations.is_sorted() && deviations[0] > 0.0, "{}", algorithm.name);
+            }
+        }
+    }
+
+    #[test]
+    fn samples_have_the_deviations_that_are_said() {
+        for name in ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"] {
+            let setup = Setup { population_size: 4000, ..Setup::new(name, 2) };
+            let evolution = setup.start().unwrap();
+            let deviations = evolution.populations[0].deviations().unwrap();
+            let genotypes = evolution.ask().genotypes;
+            for (j, expected) in deviations.iter().enumerate() {
+                let genes: Vec<f64> = genotypes.iter().map(|genes| genes[j]).collect();
+                let found = crate::Statistics::of(&genes).standard_deviation;
+                assert!((found / expected - 1.0).abs() < 0.06, "{name}: {found} {expected}");
+            }
+        }
+    }
+}

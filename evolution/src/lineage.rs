@@ -1,0 +1,207 @@
+//! Lineage: whom an individual of a genetic algorithm descends from, and how long genes survive.
+//!
+//! Nothing of it is stored: whoever draws a generation again from the state before it knows
+//! the parents of each child, and finds its genes in them.
+
+use std::collections::BTreeMap;
+
+use super::{Evolution, Genotype, Told, distribution::stream_of, mean, ranking::ranking};
+use crate::algorithms::Strategy as _;
+
+/// Who an individual comes from, by rank in the generation before it, 0 for the best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parents {
+    /// Nobody: it is of the first generation.
+    None,
+    /// It is that individual, unchanged.
+    Elite(usize),
+    /// One that was not crossed.
+    One(usize),
+    /// Two that were crossed.
+    Two(usize, usize),
+}
+
+/// From whom a gene is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GeneSource {
+    /// The first parent has the same one.
+    First,
+    /// The second parent has the same one, and the first has not.
+    Second,
+    /// Nobody: it mutated, or is a blend of both.
+    New,
+}
+
+/// The birth of an individual.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Birth {
+    /// Its parents.
+    pub parents: Parents,
+    /// Per gene, from whom it is.
+    pub sources: Vec<GeneSource>,
+}
+
+impl Birth {
+    /// Of an individual with these genes; `parent`: the genes of a rank.
+    pub(crate) fn of<'a>(
+        parents: Parents,
+        genes: &[f64],
+        parent: impl Fn(usize) -> &'a Genotype,
+    ) -> Self {
+        let (first, second) = match parents {
+            Parents::None => (None, None),
+            Parents::Elite(rank) | Parents::One(rank) => (Some(parent(rank)), None),
+            Parents::Two(a, b) => (Some(parent(a)), Some(parent(b))),
+        };
+        let has = |of: Option<&Genotype>, j: usize| {
+            of.is_some_and(|of| of[j].to_bits() == genes[j].to_bits())
+        };
+        let source = |j| match () {
+            () if has(first, j) => GeneSource::First,
+            () if has(second, j) => GeneSource::Second,
+            () => GeneSource::New,
+        };
+        Self { parents, sources: (0..genes.len()).map(source).collect() }
+    }
+}
+
+/// An individual in the lineage of another one, which it is itself or an ancestor of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ancestor {
+    /// Its generation.
+    pub generation: u64,
+    /// Its index there.
+    pub individual: u32,
+    /// Its mean fitness.
+    pub fitness: f64,
+    /// How it was born; none in the earliest generation of the lineage.
+    pub birth: Option<BirthOf>,
+    /// Genes that the one whose lineage it is still has from it, by descent.
+    pub n_surviving: usize,
+}
+
+/// A birth, with parents by their index in the generation before.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BirthOf {
+    /// What was done.
+    pub operator: Operator,
+    /// Each parent's index, and the number of genes from it.
+    pub parents: Vec<(u32, usize)>,
+    /// Genes that mutated or were blended.
+    pub n_new: usize,
+}
+
+/// How a genotype came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operator {
+    /// Drawn at random, for the first generation.
+    First,
+    /// Kept unchanged.
+    Elite,
+    /// A parent that was not crossed, mutated.
+    Copy,
+    /// Two parents crossed, then mutated.
+    Crossover,
+}
+
+/// The births of some generations in one population, from which lineages are traced.
+#[derive(Debug, Clone, Default)]
+pub struct Pedigree {
+    first: u64,
+    /// From the generation `first` on: births, except in the first one, and fitness.
+    generations: Vec<(Vec<Birth>, Vec<f64>)>,
+}
+
+impl Evolution {
+    /// The births of the next generation, per population; none if one of them has no parents
+    /// but a distribution.
+    pub fn births(&self) -> Option<Vec<Vec<Birth>>> {
+        let births = self.populations.iter().enumerate().map(|(idx, population)| {
+            let mut rng = stream_of(self.seed, self.n_generations, idx as u64);
+            population.births(self.population_size, &mut rng)
+        });
+        births.collect()
+    }
+}
+
+impl Pedigree {
+    /// Before its first generation.
+    pub fn starting_at(first: u64) -> Self {
+        Self { first, generations: Vec::new() }
+    }
+
+    /// Adds the next generation: its births, and what was told of it.
+    pub fn push(&mut self, births: Vec<Birth>, told: &Told) {
+        let fitness = told.trial_fitness.iter().map(|trials| mean(trials)).collect();
+        self.generations.push((births, fitness));
+    }
+
+    /// The lineage of an individual of the latest generation: itself first, then its ancestors,
+    /// later generations first.
+    pub fn trace(&self, individual: u32) -> Vec<Ancestor> {
+        let mut ancestors = Vec::new();
+        // Per individual the genes that are still traced in it.
+        let mut traced: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (place, (births, fitness)) in self.generations.iter().enumerate().rev() {
+            if traced.is_empty() {
+                let n_genes = births.get(individual as usize).map_or(0, |it| it.sources.len());
+                traced.insert(individual, (0..n_genes).collect());
+            }
+            let mut before: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+            let individual_of = match place.checked_sub(1) {
+                Some(earlier) => ranked(&self.generations[earlier].1),
+                None => Vec::new(),
+            };
+            for (&individual, genes) in &traced {
+                let birth = (place > 0 || self.first == 0)
+                    .then(|| births.get(individual as usize))
+                    .flatten();
+                let birth = birth.map(|birth| {
+                    let parents = parents_of(birth, &individual_of);
+                    for (nth, &(parent, _)) in parents.iter().enumerate() {
+                        let source = [GeneSource::First, GeneSource::Second][nth];
+                        let kept = genes.iter().filter(|&&j| birth.sources[j] == source);
+                        before.entry(parent).or_default().extend(kept);
+                    }
+                    birth_of(birth, parents)
+                });
+                ancestors.push(Ancestor {
+                    generation: self.first + place as u64,
+                    individual,
+                    fitness: fitness[individual as usize],
+                    birth,
+                    n_surviving: genes.len(),
+                });
+            }
+            traced = before;
+        }
+        ancestors
+    }
+}
+
+/// The individuals whose fitness is finite, best first: only they have children.
+fn ranked(fitness: &[f64]) -> Vec<u32> {
+    let finite = ranking(fitness).into_iter().filter(|&i| fitness[i].is_finite());
+    finite.map(|i| i as u32).collect()
+}
+
+fn parents_of(birth: &Birth, individual_of: &[u32]) -> Vec<(u32, usize)> {
+    let n_from = |source| birth.sources.iter().filter(|&&it| it == source).count();
+    let first = |rank: usize| (individual_of[rank], n_from(GeneSource::First));
+    match birth.parents {
+        Parents::None => Vec::new(),
+        Parents::Elite(rank) | Parents::One(rank) => vec![first(rank)],
+        Parents::Two(a, b) => vec![first(a), (individual_of[b], n_from(GeneSource::Second))],
+    }
+}
+
+fn birth_of(birth: &Birth, parents: Vec<(u32, usize)>) -> BirthOf {
+    let operator = match birth.parents {
+        Parents::None => Operator::First,
+        Parents::Elite(_) => Operator::Elite,
+        Parents::One(_) => Operator::Copy,
+        Parents::Two(..) => Operator::Crossover,
+    };
+    let n_new = birth.sources.iter().filter(|&&it| it == GeneSource::New).count();
+    BirthOf { operator, parents, n_new }
+}

@@ -1,0 +1,114 @@
+//! Forks: what they share with their parents, and what they refuse.
+
+use super::*;
+
+const SIMULATION: &str = "test";
+
+fn parent(name: &str) -> ExperimentConfig {
+    config(name, 6, &["a", "b"])
+}
+
+/// After four generations and a re-evaluation.
+fn after_four(config: &ExperimentConfig) -> Evolution {
+    let mut evolution = Evolution::new(config, &segments(&[2, 3]), SIMULATION);
+    for _ in 0..4 {
+        step(&mut evolution);
+    }
+    let n_candidates = evolution.reevaluation().unwrap().candidates().len();
+    let fitness: Vec<f64> = (0..n_candidates).map(|i| i as f64).collect();
+    choose(&mut evolution, &fitness);
+    evolution
+}
+
+fn forked(parent: &ExperimentConfig, child: &ExperimentConfig) -> Result<Evolution, ForkError> {
+    let segments = segments(&[2, 3]);
+    let (parent_simulation, simulation) = (SIMULATION, SIMULATION);
+    let fork = Fork { parent, parent_simulation, child, segments: &segments, simulation };
+    after_four(parent).fork(&fork)
+}
+
+#[test]
+fn a_fork_that_changes_nothing_has_the_digests_of_its_parent() {
+    for algorithm in ALGORITHMS {
+        let parent = parent(algorithm.name);
+        let mut child = parent.clone();
+        child.name = "another name".to_owned();
+        child.algorithm.generations = 99;
+        let (mut original, mut fork) = (after_four(&parent), forked(&parent, &child).unwrap());
+        assert_eq!(fork, original, "{}", algorithm.name);
+        for _ in 0..3 {
+            assert_eq!(step(&mut fork).digest, step(&mut original).digest, "{}", algorithm.name);
+        }
+    }
+}
+
+#[test]
+fn where_a_fork_comes_from_and_what_is_changed_are_part_of_its_digests() {
+    let parent = parent("SNES");
+    let change = |change: fn(&mut ExperimentConfig)| {
+        let mut child = parent.clone();
+        change(&mut child);
+        forked(&parent, &child).unwrap()
+    };
+    let unchanged = change(|_| ());
+    let forks = [
+        change(|config| config.seed += 1),
+        change(|config| config.world.height = 500.0),
+        change(|config| config.algorithm.num_evaluations = 7),
+        change(|config| config.algorithm.population_size = 9),
+    ];
+    let digests = forks.iter().chain([&unchanged]).map(|fork| fork.digest().to_string());
+    assert_eq!(digests.collect::<std::collections::BTreeSet<_>>().len(), 5);
+    // The link of a fresh run of the same file is another one, too.
+    let mut other = parent.clone();
+    other.world.height = 500.0;
+    assert_ne!(forks[1].digest(), Digest::of_config(&other, SIMULATION));
+
+    assert_ne!(forks[0].ask().genotypes, unchanged.ask().genotypes, "another seed");
+    assert_eq!(forks[1].ask().genotypes, unchanged.ask().genotypes, "the state is the same");
+    assert_eq!(forks[3].ask().genotypes.len(), 9);
+    let has_champion: Vec<bool> = forks.iter().map(|fork| fork.champion().is_some()).collect();
+    assert_eq!(has_champion, [true, false, true, true], "only of the same task");
+}
+
+#[test]
+fn what_a_state_cannot_carry_is_refused_by_name_and_all_at_once() {
+    let parent = parent("SNES");
+    let mut child = config("xNES", 6, &["a", "b"]);
+    child.algorithm.generations = 4;
+    let params = AlgorithmParams::default().with("eta_mu", 0.5);
+    child.algorithm.populations.get_mut("b").unwrap().params = params;
+    let segments = segments(&[2, 4]);
+    let (parent_simulation, simulation) = (SIMULATION, SIMULATION);
+    let fork =
+        Fork { parent: &parent, parent_simulation, child: &child, segments: &segments, simulation };
+    let problems = after_four(&parent).fork(&fork).unwrap_err().problems;
+    let places: Vec<&str> = problems.iter().map(|it| it.split(':').next().unwrap()).collect();
+    assert_eq!(
+        places,
+        [
+            "algorithm.name",
+            "algorithm.generations",
+            "algorithm.populations.b.params",
+            "algorithm.populations.b",
+        ]
+    );
+    let error = forked(&parent, &config("SNES", 6, &["a", "c"])).unwrap_err().to_string();
+    assert!(error.starts_with("algorithm.populations: are a, c"), "{error}");
+}
+
+#[test]
+fn a_fork_of_another_version_of_the_simulation_begins_without_a_champion() {
+    let parent = parent("SNES");
+    let segments = segments(&[2, 3]);
+    let fork = Fork {
+        parent: &parent,
+        parent_simulation: SIMULATION,
+        child: &parent,
+        segments: &segments,
+        simulation: "test 2",
+    };
+    let fork = after_four(&parent).fork(&fork).unwrap();
+    assert_eq!(fork.champion(), None);
+    assert_ne!(fork.digest(), after_four(&parent).digest());
+}

@@ -1,0 +1,84 @@
+//! Lineages: parents have the genes that their children have from them.
+
+use super::*;
+use crate::{Operator, Pedigree, Setup};
+
+const D: usize = 12;
+
+fn params(crossover: &str) -> AlgorithmParams {
+    AlgorithmParams::default().with("crossover_operator", crossover).with("num_elite", 2u32)
+}
+
+/// Some generations of a GA: their genotypes, and the births of those after the first.
+fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
+    let setup =
+        Setup { population_size: 15, seed: 5, params: params(crossover), ..Setup::new("GA", D) };
+    let mut evolution = setup.start().unwrap();
+    let mut pedigree = Pedigree::starting_at(0);
+    let mut genotypes = Vec::new();
+    for _ in 0..n_generations {
+        let asked = evolution.ask();
+        let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
+        let mut told = Told::of(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
+        // Whoever's fitness is not finite is nobody's parent.
+        told.trial_fitness[4][0] = f64::NAN;
+        genotypes.push(asked.genotypes);
+        pedigree.push(births, &told);
+        evolution.replay(&told).unwrap();
+    }
+    (genotypes, pedigree)
+}
+
+#[test]
+fn genes_are_from_the_parents_that_are_named() {
+    for crossover in ["uniform", "onepoint", "multipoint", "blxalpha", "simulated_binary"] {
+        let (genotypes, pedigree) = bred(crossover, 6);
+        for individual in 0..15 {
+            let lineage = pedigree.trace(individual);
+            assert_eq!((lineage[0].generation, lineage[0].individual), (5, individual));
+            assert_eq!(lineage[0].n_surviving, D);
+            assert!(lineage.iter().all(|it| it.individual != 4 || it.generation == 5));
+            for ancestor in &lineage {
+                let genes = &genotypes[ancestor.generation as usize][ancestor.individual as usize];
+                let birth = ancestor.birth.as_ref().unwrap();
+                let n_kept: usize = birth.parents.iter().map(|(_, n)| n).sum();
+                assert_eq!(n_kept + birth.n_new, D, "{crossover}: {ancestor:?}");
+                for &(parent, n) in &birth.parents {
+                    let of = &genotypes[ancestor.generation as usize - 1][parent as usize];
+                    let n_same = genes.iter().zip(of).filter(|(a, b)| a == b).count();
+                    assert!(n_same >= n, "{crossover}: {ancestor:?}");
+                }
+                if birth.operator == Operator::Elite {
+                    assert_eq!(birth.parents[0].1, D);
+                }
+                let focal = &genotypes[5][individual as usize];
+                let n_same = focal.iter().zip(genes).filter(|(a, b)| a == b).count();
+                assert!(n_same >= ancestor.n_surviving, "{crossover}: {ancestor:?}");
+            }
+            for generation in 0..5 {
+                let of = lineage.iter().filter(|it| it.generation == generation);
+                assert!(of.map(|it| it.n_surviving).sum::<usize>() <= D);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
+    let (_, whole) = bred("uniform", 3);
+    let first = whole.trace(0).last().unwrap().clone();
+    assert_eq!((first.generation, first.birth.unwrap().operator), (0, Operator::First));
+    let mut evolution = Setup { population_size: 9, ..Setup::new("GA", D) }.start().unwrap();
+    let mut later = Pedigree::starting_at(1);
+    for generation in 0..3 {
+        let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
+        let told = Told::of(evaluate(&evolution.ask().genotypes));
+        if generation > 0 {
+            later.push(births, &told);
+        }
+        evolution.replay(&told).unwrap();
+    }
+    let lineage = later.trace(8);
+    assert!(lineage.iter().all(|it| it.birth.is_some() == (it.generation == 2)));
+    assert!(Setup::new("SNES", D).start().unwrap().births().is_none());
+}
