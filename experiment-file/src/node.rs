@@ -17,6 +17,29 @@ use crate::{NamedMap, ParameterValue, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
+/// What a number is as a whole one.
+enum Whole {
+    Number(u64),
+    /// Negative, or more than 64 bits.
+    OutOfRange,
+    Not,
+}
+
+/// JSON Schema takes `32.0` and `1e3` for whole numbers, too.
+fn whole_number(text: &str) -> Whole {
+    /// Above, not every whole number is an f64.
+    const EXACT_MAX: f64 = (1_u64 << 53) as f64;
+    if let Ok(number) = text.parse() {
+        return Whole::Number(number);
+    }
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number.fract() != 0.0 => Whole::Not,
+        Ok(number) if (0.0..=EXACT_MAX).contains(&number) => Whole::Number(number as u64),
+        Ok(_) => Whole::OutOfRange,
+        Err(_) => Whole::Not,
+    }
+}
+
 /// One value of the file; or, after a problem, a silent stand-in for one.
 pub(crate) struct Node<'a> {
     report: &'a Report<'a>,
@@ -99,12 +122,9 @@ impl<'a> Node<'a> {
             return min;
         };
         let found = Excerpt(literal.value);
-        let digits = literal.value.strip_prefix('-').unwrap_or(literal.value);
-        match literal.value.parse() {
-            Ok(number) if range.contains(&number) => return number,
-            _ if !digits.bytes().all(|byte| byte.is_ascii_digit()) => {
-                self.problem(format!("expected a whole number, found {found}"));
-            }
+        match whole_number(literal.value) {
+            Whole::Number(number) if range.contains(&number) => return number,
+            Whole::Not => self.problem(format!("expected a whole number, found {found}")),
             _ if min == max => self.problem(format!("must be {min}, is {found}")),
             _ => self.problem(format!("must be between {min} and {max}, is {found}")),
         }

@@ -211,8 +211,15 @@ impl Stream {
     /// Fills `values` with what [`normal`](Self::normal) would draw one by one, to
     /// the bit, in less than half the time.
     pub fn fill_normal(&mut self, values: &mut [f64]) {
+        self.fill_probability(values);
+        standard_normal_quantiles(values);
+    }
+
+    /// Fills `values` with numbers that are uniform in (0, 1), and that
+    /// [`standard_normal_quantiles`] makes those of [`fill_normal`](Self::fill_normal): for
+    /// what draws few numbers each from many streams.
+    pub fn fill_probability(&mut self, values: &mut [f64]) {
         values.fill_with(|| self.probability());
-        Isa::best().run(StandardNormalQuantiles(values));
     }
 
     /// Uniform in (0, 1).
@@ -238,6 +245,11 @@ pub fn sample(weights: &[f64], u: f64) -> usize {
 
 const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
 const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
+
+/// Replaces probabilities in (0, 1) by the quantiles of N(0, 1) there.
+pub fn standard_normal_quantiles(probabilities: &mut [f64]) {
+    Isa::best().run(StandardNormalQuantiles(probabilities));
+}
 
 /// Quantile of N(0, 1) at `p` in (0, 1); Wichura, "Algorithm AS 241: The
 /// Percentage Points of the Normal Distribution", Applied Statistics 37 (1988),
@@ -279,7 +291,7 @@ impl WithSimd for StandardNormalQuantiles<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        const N: usize = 64;
+        const N: usize = 16;
         for values in self.0.chunks_mut(N) {
             let mut probabilities = [0.5; N];
             probabilities[..values.len()].copy_from_slice(values);

@@ -29,7 +29,8 @@ impl Drive {
         let turn = turn * self.step_duration;
         // The chord of the arc: 2 r sin(turn / 2), with r = length / turn, in the
         // direction half-way between the headings.
-        let chord = speed * self.step_duration * sinc(0.5 * turn);
+        let length = speed * self.step_duration;
+        let chord = if length == 0.0 { 0.0 } else { length * sinc(0.5 * turn) };
         let way = if chord == 0.0 { Vec2::default() } else { Vec2::unit(heading + 0.5 * turn) };
         let way = Vec2 { x: chord * way.x, y: chord * way.y };
         let position = torus.wrap(Vec2 { x: position.x + way.x, y: position.y + way.y });

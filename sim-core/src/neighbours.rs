@@ -4,11 +4,17 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::polar::{self, Polar};
+use pulp::{Simd, WithSimd};
+
+use crate::polar;
 use crate::torus::{Torus, Vec2, wrap_angle};
+use numeric::Isa;
 
 /// Swarms up to this size are searched without a grid.
 const MAX_WITHOUT_GRID: usize = 64;
+/// Robots whose neighbours are found, and then located, together: few enough for what is noted of
+/// them to stay in the cache.
+const N_ROBOTS_AT_ONCE: usize = 128;
 /// Cells per axis, at most: memory, not speed.
 const MAX_CELLS: usize = 256;
 
@@ -31,71 +37,73 @@ impl Neighbour {
     }
 }
 
-/// The neighbours of every robot, robot by robot, each one's by their indices.
+/// The neighbours of every robot, robot by robot, each one's in no particular order.
 #[derive(Debug, Clone)]
 pub(crate) struct Neighbours {
     /// Distance within which robots are neighbours, cm.
     reach: f64,
+    /// The largest square of such a distance.
+    reach_squared: f64,
+    found: Found,
+    grid: Grid,
+}
+
+/// Who is near whom. There may be room for more.
+#[derive(Debug, Clone, Default)]
+struct Found {
     /// The first neighbour of each robot, and the end.
     first: Vec<usize>,
     /// Who they are.
     robots: Vec<u32>,
-    /// Where they are.
-    polar: Polar,
-    grid: Grid,
-    /// Scratch: those of one robot.
-    found: Vec<Found>,
-}
-
-/// A neighbour of some robot.
-#[derive(Debug, Clone, Copy, Default)]
-struct Found {
-    robot: u32,
-    /// How it is displaced.
-    away: Vec2,
-    rho: f64,
+    /// How far they are, cm.
+    rho: Vec<f64>,
+    /// Their directions in the world's frame, in \[0, 2 pi).
+    bearing: Vec<f64>,
+    /// Scratch: where those that were found last are, cm.
+    away_x: Vec<f64>,
+    away_y: Vec<f64>,
 }
 
 impl Neighbours {
     /// Before the first [`update`](Self::update): no robot has a neighbour.
     pub fn new(reach: f64, n_robots: usize) -> Self {
-        Self {
-            reach,
-            first: vec![0; n_robots + 1],
-            robots: Vec::new(),
-            polar: Polar::default(),
-            grid: Grid::default(),
-            found: Vec::new(),
-        }
+        let first = vec![0; n_robots + 1];
+        let found = Found { first, ..Found::default() };
+        Self { reach, reach_squared: largest_square(reach), found, grid: Grid::default() }
     }
 
     /// Places of a robot's neighbours.
     pub fn places(&self, robot: usize) -> Range<usize> {
-        self.first[robot]..self.first[robot + 1]
+        self.found.first[robot]..self.found.first[robot + 1]
     }
 
     /// The neighbour at a place.
     pub fn get(&self, place: usize) -> Neighbour {
         Neighbour {
-            robot: self.robots[place] as usize,
-            rho: self.polar.rho[place],
-            bearing: self.polar.bearing[place],
+            robot: self.found.robots[place] as usize,
+            rho: self.found.rho[place],
+            bearing: self.found.bearing[place],
         }
     }
 
-    /// The neighbours of a robot, by their indices.
+    /// The neighbours of a robot.
     pub fn of(&self, robot: usize) -> impl Iterator<Item = Neighbour> {
         self.places(robot).map(|place| self.get(place))
     }
 
+    /// Who the neighbours at some places are.
+    pub fn robots(&self, places: Range<usize>) -> &[u32] {
+        &self.found.robots[places]
+    }
+
     /// Directions of the neighbours at some places.
     pub fn bearings(&self, places: Range<usize>) -> &[f64] {
-        &self.polar.bearing[places]
+        &self.found.bearing[places]
     }
 
     /// Distances of the neighbours at some places.
     pub fn distances(&self, places: Range<usize>) -> &[f64] {
-        &self.polar.rho[places]
+        &self.found.rho[places]
     }
 
     /// Finds everybody's neighbours.
@@ -103,35 +111,152 @@ impl Neighbours {
         if self.reach == 0.0 {
             return; // no robot senses another one
         }
-        let n_robots = positions.len();
-        let has_grid = n_robots > MAX_WITHOUT_GRID && self.grid.sort(torus, self.reach, positions);
+        let has_grid =
+            positions.len() > MAX_WITHOUT_GRID && self.grid.sort(torus, self.reach, positions);
         if !has_grid {
             self.grid.keep(positions);
         }
-        let Self { reach, first, robots, polar: Polar { x, y, rho, .. }, grid, found } = self;
-        robots.clear();
-        x.clear();
-        y.clear();
-        rho.clear();
-        for (robot, &from) in positions.iter().enumerate() {
-            found.clear();
+        let Self { reach_squared, found, grid, .. } = self;
+        let grid = &*grid;
+        let reach_squared = *reach_squared;
+        for start in (0..positions.len()).step_by(N_ROBOTS_AT_ONCE) {
+            let robots = start..positions.len().min(start + N_ROBOTS_AT_ONCE);
+            let search = Search {
+                torus,
+                reach_squared,
+                positions,
+                robots: robots.clone(),
+                grid,
+                has_grid,
+                found,
+            };
+            Isa::best().run(search);
+            found.locate(robots);
+        }
+    }
+}
+
+/// The largest number whose square root is not above `reach`.
+fn largest_square(reach: f64) -> f64 {
+    let mut square = reach * reach;
+    while square.sqrt() > reach {
+        square = square.next_down();
+    }
+    while square.next_up().sqrt() <= reach {
+        square = square.next_up();
+    }
+    square
+}
+
+/// The search for everybody's neighbours.
+struct Search<'a> {
+    torus: &'a Torus,
+    reach_squared: f64,
+    positions: &'a [Vec2],
+    /// Those whose neighbours are searched for.
+    robots: Range<usize>,
+    grid: &'a Grid,
+    has_grid: bool,
+    found: &'a mut Found,
+}
+
+impl WithSimd for Search<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Self { torus, reach_squared, positions, robots, grid, has_grid, found } = self;
+        let first = found.first[robots.start];
+        let mut n_found = 0;
+        for robot in robots {
+            let from = positions[robot];
+            let near = Near { torus, reach_squared, robot: robot as u32, from, first };
             if has_grid {
                 for cells in grid.around(torus, from) {
-                    search(torus, *reach, from, grid.robots.slice(cells), found);
+                    n_found = near.search(&grid.robots, cells, found, n_found);
                 }
-                found.sort_unstable_by_key(|found| found.robot);
             } else {
-                search(torus, *reach, from, grid.robots.slice(0..n_robots), found);
+                n_found = near.search(&grid.robots, 0..positions.len(), found, n_found);
             }
-            for other in found.iter().filter(|other| other.robot as usize != robot) {
-                robots.push(other.robot);
-                x.push(other.away.x);
-                y.push(other.away.y);
-                rho.push(other.rho);
-            }
-            first[robot + 1] = robots.len();
+            found.first[robot + 1] = first + n_found;
         }
-        polar::bearings(&mut self.polar);
+    }
+}
+
+impl Found {
+    /// Makes room for so many, of whom `n_new` have yet to be located.
+    fn make_room(&mut self, n: usize, n_new: usize) {
+        self.robots.resize(n.max(self.robots.len()), 0);
+        self.away_x.resize(n_new.max(self.away_x.len()), 0.0);
+        self.away_y.resize(n_new.max(self.away_y.len()), 0.0);
+    }
+
+    /// Computes how far the neighbours of some robots are, and where.
+    fn locate(&mut self, robots: Range<usize>) {
+        let places = self.first[robots.start]..self.first[robots.end];
+        self.rho.resize(self.robots.len(), 0.0);
+        self.bearing.resize(self.robots.len(), 0.0);
+        let (x, y) = (&self.away_x[..places.len()], &self.away_y[..places.len()]);
+        polar::complete(x, y, &mut self.rho[places.clone()], &mut self.bearing[places]);
+    }
+}
+
+/// What is near a robot.
+struct Near<'a> {
+    torus: &'a Torus,
+    reach_squared: f64,
+    robot: u32,
+    from: Vec2,
+    /// The place of the first neighbour that is not yet located.
+    first: usize,
+}
+
+/// Robots that are looked at together: so many numbers fit into the longest vector.
+const N_AT_ONCE: usize = 8;
+
+impl Near<'_> {
+    /// Writes those of a range of robots that are near after the `n_found` that are not yet
+    /// located; returns how many these are now.
+    ///
+    /// Which ones are is not to be foreseen, so there is no branch: each is noted, and the next
+    /// one over it unless it is near.
+    #[inline(always)]
+    fn search(
+        &self,
+        others: &Placed,
+        range: Range<usize>,
+        found: &mut Found,
+        mut n_found: usize,
+    ) -> usize {
+        let Self { torus, reach_squared, robot, from, first } = *self;
+        let n_then = n_found + range.len();
+        if found.robots.len() < first + n_then || found.away_x.len() < n_then {
+            found.make_room(2 * (first + n_then), 2 * n_then);
+        }
+        for start in range.clone().step_by(N_AT_ONCE) {
+            let places = start..start + N_AT_ONCE;
+            let (xs, ys) = (&others.x[places.clone()], &others.y[places.clone()]);
+            let (mut away_x, mut away_y) = ([0.0; N_AT_ONCE], [0.0; N_AT_ONCE]);
+            let mut squares = [0.0; N_AT_ONCE];
+            for i in 0..N_AT_ONCE {
+                let away = torus.displacement(from, Vec2 { x: xs[i], y: ys[i] });
+                (away_x[i], away_y[i]) = (away.x, away.y);
+                squares[i] = away.x * away.x + away.y * away.y;
+            }
+            let robots = &others.robots[start..range.end.min(places.end)];
+            let (mut near, mut n_near) = ([0; N_AT_ONCE], 0);
+            for (i, (&other, square)) in robots.iter().zip(squares).enumerate() {
+                near[n_near % N_AT_ONCE] = i;
+                n_near += usize::from((square <= reach_squared) & (other != robot));
+            }
+            for &i in &near[..n_near] {
+                found.robots[first + n_found] = robots[i];
+                found.away_x[n_found] = away_x[i % N_AT_ONCE];
+                found.away_y[n_found] = away_y[i % N_AT_ONCE];
+                n_found += 1;
+            }
+        }
+        n_found
     }
 }
 
@@ -143,46 +268,18 @@ struct Placed {
     y: Vec<f64>,
 }
 
-/// Some of them.
-#[derive(Clone, Copy)]
-struct PlacedSlice<'a> {
-    robots: &'a [u32],
-    x: &'a [f64],
-    y: &'a [f64],
-}
-
 impl Placed {
+    /// As many as `n`, and room to look at the last ones in whole vectors.
     fn resize(&mut self, n: usize) {
         self.robots.resize(n, 0);
-        self.x.resize(n, 0.0);
-        self.y.resize(n, 0.0);
+        self.x.resize(n + N_AT_ONCE, 0.0);
+        self.y.resize(n + N_AT_ONCE, 0.0);
     }
 
     fn set(&mut self, index: usize, robot: usize, position: Vec2) {
         self.robots[index] = robot as u32;
         (self.x[index], self.y[index]) = (position.x, position.y);
     }
-
-    fn slice(&self, range: Range<usize>) -> PlacedSlice<'_> {
-        let Self { robots, x, y } = self;
-        PlacedSlice { robots: &robots[range.clone()], x: &x[range.clone()], y: &y[range] }
-    }
-}
-
-/// Adds those that are within `reach` of a position, which may be one of theirs.
-///
-/// Which ones are is not to be foreseen, so there is no branch: each is written down, and
-/// the next one over it unless it is near.
-fn search(torus: &Torus, reach: f64, from: Vec2, others: PlacedSlice<'_>, found: &mut Vec<Found>) {
-    let mut n_found = found.len();
-    found.resize(n_found + others.robots.len(), Found::default());
-    for ((&robot, &x), &y) in others.robots.iter().zip(others.x).zip(others.y) {
-        let away = torus.displacement(from, Vec2 { x, y });
-        let rho = away.norm();
-        found[n_found] = Found { robot, away, rho };
-        n_found += usize::from(rho <= reach);
-    }
-    found.truncate(n_found);
 }
 
 /// Robots by cells of the plane.
@@ -234,23 +331,30 @@ impl Grid {
     }
 
     /// Where the robots in the cells around a position are.
-    fn around(&self, torus: &Torus, position: Vec2) -> impl Iterator<Item = Range<usize>> {
+    #[inline(always)]
+    fn around(&self, torus: &Torus, position: Vec2) -> [Range<usize>; 6] {
         let (column, row) = self.column_and_row(torus, position);
-        let rows = [row + self.n_rows - 1, row, row + 1];
-        rows.into_iter().flat_map(move |row| {
-            let row = row % self.n_rows * self.n_columns;
-            // Neighbouring cells of a row are neighbours in memory, but for the seam.
-            let last = self.n_columns - 1;
-            let (middle, beyond) = match column {
-                0 => (0..2, Some(last)),
-                column if column == last => (last - 1..last + 1, Some(0)),
-                column => (column - 1..column + 2, None),
-            };
-            let beyond = beyond.map(|column| column..column + 1);
-            std::iter::once(middle)
-                .chain(beyond)
-                .map(move |columns| self.first[row + columns.start]..self.first[row + columns.end])
-        })
+        // Neighbouring cells of a row are neighbours in memory, but for the seam.
+        let last = self.n_columns - 1;
+        let (middle, beyond) = match column {
+            0 => (0..2, last..last + 1),
+            column if column == last => (last - 1..last + 1, 0..1),
+            column => (column - 1..column + 2, 0..0),
+        };
+        let above = if row == 0 { self.n_rows - 1 } else { row - 1 };
+        let below = if row + 1 == self.n_rows { 0 } else { row + 1 };
+        let robots = |row: usize, columns: &Range<usize>| {
+            let first = &self.first[row * self.n_columns..];
+            first[columns.start]..first[columns.end]
+        };
+        [
+            robots(above, &middle),
+            robots(row, &middle),
+            robots(below, &middle),
+            robots(above, &beyond),
+            robots(row, &beyond),
+            robots(below, &beyond),
+        ]
     }
 
     fn cell(&self, torus: &Torus, position: Vec2) -> usize {
@@ -308,14 +412,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn everybody_within_reach_is_found_once_and_in_order(
+        fn everybody_within_reach_is_found_once(
             points in prop::collection::vec((0.0..1000.0, 0.0..600.0), 0..200),
             reach in prop::sample::select(vec![1.0, 40.0, 199.9, 200.0, 250.0, 2000.0]),
         ) {
             let positions: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
             let neighbours = neighbours(&positions, reach);
             for (robot, &position) in positions.iter().enumerate() {
-                let found: Vec<usize> = neighbours.of(robot).map(|n| n.robot).collect();
+                let mut found: Vec<usize> = neighbours.of(robot).map(|n| n.robot).collect();
+                found.sort_unstable();
                 let others = (0..positions.len()).filter(|&other| {
                     other != robot && TORUS.distance(position, positions[other]) <= reach
                 });

@@ -1,35 +1,27 @@
-//! Directions of many points at once.
+//! Polar coordinates of many points at once.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use pulp::{Simd, WithSimd};
 
+use crate::torus::Vec2;
 use numeric::Isa;
 
-/// Points (x, y), cm, and their polar coordinates.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Polar {
-    pub x: Vec<f64>,
-    pub y: Vec<f64>,
-    /// Distance from the origin, cm.
-    pub rho: Vec<f64>,
-    /// Direction seen from the origin, in \[0, 2 pi); 0 for the origin itself.
-    pub bearing: Vec<f64>,
+/// Computes the polar coordinates of points (x, y), cm: `rho`, their distance from the origin,
+/// cm, and `bearing`, their direction seen from it, in \[0, 2 pi), 0 for the origin itself. All
+/// slices have the same length.
+pub(crate) fn complete(x: &[f64], y: &[f64], rho: &mut [f64], bearing: &mut [f64]) {
+    Isa::best().run(Complete { x, y, rho, bearing });
 }
 
-/// Computes `bearing` from `x` and `y`.
-pub(crate) fn bearings(Polar { x, y, bearing, .. }: &mut Polar) {
-    bearing.resize(x.len(), 0.0);
-    Isa::best().run(Bearings { x, y, bearing });
-}
-
-struct Bearings<'a> {
+struct Complete<'a> {
     x: &'a [f64],
     y: &'a [f64],
+    rho: &'a mut [f64],
     bearing: &'a mut [f64],
 }
 
-impl WithSimd for Bearings<'_> {
+impl WithSimd for Complete<'_> {
     type Output = ();
 
     /// Without a branch, the compiler computes several points at once; in blocks, lest it
@@ -37,15 +29,18 @@ impl WithSimd for Bearings<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         const N: usize = 16;
-        for ((x, y), bearing) in
-            self.x.chunks(N).zip(self.y.chunks(N)).zip(self.bearing.chunks_mut(N))
-        {
-            let (mut xs, mut ys, mut bearings) = ([0.0; N], [0.0; N], [0.0; N]);
+        let Self { x, y, rho, bearing } = self;
+        let polar = rho.chunks_mut(N).zip(bearing.chunks_mut(N));
+        for ((x, y), (rho, bearing)) in x.chunks(N).zip(y.chunks(N)).zip(polar) {
+            let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
+            let (mut rhos, mut bearings) = ([0.0; N], [0.0; N]);
             xs[..x.len()].copy_from_slice(x);
             ys[..y.len()].copy_from_slice(y);
             for i in 0..N {
+                rhos[i] = Vec2 { x: xs[i], y: ys[i] }.norm();
                 bearings[i] = angle(xs[i], ys[i]);
             }
+            rho.copy_from_slice(&rhos[..rho.len()]);
             bearing.copy_from_slice(&bearings[..bearing.len()]);
         }
     }
@@ -146,15 +141,15 @@ mod tests {
     fn many_at_once_are_as_one_by_one() {
         for n in [0, 1, 15, 16, 17, 100] {
             let directions: Vec<f64> = directions().take(n).collect();
-            let mut points = Polar {
-                x: directions.iter().map(|&direction| 3.0 * libm::cos(direction)).collect(),
-                y: directions.iter().map(|&direction| 3.0 * libm::sin(direction)).collect(),
-                ..Polar::default()
+            let points = |f: fn(f64) -> f64| -> Vec<f64> {
+                directions.iter().map(|&direction| 3.0 * f(direction)).collect()
             };
-            bearings(&mut points);
+            let (x, y) = (points(libm::cos), points(libm::sin));
+            let (mut rho, mut bearing) = (vec![0.0; n], vec![0.0; n]);
+            complete(&x, &y, &mut rho, &mut bearing);
             for i in 0..n {
-                let (x, y) = (points.x[i], points.y[i]);
-                assert_eq!(points.bearing[i].to_bits(), angle(x, y).to_bits());
+                assert_eq!(rho[i].to_bits(), Vec2 { x: x[i], y: y[i] }.norm().to_bits());
+                assert_eq!(bearing[i].to_bits(), angle(x[i], y[i]).to_bits());
             }
         }
     }

@@ -36,6 +36,8 @@ pub struct StepRecord {
     pub robots: Vec<RobotRecord>,
     /// Positions of all lights during the step.
     pub lights: Vec<Vec2>,
+    /// Positions of all ground areas, which do not move.
+    pub areas: Vec<Vec2>,
 }
 
 /// One robot in one step.
@@ -47,8 +49,13 @@ pub struct RobotRecord {
     pub heading: f64,
     /// What its controller got, input by input.
     pub stimuli: Vec<f64>,
+    /// Activity of every neuron of its network after the step, in the order of
+    /// [`Simulation::network_json`](crate::Simulation::network_json); empty without a network.
+    pub activity: Vec<f64>,
     /// The frame that it took from the air.
     pub received: Option<ReceivedFrame>,
+    /// The message of that frame; zeros without one.
+    pub received_message: Vec<f64>,
     /// Actions of the right and left wheel, in \[-1, 1\].
     pub wheels: [f64; 2],
     /// Colour of its LED, 0 off.
@@ -57,11 +64,15 @@ pub struct RobotRecord {
     pub mode: Mode,
     /// Its own message, as quantised; on the air if it sent.
     pub message: Vec<f64>,
+    /// Whether its LED should be on, where the task says who it should be.
+    pub target: Option<bool>,
 }
 
 /// A frame that a robot took from the air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReceivedFrame {
+    /// The robot from which it came.
+    pub emitter: usize,
     /// The robot whose message it carries.
     pub originator: usize,
     /// Emissions until then, from 1.

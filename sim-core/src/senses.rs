@@ -1,13 +1,15 @@
 //! What robots perceive: the readings that stimuli are made of.
 
+use std::ops::Range;
+
 use crate::communication::Mode;
 use crate::perturbations::Perturbations;
 use crate::sensors::{Noise, NoiseStream, Surroundings};
-use crate::swarm::Swarm;
+use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::RobotGroup;
 use experiment_file::SensorQuery;
-use numeric::random::Stream;
+use numeric::random::{Stream, standard_normal_quantiles};
 
 /// Readings of the robots of one group in one trial, beside those of the radio.
 #[derive(Debug, Clone)]
@@ -26,6 +28,8 @@ struct NoiseSource {
     streams: Vec<Stream>,
     /// How many sensors draw from them.
     n_sensors: usize,
+    /// Scratch: what has been drawn.
+    normals: Vec<f64>,
 }
 
 /// What a mounted sensor has in one trial.
@@ -40,28 +44,6 @@ struct SensorState {
     is_wanted: Vec<bool>,
     /// Place of its noise in [`Senses::noise`]; none without noise.
     noise: Option<usize>,
-}
-
-/// A reading of one robot.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Reading<'a> {
-    /// One value.
-    Scalar([f64; 1]),
-    /// A direction.
-    Vector([f64; 2]),
-    /// Any number of values.
-    Slice(&'a [f64]),
-}
-
-impl Reading<'_> {
-    /// Its values.
-    pub fn values(&self) -> &[f64] {
-        match self {
-            Self::Scalar(values) => values,
-            Self::Vector(values) => values,
-            Self::Slice(values) => values,
-        }
-    }
 }
 
 impl Senses {
@@ -80,7 +62,8 @@ impl Senses {
                 let known = noise.iter().position(|source| source.key == key);
                 known.unwrap_or_else(|| {
                     let streams = group.robots.clone().map(|robot| stream(key.number(robot)));
-                    noise.push(NoiseSource { key, streams: streams.collect(), n_sensors: 0 });
+                    let (streams, normals) = (streams.collect(), Vec::new());
+                    noise.push(NoiseSource { key, streams, n_sensors: 0, normals });
                     noise.len() - 1
                 })
             });
@@ -100,37 +83,41 @@ impl Senses {
         Self { sensors, noise }
     }
 
-    /// A reading of robot `robot`, the group's number `index`.
-    pub fn reading<'a>(
-        &'a self,
+    /// Writes one value of a reading, robot by robot. `robots`: the group's.
+    pub fn write(
+        &self,
         query: SensorQuery,
-        swarm: &'a Swarm,
-        index: usize,
-        robot: usize,
-    ) -> Reading<'a> {
-        let received = swarm.received[robot].as_ref();
-        let vector = |direction: Option<Vec2>| {
-            Reading::Vector(direction.map_or([0.0; 2], |direction| [direction.x, direction.y]))
-        };
+        value: usize,
+        robots: Range<usize>,
+        swarm: &Swarm,
+        row: &mut [f32],
+    ) {
+        let received = swarm.received[robots.clone()].iter().map(Option::as_ref);
         match query {
-            SensorQuery::ReceiverMessage => {
-                Reading::Slice(&swarm.received_messages[swarm.message_range(robot)])
+            SensorQuery::ReceiverMessage if value < swarm.message_len => {
+                let messages = &swarm.received_messages[robots.start * swarm.message_len..];
+                fill(row, messages.chunks_exact(swarm.message_len).map(|message| message[value]));
             }
-            SensorQuery::ReceiverSignal => Reading::Scalar([received.map_or(0.0, |r| r.signal)]),
+            SensorQuery::ReceiverSignal => {
+                fill(row, received.map(|received| received.map_or(0.0, Received::signal)));
+            }
             SensorQuery::ReceiverReceivingDirection => {
-                vector(received.map(|received| received.receiving_direction))
+                fill(row, received.map(|it| component(it.map(|it| it.receiving_direction), value)));
             }
             SensorQuery::ReceiverSendingDirection => {
-                vector(received.map(|received| received.sending_direction))
+                fill(row, received.map(|it| component(it.map(|it| it.sending_direction), value)));
             }
             SensorQuery::ReceiverState => {
-                Reading::Scalar([f64::from(swarm.modes[robot] == Mode::Send)])
+                let modes = swarm.modes[robots].iter();
+                fill(row, modes.map(|&mode| f64::from(mode == Mode::Send)));
             }
             query => {
-                let sensor = self.sensors.iter().find(|sensor| sensor.query == query);
-                Reading::Slice(sensor.map_or(&[], |sensor| {
-                    &sensor.readings[index * sensor.reading_len..][..sensor.reading_len]
-                }))
+                let mut sensors = self.sensors.iter();
+                let gives = |it: &&SensorState| it.query == query && value < it.reading_len;
+                if let Some(sensor) = sensors.find(gives) {
+                    let readings = sensor.readings.chunks_exact(sensor.reading_len);
+                    fill(row, readings.map(|reading| reading[value]));
+                }
             }
         }
     }
@@ -143,19 +130,8 @@ impl Senses {
             let robots = group.robots.clone();
             mounted.sensor.sense_group(robots, is_wanted, swarm, surroundings, readings);
             if let Some(source) = state.noise {
-                let NoiseSource { streams, n_sensors, .. } = &mut self.noise[source];
                 let deviation = mounted.sensor.noise().deviation;
-                for ((reading, is_wanted), stream) in
-                    readings.chunks_exact_mut(*reading_len).zip(is_wanted).zip(streams)
-                {
-                    if *is_wanted {
-                        add_noise(reading, deviation, stream);
-                    } else if *n_sensors > 1 {
-                        // The reading is not used, but the next noise in the stream is
-                        // another sensor's.
-                        stream.skip(*reading_len);
-                    }
-                }
+                self.noise[source].add(deviation, *reading_len, readings, is_wanted);
             }
             let range = mounted.sensor.value_range();
             for value in readings.iter_mut() {
@@ -165,10 +141,49 @@ impl Senses {
     }
 }
 
-/// Adds Gaussian noise to each value of a reading, one draw each.
-fn add_noise(reading: &mut [f64], deviation: f64, stream: &mut Stream) {
-    for value in reading {
-        *value += deviation * stream.normal();
+/// Writes as many values as there are robots in a row.
+fn fill(row: &mut [f32], values: impl Iterator<Item = f64>) {
+    for (lane, value) in row.iter_mut().zip(values) {
+        *lane = value as f32;
+    }
+}
+
+/// A component of a direction; zero if there is none.
+fn component(direction: Option<Vec2>, index: usize) -> f64 {
+    direction.map_or(0.0, |direction| if index == 0 { direction.x } else { direction.y })
+}
+
+impl NoiseSource {
+    /// Adds Gaussian noise to each value of the readings `[robot][value]` that are wanted, one
+    /// draw each.
+    fn add(
+        &mut self,
+        deviation: f64,
+        reading_len: usize,
+        readings: &mut [f64],
+        is_wanted: &[bool],
+    ) {
+        let Self { streams, n_sensors, normals, .. } = self;
+        normals.resize(readings.len(), 0.0);
+        let mut n_drawn = 0;
+        for (is_wanted, stream) in is_wanted.iter().zip(streams) {
+            if *is_wanted {
+                stream.fill_probability(&mut normals[n_drawn..n_drawn + reading_len]);
+                n_drawn += reading_len;
+            } else if *n_sensors > 1 {
+                // The reading is not used, but the next noise in the stream is another
+                // sensor's.
+                stream.skip(reading_len);
+            }
+        }
+        standard_normal_quantiles(&mut normals[..n_drawn]);
+        let wanted = readings.chunks_exact_mut(reading_len).zip(is_wanted);
+        let wanted = wanted.filter(|(_, is_wanted)| **is_wanted);
+        for ((reading, _), normals) in wanted.zip(normals.chunks_exact(reading_len)) {
+            for (value, normal) in reading.iter_mut().zip(normals) {
+                *value += deviation * normal;
+            }
+        }
     }
 }
 
@@ -178,14 +193,24 @@ mod tests {
     use numeric::random::Purpose;
 
     #[test]
-    fn noise_has_its_deviation_and_one_draw_per_value() {
-        let mut stream = Stream::new(0, 0, 0, Purpose::SensorNoise, 0);
-        let mut expected = stream.clone();
-        let mut reading = [0.5, 0.9, 0.1, 0.0];
-        add_noise(&mut reading, 0.4, &mut stream);
-        for (value, clean) in reading.into_iter().zip([0.5, 0.9, 0.1, 0.0]) {
-            assert_eq!(value, clean + 0.4 * expected.normal());
+    fn noise_has_its_deviation_and_one_draw_per_value_that_is_wanted() {
+        let stream = |robot| Stream::new(0, 0, 0, Purpose::SensorNoise, robot);
+        let mut source = NoiseSource {
+            key: NoiseStream::LIGHT_AND_DISTANCE,
+            streams: (0..3).map(stream).collect(),
+            n_sensors: 1,
+            normals: Vec::new(),
+        };
+        let clean = [0.5, 0.9, 0.1, 0.0, 0.3, 1.0];
+        let mut readings = clean;
+        source.add(0.4, 2, &mut readings, &[true, false, true]);
+        for (robot, is_wanted) in [true, false, true].into_iter().enumerate() {
+            let mut expected = stream(robot as u64);
+            for value in 2 * robot..2 * robot + 2 {
+                let noise = if is_wanted { 0.4 * expected.normal() } else { 0.0 };
+                assert_eq!(readings[value], clean[value] + noise);
+            }
+            assert_eq!(source.streams[robot].uniform(), expected.uniform());
         }
-        assert_eq!(stream.uniform(), expected.uniform());
     }
 }

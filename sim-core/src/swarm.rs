@@ -39,16 +39,26 @@ pub(crate) struct Swarm {
 /// A frame taken from the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Received {
+    /// The robot that emitted it.
+    pub emitter: usize,
     /// The receiving sector.
     pub sector: usize,
-    /// Strength of the frame.
-    pub signal: f64,
+    /// Logarithm of the frame's strength.
+    pub log_strength: f64,
     /// (cos, sin) of the receiving sector in the receiver's own frame.
     pub receiving_direction: Vec2,
-    /// (cos, sin) of the sending sector in the frame of the robot whose sector it is.
+    /// (cos, sin) of the sending sector in the frame of the robot whose sector it is; zero
+    /// where it is not observed.
     pub sending_direction: Vec2,
     /// Where it comes from, the sending direction filled in.
     pub origin: FrameOrigin,
+}
+
+impl Received {
+    /// Strength of the frame.
+    pub fn signal(&self) -> f64 {
+        libm::exp(self.log_strength)
+    }
 }
 
 impl Swarm {
@@ -71,22 +81,26 @@ impl Swarm {
         }
     }
 
-    /// What there is to see of a robot, except its stimuli.
+    /// What there is to see of a robot, except what its controller and the task know.
     pub fn record(&self, robot: usize) -> RobotRecord {
         RobotRecord {
             position: self.positions[robot],
             heading: self.headings[robot],
             stimuli: Vec::new(),
-            received: self.received[robot].map(|received| ReceivedFrame {
+            activity: Vec::new(),
+            received: self.received[robot].as_ref().map(|received| ReceivedFrame {
+                emitter: received.emitter,
                 originator: received.origin.originator,
                 hops: received.origin.hops,
                 sector: received.sector,
-                signal: received.signal,
+                signal: received.signal(),
             }),
+            received_message: self.received_messages[self.message_range(robot)].to_vec(),
             wheels: self.wheels[robot],
             led: self.leds[robot],
             mode: self.modes[robot],
             message: self.messages[self.message_range(robot)].to_vec(),
+            target: None,
         }
     }
 

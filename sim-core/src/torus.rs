@@ -28,6 +28,7 @@ impl Vec2 {
     }
 
     /// Euclidean norm.
+    #[inline(always)]
     pub(crate) fn norm(self) -> f64 {
         (self.x * self.x + self.y * self.y).sqrt()
     }
@@ -93,6 +94,7 @@ impl Torus {
     }
 
     /// The shortest way from `from` to `to`; both within the torus.
+    #[inline(always)]
     pub fn displacement(&self, from: Vec2, to: Vec2) -> Vec2 {
         Vec2 { x: shortest(to.x - from.x, self.width), y: shortest(to.y - from.y, self.height) }
     }
@@ -118,6 +120,7 @@ impl Torus {
 
 /// The representative of `difference`, given in (-period, period), with the
 /// least absolute value.
+#[inline(always)]
 fn shortest(difference: f64, period: f64) -> f64 {
     let half = 0.5 * period;
     // Without a branch: where somebody is, is not to be foreseen.

@@ -245,12 +245,15 @@ impl World {
             initial_frame: transmitter.is_some_and(|transmitter| transmitter.initial_frame),
             perturbations: config.perturbations.clone(),
         };
-        self.antennas.extend(group.robots.clone().map(|_| antenna(config)));
+        self.antennas.extend(group.robots.clone().map(|_| antenna(config, network)));
         self.groups.push(group);
     }
 }
 
-fn antenna(robot: &RobotConfig) -> Antenna {
+fn antenna(robot: &RobotConfig, network: &Network) -> Antenna {
+    let mut stimuli = network.stimuli.values().map(|stimulus| stimulus.sensor);
+    let observes_sending_direction =
+        stimuli.any(|sensor| sensor == SensorQuery::ReceiverSendingDirection);
     let transmitter = robot.actuators.wireless_transmitter.as_ref();
     let receiver = robot.sensors.wireless_receiver.as_ref();
     Antenna {
@@ -261,6 +264,7 @@ fn antenna(robot: &RobotConfig) -> Antenna {
             decay: Decay { rho: receiver.decay_rho, phi: receiver.decay_phi },
             max_hops: receiver.max_hops,
             sending_direction: receiver.sending_direction,
+            observes_sending_direction,
         }),
     }
 }

@@ -7,6 +7,7 @@ use crate::{ActuatorQuery, DecodingConfig, TopologyConfig};
 
 pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     names(topology, report);
+    inputs(topology, report);
     groups(topology, report);
     outputs(topology, report);
     decoding(topology, report);
@@ -29,6 +30,24 @@ fn names(topology: &TopologyConfig, report: &Report<'_>) {
             let path = Path::from(["topology", "ensembles", name]);
             report.conflict(&path, &[], "a stimulus has the same name");
         }
+    }
+}
+
+/// A network that senses nothing is rarely meant.
+fn inputs(topology: &TopologyConfig, report: &Report<'_>) {
+    let is_used = |stimulus: &String| {
+        topology.synapses.values().any(|group| group.p > 0.0 && group.pre.contains(stimulus))
+    };
+    let path = Path::from(["topology", "stimuli"]);
+    if !topology.stimuli.keys().any(is_used) {
+        return report
+            .warning(&path, "no synapse group starts from a stimulus: the network has no input");
+    }
+    for stimulus in topology.stimuli.keys().filter(|stimulus| !is_used(stimulus)) {
+        report.warning(
+            &path.key(stimulus),
+            "no synapse group starts from it: the network does not get it",
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::validator::is_valid;
-use super::{BASE, accept, defaults, edited, read};
+use super::{BASE, accept, defaults, edited, read, refuse};
 use evolution::ALGORITHMS;
 use experiment_file::{
     Activation, ExperimentConfig, InitialRates, Initializer, LightController, LightSourceConfig,
@@ -223,6 +223,29 @@ fn a_perturbation_affects_all_robots_unless_it_says_how_many() {
                 speed: 0.1,
             })
         );
+    }
+}
+
+#[test]
+fn inputs_that_the_network_does_not_get_are_named() {
+    let warnings = |pre: &str| {
+        let text = edited(r#""pre": ["MSG", "LIGHT"]"#, &format!(r#""pre": {pre}"#));
+        let (_, warnings) = read(&text).unwrap();
+        warnings.into_iter().map(|warning| warning.path).collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(r#""MSG""#), ["topology.stimuli.LIGHT"]);
+    assert_eq!(warnings(r#""OUT_LED""#), ["topology.stimuli"]);
+}
+
+#[test]
+fn whole_numbers_may_be_written_as_json_schema_allows() {
+    let text =
+        |number: &str| edited(r#""generations": 10"#, &format!(r#""generations": {number}"#));
+    for number in ["10.0", "1e1"] {
+        assert_eq!(accept(&text(number)), accept(BASE), "{number}");
+    }
+    for number in ["10.5", "1e-1", "1e30", "-10.0"] {
+        refuse(&text(number));
     }
 }
 

@@ -2,8 +2,7 @@
 
 use crate::torus::Vec2;
 
-/// Where a frame's message comes from. A frame without an origin is one that a
-/// robot emitted which had nothing to relay: no receiver accepts it.
+/// Where a frame's message comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FrameOrigin {
     /// The robot whose message it is.
@@ -16,6 +15,11 @@ pub(crate) struct FrameOrigin {
 }
 
 impl FrameOrigin {
+    /// Of a frame that a robot emitted which had nothing to relay: it has made more hops than
+    /// any receiver accepts.
+    pub const NOTHING: Self =
+        Self { originator: usize::MAX, hops: u32::MAX, sending_direction: Vec2::new(0.0, 0.0) };
+
     /// Of a robot's own message.
     pub fn sent_by(originator: usize) -> Self {
         Self { originator, hops: 1, sending_direction: Vec2::default() }
@@ -23,10 +27,11 @@ impl FrameOrigin {
 }
 
 /// All frames on the air. Frame r is robot r's. Where there is none, it is the same for
-/// receivers as a frame without origin.
+/// receivers as one that comes from nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Ether {
-    origins: Vec<Option<FrameOrigin>>,
+    /// Of each robot's frame; and of the frame of nobody, who has the number after theirs.
+    origins: Vec<FrameOrigin>,
     /// `[robot][component]`
     messages: Vec<f64>,
     message_len: usize,
@@ -36,15 +41,22 @@ impl Ether {
     /// No frame is on the air.
     pub fn new(n_robots: usize, message_len: usize) -> Self {
         Self {
-            origins: vec![None; n_robots],
+            origins: vec![FrameOrigin::NOTHING; n_robots + 1],
             messages: vec![0.0; n_robots * message_len],
             message_len,
         }
     }
 
-    /// FrameOrigin of a robot's frame.
-    pub fn origin(&self, emitter: usize) -> Option<&FrameOrigin> {
-        self.origins[emitter].as_ref()
+    /// Where a robot's frame comes from; nobody's comes from nothing.
+    pub fn origin(&self, emitter: usize) -> FrameOrigin {
+        self.origins[emitter]
+    }
+
+    /// Whether a robot that accepts less than `max_hops` hops takes the frame of another one,
+    /// or of nobody.
+    pub fn is_valid(&self, emitter: usize, receiver: usize, max_hops: u32) -> bool {
+        let FrameOrigin { originator, hops, .. } = self.origins[emitter];
+        (originator != receiver) & (hops < max_hops)
     }
 
     /// Message of a robot's frame.
@@ -53,7 +65,7 @@ impl Ether {
     }
 
     /// Puts a robot's frame on the air, in place of its last one.
-    pub fn emit(&mut self, emitter: usize, origin: Option<FrameOrigin>, message: &[f64]) {
+    pub fn emit(&mut self, emitter: usize, origin: FrameOrigin, message: &[f64]) {
         self.origins[emitter] = origin;
         self.messages[emitter * self.message_len..][..self.message_len].copy_from_slice(message);
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use crate::neighbours::{Neighbour, Neighbours};
+use crate::neighbours::Neighbours;
 use crate::sensors::Decay;
 use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
 use experiment_file::SendingDirection;
@@ -37,200 +37,246 @@ pub(crate) struct Receiver {
     pub max_hops: u32,
     /// Whose sector the sending direction is.
     pub sending_direction: SendingDirection,
+    /// Whether sending directions are observed: only if a robot's network gets them.
+    pub observes_sending_direction: bool,
 }
 
-/// The strongest emitter in a sector.
+/// Robots whose neighbours are listened to together: few enough for what is noted of them to stay
+/// in the cache.
+const N_LISTENERS_AT_ONCE: usize = 128;
+
+/// The strongest emitter in a sector of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Heard {
-    /// The robot that is heard, as the listener has it nearby.
-    pub emitter: Neighbour,
-    /// How far off the sector's direction it is, radians.
-    phi: f64,
-}
-
-/// What a listener observes of the frame that it takes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Observed {
-    /// Strength of the frame.
-    pub signal: f64,
-    /// (cos, sin) of the emitter's sector that faces the listener, in the emitter's own
-    /// frame.
-    pub sending_direction: Vec2,
+    /// The robot that is heard; the number of robots if there is none.
+    pub robot: u32,
+    /// Its place among the neighbours.
+    place: u32,
 }
 
 /// The strongest emitter in every sector of every robot. Every emitter puts a
 /// frame on the air in each step, so it is also the sector's frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Hearing {
-    /// `[robot][sector]`
-    sectors: Vec<Option<Heard>>,
-    /// Direction of each sector in its robot's own frame, `[robot][sector]`.
-    angles: Vec<f64>,
-    /// (cos, sin) of `angles`.
-    directions: Vec<Vec2>,
-    /// First sector of each robot, and the end.
-    first: Vec<usize>,
-    /// What [`observe`](Self::observe) has found, `[robot][sector]`.
-    observed: Vec<Option<Observed>>,
-    /// Scratch: every neighbour of every robot, as it hears them.
+    /// Those that hear.
+    listeners: Vec<Listeners>,
+    /// Reach of every robot's transmitter, cm; below 0 if it does not emit.
+    reaches: Vec<f64>,
     emitters: Emitters,
 }
 
-/// Robots as their neighbours hear them.
+/// Robots with neighbouring numbers whose receivers are alike.
+#[derive(Debug, Clone)]
+pub(crate) struct Listeners {
+    /// Their numbers.
+    robots: Range<usize>,
+    /// What each of them has.
+    pub receiver: Receiver,
+    /// The strongest emitters, `[robot][sector]`.
+    heard: Vec<Heard>,
+    /// Direction of each sector in its robot's own frame.
+    angles: Vec<f64>,
+    /// (cos, sin) of `angles`.
+    pub directions: Vec<Vec2>,
+}
+
+/// Scratch: the neighbours of some listeners, as these hear them.
 #[derive(Debug, Clone, Default)]
 struct Emitters {
     /// Direction in the listener's own frame.
     bearings: Vec<f64>,
     /// Sector whose direction is nearest.
-    sectors: Vec<f64>,
-    /// How far off that direction they are, radians.
-    phis: Vec<f64>,
+    sectors: Vec<u32>,
     /// Logarithm of their strength.
     log_strengths: Vec<f64>,
-    /// The loudest in each sector of a robot: logarithm of its strength, and its index.
-    loudest: Vec<(f64, usize)>,
+    /// Whether any is on the border of two sectors.
+    is_any_on_border: bool,
+    /// The loudest in each sector of a robot.
+    loudest: Vec<Loudest>,
+}
+
+/// The loudest emitter so far in a sector.
+#[derive(Debug, Clone, Copy)]
+struct Loudest {
+    log_strength: f64,
+    heard: Heard,
+}
+
+impl Loudest {
+    /// Makes an emitter the loudest if it is heard and louder, or as loud and of a lower
+    /// number. That is not to be foreseen, so there is no branch.
+    #[inline(always)]
+    fn hear(&mut self, log_strength: f64, emitter: Heard, is_heard: bool) {
+        let is_first = (log_strength == self.log_strength) & (emitter.robot < self.heard.robot);
+        let is_louder = is_heard & ((log_strength > self.log_strength) | is_first);
+        self.log_strength = if is_louder { log_strength } else { self.log_strength };
+        self.heard.robot = if is_louder { emitter.robot } else { self.heard.robot };
+        self.heard.place = if is_louder { emitter.place } else { self.heard.place };
+    }
 }
 
 impl Hearing {
     /// Before the first [`update`](Self::update): no robot hears another one.
     pub fn new(antennas: &[Antenna]) -> Self {
-        let mut first = vec![0];
-        let mut angles = Vec::new();
-        for antenna in antennas {
-            let n_sectors = antenna.receiver.map_or(0, |receiver| receiver.n_sectors);
-            angles.extend((0..n_sectors).map(|sector| sector_angle(sector, n_sectors)));
-            first.push(angles.len());
-        }
-        let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
-        let (sectors, observed) = (vec![None; angles.len()], vec![None; angles.len()]);
-        let emitters = Emitters::default();
-        Self { sectors, angles, directions, first, observed, emitters }
-    }
-
-    /// The sectors of one robot.
-    pub fn of(&self, robot: usize) -> &[Option<Heard>] {
-        &self.sectors[self.first[robot]..self.first[robot + 1]]
-    }
-
-    /// (cos, sin) of a robot's sector in its own frame.
-    pub fn direction(&self, robot: usize, sector: usize) -> Vec2 {
-        self.directions[self.first[robot] + sector]
-    }
-
-    /// What a robot observes of the emitter in one of its sectors, which must have one. It is
-    /// computed once: robots that stand hear the same all the time.
-    pub fn observe(
-        &mut self,
-        robot: usize,
-        sector: usize,
-        decay: Decay,
-        headings: &[f64],
-    ) -> Option<Observed> {
-        let index = self.first[robot] + sector;
-        if self.observed[index].is_none() {
-            self.observed[index] = self.sectors[index].as_ref().map(|heard| Observed {
-                signal: heard.strength(decay),
-                sending_direction: self.sending_direction(robot, heard, headings),
-            });
-        }
-        self.observed[index]
-    }
-
-    /// As [`Observed`] has it.
-    fn sending_direction(&self, listener: usize, heard: &Heard, headings: &[f64]) -> Vec2 {
-        // What cannot listen has as many sectors as its listener.
-        let emitter = heard.emitter.robot;
-        let listens = self.first[emitter] < self.first[emitter + 1];
-        let robot = if listens { emitter } else { listener };
-        let angles = &self.angles[self.first[robot]..self.first[robot + 1]];
-        let bearing = wrap_angle(heard.emitter.reverse_bearing() - headings[emitter]);
-        self.direction(robot, facing(bearing, angles))
-    }
-
-    /// Computes everything from who is near whom and from headings.
-    pub fn update(&mut self, antennas: &[Antenna], neighbours: &Neighbours, headings: &[f64]) {
-        self.sectors.fill(None);
-        self.observed.fill(None);
+        let nobody = Heard { robot: antennas.len() as u32, place: 0 };
+        let mut listeners = Vec::new();
         let mut robot = 0;
         for group in antennas.chunk_by(|a, b| a.receiver == b.receiver) {
             let robots = robot..robot + group.len();
             robot = robots.end;
             if let Some(receiver) = group[0].receiver {
-                self.update_group(robots, receiver, antennas, neighbours, headings);
+                listeners.push(Listeners::new(robots, receiver, nobody));
             }
+        }
+        let reaches = antennas.iter().map(|antenna| antenna.emits_within.unwrap_or(-1.0));
+        Self { listeners, reaches: reaches.collect(), emitters: Emitters::default() }
+    }
+
+    /// Those that hear.
+    pub fn listeners(&self) -> &[Listeners] {
+        &self.listeners
+    }
+
+    /// Computes everything from who is near whom and from headings.
+    pub fn update(&mut self, neighbours: &Neighbours, headings: &[f64]) {
+        for listeners in &mut self.listeners {
+            listeners.update(&self.reaches, &mut self.emitters, neighbours, headings);
         }
     }
 
-    /// As above, for robots whose receivers are alike.
-    fn update_group(
+    /// (cos, sin) of the sector of an emitter that faces its listener, in the emitter's own
+    /// frame.
+    pub fn sending_direction(
+        &self,
+        listener: &Listeners,
+        heard: Heard,
+        neighbours: &Neighbours,
+        headings: &[f64],
+    ) -> Vec2 {
+        let emitter = heard.robot as usize;
+        let listens = |listeners: &&Listeners| listeners.robots.contains(&emitter);
+        // What cannot listen has as many sectors as its listener.
+        let Listeners { angles, directions, .. } =
+            self.listeners.iter().find(listens).unwrap_or(listener);
+        let reverse = neighbours.get(heard.place as usize).reverse_bearing();
+        directions[facing(wrap_angle(reverse - headings[emitter]), angles)]
+    }
+}
+
+impl Listeners {
+    fn new(robots: Range<usize>, receiver: Receiver, nobody: Heard) -> Self {
+        let n_sectors = receiver.n_sectors;
+        let angles = (0..n_sectors).map(|sector| sector_angle(sector, n_sectors));
+        let angles: Vec<f64> = angles.collect();
+        let directions = angles.iter().map(|&angle| Vec2::unit(angle)).collect();
+        let heard = vec![nobody; robots.len() * n_sectors];
+        Self { robots, receiver, heard, angles, directions }
+    }
+
+    /// Each robot with what it hears, sector by sector.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &[Heard])> {
+        self.robots.clone().zip(self.heard.chunks_exact(self.angles.len()))
+    }
+
+    /// Logarithm of the strength of what a robot hears in a sector.
+    pub fn log_strength(
+        &self,
+        robot: usize,
+        sector: usize,
+        heard: Heard,
+        neighbours: &Neighbours,
+        headings: &[f64],
+    ) -> f64 {
+        let emitter = neighbours.get(heard.place as usize);
+        let bearing = wrap_difference(emitter.bearing - headings[robot]);
+        let phi = angular_difference(bearing, self.angles[sector]);
+        self.receiver.decay.log_strength(emitter.rho, phi)
+    }
+
+    fn update(
         &mut self,
-        robots: Range<usize>,
-        receiver: Receiver,
-        antennas: &[Antenna],
+        reaches: &[f64],
+        emitters: &mut Emitters,
         neighbours: &Neighbours,
         headings: &[f64],
     ) {
-        let places = neighbours.places(robots.start).start..neighbours.places(robots.end - 1).end;
-        self.emitters.bearings.clear();
-        for robot in robots.clone() {
-            let bearings = neighbours.bearings(neighbours.places(robot));
-            self.emitters.bearings.extend(bearings.iter().map(|bearing| bearing - headings[robot]));
-        }
-        self.emitters.complete(receiver, neighbours.distances(places.clone()));
-        let half_width = PI / receiver.n_sectors as f64;
-        for robot in robots {
-            let angles = &self.angles[self.first[robot]..self.first[robot + 1]];
-            self.emitters.loudest.clear();
-            self.emitters.loudest.resize(angles.len(), (f64::NEG_INFINITY, 0));
-            for place in neighbours.places(robot) {
-                let emitter = neighbours.get(place);
-                let reach = antennas[emitter.robot].emits_within.unwrap_or(-1.0);
-                let is_heard = emitter.rho <= receiver.range.min(reach);
-                let index = place - places.start;
-                if self.emitters.phis[index] < half_width - BORDER {
-                    self.emitters.hear(self.emitters.sectors[index] as usize, index, is_heard);
-                    continue;
-                }
-                // On a border.
-                for (sector, &angle) in angles.iter().enumerate() {
-                    let phi = angular_difference(self.emitters.bearings[index], angle);
-                    if phi <= half_width + BORDER {
-                        self.emitters.hear(sector, index, is_heard);
-                    }
-                }
-            }
-            let sectors = &mut self.sectors[self.first[robot]..self.first[robot + 1]];
-            let loudest = self.emitters.loudest.iter().zip(angles);
-            for (heard, (&(log_strength, index), &angle)) in sectors.iter_mut().zip(loudest) {
-                let is_heard = log_strength > f64::NEG_INFINITY;
-                *heard = is_heard.then(|| Heard {
-                    emitter: neighbours.get(places.start + index),
-                    phi: angular_difference(self.emitters.bearings[index], angle),
-                });
-            }
+        let n_sectors = self.angles.len();
+        let mut start = self.robots.start;
+        for heard in self.heard.chunks_mut(N_LISTENERS_AT_ONCE * n_sectors) {
+            let robots = start..start + heard.len() / n_sectors;
+            start = robots.end;
+            emitters.locate(self.receiver, neighbours, headings, robots.clone());
+            emitters.choose(self.receiver, &self.angles, reaches, neighbours, robots, heard);
         }
     }
 }
 
 impl Emitters {
-    /// Makes an emitter the loudest of a sector if it is heard and louder than those before.
-    /// That is not to be foreseen, so there is no branch.
-    fn hear(&mut self, sector: usize, index: usize, is_heard: bool) {
-        let loudest = &mut self.loudest[sector];
-        let log_strength = self.log_strengths[index];
-        let is_louder = is_heard & (log_strength > loudest.0);
-        loudest.0 = if is_louder { log_strength } else { loudest.0 };
-        loudest.1 = if is_louder { index } else { loudest.1 };
-    }
-
-    /// Completes what `bearings` begins: differences of two angles in \[0, 2 pi). `rho`: how
-    /// far they are, cm.
-    fn complete(&mut self, receiver: Receiver, rho: &[f64]) {
-        self.sectors.resize(rho.len(), 0.0);
-        self.phis.resize(rho.len(), 0.0);
+    /// The neighbours of some robots, as these hear them.
+    fn locate(
+        &mut self,
+        receiver: Receiver,
+        neighbours: &Neighbours,
+        headings: &[f64],
+        robots: Range<usize>,
+    ) {
+        let rho = neighbours.distances(places(neighbours, &robots));
+        self.bearings.clear();
+        for robot in robots {
+            let bearings = neighbours.bearings(neighbours.places(robot));
+            self.bearings.extend(bearings.iter().map(|bearing| bearing - headings[robot]));
+        }
+        self.sectors.resize(rho.len(), 0);
         self.log_strengths.resize(rho.len(), 0.0);
         Isa::best().run(Complete { emitters: self, receiver, rho });
     }
+
+    /// Chooses the loudest of those in each sector of the robots: `heard`, `[robot][sector]`.
+    fn choose(
+        &mut self,
+        receiver: Receiver,
+        angles: &[f64],
+        reaches: &[f64],
+        neighbours: &Neighbours,
+        robots: Range<usize>,
+        heard: &mut [Heard],
+    ) {
+        let Self { bearings, sectors, log_strengths, is_any_on_border, loudest } = self;
+        let nobody = Heard { robot: reaches.len() as u32, place: 0 };
+        let first = places(neighbours, &robots).start;
+        for (robot, heard) in robots.zip(heard.chunks_exact_mut(angles.len())) {
+            let places = neighbours.places(robot);
+            let its = places.start - first..places.end - first;
+            let who = neighbours.robots(places.clone()).iter().zip(places.clone());
+            let emitters = who.zip(neighbours.distances(places));
+            let how = sectors[its.clone()].iter().zip(&log_strengths[its.clone()]);
+            loudest.clear();
+            loudest.resize(angles.len(), Loudest { log_strength: f64::MIN, heard: nobody });
+            for ((((&emitter, place), &rho), (&nearest, &log_strength)), &bearing) in
+                emitters.zip(how).zip(&bearings[its])
+            {
+                let is_heard = rho <= receiver.range.min(reaches[emitter as usize]);
+                let emitter = Heard { robot: emitter, place: place as u32 };
+                if !*is_any_on_border || !is_on_border(bearing, angles[nearest as usize], angles) {
+                    loudest[nearest as usize].hear(log_strength, emitter, is_heard);
+                    continue;
+                }
+                for (loudest, &angle) in loudest.iter_mut().zip(angles) {
+                    if angular_difference(bearing, angle) <= half_width(angles) + BORDER {
+                        loudest.hear(log_strength, emitter, is_heard);
+                    }
+                }
+            }
+            for (heard, loudest) in heard.iter_mut().zip(&*loudest) {
+                *heard = loudest.heard;
+            }
+        }
+    }
+}
+
+/// Places of the neighbours of some robots.
+fn places(neighbours: &Neighbours, robots: &Range<usize>) -> Range<usize> {
+    neighbours.places(robots.start).start..neighbours.places(robots.end - 1).end
 }
 
 struct Complete<'a> {
@@ -248,30 +294,41 @@ impl WithSimd for Complete<'_> {
         let Self { emitters, receiver, rho } = self;
         let n_sectors = receiver.n_sectors as f64;
         let sectors_per_radian = n_sectors / TAU;
-        let Emitters { bearings, sectors, phis, log_strengths, .. } = emitters;
-        let heard = sectors.iter_mut().zip(phis).zip(log_strengths);
-        for ((bearing, rho), ((sector, phi), log_strength)) in
-            bearings.iter_mut().zip(rho).zip(heard)
+        let border = PI / n_sectors - BORDER;
+        let mut n_on_border = 0;
+        let Emitters { bearings, sectors, log_strengths, .. } = &mut *emitters;
+        for ((bearing, rho), (sector, log_strength)) in
+            bearings.iter_mut().zip(rho).zip(sectors.iter_mut().zip(log_strengths))
         {
-            // wrap_angle, for a difference of two angles
-            let positive = if *bearing < 0.0 { *bearing + TAU } else { *bearing };
-            *bearing = if positive < TAU { positive } else { 0.0 };
+            *bearing = wrap_difference(*bearing);
             let nearest = (*bearing * sectors_per_radian + 0.5).floor();
             let nearest = if nearest < n_sectors { nearest } else { 0.0 };
             // sector_angle and angular_difference
             let difference = (*bearing - nearest * TAU / n_sectors).abs();
             let off = if difference < TAU - difference { difference } else { TAU - difference };
-            (*sector, *phi) = (nearest, off);
+            *sector = nearest as u32;
             *log_strength = receiver.decay.log_strength(*rho, off);
+            n_on_border += u32::from(off >= border);
         }
+        emitters.is_any_on_border = n_on_border > 0;
     }
 }
 
-impl Heard {
-    /// Strength of its frames.
-    fn strength(&self, decay: Decay) -> f64 {
-        decay.strength(self.emitter.rho, self.phi)
-    }
+/// `wrap_angle` for a difference of two angles, without a branch.
+#[inline(always)]
+fn wrap_difference(difference: f64) -> f64 {
+    let positive = if difference < 0.0 { difference + TAU } else { difference };
+    if positive < TAU { positive } else { 0.0 }
+}
+
+/// Half the width of the sectors with the given directions, radians.
+fn half_width(sectors: &[f64]) -> f64 {
+    PI / sectors.len() as f64
+}
+
+/// Whether an angle is on the border of the sector that is nearest to it.
+fn is_on_border(angle: f64, nearest: f64, sectors: &[f64]) -> bool {
+    angular_difference(angle, nearest) >= half_width(sectors) - BORDER
 }
 
 /// The sector, of those with the given directions, that is nearest to an angle in
@@ -280,7 +337,7 @@ fn facing(angle: f64, sectors: &[f64]) -> usize {
     let n_sectors = sectors.len() as f64;
     let nearest = (angle * n_sectors / TAU + 0.5) as usize;
     let nearest = if nearest < sectors.len() { nearest } else { 0 };
-    if angular_difference(angle, sectors[nearest]) < PI / n_sectors - BORDER {
+    if !is_on_border(angle, sectors[nearest], sectors) {
         return nearest;
     }
     let mut nearest = (f64::INFINITY, 0);
@@ -309,46 +366,76 @@ mod tests {
             decay: Decay { rho: 0.05, phi: 1.0 },
             max_hops: 10,
             sending_direction: SendingDirection::Emitter,
+            observes_sending_direction: true,
         }),
     };
 
-    fn hearing(antennas: &[Antenna], robots: &[(f64, f64, f64)]) -> Hearing {
+    /// Robots that hear each other, with where they are and where they look.
+    struct Scene {
+        neighbours: Neighbours,
+        headings: Vec<f64>,
+        hearing: Hearing,
+    }
+
+    fn scene(antennas: &[Antenna], robots: &[(f64, f64, f64)]) -> Scene {
         let positions: Vec<Vec2> = robots.iter().map(|&(x, y, _)| Vec2::new(x, y)).collect();
         let headings: Vec<f64> = robots.iter().map(|&(_, _, heading)| heading).collect();
         let mut hearing = Hearing::new(antennas);
         let mut neighbours = Neighbours::new(100.0, robots.len());
         neighbours.update(&TORUS, &positions);
-        hearing.update(antennas, &neighbours, &headings);
-        hearing
+        hearing.update(&neighbours, &headings);
+        Scene { neighbours, headings, hearing }
     }
 
-    fn emitters(hearing: &Hearing, robot: usize) -> Vec<Option<usize>> {
-        hearing.of(robot).iter().map(|heard| heard.map(|heard| heard.emitter.robot)).collect()
+    impl Scene {
+        /// Robots of a kind, and what one of them hears.
+        fn of(&self, robot: usize) -> (&Listeners, &[Heard]) {
+            let kinds = self.hearing.listeners().iter();
+            let mut robots = kinds.flat_map(|kind| kind.iter().map(move |it| (kind, it)));
+            let found = robots.find(|(_, (listener, _))| *listener == robot);
+            found.map(|(kind, (_, heard))| (kind, heard)).expect("it listens")
+        }
+
+        /// Whom a robot hears, sector by sector.
+        fn emitters(&self, robot: usize) -> Vec<Option<usize>> {
+            let emitter = |heard: &Heard| {
+                let robot = heard.robot as usize;
+                (robot < self.headings.len()).then_some(robot)
+            };
+            self.of(robot).1.iter().map(emitter).collect()
+        }
+
+        fn strength(&self, robot: usize, sector: usize) -> f64 {
+            let (kind, heard) = self.of(robot);
+            let (neighbours, headings) = (&self.neighbours, &self.headings);
+            libm::exp(kind.log_strength(robot, sector, heard[sector], neighbours, headings))
+        }
     }
 
     #[test]
     fn strength_and_directions_match_a_case_by_hand() {
         // 50 cm away, 53.13 degrees to the left; the other one looks up.
         let robots = [(990.0, 500.0, 0.0), (20.0, 540.0, FRAC_PI_2)];
-        let hearing = hearing(&[ANTENNA; 2], &robots);
-        assert_eq!(emitters(&hearing, 0), [None, Some(1), None, None]);
-        let heard = hearing.of(0)[1].unwrap();
+        let scene = scene(&[ANTENNA; 2], &robots);
+        assert_eq!(scene.emitters(0), [None, Some(1), None, None]);
         let phi = FRAC_PI_2 - libm::atan2(4.0, 3.0);
-        let strength = heard.strength(ANTENNA.receiver.unwrap().decay);
-        assert!((strength - libm::exp(-2.5 - phi)).abs() < 1e-15);
+        assert!((scene.strength(0, 1) - libm::exp(-2.5 - phi)).abs() < 1e-15);
         // Seen from the other: 143.13 degrees to its left, nearest to 180.
-        let sending_direction = hearing.sending_direction(0, &heard, &[0.0, FRAC_PI_2]);
+        let (kind, heard) = scene.of(0);
+        let (neighbours, headings) = (&scene.neighbours, &scene.headings);
+        let sending_direction =
+            scene.hearing.sending_direction(kind, heard[1], neighbours, headings);
         assert!((sending_direction.x + 1.0).abs() < 1e-15);
         assert!(sending_direction.y.abs() < 1e-15);
-        assert_eq!(emitters(&hearing, 1), [None, None, Some(0), None]);
+        assert_eq!(scene.emitters(1), [None, None, Some(0), None]);
     }
 
     #[test]
     fn the_strongest_wins_its_sector_and_the_lower_index_wins_ties() {
         let robots = [(500.0, 500.0, 0.0), (560.0, 500.0, 0.0), (550.0, 500.0, 0.0)];
-        assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(2));
+        assert_eq!(scene(&[ANTENNA; 3], &robots).emitters(0)[0], Some(2));
         let robots = [(500.0, 500.0, 0.0), (550.0, 520.0, 0.0), (550.0, 520.0, 0.0)];
-        assert_eq!(emitters(&hearing(&[ANTENNA; 3], &robots), 0)[0], Some(1));
+        assert_eq!(scene(&[ANTENNA; 3], &robots).emitters(0)[0], Some(1));
     }
 
     #[test]
@@ -357,8 +444,8 @@ mod tests {
             let angle = FRAC_PI_4 + f64::from(corner) * FRAC_PI_2;
             let away = Vec2::unit(angle);
             let other = (500.0 + 50.0 * away.x.signum(), 500.0 + 50.0 * away.y.signum(), 0.0);
-            let hearing = hearing(&[ANTENNA; 2], &[(500.0, 500.0, 0.0), other]);
-            let heard = emitters(&hearing, 0).iter().flatten().count();
+            let scene = scene(&[ANTENNA; 2], &[(500.0, 500.0, 0.0), other]);
+            let heard = scene.emitters(0).iter().flatten().count();
             assert_eq!(heard, 2, "corner {corner}");
         }
     }
@@ -367,16 +454,16 @@ mod tests {
     fn the_smaller_reach_decides() {
         let weak = Antenna { emits_within: Some(40.0), ..ANTENNA };
         let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0)];
-        let hearing = hearing(&[ANTENNA, weak], &robots);
-        assert_eq!(hearing.of(0), [None; 4]);
-        assert_eq!(emitters(&hearing, 1)[2], Some(0));
+        let scene = scene(&[ANTENNA, weak], &robots);
+        assert_eq!(scene.emitters(0), [None; 4]);
+        assert_eq!(scene.emitters(1)[2], Some(0));
     }
 
     #[test]
     fn robots_at_one_point_hear_each_other_ahead() {
-        let hearing = hearing(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
-        assert_eq!(emitters(&hearing, 0), [Some(1), None, None, None]);
-        assert_eq!(hearing.of(0)[0].unwrap().strength(ANTENNA.receiver.unwrap().decay), 1.0);
+        let scene = scene(&[ANTENNA; 2], &[(1.0, 1.0, 0.0), (1.0, 1.0, 0.0)]);
+        assert_eq!(scene.emitters(0), [Some(1), None, None, None]);
+        assert_eq!(scene.strength(0, 0), 1.0);
     }
 
     #[test]
@@ -384,9 +471,10 @@ mod tests {
         let beacon = Antenna { receiver: None, ..ANTENNA };
         let listener = Antenna { emits_within: None, ..ANTENNA };
         let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0), (510.0, 500.0, 0.0)];
-        let hearing = hearing(&[beacon, ANTENNA, listener], &robots);
-        assert!(hearing.of(0).is_empty());
-        assert_eq!(emitters(&hearing, 1)[2], Some(0));
-        assert_eq!(emitters(&hearing, 2), [Some(1), None, Some(0), None]);
+        let scene = scene(&[beacon, ANTENNA, listener], &robots);
+        let n_listeners: usize = scene.hearing.listeners().iter().map(|it| it.iter().count()).sum();
+        assert_eq!(n_listeners, 2);
+        assert_eq!(scene.emitters(1)[2], Some(0));
+        assert_eq!(scene.emitters(2), [Some(1), None, Some(0), None]);
     }
 }

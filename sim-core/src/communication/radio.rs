@@ -3,10 +3,11 @@
 
 use super::Mode;
 use super::frame::{Ether, FrameOrigin};
-use super::hearing::{Hearing, Observed};
+use super::hearing::Hearing;
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
+use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
 use experiment_file::SendingDirection;
 use numeric::Isa;
@@ -24,6 +25,8 @@ pub(crate) struct Radio {
     /// What the quantiser's draws are, for a group.
     u: Vec<f64>,
     scratch: Scratch,
+    /// Sectors whose strongest frame is valid, for a robot.
+    valid: Vec<usize>,
 }
 
 impl Radio {
@@ -32,7 +35,7 @@ impl Radio {
         let mut ether = Ether::new(world.n_robots(), world.message_len);
         let groups = world.groups.iter().filter(|group| group.initial_frame);
         for robot in groups.flat_map(|group| group.robots.clone()) {
-            ether.emit(robot, Some(FrameOrigin::sent_by(robot)), &vec![0.0; world.message_len]);
+            ether.emit(robot, FrameOrigin::sent_by(robot), &vec![0.0; world.message_len]);
         }
         Self {
             ether,
@@ -41,64 +44,68 @@ impl Radio {
             quantisation,
             u: Vec::new(),
             scratch: Scratch::default(),
+            valid: Vec::new(),
         }
     }
 
     /// Robots have taken their places, moved or turned.
-    pub fn listen(&mut self, world: &World, neighbours: &Neighbours, swarm: &Swarm) {
-        self.hearing.update(&world.antennas, neighbours, &swarm.headings);
+    pub fn listen(&mut self, neighbours: &Neighbours, swarm: &Swarm) {
+        self.hearing.update(neighbours, &swarm.headings);
     }
 
     /// Every receiver takes a frame from the air: one uniformly chosen among the
     /// sectors whose strongest frame is valid.
-    pub fn receive(&mut self, world: &World, swarm: &mut Swarm) {
-        for (robot, antenna) in world.antennas.iter().enumerate() {
-            let Some(receiver) = antenna.receiver else { continue };
-            let ether = &self.ether;
-            let accepted = |origin: &&FrameOrigin| {
-                origin.originator != robot && origin.hops < receiver.max_hops
-            };
-            let sectors = self.hearing.of(robot).iter().enumerate();
-            let mut valid = sectors.filter_map(|(sector, heard)| {
-                let heard = heard.as_ref()?;
-                let origin = ether.origin(heard.emitter.robot).filter(accepted)?;
-                Some((sector, heard, origin))
-            });
-            // One draw per step, needed or not.
-            let u = self.reception[robot].uniform();
-            let count = valid.clone().count();
-            let chosen = valid.nth(((u * count as f64) as usize).min(count.saturating_sub(1)));
-            let chosen =
-                chosen.map(|(sector, heard, &origin)| (sector, heard.emitter.robot, origin));
-            let chosen = chosen.and_then(|(sector, emitter, origin)| {
-                let (decay, headings) = (receiver.decay, &swarm.headings);
-                let observed = self.hearing.observe(robot, sector, decay, headings)?;
-                Some((sector, emitter, origin, observed))
-            });
-            let message = swarm.message_range(robot);
-            let message = &mut swarm.received_messages[message];
-            let Some((sector, emitter, origin, Observed { signal, sending_direction })) = chosen
-            else {
-                swarm.received[robot] = None;
-                message.fill(0.0);
-                continue;
-            };
-            message.copy_from_slice(ether.message(emitter));
-            // The first to hear a frame sees the direction in which its message was sent.
-            let origin = match origin.hops {
-                1 => FrameOrigin { sending_direction, ..origin },
-                _ => origin,
-            };
-            swarm.received[robot] = Some(Received {
-                sector,
-                signal,
-                receiving_direction: self.hearing.direction(robot, sector),
-                sending_direction: match receiver.sending_direction {
-                    SendingDirection::Emitter => sending_direction,
-                    SendingDirection::Originator => origin.sending_direction,
-                },
-                origin,
-            });
+    pub fn receive(&mut self, neighbours: &Neighbours, swarm: &mut Swarm) {
+        let Self { ether, hearing, reception, valid, .. } = self;
+        for listeners in hearing.listeners() {
+            let receiver = listeners.receiver;
+            valid.resize(receiver.n_sectors + 1, 0);
+            for (robot, heard) in listeners.iter() {
+                let mut n_valid = 0;
+                for (sector, heard) in heard.iter().enumerate() {
+                    // Without a branch: which ones are valid is not to be foreseen.
+                    valid[n_valid] = sector;
+                    let is_valid = ether.is_valid(heard.robot as usize, robot, receiver.max_hops);
+                    n_valid += usize::from(is_valid);
+                }
+                // One draw per step, needed or not.
+                let u = reception[robot].uniform();
+                let message = swarm.message_range(robot);
+                let message = &mut swarm.received_messages[message];
+                if n_valid == 0 {
+                    swarm.received[robot] = None;
+                    message.fill(0.0);
+                    continue;
+                }
+                let sector = valid[((u * n_valid as f64) as usize).min(n_valid - 1)];
+                let heard = heard[sector];
+                let emitter = heard.robot as usize;
+                message.copy_from_slice(ether.message(emitter));
+                let headings = &swarm.headings;
+                let sending_direction = if receiver.observes_sending_direction {
+                    hearing.sending_direction(listeners, heard, neighbours, headings)
+                } else {
+                    Vec2::default()
+                };
+                // The first to hear a frame sees the direction in which its message was sent.
+                let mut origin = ether.origin(emitter);
+                if origin.hops == 1 {
+                    origin.sending_direction = sending_direction;
+                }
+                let log_strength =
+                    listeners.log_strength(robot, sector, heard, neighbours, headings);
+                swarm.received[robot] = Some(Received {
+                    emitter,
+                    sector,
+                    log_strength,
+                    receiving_direction: listeners.directions[sector],
+                    sending_direction: match receiver.sending_direction {
+                        SendingDirection::Emitter => sending_direction,
+                        SendingDirection::Originator => origin.sending_direction,
+                    },
+                    origin,
+                });
+            }
         }
     }
 
@@ -127,11 +134,15 @@ impl Radio {
         match swarm.modes[robot] {
             Mode::Send => {
                 let origin = FrameOrigin::sent_by(robot);
-                self.ether.emit(robot, Some(origin), &swarm.messages[message]);
+                self.ether.emit(robot, origin, &swarm.messages[message]);
             }
             Mode::Relay => {
-                let origin = swarm.received[robot]
-                    .map(|Received { origin, .. }| FrameOrigin { hops: origin.hops + 1, ..origin });
+                let received = swarm.received[robot].as_ref();
+                let origin =
+                    received.map_or(FrameOrigin::NOTHING, |Received { origin, .. }| FrameOrigin {
+                        hops: origin.hops + 1,
+                        ..*origin
+                    });
                 self.ether.emit(robot, origin, &swarm.received_messages[message]);
             }
         }

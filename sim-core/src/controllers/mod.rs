@@ -20,6 +20,11 @@ pub(crate) trait Controller {
     /// robot's own for stochastic decisions, from which every step draws the same
     /// number of values.
     fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>);
+
+    /// Activities of its neurons, `[neuron][lane]`, if it has any.
+    fn activity(&self) -> Option<&Lanes> {
+        None
+    }
 }
 
 /// The actions of one robot in one step.

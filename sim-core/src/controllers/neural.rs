@@ -35,4 +35,8 @@ impl Controller for NeuralController<'_> {
             output.decode(self.state.activity(), lane, stream, &mut self.weights, action);
         }
     }
+
+    fn activity(&self) -> Option<&Lanes> {
+        Some(self.state.activity())
+    }
 }

@@ -46,6 +46,10 @@ impl Fitness for IdentifyBorderline {
         }
         measures.insert("accuracy", rates.accuracy);
     }
+
+    fn targets(&self) -> &[bool] {
+        &self.targets
+    }
 }
 
 /// Shares of robots that know their place.

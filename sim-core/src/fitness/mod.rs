@@ -66,6 +66,12 @@ pub(crate) trait Fitness {
 
     /// Adds the measures of the step that was scored last.
     fn measure(&self, moment: &Moment<'_>, measures: &mut Measures);
+
+    /// For each robot whether its LED should have been on in the step that was scored
+    /// last; empty if the task does not say.
+    fn targets(&self) -> &[bool] {
+        &[]
+    }
 }
 
 /// A fitness function as far as it is the same for all trials.

@@ -7,12 +7,14 @@ mod json;
 mod phenotype;
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use indexmap::IndexMap;
 
 use crate::problems::Problems;
 use connections::{Synapse, SynapseGroup};
 use decoding::Output;
+use dynamics::Wiring;
 use experiment_file::{
     Activation, InitialRates, NamedMap, NeuronModel, NeuronParameter, SensorQuery, TopologyConfig,
 };
@@ -41,6 +43,9 @@ pub(crate) struct Network {
     pub groups: IndexMap<String, SynapseGroup>,
     /// All synapses, group by group.
     pub synapses: Vec<Synapse>,
+    /// The order in which they are computed, once it is asked for: whoever merely checks
+    /// experiments, as a coordinator does, needs none, and it may have a million synapses.
+    wiring: OnceLock<Wiring>,
     /// What neurons do, in the order of the configuration.
     pub outputs: Vec<Output>,
 }
@@ -110,8 +115,15 @@ impl Network {
             ensembles,
             groups,
             synapses,
+            wiring: OnceLock::new(),
             outputs,
         }
+    }
+
+    /// The order in which its neurons and synapses are computed.
+    pub fn wiring(&self) -> &Wiring {
+        let new = || Wiring::new(self.model, &self.ensembles, &self.synapses);
+        self.wiring.get_or_init(new)
     }
 
     /// Number of neurons.

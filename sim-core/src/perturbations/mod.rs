@@ -63,6 +63,18 @@ impl Perturbations {
         self.inhibitions.iter().any(|inhibition| inhibition.inhibits(robot, reading))
     }
 
+    /// Replaces a value of a reading by zero, in a row of the group's robots, where networks do
+    /// not get it.
+    pub fn inhibit(&self, reading: SensorQuery, row: &mut [f32]) {
+        for inhibition in &self.inhibitions {
+            for (robot, value) in row.iter_mut().enumerate() {
+                if inhibition.inhibits(robot, reading) {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+
     /// Rewrites the actions of the group.
     pub fn rewrite(&mut self, step: u32, group: &RobotGroup, swarm: &mut Swarm) {
         let robots = group.robots.clone();

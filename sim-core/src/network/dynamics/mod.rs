@@ -1,13 +1,16 @@
 //! Networks at work: which implementation each neuron model has.
 //!
 //! To add a model: describe it in `experiment-file` (its module `neuron`), implement
-//! [`Dynamics`] in a module beside `ctrnn`, and add an arm to [`compile`].
+//! [`Dynamics`] in a module beside `ctrnn`, and add a variant to [`Wiring`].
 
 mod ctrnn;
 
 use std::fmt;
 
-use super::{Network, Phenotype};
+use indexmap::IndexMap;
+
+use super::connections::Synapse;
+use super::{Ensemble, Network, Phenotype};
 use crate::lanes::Lanes;
 use ctrnn::Ctrnn;
 use experiment_file::NeuronModel;
@@ -23,6 +26,26 @@ pub(crate) trait Dynamics: fmt::Debug {
 
     /// Writes the activities that outputs decode: `[neuron][lane]`.
     fn write_activity(&self, activity: &mut Lanes);
+}
+
+/// What a neuron model makes of a network's structure, once for all genotypes.
+#[derive(Debug, Clone)]
+pub(crate) enum Wiring {
+    /// [`NeuronModel::Rate`]
+    Rate(ctrnn::Wiring),
+}
+
+impl Wiring {
+    /// Of the neurons of some ensembles and the synapses that join them.
+    pub fn new(
+        model: NeuronModel,
+        ensembles: &IndexMap<String, Ensemble>,
+        synapses: &[Synapse],
+    ) -> Self {
+        match model {
+            NeuronModel::Rate => Self::Rate(ctrnn::Wiring::new(ensembles, synapses)),
+        }
+    }
 }
 
 /// A network with its values in every lane, and what its neurons show.
@@ -61,7 +84,7 @@ fn compile(
     phenotype: &Phenotype,
     n_lanes: usize,
 ) -> Box<dyn Dynamics> {
-    match network.model {
-        NeuronModel::Rate => Box::new(Ctrnn::new(isa, network, phenotype, n_lanes)),
+    match network.wiring() {
+        Wiring::Rate(wiring) => Box::new(Ctrnn::new(isa, network, wiring, phenotype, n_lanes)),
     }
 }

@@ -1,15 +1,14 @@
 //! A network with its weights, in the order in which it is computed.
 
-use std::collections::BTreeMap;
+use std::array;
 use std::ops::Range;
 
 use super::squash;
-use crate::network::connections::Source;
+use super::wiring::{WiredBlocks, WiredCoupling, Wiring};
 use crate::network::{Network, Phenotype};
 use experiment_file::{Activation, InitialRates};
 
-/// Neurons in blocks of four and, what is left of ensembles, of two. A neuron's row is its
-/// place, blocks of four first; rows 2k and 2k+1 are a pair, which shares a division.
+/// The blocks of a [`Wiring`] with their values.
 #[derive(Debug)]
 pub(super) struct Kernel {
     pub n_substeps: u32,
@@ -57,40 +56,14 @@ pub(super) struct Coupling<const N: usize> {
 }
 
 impl Kernel {
-    /// The kernel of a genotype, and its row of each neuron.
-    pub fn compile(network: &Network, phenotype: &Phenotype) -> (Self, Vec<usize>) {
-        let Members { quads, pairs } = Members::of(network);
-        let quad_rows = quads.iter().flat_map(|(_, members)| members.iter().copied().map(Some));
-        let pair_rows = pairs.iter().flat_map(|(_, members)| members.iter().copied());
-        let mut rows = vec![0; network.n_neurons()];
-        for (row, neuron) in quad_rows.chain(pair_rows).enumerate() {
-            if let Some(neuron) = neuron {
-                rows[neuron] = row;
-            }
-        }
-        let mut incoming = vec![[BTreeMap::new(), BTreeMap::new()]; network.n_neurons()];
-        for (synapse, weight) in network.synapses.iter().zip(&phenotype.weights) {
-            let [recurrent, afferent] = &mut incoming[synapse.post];
-            // Two groups of synapses may join the same neurons.
-            *match synapse.pre {
-                Source::Neuron(pre) => recurrent.entry(rows[pre]).or_insert(0.0),
-                Source::Input(pre) => afferent.entry(pre).or_insert(0.0),
-            } += weight;
-        }
-        let wiring = Wiring { network, phenotype, incoming };
-        let mut kernel = Self {
+    /// The kernel of a genotype.
+    pub fn compile(network: &Network, wiring: &Wiring, phenotype: &Phenotype) -> Self {
+        Self {
             n_substeps: network.n_substeps,
             initial_rates: network.initial_rates,
-            quads: Blocks::default(),
-            pairs: Blocks::default(),
-        };
-        for (activation, members) in quads {
-            kernel.quads.add(&wiring, activation, members.map(Some));
+            quads: Blocks::compile(network, &wiring.quads, phenotype),
+            pairs: Blocks::compile(network, &wiring.pairs, phenotype),
         }
-        for (activation, members) in pairs {
-            kernel.pairs.add(&wiring, activation, members);
-        }
-        (kernel, rows)
     }
 
     /// y of each row at the start.
@@ -118,89 +91,52 @@ impl Kernel {
     }
 }
 
-/// What blocks are made from.
-struct Wiring<'a> {
-    network: &'a Network,
-    phenotype: &'a Phenotype,
-    /// Of each neuron: rows and weights of its synapses with neurons and with inputs.
-    incoming: Vec<[BTreeMap<usize, f64>; 2]>,
-}
-
 impl<const N: usize> Blocks<N> {
-    fn add(&mut self, wiring: &Wiring<'_>, activation: Activation, members: [Option<usize>; N]) {
-        let Wiring { network, phenotype, incoming } = wiring;
+    fn compile(network: &Network, wired: &WiredBlocks<N>, phenotype: &Phenotype) -> Self {
         let [tau, gain, bias] = ["tau", "gain", "bias"].map(|name| &phenotype.neurons[name]);
-        let (mut start, mut retention, mut drive) = ([0.0; N], [0.0; N], [0.0; N]);
-        let mut couplings = [BTreeMap::new(), BTreeMap::new()];
-        for (place, neuron) in members.into_iter().enumerate() {
-            let Some(neuron) = neuron else { continue };
-            let rate = network.dt / tau[neuron];
-            let squash_scale = squash::scale(activation);
-            let scale = squash_scale * gain[neuron];
-            let bias_scale = if network.bias_in_gain { scale } else { squash_scale };
-            start[place] = (bias_scale * bias[neuron]) as f32;
-            retention[place] = (1.0 - rate) as f32;
-            drive[place] = (rate * bias_scale * bias[neuron]) as f32;
-            for (couplings, incoming) in couplings.iter_mut().zip(&incoming[neuron]) {
-                for (&pre, weight) in incoming {
-                    let weights = couplings.entry(pre).or_insert([0.0; N]);
-                    weights[place] = (rate * scale * weight) as f32;
-                }
+        let mut kernel = Self {
+            blocks: Vec::with_capacity(wired.blocks.len()),
+            recurrent: Vec::with_capacity(wired.recurrent.len()),
+            afferent: Vec::with_capacity(wired.afferent.len()),
+        };
+        for block in &wired.blocks {
+            let (mut start, mut retention, mut drive) = ([0.0; N], [0.0; N], [0.0; N]);
+            let mut weight_scales = [0.0; N];
+            for (place, neuron) in block.neurons.into_iter().enumerate() {
+                let Some(neuron) = neuron else { continue };
+                let rate = network.dt / tau[neuron];
+                let squash_scale = squash::scale(block.activation);
+                let scale = squash_scale * gain[neuron];
+                let bias_scale = if network.bias_in_gain { scale } else { squash_scale };
+                start[place] = (bias_scale * bias[neuron]) as f32;
+                retention[place] = (1.0 - rate) as f32;
+                drive[place] = (rate * bias_scale * bias[neuron]) as f32;
+                weight_scales[place] = rate * scale;
             }
-        }
-        let [recurrent, afferent] = couplings;
-        let recurrent = append(&mut self.recurrent, recurrent);
-        let afferent = append(&mut self.afferent, afferent);
-        self.blocks.push(Block { activation, start, retention, drive, recurrent, afferent });
-    }
-}
-
-/// Adds couplings, given as rows and weights, and returns where they are.
-fn append<const N: usize>(
-    couplings: &mut Vec<Coupling<N>>,
-    added: BTreeMap<usize, [f32; N]>,
-) -> Range<usize> {
-    let first = couplings.len();
-    couplings.extend(added.into_iter().map(|(pre, weights)| Coupling { pre, weights }));
-    first..couplings.len()
-}
-
-/// All neurons, in blocks of one activation function. It depends on the network's
-/// structure alone.
-struct Members {
-    quads: Vec<(Activation, [usize; 4])>,
-    pairs: Vec<(Activation, [Option<usize>; 2])>,
-}
-
-impl Members {
-    /// Neighbours of an ensemble first, because they have most of their presynaptic
-    /// neurons in common, then what ensembles have left over.
-    fn of(network: &Network) -> Self {
-        let (mut quads, mut pairs) = (Vec::new(), Vec::new());
-        let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];
-        for ensemble in network.ensembles.values() {
-            // The reader gives every ensemble of rate neurons one.
-            let function = ensemble.activation.unwrap_or_default();
-            let neurons: Vec<usize> = ensemble.neurons.clone().collect();
-            let (of_four, rest) = neurons.as_chunks();
-            quads.extend(of_four.iter().map(|&members| (function, members)));
-            let (of_two, rest) = rest.as_chunks();
-            pairs.extend(of_two.iter().map(|&members: &[usize; 2]| (function, members.map(Some))));
-            let [first] = *rest else { continue };
-            for (activation, single) in &mut left_over {
-                if *activation == function {
-                    match single.take() {
-                        None => *single = Some(first),
-                        Some(other) => pairs.push((*activation, [Some(other), Some(first)])),
+            let weigh = |coupling: &WiredCoupling<N>| {
+                let weight = |place: usize| match wired.synapses(coupling, place) {
+                    [] => 0.0,
+                    synapses => {
+                        let weights = synapses.iter().map(|&synapse| phenotype.weights[synapse]);
+                        (weight_scales[place] * weights.fold(0.0, |sum, weight| sum + weight))
+                            as f32
                     }
-                }
-            }
+                };
+                Coupling { pre: coupling.pre, weights: array::from_fn(weight) }
+            };
+            let wired_recurrent = &wired.recurrent[block.recurrent.clone()];
+            let wired_afferent = &wired.afferent[block.afferent.clone()];
+            kernel.recurrent.extend(wired_recurrent.iter().map(weigh));
+            kernel.afferent.extend(wired_afferent.iter().map(weigh));
+            kernel.blocks.push(Block {
+                activation: block.activation,
+                start,
+                retention,
+                drive,
+                recurrent: block.recurrent.clone(),
+                afferent: block.afferent.clone(),
+            });
         }
-        for (activation, single) in left_over {
-            if single.is_some() {
-                pairs.push((activation, [single, None]));
-            }
-        }
-        Self { quads, pairs }
+        kernel
     }
 }

@@ -24,6 +24,7 @@ mod chunk;
 mod kernel;
 mod remainder;
 mod squash;
+mod wiring;
 
 use super::Dynamics;
 use crate::lanes::Lanes;
@@ -32,6 +33,7 @@ use chunk::Chunk;
 use kernel::Kernel;
 use numeric::Isa;
 use remainder::{Bundles, Remainder};
+pub(super) use wiring::Wiring;
 
 /// A network with its weights, and its state in every lane.
 #[derive(Debug)]
@@ -54,8 +56,14 @@ struct Rest {
 
 impl Ctrnn {
     /// At rest: v = 0 in every lane.
-    pub fn new(isa: Isa, network: &Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
-        let (kernel, rows) = Kernel::compile(network, phenotype);
+    pub fn new(
+        isa: Isa,
+        network: &Network,
+        wiring: &Wiring,
+        phenotype: &Phenotype,
+        n_lanes: usize,
+    ) -> Self {
+        let kernel = Kernel::compile(network, wiring, phenotype);
         let vector_len = isa.vector_len();
         let (mut n_vectors, mut n_left) = (n_lanes / vector_len, n_lanes % vector_len);
         // A vector of lanes costs a vector of each row, a remainder's lane one of as many
@@ -81,7 +89,7 @@ impl Ctrnn {
             let remainders = remainders.collect();
             Rest { bundles, remainders }
         });
-        Self { isa, kernel, chunks, rest, rows }
+        Self { isa, kernel, chunks, rest, rows: wiring.rows.clone() }
     }
 }
 

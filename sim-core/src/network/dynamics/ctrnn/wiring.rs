@@ -1,0 +1,174 @@
+//! The order in which a network is computed: what of a [`Kernel`](super::kernel::Kernel)
+//! depends on the network's structure alone and is the same for all genotypes.
+
+use std::array;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use indexmap::IndexMap;
+
+use crate::network::Ensemble;
+use crate::network::connections::{Source, Synapse};
+use experiment_file::Activation;
+
+/// Neurons in blocks of four and, what is left of ensembles, of two. A neuron's row is its
+/// place, blocks of four first; rows 2k and 2k+1 are a pair, which shares a division.
+#[derive(Debug, Clone)]
+pub(crate) struct Wiring {
+    /// Row of each neuron.
+    pub rows: Vec<usize>,
+    pub quads: WiredBlocks<4>,
+    pub pairs: WiredBlocks<2>,
+}
+
+/// Blocks of N neurons, and their synapses, block by block.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct WiredBlocks<const N: usize> {
+    pub blocks: Vec<WiredBlock<N>>,
+    /// Synapses between neurons.
+    pub recurrent: Vec<WiredCoupling<N>>,
+    /// Synapses from inputs.
+    pub afferent: Vec<WiredCoupling<N>>,
+    /// Numbers of synapses, those of the same neurons one after the other.
+    synapses: Vec<usize>,
+}
+
+/// N neurons of one activation function.
+#[derive(Debug, Clone)]
+pub(crate) struct WiredBlock<const N: usize> {
+    /// F
+    pub activation: Activation,
+    /// Its neurons; the last block of a function may have a place left.
+    pub neurons: [Option<usize>; N],
+    /// Its synapses in `WiredBlocks::recurrent`.
+    pub recurrent: Range<usize>,
+    /// Its synapses in `WiredBlocks::afferent`.
+    pub afferent: Range<usize>,
+}
+
+/// Synapses of one row with the neurons of a block, which has them by ascending rows.
+#[derive(Debug, Clone)]
+pub(crate) struct WiredCoupling<const N: usize> {
+    /// Row of the presynaptic neuron or input.
+    pub pre: usize,
+    /// Of each neuron: its synapses in `WiredBlocks::synapses`.
+    synapses: [Range<usize>; N],
+}
+
+/// Numbers of a neuron's synapses by their presynaptic row. Two groups of synapses may
+/// join the same neurons.
+type Incoming = BTreeMap<usize, Vec<usize>>;
+
+impl Wiring {
+    /// Orders a network.
+    pub fn new(ensembles: &IndexMap<String, Ensemble>, synapses: &[Synapse]) -> Self {
+        let Members { quads, pairs } = Members::of(ensembles);
+        let quad_rows = quads.iter().flat_map(|(_, members)| members);
+        let pair_rows = pairs.iter().flat_map(|(_, members)| members);
+        let n_neurons = ensembles.values().last().map_or(0, |ensemble| ensemble.neurons.end);
+        let mut rows = vec![0; n_neurons];
+        for (row, neuron) in quad_rows.chain(pair_rows).enumerate() {
+            if let Some(neuron) = *neuron {
+                rows[neuron] = row;
+            }
+        }
+        let mut incoming = vec![[Incoming::new(), Incoming::new()]; n_neurons];
+        for (number, synapse) in synapses.iter().enumerate() {
+            let [recurrent, afferent] = &mut incoming[synapse.post];
+            let same = match synapse.pre {
+                Source::Neuron(pre) => recurrent.entry(rows[pre]),
+                Source::Input(pre) => afferent.entry(pre),
+            };
+            same.or_default().push(number);
+        }
+        let (mut wired_quads, mut wired_pairs) = (WiredBlocks::default(), WiredBlocks::default());
+        for (activation, members) in quads {
+            wired_quads.add(&incoming, activation, members);
+        }
+        for (activation, members) in pairs {
+            wired_pairs.add(&incoming, activation, members);
+        }
+        Self { rows, quads: wired_quads, pairs: wired_pairs }
+    }
+}
+
+impl<const N: usize> WiredBlocks<N> {
+    /// Numbers of the synapses at a place of a coupling, ascending; there may be none.
+    #[inline(always)]
+    pub fn synapses(&self, coupling: &WiredCoupling<N>, place: usize) -> &[usize] {
+        &self.synapses[coupling.synapses[place].clone()]
+    }
+
+    fn add(
+        &mut self,
+        incoming: &[[Incoming; 2]],
+        activation: Activation,
+        neurons: [Option<usize>; N],
+    ) {
+        let mut couplings = [BTreeMap::new(), BTreeMap::new()];
+        for (place, neuron) in neurons.into_iter().enumerate() {
+            let Some(neuron) = neuron else { continue };
+            for (couplings, incoming) in couplings.iter_mut().zip(&incoming[neuron]) {
+                for (&pre, synapses) in incoming {
+                    let first = self.synapses.len();
+                    self.synapses.extend(synapses);
+                    let places = couplings.entry(pre).or_insert_with(|| array::from_fn(|_| 0..0));
+                    places[place] = first..self.synapses.len();
+                }
+            }
+        }
+        let [recurrent, afferent] = couplings;
+        let recurrent = append(&mut self.recurrent, recurrent);
+        let afferent = append(&mut self.afferent, afferent);
+        self.blocks.push(WiredBlock { activation, neurons, recurrent, afferent });
+    }
+}
+
+/// Adds couplings, given as rows and synapses, and returns where they are.
+fn append<const N: usize>(
+    couplings: &mut Vec<WiredCoupling<N>>,
+    added: BTreeMap<usize, [Range<usize>; N]>,
+) -> Range<usize> {
+    let first = couplings.len();
+    couplings.extend(added.into_iter().map(|(pre, synapses)| WiredCoupling { pre, synapses }));
+    first..couplings.len()
+}
+
+/// All neurons, in blocks of one activation function.
+struct Members {
+    quads: Vec<(Activation, [Option<usize>; 4])>,
+    pairs: Vec<(Activation, [Option<usize>; 2])>,
+}
+
+impl Members {
+    /// Neighbours of an ensemble first, because they have most of their presynaptic
+    /// neurons in common, then what ensembles have left over.
+    fn of(ensembles: &IndexMap<String, Ensemble>) -> Self {
+        let (mut quads, mut pairs) = (Vec::new(), Vec::new());
+        let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];
+        for ensemble in ensembles.values() {
+            // The reader gives every ensemble of rate neurons one.
+            let function = ensemble.activation.unwrap_or_default();
+            let neurons: Vec<usize> = ensemble.neurons.clone().collect();
+            let (of_four, rest) = neurons.as_chunks();
+            quads.extend(of_four.iter().map(|&members: &[usize; 4]| (function, members.map(Some))));
+            let (of_two, rest) = rest.as_chunks();
+            pairs.extend(of_two.iter().map(|&members: &[usize; 2]| (function, members.map(Some))));
+            let [first] = *rest else { continue };
+            for (activation, single) in &mut left_over {
+                if *activation == function {
+                    match single.take() {
+                        None => *single = Some(first),
+                        Some(other) => pairs.push((*activation, [Some(other), Some(first)])),
+                    }
+                }
+            }
+        }
+        for (activation, single) in left_over {
+            if single.is_some() {
+                pairs.push((activation, [single, None]));
+            }
+        }
+        Self { quads, pairs }
+    }
+}
