@@ -1,0 +1,233 @@
+//! The files of a bundle: what each holds, as bytes and back.
+
+use evolution::{Champion, ChampionSource, Digest, Statistics};
+use experiment_file::limits;
+use serde::{Deserialize, Serialize};
+
+use super::{Bundle, BundleError, GenerationRow, Manifest, archive::File};
+
+const MANIFEST: &str = "bundle.json";
+const EXPERIMENT: &str = "experiment.json";
+const HISTORY: &str = "history.csv";
+const LOG: &str = "fitness-log.bin";
+const KEYFRAMES: &str = "keyframes.bin";
+const CHAMPION: &str = "champion.json";
+
+/// All files beside the description, empty, in the order of the archive.
+pub fn all() -> [File; 6] {
+    let file = |name, about, encoding| File { name, about, encoding, content: Vec::new() };
+    let binary = "application/octet-stream";
+    [
+        file(MANIFEST, "Versions, digests and how the experiment ended", "application/json"),
+        file(
+            EXPERIMENT,
+            "The experiment file in canonical form, with its seed",
+            "application/json",
+        ),
+        file(HISTORY, "Fitness, time and digest of every generation", "text/csv"),
+        file(LOG, "The fitness of every individual in every trial, bit for bit", binary),
+        file(KEYFRAMES, "The state of evolution after some generations", binary),
+        file(CHAMPION, "The champion, and what it is worth", "application/json"),
+    ]
+}
+
+/// A row of `history.csv`.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    generation: u64,
+    best: f64,
+    mean: f64,
+    min: f64,
+    standard_deviation: f64,
+    episodes: u64,
+    duration_ms: u64,
+    completed_at_ms: u64,
+    workers: u64,
+    idle_share: f64,
+    digest: Digest,
+}
+
+impl Bundle {
+    /// The files beside the description.
+    pub(super) fn to_files(&self) -> [File; 6] {
+        let mut files = all();
+        files[0].content = write_manifest(&self.manifest);
+        files[1].content = self.config_json.clone().into();
+        files[2].content = write_history(&self.history);
+        for entry in &self.log {
+            frame(&mut files[3].content, entry);
+        }
+        for (n_generations, state) in &self.keyframes {
+            files[4].content.extend(n_generations.to_le_bytes());
+            frame(&mut files[4].content, state);
+        }
+        files[5].content = self.champion_json.clone().into();
+        files
+    }
+
+    /// The bundle that has these files.
+    pub(super) fn from_files(files: [File; 6]) -> Result<Self, BundleError> {
+        let [manifest, experiment, history, log, keyframes, champion] = files;
+        let malformed = |file: &'static str, what: &dyn std::fmt::Display| BundleError::Malformed {
+            file,
+            what: what.to_string(),
+        };
+        let text = |file: File| {
+            String::from_utf8(file.content).map_err(|error| malformed(file.name, &error))
+        };
+        let bundle = Self {
+            manifest: serde_json::from_slice(&manifest.content)
+                .map_err(|error| malformed(MANIFEST, &error))?,
+            config_json: text(experiment)?,
+            history: read_history(&history.content).map_err(|what| malformed(HISTORY, &what))?,
+            log: read_frames(&log.content).map_err(|what| malformed(LOG, &what))?,
+            keyframes: read_keyframes(&keyframes.content)
+                .map_err(|what| malformed(KEYFRAMES, &what))?,
+            champion_json: text(champion)?,
+        };
+        // There is one way to write each of them, so every bit means something.
+        let written = [
+            (MANIFEST, write_manifest(&bundle.manifest), manifest.content),
+            (HISTORY, write_history(&bundle.history), history.content),
+        ];
+        for (file, written, content) in written {
+            if written != content {
+                return Err(malformed(file, &"it is not written as a bundle is"));
+            }
+        }
+        Ok(bundle)
+    }
+}
+
+/// A champion as JSON: `swarmctl simulate --genotype` takes it.
+pub fn champion_json(champion: &Champion) -> String {
+    // Databases do not keep the sign of zero: where it may be lost, it is left out.
+    let Champion { generation, source, genotype, trial_fitness, held_out, judged } = champion;
+    let individual = match source {
+        ChampionSource::Individual(index) => Some(index),
+        ChampionSource::Mean => None,
+    };
+    let document = serde_json::json!({
+        "generation": generation,
+        "individual": individual,
+        "trial_fitness": trial_fitness,
+        "selection": held_out.map(|it| serde_json::json!({
+            "mean": it.mean + 0.0, "ci95": it.ci95, "trials": it.n_trials, "generation": it.generation,
+        })),
+        "judged": judged.map(|it| serde_json::json!({
+            "mean": it.mean + 0.0, "low": it.low + 0.0, "high": it.high + 0.0, "trials": it.n_trials,
+            "generation": it.generation,
+        })),
+        "genotype": genotype,
+    });
+    serde_json::to_string_pretty(&document).expect("JSON serialises")
+}
+
+fn write_manifest(manifest: &Manifest) -> Vec<u8> {
+    serde_json::to_vec_pretty(manifest).expect("plain data serialises")
+}
+
+fn write_history(history: &[GenerationRow]) -> Vec<u8> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for (generation, row) in (0..).zip(history) {
+        let GenerationRow { statistics, digest, .. } = row;
+        let row = Row {
+            generation,
+            best: statistics.best,
+            mean: statistics.mean,
+            min: statistics.min,
+            standard_deviation: statistics.standard_deviation,
+            episodes: row.episodes,
+            duration_ms: row.duration_ms,
+            completed_at_ms: row.completed_at_ms,
+            workers: row.workers,
+            idle_share: row.idle_share,
+            digest: *digest,
+        };
+        table.serialize(row).expect("numbers and text are a row");
+    }
+    table.into_inner().expect("memory can be written")
+}
+
+fn read_history(bytes: &[u8]) -> Result<Vec<GenerationRow>, String> {
+    let mut history = Vec::new();
+    for (generation, row) in (0..).zip(csv::Reader::from_reader(bytes).into_deserialize()) {
+        let row: Row = row.map_err(|error| error.to_string())?;
+        if generation >= limits::GENERATIONS {
+            return Err(too_many());
+        }
+        if row.generation != generation {
+            return Err(format!("generation {generation} is not where it belongs"));
+        }
+        let Row { best, mean, min, standard_deviation, .. } = row;
+        history.push(GenerationRow {
+            statistics: Statistics { best, mean, min, standard_deviation },
+            episodes: row.episodes,
+            duration_ms: row.duration_ms,
+            completed_at_ms: row.completed_at_ms,
+            workers: row.workers,
+            idle_share: row.idle_share,
+            digest: row.digest,
+        });
+    }
+    Ok(history)
+}
+
+/// Appends bytes with their length before them: 8 bytes, the lowest first.
+fn frame(file: &mut Vec<u8>, bytes: &[u8]) {
+    file.extend((bytes.len() as u64).to_le_bytes());
+    file.extend(bytes);
+}
+
+/// The number at the beginning, and what follows it.
+fn number(bytes: &[u8]) -> Option<(u64, &[u8])> {
+    let (number, rest) = bytes.split_first_chunk()?;
+    Some((u64::from_le_bytes(*number), rest))
+}
+
+/// What [`frame`] appended, and what follows it.
+fn unframe(bytes: &[u8]) -> Option<(Vec<u8>, &[u8])> {
+    let (len, rest) = number(bytes)?;
+    let (content, rest) = rest.split_at_checked(usize::try_from(len).ok()?)?;
+    Some((content.to_vec(), rest))
+}
+
+fn read_frames(mut bytes: &[u8]) -> Result<Vec<Vec<u8>>, String> {
+    let mut frames = Vec::new();
+    while !bytes.is_empty() {
+        let (content, rest) = unframe(bytes).ok_or_else(cut_off)?;
+        frames.push(content);
+        bytes = rest;
+        if frames.len() as u64 > limits::GENERATIONS {
+            return Err(too_many());
+        }
+    }
+    Ok(frames)
+}
+
+fn read_keyframes(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<u8>)>, String> {
+    let mut keyframes = Vec::new();
+    while !bytes.is_empty() {
+        let (n_generations, rest) = number(bytes).ok_or_else(cut_off)?;
+        let (state, rest) = unframe(rest).ok_or_else(cut_off)?;
+        // In order, so that there are not more of them than generations.
+        if keyframes.last().is_some_and(|&(before, _)| before >= n_generations) {
+            return Err("its keyframes are not in order".to_owned());
+        }
+        if n_generations > limits::GENERATIONS {
+            return Err(too_many());
+        }
+        keyframes.push((n_generations, state));
+        bytes = rest;
+    }
+    Ok(keyframes)
+}
+
+fn cut_off() -> String {
+    "it is cut off".to_owned()
+}
+
+fn too_many() -> String {
+    format!("it has more than {} generations", limits::GENERATIONS)
+}

@@ -1,0 +1,368 @@
+//! Goes through an experiment again, and says what of its bundle was proven.
+//!
+//! Evolution is a function of seed and fitness. So the chain of digests, the history, the
+//! keyframes and the champion follow from the experiment file and the fitness log alone;
+//! only that the fitness itself is right takes simulations, which the caller does.
+
+use std::{collections::BTreeSet, fmt};
+
+use evolution::{
+    ALGORITHMS, Champion, Checkpoint, CheckpointError, Digest, Evolution, Outcome, Replay, Round,
+    Told,
+};
+use experiment_file::ExperimentConfig;
+use sim_core::{FINGERPRINT, Simulation, TrialSet, panic_to_failure};
+
+use super::{Bundle, GenerationRow, Sample, champion_json};
+
+/// An experiment of which a part has been gone through.
+#[derive(Debug)]
+pub struct Verification<'a> {
+    bundle: &'a Bundle,
+    simulation: Simulation,
+    n_trials: u32,
+    evolution: Evolution,
+    /// Whose trials are simulated again.
+    sample: BTreeSet<u64>,
+    n_keyframes: usize,
+    n_episodes: u64,
+    champion: Option<Champion>,
+}
+
+/// What a bundle claims.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Claim {
+    /// The experiment file is that of the chain's first link, and makes sense.
+    Experiment,
+    /// Every link follows from the one before, the genotypes that evolution draws, and the log.
+    Chain,
+    /// So does what the history says of fitness.
+    History,
+    /// The keyframes are the states of evolution.
+    Keyframes,
+    /// The champion is the one that the log leads to, and so is the last link.
+    Champion,
+    /// A simulation gives the fitness of the log.
+    Simulation,
+}
+
+/// What is wrong with a bundle.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{claim}: {what}")]
+pub struct Flaw {
+    /// The claim that does not hold.
+    pub claim: Claim,
+    /// Where, and what.
+    pub what: String,
+}
+
+/// What was proven, and what was not.
+#[derive(Debug)]
+pub struct Proof {
+    /// Each claim with what it comes to.
+    pub proven: Vec<(Claim, String)>,
+    /// What nobody can know from a bundle.
+    pub unproven: Vec<String>,
+    /// The champion.
+    pub champion: Option<Champion>,
+}
+
+/// Genotypes to be simulated again, all in the same trials.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    /// Which worlds and noise.
+    pub trial_set: TrialSet,
+    /// The genotypes.
+    pub genotypes: evolution::Population,
+    /// Of each the fitness that the log has, trial by trial from 0.
+    pub trial_fitness: Vec<Vec<f64>>,
+}
+
+impl fmt::Display for Claim {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Experiment => "experiment",
+            Self::Chain => "chain",
+            Self::History => "history",
+            Self::Keyframes => "keyframes",
+            Self::Champion => "champion",
+            Self::Simulation => "simulation",
+        })
+    }
+}
+
+impl Claim {
+    fn flaw(self, what: impl fmt::Display) -> Flaw {
+        Flaw { claim: self, what: what.to_string() }
+    }
+}
+
+impl Batch {
+    fn of(round: Round<'_>) -> Self {
+        let Round { trial_set, genotypes, trial_fitness } = round;
+        Self { trial_set, genotypes, trial_fitness: trial_fitness.to_vec() }
+    }
+
+    /// Compares with what a simulation gives, bit for bit.
+    pub fn compare(&self, simulated: &[Vec<f64>]) -> Result<(), Flaw> {
+        let flaw = |what: String| Claim::Simulation.flaw(format!("{}: {what}", self.trial_set));
+        if simulated.len() != self.trial_fitness.len() {
+            return Err(flaw("the simulation is incomplete".to_owned()));
+        }
+        for (i, (found, logged)) in simulated.iter().zip(&self.trial_fitness).enumerate() {
+            if !same_bits(found, logged) {
+                let what =
+                    format!("genotype {i} has the fitness {found:?}, and the log {logged:?}");
+                return Err(flaw(what));
+            }
+        }
+        Ok(())
+    }
+
+    fn n_episodes(&self) -> u64 {
+        self.trial_fitness.iter().map(|trials| trials.len() as u64).sum()
+    }
+}
+
+impl<'a> Verification<'a> {
+    /// Checks everything that comes before the first generation. `sample`: the generations
+    /// whose trials will be handed out to be simulated again.
+    pub fn begin(bundle: &'a Bundle, sample: Sample) -> Result<Self, Flaw> {
+        let flaw = |what: &dyn fmt::Display| Claim::Experiment.flaw(what);
+        let (config, _) = ExperimentConfig::from_json(&bundle.config_json, "", ALGORITHMS)
+            .map_err(|error| flaw(&one_line(&error)))?;
+        if config.to_canonical_json() != bundle.config_json {
+            return Err(flaw(&"its file is not in canonical form"));
+        }
+        let simulation = Simulation::compile(&config).map_err(|error| flaw(&one_line(&error)))?;
+        let own = Digest::of_config(&config, FINGERPRINT);
+        if own != bundle.manifest.config_digest {
+            let stated = bundle.manifest.config_digest;
+            return Err(flaw(&format!("its file has the digest {own}, and not {stated}")));
+        }
+        let (first, n_generations) = (bundle.first_own(), bundle.history.len() as u64);
+        if n_generations != first.saturating_add(bundle.log.len() as u64) || bundle.log.is_empty() {
+            return Err(Claim::Chain.flaw(format!(
+                "the history has {n_generations} generations, and the log {} from {first} on",
+                bundle.log.len()
+            )));
+        }
+        if bundle.keyframes.first().is_none_or(|&(at, _)| at != first) {
+            return Err(Claim::Keyframes.flaw("there is none before the first generation"));
+        }
+        if bundle.keyframes.last().is_some_and(|&(at, _)| at > n_generations) {
+            return Err(Claim::Keyframes.flaw("there is one after the last generation"));
+        }
+        let is_complete = n_generations == config.algorithm.generations;
+        let should_be = bundle.manifest.state == "completed" && bundle.manifest.reason.is_empty();
+        if n_generations > config.algorithm.generations || should_be && !is_complete {
+            return Err(Claim::Champion.flaw(format!(
+                "it has {n_generations} generations, and its file asks for {}",
+                config.algorithm.generations
+            )));
+        }
+        let new = Evolution::new(&config, simulation.population_segments(), FINGERPRINT);
+        let evolution = match &bundle.manifest.fork {
+            None => new,
+            Some(_) => fork_start(bundle, own, &new)?,
+        };
+        let sample = sample.generations(bundle.manifest.digest, first, n_generations);
+        Ok(Self {
+            bundle,
+            n_trials: config.algorithm.num_evaluations,
+            simulation,
+            evolution,
+            sample,
+            n_keyframes: 0,
+            n_episodes: 0,
+            champion: None,
+        })
+    }
+
+    /// What simulates the batches.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// Generations that have been gone through, and all.
+    pub fn progress(&self) -> (u64, u64) {
+        let first = self.bundle.first_own();
+        (self.evolution.n_generations() - first, self.bundle.log.len() as u64)
+    }
+
+    /// Goes through the next generation; what is to be simulated again of it, or none if there
+    /// is no generation left.
+    pub fn advance(&mut self) -> Result<Option<Vec<Batch>>, Flaw> {
+        let generation = self.evolution.n_generations();
+        let place = (generation - self.bundle.first_own()) as usize;
+        let Some(entry) = self.bundle.log.get(place) else { return Ok(None) };
+        // A forged state of a fork may be one that no algorithm can be in.
+        let step = panic_to_failure(|| Ok(self.step(generation, entry)));
+        let flaw = |what: String| Claim::Chain.flaw(format!("generation {generation}: {what}"));
+        step.unwrap_or_else(|what| Err(flaw(what))).map(Some)
+    }
+
+    fn step(&mut self, generation: u64, entry: &[u8]) -> Result<Vec<Batch>, Flaw> {
+        let at = |what: &dyn fmt::Display| format!("generation {generation}: {what}");
+        let misfit = |error: CheckpointError| Claim::Chain.flaw(at(&error));
+        self.compare_keyframe()?;
+        let told = Told::from_bytes(entry).map_err(misfit)?;
+        if told.to_bytes() != entry {
+            return Err(Claim::Chain.flaw(at(&"its entry is not written as entries are")));
+        }
+        let row = &self.bundle.history[generation as usize];
+        let Replay { summary, rounds } = self.evolution.replay(&told).map_err(misfit)?;
+        if summary.digest != row.digest {
+            let found = summary.digest;
+            let what =
+                format!("what the log leads to has the digest {found}, and not {}", row.digest);
+            return Err(Claim::Chain.flaw(at(&what)));
+        }
+        let n_episodes: u64 = told.trial_fitness.iter().map(|trials| trials.len() as u64).sum();
+        let GenerationRow { statistics, .. } = row;
+        let [found, stated] = [summary.statistics, *statistics]
+            // Databases do not keep the sign of zero.
+            .map(|it| [it.best, it.mean, it.min, it.standard_deviation].map(|value| value + 0.0));
+        if !same_bits(&found, &stated) || row.episodes != n_episodes {
+            return Err(Claim::History.flaw(at(&format!(
+                "its fitness is {found:?} of {n_episodes} episodes, and not {stated:?} of {}",
+                row.episodes
+            ))));
+        }
+        let mut batches = Vec::new();
+        if self.sample.contains(&generation) {
+            batches.extend(rounds.into_iter().map(Batch::of));
+            let n_trials = self.n_trials as usize;
+            if told.trial_fitness.iter().any(|trials| trials.len() != n_trials) {
+                return Err(Claim::Simulation.flaw(at(&format!("it has not {n_trials} trials"))));
+            }
+        }
+        let has_end = !told.end.blocks.is_empty() || !told.end.judgement.is_empty();
+        if generation + 1 < self.bundle.history.len() as u64 {
+            if has_end {
+                return Err(Claim::Chain.flaw(at(&"its entry says that it is the last one")));
+            }
+        } else {
+            self.compare_keyframe()?;
+            batches.extend(self.conclude(&told)?);
+        }
+        self.n_episodes += batches.iter().map(Batch::n_episodes).sum::<u64>();
+        Ok(batches)
+    }
+
+    /// The end of the run; returns what was evaluated for it.
+    fn conclude(&mut self, told: &Told) -> Result<Vec<Batch>, Flaw> {
+        let outcome = self.evolution.outcome(told);
+        let outcome = outcome.map_err(|error| Claim::Champion.flaw(error))?;
+        let Outcome { champion, digest, rounds } = outcome;
+        let stated = self.bundle.manifest.digest;
+        if digest != stated {
+            let what = format!("the last link is {digest}, and not {stated}");
+            return Err(Claim::Champion.flaw(what));
+        }
+        let text = champion.as_ref().map(champion_json).unwrap_or_default();
+        if text != self.bundle.champion_json {
+            return Err(Claim::Champion.flaw("the log leads to another one"));
+        }
+        self.champion = champion;
+        Ok(rounds.into_iter().map(Batch::of).collect())
+    }
+
+    fn compare_keyframe(&mut self) -> Result<(), Flaw> {
+        let now = self.evolution.n_generations();
+        let Some((at, state)) = self.bundle.keyframes.get(self.n_keyframes) else { return Ok(()) };
+        if *at > now {
+            return Ok(());
+        }
+        self.n_keyframes += 1;
+        if *at < now || *state != self.evolution.keyframe() {
+            let what = format!("the one before generation {at} is not the state of evolution");
+            return Err(Claim::Keyframes.flaw(what));
+        }
+        Ok(())
+    }
+
+    /// What was proven, once all generations have been gone through and all batches have been
+    /// simulated.
+    pub fn finish(self) -> Proof {
+        let Self { bundle, evolution, sample, n_keyframes, n_episodes, champion, .. } = self;
+        let (first, end) = (bundle.first_own(), evolution.n_generations());
+        let last = end - 1;
+        let chosen = match sample.len() as u64 {
+            0 => "no generation".to_owned(),
+            n if n == end - first => format!("all generations from {first} to {last}"),
+            _ => {
+                let drawn: Vec<String> = sample.iter().map(ToString::to_string).collect();
+                format!("generations {}, drawn by the last link,", drawn.join(", "))
+            }
+        };
+        let proven = vec![
+            (
+                Claim::Experiment,
+                format!("its file has the digest {}", bundle.manifest.config_digest),
+            ),
+            (
+                Claim::Chain,
+                format!(
+                    "every gene and the link of generations {first} to {last} follow from the log"
+                ),
+            ),
+            (
+                Claim::History,
+                format!("fitness of generations {first} to {last} follows from the log"),
+            ),
+            (Claim::Keyframes, format!("{n_keyframes} of {n_keyframes} are states of evolution")),
+            (
+                Claim::Champion,
+                format!("it and the last link, {}, follow from the log", bundle.manifest.digest),
+            ),
+            (
+                Claim::Simulation,
+                format!(
+                    "{chosen} and the end of the run, simulated again: {n_episodes} episodes have \
+                     the same fitness, bit for bit"
+                ),
+            ),
+        ];
+        let mut unproven =
+            vec!["times, workers and idle shares are what was written down".to_owned()];
+        if let Some(fork) = &bundle.manifest.fork {
+            unproven.push(format!(
+                "generations 0 to {} and the state after them are those of the experiment that \
+                 this is a fork of: verify its bundle, whose generation {} has the link {}",
+                fork.generation, fork.generation, bundle.history[fork.generation as usize].digest
+            ));
+        }
+        Proof { proven, unproven, champion }
+    }
+}
+
+/// The state that a fork begins with. `own`: link -1 of its configuration; `new`: an evolution
+/// of the same shape.
+fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution, Flaw> {
+    let flaw = |what: &dyn fmt::Display| Claim::Chain.flaw(format!("where it was forked: {what}"));
+    let Some(fork) = &bundle.manifest.fork else { return Err(flaw(&"it is no fork")) };
+    let parent = bundle.history.get(fork.generation as usize);
+    let parent = parent.ok_or_else(|| flaw(&"there is no such generation"))?.digest;
+    if fork.link != parent && fork.link != parent.forked(own) {
+        return Err(flaw(&format!("the link {} does not follow from {parent}", fork.link)));
+    }
+    let keyframe = bundle.keyframes[0].1.clone();
+    let state = Evolution::restore(&Checkpoint { keyframe, log: Vec::new() });
+    let state = state.map_err(|error| Claim::Keyframes.flaw(error))?;
+    if !state.has_shape_of(new)
+        || state.n_generations() != bundle.first_own()
+        || state.digest() != fork.link
+    {
+        return Err(Claim::Keyframes.flaw("the first one is not the state that it was forked from"));
+    }
+    Ok(state)
+}
+
+fn same_bits(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+fn one_line(text: &dyn fmt::Display) -> String {
+    text.to_string().replace('\n', "; ")
+}
