@@ -1,0 +1,101 @@
+// Which part of the plane is seen. The plane is a torus: every object is drawn at each
+// of its images within view.
+
+import { shortest } from "swarm/episode.js";
+
+export class Camera {
+  constructor(episode) {
+    this.episode = episode;
+    this.width = this.height = 1;
+    this.showSwarm();
+  }
+
+  /** All places where robots, lights and areas ever are, if that is less than the world. */
+  showSwarm() {
+    const { episode } = this;
+    const first = [episode.at("x", 0, 0), episode.at("y", 0, 0)];
+    const low = [0, 0], high = [0, 0];
+    const include = (x, y) => {
+      const way = [shortest(x - first[0], episode.width), shortest(y - first[1], episode.height)];
+      for (const axis of [0, 1]) {
+        low[axis] = Math.min(low[axis], way[axis]);
+        high[axis] = Math.max(high[axis], way[axis]);
+      }
+    };
+    for (let step = 0; step < episode.steps; step += 5) {
+      for (let robot = 0; robot < episode.n_robots; robot++) {
+        include(episode.at("x", robot, step), episode.at("y", robot, step));
+      }
+      for (let light = 0; light < episode.lights.length; light++) {
+        include(episode.at("light_x", light, step), episode.at("light_y", light, step));
+      }
+    }
+    for (const area of episode.areas) include(area.x, area.y);
+    const [across, along] = [high[0] - low[0], high[1] - low[1]];
+    if (across > 0.7 * episode.width || along > 0.7 * episode.height) return this.showWorld();
+    this.look(first[0] + (low[0] + high[0]) / 2, first[1] + (low[1] + high[1]) / 2, across + 70, along + 70);
+  }
+
+  /** The whole world. */
+  showWorld() {
+    const { width, height } = this.episode;
+    this.look(width / 2, height / 2, width, height);
+  }
+
+  /** A centre, and a rectangle around it that has to be in view, cm. */
+  look(x, y, across, along) {
+    Object.assign(this, { x, y, across, along, zoom: 1 });
+  }
+
+  resize(width, height) {
+    Object.assign(this, { width, height });
+  }
+
+  /** Pixels per cm. */
+  get scale() {
+    return this.zoom * Math.min(this.width / this.across, this.height / this.along);
+  }
+
+  /** Pixels of a place; y points up. */
+  toScreen(x, y) {
+    return [this.width / 2 + (x - this.x) * this.scale, this.height / 2 - (y - this.y) * this.scale];
+  }
+
+  toWorld(px, py) {
+    return [this.x + (px - this.width / 2) / this.scale, this.y - (py - this.height / 2) / this.scale];
+  }
+
+  move(dx, dy) {
+    this.x -= dx / this.scale;
+    this.y += dy / this.scale;
+  }
+
+  /** Zooms so that the place under a pixel stays there. */
+  zoomAt(px, py, factor) {
+    const [x, y] = this.toWorld(px, py);
+    this.zoom = Math.min(40, Math.max(0.5, this.zoom * factor));
+    const [nx, ny] = this.toWorld(px, py);
+    this.x += x - nx;
+    this.y += y - ny;
+  }
+
+  /** Half the width and height of what is drawn, pixels: nothing is seen twice. */
+  get halves() {
+    const { width, height } = this.episode;
+    return [Math.min(this.width, width * this.scale) / 2, Math.min(this.height, height * this.scale) / 2];
+  }
+
+  /** Calls `draw` with the pixels of every image of a place that is in view, or so close to
+   *  it that something of `radius` pixels is. */
+  eachImage(x, y, radius, draw) {
+    const { width, height } = this.episode;
+    const [halfX, halfY] = this.halves.map((half) => (half + radius) / this.scale);
+    const first = (value, centre, half, period) => Math.ceil((centre - half - value) / period);
+    const last = (value, centre, half, period) => Math.floor((centre + half - value) / period);
+    for (let i = first(x, this.x, halfX, width); i <= last(x, this.x, halfX, width); i++) {
+      for (let k = first(y, this.y, halfY, height); k <= last(y, this.y, halfY, height); k++) {
+        draw(...this.toScreen(x + i * width, y + k * height));
+      }
+    }
+  }
+}

@@ -1,0 +1,107 @@
+// An episode as a program packed it: web/src/replay/mod.rs has the format.
+
+const ARRAYS = { i8: Int8Array, i16: Int16Array, i32: Int32Array, f32: Float32Array };
+
+/** Unpacks an episode from an ArrayBuffer or Uint8Array. */
+export async function unpack(packed) {
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  return new Episode(header, buffer, 4 + length);
+}
+
+/** What is the same in all steps, as the header says, and the columns. */
+export class Episode {
+  constructor(header, buffer, start) {
+    Object.assign(this, header);
+    this.columns = {};
+    for (const place of header.columns) {
+      const n = place.n_rows * this.steps;
+      const values = new ARRAYS[place.type](buffer, start + place.offset, n);
+      if (place.is_difference) {
+        for (let i = 0; i < n; i++) if (i % this.steps) values[i] += values[i - 1];
+      }
+      this.columns[place.name] = { values, scale: place.scale, n_rows: place.n_rows };
+    }
+    // The object that each robot is of.
+    this.kinds = this.robots.flatMap((robots) => Array(robots.n).fill(robots));
+    this.has_targets = this.columns.target.values.some((target) => target >= 0);
+    // Whether a robot ever changes its place.
+    const isStill = (name, robot) => this.row(name, robot).every((value, _, row) => value === row[0]);
+    this.moves = this.kinds.map((_, robot) => !(isStill("x", robot) && isStill("y", robot)));
+    this.has_radio = this.columns.emitter.values.some((emitter) => emitter >= 0);
+  }
+
+  /** A value of a row. */
+  at(name, row, step) {
+    const { values, scale } = this.columns[name];
+    return values[row * this.steps + step] * scale;
+  }
+
+  /** A whole number of a row, such as a colour. */
+  whole(name, row, step) {
+    return this.columns[name].values[row * this.steps + step];
+  }
+
+  /** The components of a robot's value. */
+  components(name, robot, step) {
+    const n = this.columns[name].n_rows / this.n_robots;
+    return Array.from({ length: n }, (_, i) => this.at(name, robot * n + i, step));
+  }
+
+  /** All steps of a row, unscaled. */
+  row(name, row) {
+    return this.columns[name].values.subarray(row * this.steps, (row + 1) * this.steps);
+  }
+
+  /** Position and heading of a robot; a share of a step later if it is under way. */
+  pose(robot, step, share = 0) {
+    const pose = (k) => [this.at("x", robot, k), this.at("y", robot, k), this.at("heading", robot, k)];
+    const [x, y, heading] = pose(step);
+    if (share === 0 || step + 1 >= this.steps) return { x, y, heading };
+    const [nextX, nextY, nextHeading] = pose(step + 1);
+    const turn = shortest(nextHeading - heading, 2 * Math.PI);
+    const [dx, dy] = [shortest(nextX - x, this.width), shortest(nextY - y, this.height)];
+    // Who is placed elsewhere does not glide there.
+    const part = Math.hypot(dx, dy) > 50 ? 0 : share;
+    return { x: x + part * dx, y: y + part * dy, heading: heading + part * turn };
+  }
+
+  /** Within which distance a robot is heard, cm; 0 if it does not emit. */
+  reach(robot) {
+    const heard = this.robots.map((robots) => robots.hears_within).filter((range) => range !== null);
+    const emits = this.kinds[robot].emits_within;
+    return emits === null || heard.length === 0 ? 0 : Math.min(emits, Math.max(...heard));
+  }
+
+  /** The number of a message on its lattice; null if messages are not quantised. */
+  symbol(robot, message) {
+    const levels = this.kinds[robot].n_levels;
+    if (levels === null) return null;
+    return message.reduce((number, value) => number * levels + Math.round(value * (levels - 1)), 0);
+  }
+
+  /** The symbol of the message that a robot hears; null without a lattice. All are worked out
+   *  at the first question, for they are asked for in every frame. */
+  heardSymbol(robot, step) {
+    this.heardSymbols ??= Int32Array.from({ length: this.n_robots * this.steps }, (_, i) => {
+      const [robot, step] = [Math.floor(i / this.steps), i % this.steps];
+      const emitter = this.whole("emitter", robot, step);
+      return emitter < 0 ? -1 : this.symbol(emitter, this.components("heard", robot, step)) ?? -1;
+    });
+    const symbol = this.heardSymbols[robot * this.steps + step];
+    return symbol < 0 ? null : symbol;
+  }
+
+  /** How many symbols there are. */
+  get n_symbols() {
+    const levels = Math.max(1, ...this.robots.map((robots) => robots.n_levels ?? 1));
+    return levels ** this.message_len;
+  }
+}
+
+/** The representative of a difference with the least absolute value. */
+export function shortest(difference, period) {
+  return difference - period * Math.round(difference / period);
+}

@@ -1,0 +1,106 @@
+// Runs over one another, one by one or as the median of a group.
+
+import { element } from "swarm/dom.js";
+import { chart } from "swarm/charts.js";
+import { askJson, bar, complain, main } from "swarm/page.js";
+
+const COLORS = ["#4269d0", "#ff725c", "#3ca951", "#a463f2", "#efb118", "#6cc5b0", "#ff8ab7", "#9c6b4e", "#97bbf5", "#9498a0"];
+/** What runs are laid along: its name, and its value after each generation. */
+const AXES = {
+  generation: { label: "generation", values: (rows) => rows.map((row) => row[0]) },
+  episodes: { label: "episodes", values: (rows) => sums(rows, 6) },
+  time: { label: "wall time, s", values: (rows) => sums(rows, 5).map((ms) => ms / 1000) },
+};
+const COLUMNS = { best: 1, mean: 2 };
+
+function sums(rows, column) {
+  let sum = 0;
+  return rows.map((row) => (sum += row[column]));
+}
+
+bar("Compare", "/compare");
+const words = new URLSearchParams(location.search);
+const chosen = new Set((words.get("runs") ?? "").split(",").filter(Boolean).map(Number));
+const histories = new Map();
+let experiments = [];
+
+const select = (name, options, value) => element("select", { id: name, "aria-label": name, onchange: show }, ...options.map((option) => element("option", { value: option, selected: option === value }, option)));
+const axis = select("along", Object.keys(AXES), words.get("along") ?? "generation");
+const column = select("value", Object.keys(COLUMNS), words.get("value") ?? "mean");
+const grouping = select("as", ["runs", "median of groups"], words.get("as") ?? "runs");
+const list = element("div", { className: "choices" });
+const picture = chart("fitness of several runs");
+main.replaceChildren(element("h1", {}, "Compare"),
+  element("div", { className: "row" }, element("label", {}, "fitness: ", column), element("label", {}, "along: ", axis), element("label", {}, "as: ", grouping)),
+  element("section", { className: "panel tall" }, picture),
+  element("section", { className: "panel" }, element("h2", {}, "Runs"), list));
+
+async function history(id) {
+  if (histories.has(id)) return histories.get(id);
+  const rows = [];
+  for (let from = 0; from !== null;) {
+    const page = await askJson(`/api/experiments/${id}/generations?from=${from}`);
+    rows.push(...page.generations);
+    from = page.next;
+  }
+  histories.set(id, rows);
+  return rows;
+}
+
+/** What a run is grouped by. */
+const kind = (it) => [it.group || it.name, it.variant].filter(Boolean).join(" ");
+
+function quantile(sorted, share) {
+  const at = share * (sorted.length - 1);
+  const low = Math.floor(at);
+  return sorted[low] + (sorted[Math.min(low + 1, sorted.length - 1)] - sorted[low]) * (at - low);
+}
+
+async function show() {
+  const words = new URLSearchParams({ runs: [...chosen].join(","), along: axis.value, value: column.value, as: grouping.value });
+  window.history.replaceState(null, "", `?${words}`);
+  try {
+    const runs = experiments.filter((it) => chosen.has(it.id));
+    const { label, values } = AXES[axis.value];
+    const curves = await Promise.all(runs.map(async (it) => {
+      const rows = await history(it.id);
+      const along = values(rows);
+      return { it, points: rows.map((row, i) => [along[i], row[COLUMNS[column.value]]]) };
+    }));
+    const content = { xLabel: label, yLabel: `${column.value} fitness`, lines: [], bands: [] };
+    if (grouping.value === "runs") {
+      content.lines = curves.map(({ it, points }, i) => ({ name: `${it.id} ${kind(it)} seed ${it.seed}`, color: COLORS[i % COLORS.length], points }));
+    } else {
+      [...new Set(curves.map(({ it }) => kind(it)))].forEach((name, i) => {
+        const members = curves.filter(({ it }) => kind(it) === name).map(({ points }) => points).filter((points) => points.length);
+        const n = Math.min(...members.map((points) => points.length));
+        const sorted = (k) => members.map((points) => points[k][1]).sort((a, b) => a - b);
+        // Along episodes and time runs differ in where a generation ends: the median of that.
+        const at = (k) => quantile(members.map((points) => points[k][0]).sort((a, b) => a - b), 0.5);
+        const steps = Array.from({ length: Number.isFinite(n) ? n : 0 }, (_, k) => k);
+        const color = COLORS[i % COLORS.length];
+        content.bands.push({ color, points: steps.map((k) => [at(k), quantile(sorted(k), 0.25), quantile(sorted(k), 0.75)]) });
+        content.lines.push({ name: `${name}, ${members.length} runs, median and quartiles`, color, points: steps.map((k) => [at(k), quantile(sorted(k), 0.5)]) });
+      });
+    }
+    picture.show(content);
+  } catch (error) {
+    complain(error);
+  }
+}
+
+try {
+  experiments = (await askJson("/api/experiments")).experiments;
+  if (chosen.size === 0) for (const it of experiments.slice(-5)) chosen.add(it.id);
+  list.replaceChildren(...experiments.toReversed().map((it) => {
+    const box = element("input", { type: "checkbox", checked: chosen.has(it.id), onchange: () => {
+      if (box.checked) chosen.add(it.id);
+      else chosen.delete(it.id);
+      show();
+    } });
+    return element("label", {}, box, `${it.id} ${kind(it)} seed ${it.seed} (${it.algorithm}, ${it.generations_done} generations)`);
+  }));
+  await show();
+} catch (error) {
+  complain(error);
+}

@@ -1,0 +1,45 @@
+// Who computes.
+
+import { decimals, element } from "swarm/dom.js";
+import { askJson, bar, complain, main, span } from "swarm/page.js";
+
+/** Between two looks, ms. */
+const LOOK_EVERY = 2000;
+
+bar("Fleet", "/fleet");
+const summary = element("p", { className: "muted" });
+const rows = element("tbody");
+const heading = ["Worker", "Slots", "Items", "Results/s", "Idle", "Last heard", "Connected", "Version", ""];
+main.replaceChildren(element("h1", {}, "Fleet"), summary,
+  element("div", { className: "panel scroll" }, element("table", { className: "list" },
+    element("thead", {}, element("tr", {}, ...heading.map((name) => element("th", {}, name)))), rows)));
+
+function row(it) {
+  const ago = (ms) => span(Math.max(0, Date.now() - ms));
+  const cell = (label, ...content) => element("td", { "data-label": label }, ...content);
+  const idle = element("meter", { min: 0, max: 1, value: it.idle_share, title: `${Math.round(100 * it.idle_share)} %` });
+  return element("tr", { "data-id": it.id },
+    cell("", element("b", {}, it.name)), cell("Slots", String(it.slots)), cell("Items", String(it.items)),
+    cell("Results/s", decimals(it.results_per_second, 1)), cell("Idle", idle, ` ${Math.round(100 * it.idle_share)} %`),
+    cell("Last heard", `${ago(it.last_heard_at_ms)} ago`), cell("Connected", ago(it.connected_at_ms)),
+    cell("Version", it.version), cell("", element("span", { className: "bad" }, it.trouble)));
+}
+
+async function look() {
+  try {
+    const { workers } = await askJson("/api/workers");
+    const slots = workers.reduce((sum, it) => sum + it.slots, 0);
+    const rate = workers.reduce((sum, it) => sum + it.results_per_second, 0);
+    summary.textContent = workers.length
+      ? `${workers.length} workers with ${slots} slots, ${decimals(rate, 1)} results per second`
+      : "No worker is connected: start one with `worker`.";
+    rows.replaceChildren(...workers.slice(0, 1000).map(row));
+    document.getElementById("problem")?.remove();
+  } catch (error) {
+    complain(error);
+  }
+  // The next look begins when this one has ended: a slow server gets fewer.
+  setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
+}
+
+await look();

@@ -1,0 +1,98 @@
+// Any individual, simulated when the page is opened; and again with something different,
+// side by side.
+
+import { element } from "swarm/dom.js";
+import { unpack } from "swarm/episode.js";
+import { ask, bar, complain, main } from "swarm/page.js";
+import { Player, heading } from "swarm/player.js";
+
+const address = decodeURIComponent(location.pathname.slice("/replay/".length));
+const [id, at] = address.split("@");
+bar(`Replay ${address}`, "");
+
+/** What may be different, as the form shows it. */
+const FIELDS = [
+  ["trial", "trial", { type: "number", min: 0, max: 999 }],
+  ["generation", "worlds of generation", { type: "number", min: 0 }],
+  ["seed", "seed", { type: "number", min: 0 }],
+  ["robots", "robots", { type: "number", min: 1, max: 10000 }],
+  ["steps", "steps", { type: "number", min: 1, max: 100000 }],
+];
+const INHIBIT = ["wireless_receiver:msg", "wireless_receiver:signal", "wireless_receiver:receiving_direction", "wireless_receiver:sending_direction", "wireless_receiver:state", "light_sensor", "distance_sensor", "ground_sensor"];
+const PERTURB = ["leader_failure", "topology_switch"];
+
+const words = new URLSearchParams(location.search);
+const inputs = Object.fromEntries(FIELDS.map(([name, , attributes]) => [name, element("input", { ...attributes, id: `what-if-${name}`, value: words.get(name) ?? "", className: "number" })]));
+const choice = (name, options) => {
+  inputs[name] = element("select", { id: `what-if-${name}` }, ...["", ...options].map((option) => element("option", { value: option, selected: option === (words.get(name) ?? "") }, option || "nothing")));
+  return inputs[name];
+};
+const form = element("form", { className: "panel what-if" }, element("b", {}, "What if"),
+  ...FIELDS.map(([name, text]) => element("label", {}, text, inputs[name])),
+  element("label", {}, "nobody gets", choice("inhibit", INHIBIT)), element("label", {}, "trouble", choice("perturb", PERTURB)),
+  element("button", { type: "submit", id: "again" }, "Simulate"),
+  element("button", { type: "button", id: "beside", title: "the one above, and the changed one next to it", onclick: () => beside() }, "Side by side"));
+const stage = element("div", { className: "replays" });
+const neighbours = element("p", { className: "row" }, element("a", { href: `/experiment/${id}` }, `experiment ${id}`));
+main.replaceChildren(neighbours, stage, form);
+
+if (at?.includes("/") && !at.endsWith("mean")) {
+  const [generation, individual] = at.split("/").map(Number);
+  const link = (g, i, text) => element("a", { href: `/replay/${id}@${g}/${i}` }, text);
+  if (individual > 0) neighbours.append(link(generation, individual - 1, "‹ individual"));
+  neighbours.append(link(generation, individual + 1, "individual ›"));
+  if (generation > 0) neighbours.append(link(generation - 1, individual, "‹ generation"));
+  neighbours.append(link(generation + 1, individual, "generation ›"));
+  neighbours.append(element("a", { href: `/replay/${id}` }, "champion"));
+}
+
+function query() {
+  const filled = Object.entries(inputs).map(([name, input]) => [name, input.value]).filter(([, value]) => value !== "");
+  return new URLSearchParams(filled);
+}
+
+async function simulated(words) {
+  const response = await ask(`/api/replay/${encodeURIComponent(id)}${at ? `@${at}` : ""}?${words}`);
+  return unpack(await response.arrayBuffer());
+}
+
+let shown = null;
+
+async function show(words) {
+  stage.setAttribute("aria-busy", "true");
+  try {
+    const episode = await simulated(words);
+    shown?.pause();
+    shown = new Player(episode);
+    stage.replaceChildren(element("div", {}, heading(episode), shown.node));
+    stage.classList.remove("two");
+    shown.node.focus({ preventScroll: true });
+    document.getElementById("problem")?.remove();
+  } catch (error) {
+    complain(error);
+  }
+  stage.removeAttribute("aria-busy");
+}
+
+/** The same steps of both; the first one leads. */
+async function beside() {
+  try {
+    const other = new Player(await simulated(query()), { read: () => ({ step: shown.view.step }), write: () => {} });
+    shown.followers = [other];
+    stage.replaceChildren(...[shown, other].map((player) => element("div", {}, heading(player.episode), player.node)));
+    stage.classList.add("two");
+    document.getElementById("problem")?.remove();
+  } catch (error) {
+    complain(error);
+  }
+}
+
+form.addEventListener("submit", (event) => {
+  event.preventDefault();
+  history.replaceState(null, "", `${location.pathname}?${query()}`);
+  show(query());
+});
+// Somebody clicked an individual to see it move; an address with a step is to be looked at.
+const plays = location.hash === "" && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+await show(words);
+if (plays) shown?.toggle();

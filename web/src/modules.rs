@@ -1,0 +1,73 @@
+//! The files of the folder `pages`, as they are in this program.
+//!
+//! Modules import each other by bare names, `swarm/NAME`, which a page's import map
+//! resolves: to data within a file of its own, to addresses of a server otherwise.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+/// The style of all pages.
+pub const STYLE: &str = include_str!("../pages/style.css");
+
+macro_rules! modules {
+    ($($name:literal),* $(,)?) => {
+        /// All modules: name and text.
+        pub const MODULES: &[(&str, &str)] =
+            &[$(($name, include_str!(concat!("../pages/", $name)))),*];
+    };
+}
+
+modules!(
+    "camera.js",
+    "dom.js",
+    "drawing.js",
+    "charts.js",
+    "episode.js",
+    "heat-map.js",
+    "page.js",
+    "page-compare.js",
+    "page-experiment.js",
+    "page-experiments.js",
+    "page-fleet.js",
+    "page-login.js",
+    "page-replay.js",
+    "player.js",
+    "replay-file.js",
+    "robot-panel.js",
+    "timeline.js",
+    "world.js",
+);
+
+/// The import map in which `address` says where each module is.
+pub fn import_map(address: impl Fn(&str, &str) -> String) -> String {
+    let imports: BTreeMap<String, String> =
+        MODULES.iter().map(|(name, text)| (format!("swarm/{name}"), address(name, text))).collect();
+    json!({ "imports": imports }).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modules_import_only_each_other() {
+        let known: Vec<String> = MODULES.iter().map(|(name, _)| format!("swarm/{name}")).collect();
+        for (name, text) in MODULES {
+            let imports = text.lines().filter(|line| line.starts_with("import "));
+            for line in imports {
+                let from = line.split('"').nth(1).expect("a name in double quotes");
+                assert!(known.iter().any(|known| known == from), "{name}: {line}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_fetched_from_elsewhere() {
+        for (name, text) in MODULES.iter().chain(&[("style.css", STYLE)]) {
+            let svg = "http://www.w3.org/2000/svg";
+            let text = text.replace(svg, "");
+            assert!(!text.contains("http:") && !text.contains("https:"), "{name}");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! An episode, simulated again and packed for the player in `pages/`.
+//!
+//! Packed, an episode is gzip of: the length of the header (u32), the header (JSON, padded
+//! with spaces to a multiple of 8 bytes), and the columns that the header lists. A column is
+//! a little-endian array `[row][step]`; a row is a robot, or a component of a robot's
+//! reading, or a light, or a measure.
+
+mod column;
+mod robots;
+mod scene;
+
+use std::io::Write as _;
+
+use experiment_file::ExperimentConfig;
+use flate2::{Compression, write::GzEncoder};
+use serde::Serialize;
+use sim_core::{EpisodeSummary, EvaluateError, Simulation, StepRecord, TrialSet};
+
+use self::{
+    column::{Column, Form, Place},
+    robots::{ROBOT_COLUMNS, RobotColumn},
+    scene::Scene,
+};
+
+/// Values of all robots in all steps: some 1,000 steps of 1,000 robots, or 250 MB.
+const VALUES_MAX: usize = 64_000_000;
+
+/// What is simulated.
+#[derive(Debug, Clone)]
+pub struct Episode<'a> {
+    /// The experiment.
+    pub config: &'a ExperimentConfig,
+    /// The same, compiled.
+    pub simulation: &'a Simulation,
+    /// Genes in \[0, 1\].
+    pub genotype: &'a [f64],
+    /// Who that is, for people.
+    pub name: &'a str,
+    /// The worlds.
+    pub trial_set: TrialSet,
+    /// Which of them.
+    pub trial: u32,
+}
+
+/// Why there is no replay.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReplayError {
+    /// It cannot be simulated.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+    /// It does not fit into a browser.
+    #[error(
+        "a replay has at most {} million values of robots, this one would have {}; simulate fewer \
+         steps or robots",
+        VALUES_MAX / 1_000_000,
+        n_values / 1_000_000
+    )]
+    TooLong {
+        /// Values that it would have: steps times robots times values per robot.
+        n_values: usize,
+    },
+}
+
+/// An episode, ready to be packed.
+#[derive(Debug)]
+pub struct Replay {
+    scene: Scene,
+    summary: EpisodeSummary,
+    columns: Vec<Column>,
+}
+
+/// What the player reads first.
+#[derive(Serialize)]
+struct Header<'a> {
+    #[serde(flatten)]
+    scene: &'a Scene,
+    fitness: f64,
+    /// Means over the steps, by name.
+    measures: &'a sim_core::Measures,
+    columns: Vec<Place>,
+}
+
+impl Replay {
+    /// Simulates the episode.
+    pub fn simulate(episode: &Episode<'_>) -> Result<Self, ReplayError> {
+        let Episode { simulation, genotype, trial_set, trial, .. } = *episode;
+        let mut scene = Scene::new(episode);
+        let per_robot: usize = ROBOT_COLUMNS.iter().map(|it| (it.n_components)(&scene)).sum();
+        let n_values = scene.steps as usize * scene.n_robots * per_robot;
+        if n_values > VALUES_MAX {
+            return Err(ReplayError::TooLong { n_values });
+        }
+        let mut columns = Columns::new(&scene);
+        let summary = simulation.simulate(genotype, trial_set, trial, &mut |step| {
+            if step.step == 0 {
+                scene.place_areas(&step.areas);
+            }
+            columns.record(&scene, &step);
+        })?;
+        Ok(Self { scene, summary, columns: columns.into_vec() })
+    }
+
+    /// What the player reads.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut body = Vec::new();
+        let places = self.columns.iter().map(|column| column.write(&mut body)).collect();
+        let EpisodeSummary { fitness, measures } = &self.summary;
+        let header = Header { scene: &self.scene, fitness: *fitness, measures, columns: places };
+        let mut header = serde_json::to_vec(&header).expect("plain data serialises");
+        // Columns lie where arrays of four bytes may begin.
+        header.resize((header.len() + 4).next_multiple_of(8) - 4, b' ');
+        let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+        let parts = [&(header.len() as u32).to_le_bytes()[..], &header, &body];
+        parts
+            .into_iter()
+            .try_for_each(|part| packed.write_all(part))
+            .and_then(|()| packed.finish())
+            .expect("memory takes all writes")
+    }
+}
+
+/// The columns of an episode, step by step.
+struct Columns {
+    /// As [`ROBOT_COLUMNS`].
+    robots: Vec<Column>,
+    lights: [Column; 2],
+    fitness: Column,
+    measures: Column,
+    /// Scratch: a robot's values.
+    values: Vec<f64>,
+}
+
+impl Columns {
+    fn new(scene: &Scene) -> Self {
+        let n_steps = scene.steps as usize;
+        let of_robots = |column: &RobotColumn| {
+            let n_rows = scene.n_robots * (column.n_components)(scene);
+            Column::new(column.name, column.form, n_rows, n_steps)
+        };
+        let light = |name| Column::new(name, Form::Position, scene.lights.len(), n_steps);
+        Self {
+            robots: ROBOT_COLUMNS.iter().map(of_robots).collect(),
+            lights: [light("light_x"), light("light_y")],
+            fitness: Column::new("fitness", Form::Real, 1, n_steps),
+            measures: Column::new("measures", Form::Real, scene.measure_names.len(), n_steps),
+            values: Vec::new(),
+        }
+    }
+
+    fn record(&mut self, scene: &Scene, record: &StepRecord) {
+        let step = record.step as usize;
+        for (column, described) in self.robots.iter_mut().zip(ROBOT_COLUMNS) {
+            let n_components = (described.n_components)(scene);
+            for (index, robot) in record.robots.iter().enumerate() {
+                self.values.clear();
+                (described.read)(robot, &mut self.values);
+                for (component, value) in self.values.iter().enumerate() {
+                    column.set(index * n_components + component, step, *value);
+                }
+            }
+        }
+        let [x, y] = &mut self.lights;
+        for (light, position) in record.lights.iter().enumerate() {
+            x.set(light, step, position.x);
+            y.set(light, step, position.y);
+        }
+        self.fitness.set(0, step, record.fitness.unwrap_or(f64::NAN));
+        for (row, name) in scene.measure_names.iter().enumerate() {
+            let value = record.measures.get(name).copied().unwrap_or(f64::NAN);
+            self.measures.set(row, step, value);
+        }
+    }
+
+    fn into_vec(self) -> Vec<Column> {
+        let Self { mut robots, lights, fitness, measures, .. } = self;
+        robots.extend(lights.into_iter().chain([fitness, measures]));
+        robots
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,161 @@
+//! What is the same in all steps of an episode.
+
+use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController, SensorQuery};
+use serde::Serialize;
+use sim_core::{TrialSet, Vec2};
+
+use super::Episode;
+
+/// An episode but for its steps.
+#[derive(Debug, Serialize)]
+pub struct Scene {
+    /// Who it is.
+    name: String,
+    /// The experiment's name.
+    experiment: String,
+    seed: u64,
+    /// Of the worlds, if they are a generation's.
+    generation: Option<u64>,
+    trial: u32,
+    fitness_function: &'static str,
+    pub steps: u32,
+    /// cm
+    width: f64,
+    height: f64,
+    robots: Vec<Robots>,
+    pub n_robots: usize,
+    pub message_len: usize,
+    /// Values of the longest list of stimuli.
+    pub n_inputs: usize,
+    pub n_neurons: usize,
+    ensembles: Vec<Rows>,
+    pub lights: Vec<Disc>,
+    areas: Vec<Disc>,
+    pub measure_names: &'static [&'static str],
+}
+
+/// The robots of one object.
+#[derive(Debug, Serialize)]
+struct Robots {
+    name: String,
+    n: usize,
+    /// cm; none without a transmitter.
+    emits_within: Option<f64>,
+    /// cm; none without a receiver.
+    hears_within: Option<f64>,
+    /// Of the receiver.
+    n_sectors: u32,
+    /// Levels of a component of a message; none if it is not quantised.
+    n_levels: Option<u32>,
+    stimuli: Vec<Rows>,
+    /// Whether a network decides.
+    has_network: bool,
+}
+
+/// Rows that have a name together.
+#[derive(Debug, Serialize)]
+struct Rows {
+    name: String,
+    n: u32,
+}
+
+/// A light, or a ground area.
+#[derive(Debug, Serialize)]
+pub struct Disc {
+    color: String,
+    /// cm
+    range: f64,
+    /// Where it is, if it does not move.
+    x: Option<f64>,
+    y: Option<f64>,
+}
+
+impl Scene {
+    /// The scene of an episode, its ground areas not placed yet.
+    pub fn new(episode: &Episode<'_>) -> Self {
+        let config = episode.config;
+        let robots: Vec<Robots> =
+            config.robots().map(|(name, robot)| Robots::new(name, robot, config)).collect();
+        let n_inputs = |robots: &Robots| robots.stimuli.iter().map(|it| it.n as usize).sum();
+        let message_len = config.robots().filter_map(|(_, robot)| message_len(robot)).max();
+        let discs = |of: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
+            let kinds = config.world.objects.values().filter_map(of);
+            let disc = |range, color: &str| Disc { color: color.into(), range, x: None, y: None };
+            kinds.flat_map(|(n, range, color)| (0..n).map(move |_| disc(range, color))).collect()
+        };
+        Self {
+            name: episode.name.to_owned(),
+            experiment: config.name.clone(),
+            seed: config.seed,
+            generation: match episode.trial_set {
+                TrialSet::Generation(generation) => Some(generation),
+                _ => None,
+            },
+            trial: episode.trial,
+            fitness_function: config.algorithm.fitness_function.name(),
+            steps: config.algorithm.evaluation_steps,
+            width: config.world.width,
+            height: config.world.height,
+            n_robots: robots.iter().map(|robots| robots.n).sum(),
+            message_len: message_len.unwrap_or_default() as usize,
+            n_inputs: robots.iter().map(n_inputs).max().unwrap_or_default(),
+            n_neurons: config.topology.ensembles.values().map(|it| it.n as usize).sum(),
+            ensembles: rows(config.topology.ensembles.iter().map(|(name, it)| (&**name, it.n))),
+            robots,
+            lights: discs(|object| match object {
+                ObjectConfig::LightSource(light) => {
+                    Some((light.num_instances, light.params.range, &light.params.color))
+                }
+                _ => None,
+            }),
+            areas: discs(|object| match object {
+                ObjectConfig::GroundArea(area) => {
+                    Some((area.num_instances, area.params.range, &area.params.color))
+                }
+                _ => None,
+            }),
+            measure_names: episode.simulation.measure_names(),
+        }
+    }
+
+    /// The ground areas are where they stay.
+    pub fn place_areas(&mut self, positions: &[Vec2]) {
+        for (area, position) in self.areas.iter_mut().zip(positions) {
+            (area.x, area.y) = (Some(position.x), Some(position.y));
+        }
+    }
+}
+
+impl Robots {
+    fn new(name: &str, robot: &RobotConfig, config: &ExperimentConfig) -> Self {
+        let transmitter = robot.actuators.wireless_transmitter.as_ref();
+        let receiver = robot.sensors.wireless_receiver.as_ref();
+        let has_network = robot.controller == RobotController::NeuralController;
+        let light = robot.sensors.reading_len(SensorQuery::Light).unwrap_or_default();
+        Self {
+            name: name.to_owned(),
+            n: robot.num_instances as usize,
+            emits_within: transmitter.map(|transmitter| transmitter.range),
+            hears_within: receiver.map(|receiver| receiver.range),
+            n_sectors: receiver.map_or(0, |receiver| receiver.n_sectors),
+            n_levels: transmitter.filter(|it| it.quantize).map(|it| it.n_levels()),
+            stimuli: if has_network {
+                rows(config.topology.stimuli.iter().map(|(name, it)| (&**name, it.n)))
+            } else {
+                rows([("light_sensor", light)].into_iter())
+            },
+            has_network,
+        }
+    }
+}
+
+fn rows<'a>(named: impl Iterator<Item = (&'a str, u32)>) -> Vec<Rows> {
+    named.map(|(name, n)| Rows { name: name.to_owned(), n }).collect()
+}
+
+/// Components of the messages that a robot sends or hears; all have the same length.
+fn message_len(robot: &RobotConfig) -> Option<u32> {
+    let receiver = robot.sensors.wireless_receiver.as_ref();
+    let transmitter = robot.actuators.wireless_transmitter.as_ref();
+    receiver.map(|it| it.msg_length).or(transmitter.map(|it| it.msg_length))
+}

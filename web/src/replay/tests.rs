@@ -1,0 +1,129 @@
+//! What the player gets is what the simulation shows.
+
+use std::{fs, io::Read as _};
+
+use flate2::read::GzDecoder;
+use serde_json::Value;
+
+use experiment_file::ObjectConfig;
+
+use super::*;
+
+/// The quickstart, cut to 40 steps.
+fn quickstart() -> ExperimentConfig {
+    let text =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json"));
+    let text = text.unwrap().replace("\"evaluation_steps\": 100", "\"evaluation_steps\": 40");
+    ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap().0
+}
+
+/// Header and body of a packed episode, read as the player does.
+fn unpack(packed: &[u8]) -> (Value, Vec<u8>) {
+    let mut all = Vec::new();
+    GzDecoder::new(packed).read_to_end(&mut all).unwrap();
+    let len = u32::from_le_bytes(all[..4].try_into().unwrap()) as usize;
+    let header = serde_json::from_slice(&all[4..4 + len]).unwrap();
+    (header, all.split_off(4 + len))
+}
+
+/// The values of a column, `[row][step]`.
+fn values(header: &Value, body: &[u8], name: &str) -> Vec<f64> {
+    let columns = header["columns"].as_array().unwrap();
+    let column = columns.iter().find(|column| column["name"] == name).unwrap();
+    let steps = header["steps"].as_u64().unwrap() as usize;
+    let n = column["n_rows"].as_u64().unwrap() as usize * steps;
+    let bytes = &body[column["offset"].as_u64().unwrap() as usize..];
+    let scale = column["scale"].as_f64().unwrap();
+    let raw: Vec<f64> = match column["type"].as_str().unwrap() {
+        "i8" => bytes[..n].iter().map(|&byte| byte.cast_signed().into()).collect(),
+        "i16" => bytes[..2 * n]
+            .chunks(2)
+            .map(|two| i16::from_le_bytes(two.try_into().unwrap()).into())
+            .collect(),
+        "i32" => bytes[..4 * n]
+            .chunks(4)
+            .map(|four| i32::from_le_bytes(four.try_into().unwrap()).into())
+            .collect(),
+        _ => bytes[..4 * n]
+            .chunks(4)
+            .map(|four| f32::from_le_bytes(four.try_into().unwrap()).into())
+            .collect(),
+    };
+    let mut sums = raw;
+    if column["is_difference"] == true {
+        for row in sums.chunks_mut(steps) {
+            for step in 1..steps {
+                row[step] += row[step - 1];
+            }
+        }
+    }
+    sums.into_iter().map(|value| value * scale).collect()
+}
+
+#[test]
+fn a_replay_has_every_step_of_every_robot_as_it_is_simulated() {
+    let config = quickstart();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = vec![0.6; simulation.genotype_len()];
+    let episode = Episode {
+        config: &config,
+        simulation: &simulation,
+        genotype: &genotype,
+        name: "test",
+        trial_set: TrialSet::Generation(3),
+        trial: 1,
+    };
+    let (header, body) = unpack(&Replay::simulate(&episode).unwrap().encode());
+    let mut steps = Vec::new();
+    let summary = simulation.simulate(&genotype, 3, 1, &mut |step| steps.push(step)).unwrap();
+    assert_eq!(header["fitness"].as_f64().unwrap().to_bits(), summary.fitness.to_bits());
+    assert_eq!((steps.len(), steps[0].robots.len()), (40, 5));
+    let column = |name: &str| values(&header, &body, name);
+    let near = |a: f64, b: f64, tolerance: f64| {
+        assert!((a - b).abs() <= tolerance + 1e-9, "{a} is not {b}");
+    };
+    let [x, heading, emitter, heard, stimuli, neurons, measures] =
+        ["x", "heading", "emitter", "heard", "stimuli", "neurons", "measures"].map(column);
+    let n_stimuli = steps[0].robots[0].stimuli.len();
+    let mut n_heard = 0;
+    for (step, record) in steps.iter().enumerate() {
+        for (index, robot) in record.robots.iter().enumerate() {
+            near(x[index * 40 + step], robot.position.x, 0.005);
+            near(heading[index * 40 + step], robot.heading, 0.0005);
+            let from = robot.received.map_or(-1.0, |frame| frame.emitter as f64);
+            near(emitter[index * 40 + step], from, 0.0);
+            n_heard += usize::from(robot.received.is_some());
+            near(heard[(index * 2 + 1) * 40 + step], robot.received_message[1], 0.005);
+            let row = (index * n_stimuli + 2) * 40 + step;
+            near(stimuli[row], robot.stimuli[2], 0.005);
+            near(neurons[(index * 24 + 23) * 40 + step], robot.activity[23], 0.005);
+        }
+        let one_leader = record.measures["one_leader"];
+        let row = header["measure_names"].as_array().unwrap();
+        let row = row.iter().position(|name| name == "one_leader").unwrap();
+        near(measures[row * 40 + step], one_leader, 1e-6);
+    }
+    assert!(n_heard > 0);
+}
+
+#[test]
+fn what_a_browser_cannot_hold_is_refused() {
+    let mut config = quickstart();
+    config.algorithm.evaluation_steps = 100_000;
+    if let Some(ObjectConfig::Robot(robot)) = config.world.objects.get_mut("robot") {
+        robot.num_instances = 20;
+    }
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = vec![0.5; simulation.genotype_len()];
+    let (trial_set, name) = (TrialSet::Evaluation, "");
+    let episode = Episode {
+        config: &config,
+        simulation: &simulation,
+        genotype: &genotype,
+        name,
+        trial_set,
+        trial: 0,
+    };
+    let error = Replay::simulate(&episode).unwrap_err().to_string();
+    assert!(error.ends_with("simulate fewer steps or robots"), "{error}");
+}

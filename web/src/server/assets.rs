@@ -1,0 +1,101 @@
+//! Pages, modules and the style, as they are in this program.
+
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use axum::{
+    Router,
+    extract::Path,
+    http::{
+        HeaderValue, StatusCode,
+        header::{CACHE_CONTROL, CONTENT_TYPE},
+    },
+    response::{Html, IntoResponse, Response},
+    routing::get,
+};
+use base64::{Engine as _, prelude::BASE64_STANDARD};
+use sha2::{Digest as _, Sha256};
+
+use crate::modules::{MODULES, STYLE, import_map};
+
+/// Where modules and the style are.
+pub const PREFIX: &str = "/assets/";
+
+/// Modules lead to addresses that change with their content.
+static IMPORT_MAP: LazyLock<String> =
+    LazyLock::new(|| import_map(|name, text| format!("{PREFIX}{}/{name}", version(text))));
+
+/// The import map is the only script within a page.
+static POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
+    let digest = BASE64_STANDARD.encode(Sha256::digest(IMPORT_MAP.as_bytes()));
+    let policy = format!(
+        "default-src 'none'; script-src 'self' 'sha256-{digest}'; style-src 'self'; \
+         img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'self'; \
+         frame-ancestors 'none'"
+    );
+    HeaderValue::from_str(&policy).expect("ASCII is fit for a header")
+});
+
+/// What browsers may load for a page.
+pub fn policy() -> &'static HeaderValue {
+    &POLICY
+}
+
+/// Pages by their paths, and what they load.
+pub fn routes() -> Router {
+    let page = |module: &'static str| get(move || async move { page(module) });
+    Router::new()
+        .route("/", page("page-experiments.js"))
+        .route("/experiment/{id}", page("page-experiment.js"))
+        .route("/compare", page("page-compare.js"))
+        .route("/fleet", page("page-fleet.js"))
+        .route("/replay/{*address}", page("page-replay.js"))
+        .route("/login", page("page-login.js"))
+        .route("/assets/{version}/{name}", get(asset))
+}
+
+/// A page is empty: its module fills it.
+fn page(module: &str) -> Html<String> {
+    let address = |name: &str, text: &str| format!("{PREFIX}{}/{name}", version(text));
+    let text = MODULES.iter().find(|(name, _)| *name == module).map_or("", |(_, text)| text);
+    Html(format!(
+        r#"<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>swarmevo</title>
+<link rel="icon" href="data:,">
+<link rel="stylesheet" href="{style}">
+<script type="importmap">{map}</script>
+<script type="module" src="{script}"></script>
+</head>
+<body>
+<main id="page"><noscript>These pages need JavaScript.</noscript></main>
+</body>
+</html>
+"#,
+        style = address("style.css", STYLE),
+        map = *IMPORT_MAP,
+        script = address(module, text),
+    ))
+}
+
+async fn asset(Path((_, name)): Path<(String, String)>) -> Response {
+    static ASSETS: LazyLock<BTreeMap<&str, &str>> =
+        LazyLock::new(|| MODULES.iter().copied().chain([("style.css", STYLE)]).collect());
+    let Some(text) = ASSETS.get(name.as_str()) else {
+        return StatusCode::NOT_FOUND.into_response();
+    };
+    let kind = if name.ends_with(".css") { "text/css" } else { "text/javascript" };
+    let headers = [
+        (CONTENT_TYPE, format!("{kind}; charset=utf-8")),
+        // Another text has another address.
+        (CACHE_CONTROL, "public, max-age=31536000, immutable".to_owned()),
+    ];
+    (headers, *text).into_response()
+}
+
+/// Changes with a text.
+fn version(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(6).map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,119 @@
+//! What is stored of experiments.
+
+use axum::{
+    Json,
+    extract::{Path, Query, State},
+    http::header::CONTENT_TYPE,
+    response::{IntoResponse, Response},
+};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use swarm_proto::v1::{ListEventsRequest, ListGenerationsRequest};
+
+use super::{
+    Shared,
+    answers::{self, ExperimentAnswer},
+    problem::Problem,
+};
+
+/// Generations of the small curve of a list.
+const RECENT: u64 = 40;
+/// Events at the end of an experiment that are looked at.
+const EVENTS: u64 = 1000;
+/// Generations of one answer with the fitness of every individual.
+const FITNESS_MAX: u32 = 500;
+
+/// Where a page begins.
+#[derive(Debug, Deserialize)]
+pub struct From {
+    #[serde(default)]
+    from: u64,
+}
+
+/// All experiments, each with its latest generations.
+pub async fn all(State(shared): State<Shared>) -> Result<Json<Value>, Problem> {
+    let mut list = Vec::new();
+    for experiment in shared.archive.experiments().await? {
+        let request = ListGenerationsRequest {
+            experiment_id: experiment.id,
+            from_generation: experiment.generations_done.saturating_sub(RECENT),
+            page_size: RECENT as u32,
+        };
+        let recent = shared.archive.generations(request).await?.generations;
+        let recent: Vec<_> = recent.iter().filter_map(answers::generation_row).collect();
+        let mut answer = json!(ExperimentAnswer::from(experiment));
+        answer["recent"] = json!(recent);
+        list.push(answer);
+    }
+    Ok(Json(json!({ "experiments": list })))
+}
+
+/// One experiment, its file, and its champion as far as there is one.
+pub async fn one(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+) -> Result<Json<Value>, Problem> {
+    let found = shared.archive.experiment(id).await?;
+    let champion = shared.archive.individual(&id.to_string()).await.ok();
+    let champion = champion.map(|champion| {
+        let judged = champion.judged.map(|it| json!([it.mean, it.low, it.high, it.trials]));
+        json!({
+            "generation": champion.generation,
+            "individual": champion.individual,
+            "judged": judged,
+            "selection": champion.held_out.map(|it| it.mean),
+        })
+    });
+    Ok(Json(json!({
+        "experiment": found.experiment.map(ExperimentAnswer::from),
+        "config": serde_json::from_str::<Value>(&found.config_json).unwrap_or_default(),
+        "champion": champion,
+    })))
+}
+
+/// A page of generations, and where the next one begins.
+pub async fn generations(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+    Query(From { from }): Query<From>,
+) -> Result<Json<Value>, Problem> {
+    let request = ListGenerationsRequest { experiment_id: id, from_generation: from, page_size: 0 };
+    let page = shared.archive.generations(request).await?;
+    let rows: Vec<_> = page.generations.iter().filter_map(answers::generation_row).collect();
+    Ok(Json(json!({ "generations": rows, "next": page.next_generation })))
+}
+
+/// The latest events that are no generations.
+pub async fn events(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+) -> Result<Json<Value>, Problem> {
+    let found = shared.archive.experiment(id).await?.experiment.unwrap_or_default();
+    let request = ListEventsRequest {
+        experiment_id: id,
+        from_sequence: (found.last_sequence + 1).saturating_sub(EVENTS),
+        page_size: 0,
+    };
+    let events = shared.archive.events(request).await?.events;
+    let events: Vec<_> = events.into_iter().filter_map(answers::event).collect();
+    Ok(Json(json!({ "events": events })))
+}
+
+/// The fitness of every individual of some generations: the first generation (u32), the
+/// number of generations (u32), of individuals (u32), and then `[generation][individual]` as
+/// f32, NaN where there is none; all little-endian.
+pub async fn fitness(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+    Query(From { from }): Query<From>,
+) -> Result<Response, Problem> {
+    let (first, fitness) = shared.archive.fitness(id, from, FITNESS_MAX).await?;
+    let n_individuals = fitness.iter().map(Vec::len).max().unwrap_or_default();
+    let head = [first as u32, fitness.len() as u32, n_individuals as u32];
+    let mut body: Vec<u8> = head.iter().flat_map(|number| number.to_le_bytes()).collect();
+    for generation in &fitness {
+        let padding = std::iter::repeat_n(&f32::NAN, n_individuals - generation.len());
+        body.extend(generation.iter().chain(padding).flat_map(|value| value.to_le_bytes()));
+    }
+    Ok(([(CONTENT_TYPE, "application/octet-stream")], body).into_response())
+}

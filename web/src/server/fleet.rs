@@ -1,0 +1,138 @@
+//! What the coordinator does at this moment, and having it do something.
+
+use std::time::Duration;
+
+use axum::{
+    Json,
+    body::Bytes,
+    extract::{Path, State},
+    http::header::CONTENT_TYPE,
+    response::{IntoResponse, Response},
+};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use swarm_proto::v1::{ForkPoint, Round, SubmitExperimentRequest};
+use tokio::{sync::Mutex, time::Instant};
+
+use super::{
+    Shared,
+    answers::{ExperimentAnswer, WorkerAnswer},
+    problem::Problem,
+};
+use crate::source::{Action, Control};
+
+/// For how long an answer about workers serves all pages.
+const FRESH: Duration = Duration::from_secs(1);
+
+/// The latest answer about workers.
+#[derive(Debug, Default)]
+pub struct Workers(Mutex<Option<(Instant, Bytes)>>);
+
+/// What can be done here.
+pub async fn session(State(shared): State<Shared>) -> Json<Value> {
+    Json(json!({ "has_coordinator": shared.control.is_some() }))
+}
+
+fn control(shared: &Shared) -> Result<&dyn Control, Problem> {
+    shared.control.as_deref().ok_or_else(Problem::no_coordinator)
+}
+
+/// The connected workers. The coordinator is asked once a second, whoever looks.
+pub async fn workers(State(shared): State<Shared>) -> Result<Response, Problem> {
+    let control = control(&shared)?;
+    let mut latest = shared.workers.0.lock().await;
+    let answer = match &*latest {
+        Some((at, answer)) if at.elapsed() < FRESH => answer.clone(),
+        _ => {
+            let workers = control.workers().await?.into_iter().map(WorkerAnswer::from);
+            let answer = json!({ "workers": workers.collect::<Vec<_>>() }).to_string();
+            let answer = Bytes::from(answer);
+            *latest = Some((Instant::now(), answer.clone()));
+            answer
+        }
+    };
+    Ok(([(CONTENT_TYPE, "application/json")], answer).into_response())
+}
+
+/// What an experiment does, or waits for.
+pub async fn explain(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+) -> Result<Json<Value>, Problem> {
+    let it = control(&shared)?.explain(id).await?;
+    let troubles = [it.store_trouble, it.incompatible, it.shortage].into_iter();
+    let troubles: Vec<String> = troubles.filter(|text| !text.is_empty()).collect();
+    let held = |round: &Round| -> Vec<Value> {
+        let held = round.held.iter();
+        held.map(|it| json!([it.worker_name, it.items, it.held_ms, it.silent_ms])).collect()
+    };
+    Ok(Json(json!({
+        "round": it.round.map(|round| json!({
+            "generation": round.generation,
+            "kind": match (round.held_out, round.judgement) {
+                (true, _) => "re-evaluation of candidates",
+                (_, true) => "judgement of the champion",
+                _ => "generation",
+            },
+            "episodes": round.episodes,
+            "episodes_left": round.episodes_left,
+            "items_queued": round.items_queued,
+            "running_ms": round.running_ms,
+            "held": held(&round),
+        })),
+        "workers": it.workers,
+        "workers_available": it.workers_available,
+        "rivals": it.rivals,
+        "withheld": it.withheld.iter().map(|it| json!([it.worker_name, it.reason]))
+            .collect::<Vec<_>>(),
+        // Why nothing goes on, if that is so.
+        "troubles": troubles,
+    })))
+}
+
+/// What an action needs to know.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Order {
+    /// For `priority`.
+    priority: Option<u32>,
+    /// For `fork`: the last generation that both have.
+    generation: Option<u64>,
+    /// For `fork`: another seed.
+    seed: Option<u64>,
+}
+
+/// Pauses, resumes, cancels, forks an experiment, or gives it another priority.
+pub async fn steer(
+    State(shared): State<Shared>,
+    Path((id, action)): Path<(u64, String)>,
+    Json(order): Json<Order>,
+) -> Result<Json<ExperimentAnswer>, Problem> {
+    let control = control(&shared)?;
+    let action = match (&*action, order.priority) {
+        ("pause", _) => Action::Pause,
+        ("resume", _) => Action::Resume,
+        ("cancel", _) => Action::Cancel,
+        ("priority", Some(priority)) => Action::Priority(priority),
+        ("fork", _) => return fork(&shared, control, id, &order).await,
+        (action, _) => return Err(Problem::bad(format!("no such action: {action}"))),
+    };
+    Ok(Json(control.steer(id, action).await?.into()))
+}
+
+async fn fork(
+    shared: &Shared,
+    control: &dyn Control,
+    id: u64,
+    order: &Order,
+) -> Result<Json<ExperimentAnswer>, Problem> {
+    let generation = order.generation.ok_or_else(|| Problem::bad("fork needs a generation"))?;
+    let parent = shared.archive.experiment(id).await?;
+    let forked = control.submit(SubmitExperimentRequest {
+        config_json: parent.config_json,
+        seed: order.seed,
+        fork_of: Some(ForkPoint { experiment_id: id, generation }),
+        ..SubmitExperimentRequest::default()
+    });
+    Ok(Json(forked.await?.into()))
+}

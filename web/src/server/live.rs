@@ -1,0 +1,154 @@
+//! News for pages, as server-sent events. A page that reads slowly gets fewer and longer
+//! ones: each is made when it is asked for, of what is stored then.
+
+use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Duration};
+
+use axum::{
+    extract::{Path, Query, State},
+    http::HeaderMap,
+    response::{
+        IntoResponse, Response, Sse,
+        sse::{Event, KeepAlive},
+    },
+};
+use serde::Deserialize;
+use serde_json::json;
+use swarm_proto::v1::ListGenerationsRequest;
+use tokio::sync::{Mutex, watch};
+use tokio_stream::Stream;
+
+use super::{
+    Shared,
+    answers::{self, ExperimentAnswer},
+    problem::Problem,
+};
+
+/// Least time between two events of a stream.
+const PAUSE: Duration = Duration::from_millis(400);
+
+/// Answers that are kept for other pages.
+const LATEST_MAX: usize = 256;
+
+/// What was read last of each experiment: pages that look at the same one share the work.
+#[derive(Debug, Default)]
+pub struct Latest(Mutex<Known>);
+
+/// By the number of the experiment and the first generation that was asked for: how much had
+/// been written then, and the answer.
+type Known = BTreeMap<(u64, u64), (u64, Arc<News>)>;
+
+/// What is new of an experiment.
+#[derive(Debug)]
+struct News {
+    /// As JSON.
+    experiment: String,
+    /// As JSON; none if there are none.
+    generations: Option<String>,
+    /// The generation after the last of them.
+    next: u64,
+    /// Whether there are more already.
+    is_cut: bool,
+}
+
+impl Latest {
+    /// News of an experiment. `count`: how much has been written; what was read at the same
+    /// count is still true.
+    async fn read(&self, shared: &Shared, id: u64, from: u64, count: u64) -> Option<Arc<News>> {
+        let mut known = self.0.lock().await;
+        if let Some((at, news)) = known.get(&(id, from))
+            && *at == count
+        {
+            return Some(Arc::clone(news));
+        }
+        let request =
+            ListGenerationsRequest { experiment_id: id, from_generation: from, page_size: 0 };
+        let page = shared.archive.generations(request).await.ok()?;
+        let found = shared.archive.experiment(id).await.ok()?.experiment?;
+        let rows: Vec<_> = page.generations.iter().filter_map(answers::generation_row).collect();
+        let news = Arc::new(News {
+            experiment: json!(ExperimentAnswer::from(found)).to_string(),
+            next: rows.last().map_or(from, |row| row.0 + 1),
+            generations: (!rows.is_empty()).then(|| json!(rows).to_string()),
+            is_cut: page.next_generation.is_some(),
+        });
+        if known.len() >= LATEST_MAX {
+            known.clear();
+        }
+        known.insert((id, from), (count, Arc::clone(&news)));
+        Some(news)
+    }
+}
+
+/// The first generation that is wanted.
+#[derive(Debug, Deserialize)]
+pub struct From {
+    #[serde(default)]
+    from: u64,
+}
+
+/// An event whenever something may be new.
+pub async fn news(State(shared): State<Shared>) -> Response {
+    let news = shared.archive.news();
+    let state = (shared, news);
+    stream(futures_util::stream::unfold(state, |(shared, mut news)| async move {
+        wait(&shared, &mut news).await?;
+        Some((Ok(Event::default().data("{}")), (shared, news)))
+    }))
+}
+
+/// Generations of an experiment from some on, oldest first. The id of an event is the
+/// generation after its last one, so a page that was cut off goes on without a gap.
+pub async fn generations(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+    Query(From { from }): Query<From>,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let again = headers.get("last-event-id").and_then(|id| id.to_str().ok()?.parse().ok());
+    shared.archive.experiment(id).await?;
+    let news = shared.archive.news();
+    let state = (shared, news, again.unwrap_or(from), Step::Read, String::new());
+    let events = futures_util::stream::unfold(state, move |state| async move {
+        let (shared, mut news, mut from, mut step, mut before) = state;
+        loop {
+            if step == Step::Wait {
+                wait(&shared, &mut news).await?;
+            }
+            let count = *news.borrow_and_update();
+            let latest = shared.latest.read(&shared, id, from, count).await?;
+            from = latest.next;
+            // There is more at once, or nothing until something is stored.
+            step = if latest.is_cut { Step::Read } else { Step::Wait };
+            if latest.generations.is_none() && latest.experiment == before {
+                continue;
+            }
+            before.clone_from(&latest.experiment);
+            let rows = latest.generations.as_deref().unwrap_or("[]");
+            let data = format!(r#"{{"experiment":{before},"generations":{rows}}}"#);
+            let event = Event::default().id(from.to_string()).data(data);
+            return Some((Ok(event), (shared, news, from, step, before)));
+        }
+    });
+    Ok(stream(events))
+}
+
+/// What a stream does next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    Read,
+    Wait,
+}
+
+/// Waits for news, and a moment longer, so that many come as one; none at the end.
+async fn wait(shared: &Shared, news: &mut watch::Receiver<u64>) -> Option<()> {
+    tokio::select! {
+        () = shared.shutdown.cancelled() => return None,
+        changed = news.changed() => changed.ok()?,
+    }
+    tokio::time::sleep(PAUSE).await;
+    Some(())
+}
+
+fn stream(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
+    Sse::new(events).keep_alive(KeepAlive::default()).into_response()
+}

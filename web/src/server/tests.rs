@@ -1,0 +1,172 @@
+//! Who is let in, and what browsers are told.
+
+use axum::{
+    body::{Body, to_bytes},
+    http::{Request, Response, StatusCode},
+};
+use swarm_proto::v1::{
+    Experiment, GetChampionResponse, GetExperimentResponse, ListEventsRequest, ListEventsResponse,
+    ListGenerationsRequest, ListGenerationsResponse,
+};
+use tokio::sync::watch;
+use tonic::{Status, async_trait};
+use tower::ServiceExt as _;
+
+use super::*;
+
+const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+
+/// One experiment, of which nothing is known but its name.
+struct OneExperiment(watch::Sender<u64>);
+
+#[async_trait]
+impl Archive for OneExperiment {
+    async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
+        Ok(vec![Experiment { id: 1, name: "first".into(), ..Experiment::default() }])
+    }
+
+    async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status> {
+        Err(Status::not_found(format!("there is no experiment {id}")))
+    }
+
+    async fn generations(
+        &self,
+        _: ListGenerationsRequest,
+    ) -> Result<ListGenerationsResponse, Status> {
+        Ok(ListGenerationsResponse::default())
+    }
+
+    async fn events(&self, _: ListEventsRequest) -> Result<ListEventsResponse, Status> {
+        Ok(ListEventsResponse::default())
+    }
+
+    async fn fitness(&self, _: u64, from: u64, _: u32) -> Result<(u64, Vec<Vec<f32>>), Status> {
+        Ok((from, vec![vec![0.5, 1.0], vec![2.0]]))
+    }
+
+    async fn individual(&self, _: &str) -> Result<GetChampionResponse, Status> {
+        Err(Status::failed_precondition("nobody yet"))
+    }
+
+    fn news(&self) -> watch::Receiver<u64> {
+        self.0.subscribe()
+    }
+}
+
+async fn answer(listen: &str, token: Option<&str>, request: Request<Body>) -> Response<Body> {
+    let site = Site {
+        archive: Arc::new(OneExperiment(watch::Sender::new(0))),
+        control: None,
+        token: token.map(|token| Token::parse(token).unwrap()),
+        tls: None,
+    };
+    let router = site.router(listen.parse().unwrap(), CancellationToken::new());
+    router.oneshot(request).await.unwrap()
+}
+
+fn get(path: &str, host: &str, cookie: &str) -> Request<Body> {
+    let request = Request::get(path).header("host", host).header("cookie", cookie);
+    request.body(Body::empty()).unwrap()
+}
+
+fn post(path: &str, host: &str, origin: Option<&str>, body: &str) -> Request<Body> {
+    let mut request = Request::post(path).header("host", host);
+    if let Some(origin) = origin {
+        request = request.header("origin", origin);
+    }
+    request.header("content-type", "application/json").body(Body::from(body.to_owned())).unwrap()
+}
+
+async fn text(response: Response<Body>) -> String {
+    String::from_utf8(to_bytes(response.into_body(), 1 << 20).await.unwrap().into()).unwrap()
+}
+
+const HERE: &str = "127.0.0.1:7780";
+const ORIGIN: Option<&str> = Some("http://127.0.0.1:7780");
+
+#[tokio::test]
+async fn only_those_who_have_shown_the_token_see_anything() {
+    let list = "/api/experiments";
+    let refused = answer(HERE, Some(TOKEN), get(list, HERE, "")).await;
+    assert_eq!(refused.status(), StatusCode::UNAUTHORIZED);
+    let sent_away = answer(HERE, Some(TOKEN), get("/", HERE, "")).await;
+    assert_eq!(sent_away.headers()["location"], "/login");
+
+    let login = |token: &str| post("/login", HERE, ORIGIN, &format!(r#"{{"token":"{token}"}}"#));
+    let wrong = answer(HERE, Some(TOKEN), login(&"x".repeat(32))).await;
+    assert_eq!(wrong.status(), StatusCode::UNAUTHORIZED);
+    assert!(!wrong.headers().contains_key("set-cookie"));
+    let right = answer(HERE, Some(TOKEN), login(TOKEN)).await;
+    assert_eq!(right.status(), StatusCode::NO_CONTENT);
+    let cookie = right.headers()["set-cookie"].to_str().unwrap();
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+    assert!(!cookie.contains(TOKEN), "the cookie says what the token is");
+
+    let cookie = cookie.split(';').next().unwrap();
+    let seen = answer(HERE, Some(TOKEN), get(list, HERE, &format!("other=1; {cookie}"))).await;
+    assert!(text(seen).await.contains("first"));
+    let other = Some("fedcba9876543210fedcba9876543210");
+    let stale = answer(HERE, other, get(list, HERE, cookie)).await;
+    assert_eq!(stale.status(), StatusCode::UNAUTHORIZED, "the token has changed");
+}
+
+#[tokio::test]
+async fn names_of_other_sites_do_not_lead_to_pages_of_this_machine() {
+    for host in ["localhost:7780", "127.0.0.1", "[::1]:9", "localhost"] {
+        assert_eq!(answer(HERE, None, get("/", host, "")).await.status(), StatusCode::OK, "{host}");
+    }
+    for host in ["evil.example", "evil.example:7780", "localhost.evil.example", "", "127.0.0.1.x"] {
+        let status = answer(HERE, None, get("/api/experiments", host, "")).await.status();
+        assert_eq!(status, StatusCode::MISDIRECTED_REQUEST, "{host}");
+    }
+    let network = answer("10.0.0.1:80", Some(TOKEN), get("/login", "fleet.example", "")).await;
+    assert_eq!(network.status(), StatusCode::OK);
+}
+
+#[tokio::test]
+async fn other_sites_change_nothing() {
+    for origin in [None, Some("null"), Some("http://evil.example"), Some("http://127.0.0.1:81")] {
+        let request = post("/api/experiments/1/cancel", HERE, origin, "{}");
+        assert_eq!(answer(HERE, None, request).await.status(), StatusCode::FORBIDDEN, "{origin:?}");
+    }
+    let alone = answer(HERE, None, post("/api/experiments/1/cancel", HERE, ORIGIN, "{}")).await;
+    assert_eq!(alone.status(), StatusCode::CONFLICT);
+    assert!(text(alone).await.contains("only a coordinator can do this"));
+}
+
+#[tokio::test]
+async fn browsers_load_nothing_from_elsewhere() {
+    for path in ["/", "/experiment/1", "/replay/1@0/3", "/login"] {
+        let page = answer(HERE, None, get(path, HERE, "")).await;
+        let policy = page.headers()["content-security-policy"].to_str().unwrap().to_owned();
+        assert!(policy.starts_with("default-src 'none'; script-src 'self' 'sha256-"), "{policy}");
+        assert!(!policy.contains("unsafe") && !policy.contains('*'), "{policy}");
+        assert!(!text(page).await.contains("://"), "{path}");
+    }
+}
+
+#[tokio::test]
+async fn what_went_wrong_is_said_in_one_line() {
+    for (path, status, part) in [
+        ("/api/experiments/9", StatusCode::NOT_FOUND, "there is no experiment 9"),
+        ("/api/replay/1", StatusCode::CONFLICT, "nobody yet"),
+        ("/api/replay/x", StatusCode::BAD_REQUEST, "names nobody"),
+        ("/api/workers", StatusCode::CONFLICT, "only a coordinator"),
+    ] {
+        let refused = answer(HERE, None, get(path, HERE, "")).await;
+        assert_eq!(refused.status(), status, "{path}");
+        let text = text(refused).await;
+        assert!(text.contains(part) && text.lines().count() == 1, "{text}");
+    }
+}
+
+#[tokio::test]
+async fn generations_of_different_sizes_share_a_map() {
+    let map = answer(HERE, None, get("/api/experiments/1/fitness?from=7", HERE, "")).await;
+    let bytes = to_bytes(map.into_body(), 1 << 10).await.unwrap();
+    let words: Vec<[u8; 4]> = bytes.chunks(4).map(|four| four.try_into().unwrap()).collect();
+    assert_eq!([words[0], words[1], words[2]].map(u32::from_le_bytes), [7, 2, 2]);
+    let values: Vec<f32> = words[3..].iter().map(|word| f32::from_le_bytes(*word)).collect();
+    assert_eq!(values[..3], [0.5, 1.0, 2.0]);
+    assert!(values[3].is_nan());
+}

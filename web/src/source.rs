@@ -1,0 +1,68 @@
+//! What pages are made of: the same queries, in the same messages, as clients have.
+
+use swarm_proto::v1::{
+    Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
+    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
+    SubmitExperimentRequest, Worker,
+};
+use tokio::sync::watch;
+use tonic::{Status, async_trait};
+
+/// Where experiments are read.
+#[async_trait]
+pub trait Archive: Send + Sync + 'static {
+    /// All experiments, oldest first.
+    async fn experiments(&self) -> Result<Vec<Experiment>, Status>;
+
+    /// One of them, with its file in canonical form.
+    async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status>;
+
+    /// Completed generations, page by page.
+    async fn generations(
+        &self,
+        request: ListGenerationsRequest,
+    ) -> Result<ListGenerationsResponse, Status>;
+
+    /// Events, page by page.
+    async fn events(&self, request: ListEventsRequest) -> Result<ListEventsResponse, Status>;
+
+    /// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations
+    /// from the first one on that the fitness log has, but not before `from`; and the number
+    /// of that one.
+    async fn fitness(&self, id: u64, from: u64, n: u32) -> Result<(u64, Vec<Vec<f32>>), Status>;
+
+    /// The genotype at an address that names a single one.
+    async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status>;
+
+    /// Changes when something may have been stored.
+    fn news(&self) -> watch::Receiver<u64>;
+}
+
+/// The coordinator that runs now; a data directory alone has none.
+#[async_trait]
+pub trait Control: Send + Sync + 'static {
+    /// The connected workers.
+    async fn workers(&self) -> Result<Vec<Worker>, Status>;
+
+    /// What an experiment does, or waits for.
+    async fn explain(&self, id: u64) -> Result<ExplainExperimentResponse, Status>;
+
+    /// Changes an experiment, and reads it again.
+    async fn steer(&self, id: u64, action: Action) -> Result<Experiment, Status>;
+
+    /// Starts an experiment.
+    async fn submit(&self, request: SubmitExperimentRequest) -> Result<Experiment, Status>;
+}
+
+/// What can be done with an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Until it is resumed.
+    Pause,
+    /// Goes on.
+    Resume,
+    /// Ends it.
+    Cancel,
+    /// Its weight in the sharing of the fleet, 1 to 1000.
+    Priority(u32),
+}

@@ -1,0 +1,115 @@
+//! What may be different when a swarm is simulated again.
+
+use evolution::ALGORITHMS;
+use experiment_file::{
+    ConfigError, ExperimentConfig, InhibitedStimulus, LeaderFailureConfig, ObjectConfig, Problem,
+    RobotConfig, SensorQuery, StimuliInhibitionConfig, TopologySwitchConfig,
+};
+use serde::Deserialize;
+use serde_json::{from_value, json};
+
+/// Changes of an episode; none keeps what the experiment has.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WhatIf {
+    /// Seed of all randomness.
+    pub seed: Option<u64>,
+    /// Whose worlds.
+    pub generation: Option<u64>,
+    /// Which of them.
+    pub trial: u32,
+    /// Steps of the episode.
+    pub steps: Option<u32>,
+    /// Robots of the object that evolves.
+    pub robots: Option<u32>,
+    /// A reading that none of them gets, such as `wireless_receiver:msg`.
+    pub inhibit: Option<String>,
+    /// A perturbation with its default parameters: `leader_failure` or `topology_switch`.
+    pub perturb: Option<String>,
+}
+
+impl WhatIf {
+    /// The experiment with the changes, checked like any file.
+    pub fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
+        config.seed = self.seed.unwrap_or(config.seed);
+        let algorithm = &mut config.algorithm;
+        algorithm.evaluation_steps = self.steps.unwrap_or(algorithm.evaluation_steps);
+        let evolves = config.world.objects.get_mut(&algorithm.evolvable_object);
+        if let Some(ObjectConfig::Robot(robot)) = evolves {
+            self.change(robot)?;
+        }
+        let read = ExperimentConfig::from_json(&config.to_canonical_json(), "", ALGORITHMS);
+        read.map(|(config, _)| config)
+    }
+
+    fn change(&self, robot: &mut RobotConfig) -> Result<(), ConfigError> {
+        robot.num_instances = self.robots.unwrap_or(robot.num_instances);
+        if let Some(name) = &self.inhibit {
+            let reading: SensorQuery =
+                from_value(json!(name)).map_err(|_| unknown("reading", name))?;
+            robot.perturbations.stimuli_inhibition.push(StimuliInhibitionConfig {
+                stimuli: InhibitedStimulus::Reading(reading),
+                affected_robots: robot.num_instances,
+            });
+        }
+        match self.perturb.as_deref() {
+            None => {}
+            Some("leader_failure") => {
+                robot.perturbations.leader_failure = Some(LeaderFailureConfig::default());
+            }
+            Some("topology_switch") => {
+                robot.perturbations.topology_switch = Some(TopologySwitchConfig::default());
+            }
+            Some(name) => return Err(unknown("perturbation", name)),
+        }
+        Ok(())
+    }
+}
+
+fn unknown(kind: &str, name: &str) -> ConfigError {
+    let name: String = name.chars().take(80).collect();
+    let message = format!("there is no {kind} `{name}`");
+    ConfigError { problems: vec![Problem { path: String::new(), line: None, message }] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quickstart() -> ExperimentConfig {
+        let text = include_str!("../../configs/quickstart.json");
+        ExperimentConfig::from_json(text, "", ALGORITHMS).unwrap().0
+    }
+
+    #[test]
+    fn nothing_changes_unless_it_is_asked_for() {
+        assert_eq!(WhatIf::default().apply(quickstart()), Ok(quickstart()));
+    }
+
+    #[test]
+    fn robots_readings_and_perturbations_change() {
+        let what_if = WhatIf {
+            robots: Some(7),
+            steps: Some(12),
+            inhibit: Some("wireless_receiver:msg".into()),
+            perturb: Some("leader_failure".into()),
+            ..WhatIf::default()
+        };
+        let changed = what_if.apply(quickstart()).unwrap();
+        let (_, robot) = changed.robots().next().unwrap();
+        assert_eq!((robot.num_instances, changed.algorithm.evaluation_steps), (7, 12));
+        assert_eq!(robot.perturbations.stimuli_inhibition[0].affected_robots, 7);
+        assert!(robot.perturbations.leader_failure.is_some());
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let refused = |what_if: WhatIf| what_if.apply(quickstart()).unwrap_err().to_string();
+        let error = refused(WhatIf { robots: Some(0), ..WhatIf::default() });
+        assert!(error.contains("num_instances"), "{error}");
+        let error = refused(WhatIf { perturb: Some("rain".into()), ..WhatIf::default() });
+        assert_eq!(error, "there is no perturbation `rain`");
+        let error = refused(WhatIf { inhibit: Some("smell".into()), ..WhatIf::default() });
+        assert_eq!(error, "there is no reading `smell`");
+    }
+}

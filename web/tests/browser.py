@@ -1,0 +1,343 @@
+"""Pages in a real browser: headless Chromium, driven by selenium.
+
+    python web/tests/browser.py target/debug
+
+The argument is the folder with coordinator, worker and swarmctl. Without Chromium and its
+driver the tests are skipped, with a line that says so. With SWARM_SCREENSHOTS=DIR, pages
+that were tested are also pictured there.
+"""
+
+import csv
+import json
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAMS = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else "target/debug").resolve()
+CONFIG = pathlib.Path(__file__).parents[2] / "configs/quickstart.json"
+CLIENT_TOKEN = "client-token-0123456789abcdef0123"
+WORKER_TOKEN = "worker-token-0123456789abcdef0123"
+CHROMIUM = shutil.which("chromium")
+DRIVER = shutil.which("chromedriver")
+
+if not (CHROMIUM and DRIVER):
+    print(
+        "SKIPPED, but can be installed: no Chromium, so that pages are not tested; "
+        "apt-get install chromium chromium-driver"
+    )
+    sys.exit(0)
+
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+
+# Only what hangs takes so long.
+DEADLINE = 120
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+class Fleet:
+    """A coordinator with pages, and a worker."""
+
+    def __init__(self, *args, environment=None):
+        self.directory = tempfile.TemporaryDirectory()
+        self.ports = free_port(), free_port()
+        self.args = args
+        self.environment = dict(os.environ, **(environment or {}))
+        self.processes = []
+        self.start_coordinator()
+
+    def start_coordinator(self):
+        listen, pages = (f"127.0.0.1:{port}" for port in self.ports)
+        command = ["coordinator", "--listen", listen, "--web-listen", pages]
+        self.coordinator = self.start(*command, "--data-dir", self.directory.name, *self.args)
+        # The line before tells that it listens for clients.
+        for line in self.coordinator.stderr:
+            if "pages are served" in line:
+                return
+        raise AssertionError("the coordinator does not start")
+
+    def start_worker(self):
+        return self.start("worker", "--coordinator", self.url, "--name", "w", "--slots", "1")
+
+    def start(self, program, *args):
+        process = subprocess.Popen(
+            [PROGRAMS / program, *args], env=self.environment, stderr=subprocess.PIPE, text=True
+        )
+        self.processes.append(process)
+        return process
+
+    @property
+    def url(self):
+        return f"http://127.0.0.1:{self.ports[0]}"
+
+    @property
+    def pages(self):
+        return f"http://127.0.0.1:{self.ports[1]}"
+
+    def swarmctl(self, *args):
+        command = [PROGRAMS / "swarmctl", "--coordinator", self.url, "--output", "json", *args]
+        return subprocess.run(command, check=True, text=True, capture_output=True).stdout
+
+    def stop(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+            process.stderr.close()
+        self.directory.cleanup()
+
+
+class BrowserTest(unittest.TestCase):
+    """A browser of its own for each test, whose console and requests are looked at."""
+
+    is_dark = False
+    # What a test provokes on purpose, such as a refused login.
+    expected_complaints = ()
+
+    def setUp(self):
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        for argument in ["--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"]:
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+        self.addCleanup(self.browser.quit)
+        self.prefer("dark" if self.is_dark else "light")
+
+    def tearDown(self):
+        complaints = [
+            entry["message"]
+            for entry in self.browser.get_log("browser")
+            if entry["level"] in ("SEVERE", "WARNING")
+            and not any(part in entry["message"] for part in self.expected_complaints)
+        ]
+        self.assertEqual(complaints, [], "the console has errors")
+        for entry in self.browser.get_log("performance"):
+            message = json.loads(entry["message"])["message"]
+            if message["method"] == "Network.requestWillBeSent":
+                url = message["params"]["request"]["url"]
+                is_ours = url.startswith(("http://127.0.0.1:", "file://", "data:", "blob:", "chrome:"))
+                self.assertTrue(is_ours, f"a request to another host: {url}")
+
+    def prefer(self, scheme):
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    def narrow(self):
+        size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+    def wait(self, condition, what):
+        return WebDriverWait(self.browser, DEADLINE, 0.05).until(lambda _: condition(), what)
+
+    def find(self, selector):
+        return self.wait(
+            lambda: next(iter(self.browser.find_elements(By.CSS_SELECTOR, selector)), None),
+            f"no {selector}",
+        )
+
+    def text(self, selector):
+        return self.find(selector).text
+
+    def wait_for_text(self, selector, part):
+        self.wait(lambda: part in self.script(f"return document.querySelector({selector!r})?.textContent ?? ''"), f"{selector} never says {part!r}")
+
+    def script(self, text):
+        return self.browser.execute_script(text)
+
+    def picture(self, name):
+        directory = os.environ.get("SWARM_SCREENSHOTS")
+        if directory:
+            self.browser.save_screenshot(str(pathlib.Path(directory) / f"{name}.png"))
+
+
+class Pages(BrowserTest):
+    """Pages of a fleet that has computed an experiment."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.fleet = Fleet()
+        cls.addClassCleanup(cls.fleet.stop)
+        cls.fleet.start_worker()
+        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", "12", "--watch")
+
+    def open(self, path):
+        self.browser.get(self.fleet.pages + path)
+
+    def test_the_list_is_searched(self):
+        self.open("/")
+        self.wait_for_text("tr[data-id='1']", "quickstart")
+        self.wait_for_text("tr[data-id='1']", "completed")
+        self.picture("experiments")
+        search = self.find("input[type=search]")
+        search.send_keys("nothing of the kind")
+        self.wait_for_text("tbody", "No experiment matches.")
+        search.clear()
+        search.send_keys("SNES seed=1")
+        self.wait_for_text("tbody", "quickstart")
+
+    def test_a_cell_of_the_map_plays(self):
+        self.open("/experiment/1")
+        self.wait_for_text("h1", "quickstart")
+        canvas = self.find(".heat-map canvas")
+        self.wait(lambda: canvas.size["height"] > 100, "the map is empty")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        self.picture("experiment")
+        self.script("document.querySelector('.heat-map').scrollIntoView()")
+        webdriver.ActionChains(self.browser).move_to_element_with_offset(
+            canvas, 5 - canvas.size["width"] // 2, 5 - canvas.size["height"] // 2
+        ).click().perform()
+        self.wait(lambda: self.browser.current_url.split("#")[0].endswith("/replay/1@0/0"), "no replay")
+        self.wait_for_text("h1", "Individual 0 of generation 0 of experiment 1")
+        # It plays by itself.
+        self.wait_for_text("#step", "step 99 of 100")
+
+    def test_positions_are_those_of_the_trace(self):
+        trace = pathlib.Path(self.fleet.directory.name) / "trace.csv"
+        args = ["simulate", "1@5/3", "--trials", "1", "--trace", str(trace)]
+        self.fleet.swarmctl(*args, "--trace-columns", "frames")
+        with trace.open() as file:
+            rows = {(int(row["step"]), int(row["robot"])): row for row in csv.DictReader(file)}
+        self.open("/replay/1@5/3#step=7&robot=2")
+        for step in [7, 8, 9, 10]:
+            self.wait_for_text("#step", f"step {step} of 100")
+            row = rows[step, 2]
+            expected = f"{float(row['x_cm']):.2f}, {float(row['y_cm']):.2f} cm"
+            self.assertEqual(self.text("#position"), expected)
+            hears = f"robot {row['frame_emitter']}" if row["frame_emitter"] else "nobody"
+            self.assertIn(hears, self.text("#hears"))
+            self.assertIn("on" if row["led"] != "0" else "off", self.text("#led"))
+            self.find(".player").send_keys(Keys.ARROW_RIGHT)
+        self.picture("replay")
+        self.find(".player").send_keys(Keys.END)
+        self.wait_for_text("#step", "step 99 of 100")
+        self.find(".player").send_keys("]")
+        self.wait_for_text(".robot-panel h2", "Robot 3")
+        self.assertIn("#step=99&robot=3", self.browser.current_url)
+
+    def test_what_if_there_were_more_robots(self):
+        self.open("/replay/1#step=50")
+        self.wait_for_text(".episode", "5 robots")
+        self.find("#what-if-robots").send_keys("9")
+        self.find("#beside").click()
+        self.wait(lambda: len(self.browser.find_elements(By.CSS_SELECTOR, ".player")) == 2, "one player")
+        headings = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, ".episode")]
+        self.assertIn("5 robots", headings[0])
+        self.assertIn("9 robots", headings[1])
+        self.find("#forward").click()
+        steps = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, "#step")]
+        self.assertEqual(steps, ["step 51 of 100"] * 2)
+        self.picture("what-if")
+
+    def test_runs_are_compared_along_episodes(self):
+        self.open("/compare?runs=1&along=episodes&value=best")
+        self.wait_for_text(".chart svg", "episodes")
+        self.wait_for_text(".chart figcaption", "quickstart seed 1")
+        self.picture("compare")
+
+    def test_the_fleet_is_seen(self):
+        self.open("/fleet")
+        self.wait_for_text("tbody", "w")
+        self.wait_for_text("main", "1 workers with 1 slots")
+        self.picture("fleet")
+
+    def test_a_narrow_screen_has_room_and_both_themes_differ(self):
+        self.narrow()
+        for path, ready in [("/", "tr[data-id='1']"), ("/experiment/1", ".state"), ("/replay/1", ".player"), ("/fleet", "tr[data-id]"), ("/compare", ".chart path")]:
+            self.open(path)
+            self.find(ready)
+            widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
+            self.assertLessEqual(widths[0], widths[1], f"{path} is too wide")
+            self.picture(f"narrow{path.replace('/', '-')}")
+        grounds = []
+        for scheme in ["light", "dark"]:
+            self.prefer(scheme)
+            grounds.append(self.script("return getComputedStyle(document.body).backgroundColor"))
+        self.assertNotEqual(*grounds)
+
+
+class Live(BrowserTest):
+    """Pages while something happens."""
+
+    def test_a_page_follows_through_a_kill_of_the_coordinator_without_a_gap(self):
+        self.expected_complaints = ["ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "Failed to fetch", "ERR_CONNECTION_RESET"]
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        fleet.start_worker()
+        fleet.swarmctl("submit", str(CONFIG), "--generations", "40")
+        self.browser.get(fleet.pages + "/experiment/1")
+        n_generations = lambda: int(self.script("return document.querySelector('.chart')?.dataset.generations ?? 0"))
+        self.wait(lambda: n_generations() >= 3, "no generation is seen")
+        fleet.coordinator.kill()
+        fleet.coordinator.wait()
+        self.wait_for_text("#connection", "connecting again")
+        seen = n_generations()
+        self.assertLess(seen, 40, "the run was over before the kill")
+        fleet.start_coordinator()
+        self.wait_for_text("#connection", "live")
+        self.wait(lambda: n_generations() == 40, "generations are missing")
+        self.wait_for_text(".state", "completed")
+
+    def test_an_experiment_is_paused_and_resumed(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        fleet.swarmctl("submit", str(CONFIG))
+        self.browser.get(fleet.pages + "/experiment/1")
+        self.wait_for_text("main", "No worker is connected")
+        self.find("#do-pause").click()
+        self.browser.switch_to.alert.accept()
+        self.wait_for_text(".state", "paused")
+        self.find("#do-resume").click()
+        self.wait_for_text(".state", "running")
+
+    def test_the_token_is_asked_for_once(self):
+        self.expected_complaints = ["401 (Unauthorized)"]
+        tokens = {"SWARM_CLIENT_TOKEN": CLIENT_TOKEN, "SWARM_WORKER_TOKEN": WORKER_TOKEN}
+        fleet = Fleet(environment=tokens)
+        self.addCleanup(fleet.stop)
+        self.browser.get(fleet.pages + "/fleet")
+        self.wait_for_text("form", "The token that clients")
+        for token in [WORKER_TOKEN, CLIENT_TOKEN]:
+            field = self.find("#token")
+            field.clear()
+            field.send_keys(token, Keys.ENTER)
+            if token == WORKER_TOKEN:
+                self.wait_for_text("#problem", "this is not the client token")
+        self.wait_for_text("h1", "Experiments")
+        self.assertEqual(self.script("return document.cookie"), "", "a script can read the cookie")
+        self.browser.get(fleet.pages + "/fleet")
+        self.wait_for_text("main", "No worker is connected")
+
+
+class File(BrowserTest):
+    """A replay that stands alone."""
+
+    is_dark = True
+
+    def test_a_file_plays_without_a_server(self):
+        with tempfile.TemporaryDirectory() as directory:
+            genotype, html = (pathlib.Path(directory) / name for name in ("genes.json", "swarm.html"))
+            genotype.write_text(json.dumps([0.6] * 424))
+            command = ["replay", "--config", CONFIG, "--genotype", genotype, "--to", html]
+            subprocess.run([PROGRAMS / "swarmctl", *command], check=True, capture_output=True)
+            self.browser.get(f"{html.as_uri()}#step=30&robot=1")
+            self.wait_for_text("#step", "step 30 of 100")
+            self.assertEqual(self.text(".robot-panel h2"), "Robot 1")
+            self.picture("file")
+            self.find("#play").click()
+            self.wait_for_text("#step", "step 99 of 100")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
