@@ -43,7 +43,10 @@ fn add_message(elements: &mut Elements, scope: &str, path: &[i32], message: &Des
         }
     }
     for (path, nested) in children(path, MESSAGE_NESTED, &message.nested_type) {
-        add_message(elements, &scope, &path, nested);
+        // The entries of a map are no words of a file either.
+        if !nested.options.as_ref().is_some_and(|options| options.map_entry()) {
+            add_message(elements, &scope, &path, nested);
+        }
     }
     for (path, nested) in children(path, MESSAGE_ENUMS, &message.enum_type) {
         elements.push((format!("{scope}.{}", nested.name()), path.clone()));

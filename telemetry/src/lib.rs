@@ -3,6 +3,7 @@
 //! Each program defines its own lines and metrics; `docs/logs.md` and
 //! `docs/metrics.md` list them.
 
+mod duration;
 mod endpoint;
 mod log;
 mod metric;
@@ -11,6 +12,7 @@ mod throttle;
 
 use std::net::SocketAddr;
 
+pub use duration::{parse_duration, parse_positive_duration};
 pub use endpoint::{Endpoint, ListenError};
 pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
@@ -18,11 +20,20 @@ pub use prometheus::Histogram;
 pub use text::{EscapingWriter, escape, escape_lines, is_unprintable};
 pub use throttle::Throttle;
 
+/// Version of the programs, and in release builds the commit, such as
+/// `0.1.0 (1a2b3c4)`.
+pub const VERSION: &str = env!("SWARMEVO_VERSION");
+
 /// The address at which metrics are served.
 #[derive(Debug, clap::Args)]
 pub struct MetricsArgs {
     /// Serve metrics for Prometheus on this address, at /metrics, without a token to any
     /// program that reaches it [default: not served]
-    #[arg(long, env = "SWARM_METRICS_LISTEN", value_name = "ADDR:PORT")]
+    #[arg(
+        long,
+        env = "SWARM_METRICS_LISTEN",
+        value_name = "HOST:PORT",
+        value_parser = swarm_transport::listen_address
+    )]
     pub metrics_listen: Option<SocketAddr>,
 }

@@ -5,17 +5,23 @@
 //! which refuses whatever would give a secret away. `docs/security.md` has the
 //! model.
 
+mod address;
+mod banner;
 mod credentials;
 mod link;
 mod pem;
 mod pinned;
+mod server_tls;
 mod tls_diagnosis;
 mod token;
 
+pub use address::listen_address;
+pub use banner::banner;
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
 pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};
 pub use pinned::{PinError, pinned};
+pub use server_tls::server_tls;
 pub use tls_diagnosis::tls_diagnosis;
 pub use token::{BEARER, Token, TokenError};
 

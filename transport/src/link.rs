@@ -109,6 +109,13 @@ impl Link {
         Ok(Self { endpoint, bearer, hint })
     }
 
+    /// Host and port of the coordinator.
+    pub fn authority(&self) -> String {
+        let uri = self.endpoint.uri();
+        let default = if uri.scheme_str() == Some("https") { 443 } else { 80 };
+        format!("{}:{}", uri.host().unwrap_or_default(), uri.port_u16().unwrap_or(default))
+    }
+
     /// The likely cause of a call that failed with this error, as a question.
     pub fn hint(&self, error: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
         is_break(error).then_some(self.hint)

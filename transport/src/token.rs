@@ -7,6 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
 use tonic::metadata::{Ascii, MetadataValue};
 
@@ -18,7 +19,7 @@ const LEN_MIN: usize = 32;
 /// Most characters, so that a header has room for it.
 const LEN_MAX: usize = 1024;
 
-/// A shared secret. Nothing shows it: neither `Debug` nor any error.
+/// A shared secret. Nothing shows it unasked: neither `Debug` nor any error.
 #[derive(Clone)]
 pub struct Token(String);
 
@@ -69,6 +70,18 @@ impl Token {
             ));
         }
         Ok(Self(token.to_owned()))
+    }
+
+    /// The token itself, for whoever made it to hand it on.
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+
+    /// A secret of 256 bits, in hexadecimal, that follows from the token and says nothing of
+    /// it. `purpose`: what it is for; another purpose gives another secret.
+    pub fn derived(&self, purpose: &str) -> String {
+        let digest = Sha256::new().chain_update(purpose).chain_update([0]).chain_update(&self.0);
+        digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// The token in a file, or else in an environment variable, if there is any.

@@ -1,0 +1,67 @@
+//! The banner of a server that is not a coordinator.
+
+use std::{io, time::Duration};
+
+use tokio::{net::TcpStream, time::timeout};
+
+/// Time limit of the connection and the answer.
+const LIMIT: Duration = Duration::from_secs(1);
+/// Number of bytes of the answer that are read.
+const SHOWN_BYTES_MAX: usize = 60;
+/// A server that speaks HTTP/1 answers this; a coordinator closes the connection.
+const REQUEST: &[u8] = b"GET / HTTP/1.0\r\n\r\n";
+
+/// The first line that the server at `HOST:PORT` sends, of at most 60 bytes; none if no
+/// server is there, or if the line is not text, as that of a coordinator (HTTP/2) is not.
+/// Takes up to a second.
+pub async fn banner(address: &str) -> Option<String> {
+    let answer = timeout(LIMIT, answer(address)).await.ok()?.ok()?;
+    let line = answer.lines().next().filter(|line| !line.trim().is_empty())?;
+    // HTTP/2 and TLS begin with control characters.
+    line.chars().all(|c| !c.is_control()).then(|| line.to_owned())
+}
+
+async fn answer(address: &str) -> io::Result<String> {
+    let stream = TcpStream::connect(address).await?;
+    stream.writable().await?;
+    stream.try_write(REQUEST)?;
+    let mut bytes = [0; SHOWN_BYTES_MAX];
+    loop {
+        stream.readable().await?;
+        match stream.try_read(&mut bytes) {
+            Ok(n_bytes) => return Ok(String::from_utf8_lossy(&bytes[..n_bytes]).into_owned()),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{io::Write as _, net::TcpListener, thread};
+
+    use super::*;
+
+    /// A service that sends this to every client.
+    fn service(banner: &'static [u8]) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        thread::spawn(move || {
+            for stream in listener.incoming() {
+                // A client that is gone needs no answer.
+                let _ = stream.and_then(|mut stream| stream.write_all(banner));
+            }
+        });
+        address
+    }
+
+    #[tokio::test]
+    async fn other_services_are_recognised_by_their_banner() {
+        let http = service(b"HTTP/1.0 404 Not Found\r\nServer: x\r\n\r\n");
+        assert_eq!(banner(&http).await.unwrap(), "HTTP/1.0 404 Not Found");
+        assert_eq!(banner(&service(b"220 mail ESMTP\r\n")).await.unwrap(), "220 mail ESMTP");
+        assert_eq!(banner(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, None);
+        assert_eq!(banner(&service(b"")).await, None);
+        assert_eq!(banner("127.0.0.1:1").await, None);
+    }
+}
