@@ -11,6 +11,8 @@
 //! - `queries`: what can be read of experiments; works on the store alone
 //! - `rpc`: gRPC services, which only translate
 //! - `server`: listening, TLS, tokens, limits on connections and calls
+//! - [`group`]: which experiments belong together
+//! - [`labels`]: what people find experiments by
 //! - `health_check`: asks another process's coordinator how it is
 //! - [`referee`]: evaluates single items, in a process of its own
 //! - [`metrics`]: what can be scraped
@@ -22,8 +24,10 @@ mod control;
 mod driver;
 pub mod engine;
 mod failpoint;
+pub mod group;
 mod health_check;
 pub mod ids;
+pub mod labels;
 pub mod limits;
 mod memory;
 pub mod metrics;
@@ -39,6 +43,8 @@ mod submission;
 mod text;
 
 pub use health_check::{Unhealthy, health_check};
+pub use queries::{Address, NotAnAddress, Who};
+pub use rpc::{Offline, PagesArchive};
 pub use server::{
     Access, AccessError, Coordinator, CoordinatorConfig, Role, RunError, StartError, Tls, Tokens,
 };

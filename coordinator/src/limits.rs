@@ -6,6 +6,23 @@
 
 use std::time::Duration;
 
+/// Bundles that are sent or received at the same time; more wait. Each takes up to a few
+/// times [`bundle::UNPACKED_LEN_MAX`] of memory.
+pub const BUNDLES_MAX: usize = 1;
+/// Generations that are computed again at the same time.
+pub const RECONSTRUCTIONS_MAX: usize = 4;
+/// The same for pages, which share the processor with the coordinator.
+pub const RECONSTRUCTIONS_OF_PAGES_MAX: usize = 1;
+/// Bytes of genes and fitness in one answer with individuals of a generation.
+pub const INDIVIDUALS_LEN_MAX: usize = 8 << 20;
+
+/// Generations in one answer that says how evolution moved.
+pub const DYNAMICS_PAGE_LEN_MAX: u64 = 100;
+/// Genes of the individuals of all generations that one lineage goes through; a byte each.
+pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
+/// Ancestors in one answer.
+pub const ANCESTORS_MAX: usize = 100_000;
+
 /// Connections at the same time of those who have made a call that was let in: every
 /// worker and every call of a client on one of its own.
 pub const CONNECTIONS_MAX: usize = WORKERS_MAX + CLIENT_CALLS_MAX;
@@ -91,6 +108,10 @@ pub const EVENT_PAGE_LEN: u32 = 256;
 pub const PAGE_LEN_MAX: u32 = 1000;
 /// Events that may wait for a watcher to read them.
 pub const WATCH_QUEUE_LEN: usize = 16;
+/// Pause between two messages that there is news.
+pub const NEWS_PAUSE: Duration = Duration::from_millis(200);
+/// Longest time after which a watcher of explanations is told what time alone has changed.
+pub const SITUATION_INTERVAL: Duration = Duration::from_secs(5);
 /// Time for a watcher to make room for the next event; one that takes longer is
 /// told where to resume.
 pub const WATCH_PATIENCE: Duration = Duration::from_secs(30);

@@ -10,7 +10,8 @@ use coordinator::{
     Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
     referee,
 };
-use swarm_telemetry::{LogArgs, MetricsArgs};
+use swarm_telemetry::{LogArgs, MetricsArgs, VERSION};
+use swarm_transport::listen_address;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
 
@@ -21,11 +22,17 @@ use tracing::{error, info};
 /// at the next start, unfinished experiments continue from their last completed
 /// generation, with the same bits.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES, disable_help_subcommand = true)]
+#[command(version = VERSION, after_help = EXIT_CODES, disable_help_subcommand = true)]
 struct Args {
     /// Address to listen on. An address other than loopback requires tokens, and TLS or
     /// --plaintext.
-    #[arg(long, env = "SWARM_LISTEN", default_value = "127.0.0.1:7700")]
+    #[arg(
+        long,
+        env = "SWARM_LISTEN",
+        value_name = "HOST:PORT",
+        default_value = "127.0.0.1:7700",
+        value_parser = listen_address
+    )]
     listen: SocketAddr,
     /// Directory of the database; created if it does not exist.
     #[arg(long, env = "SWARM_DATA_DIR", default_value = "swarm-data")]
@@ -55,6 +62,11 @@ struct Args {
         default_value_t = MEMORY_BUDGET_MIB
     )]
     memory_budget: u32,
+    /// Serve pages on this address: experiments, the fleet, and any swarm replayed. They need
+    /// the token of clients; an address other than loopback requires tokens, and TLS or
+    /// --plaintext.
+    #[arg(long, env = "SWARM_WEB_LISTEN", value_name = "HOST:PORT", value_parser = listen_address)]
+    web_listen: Option<SocketAddr>,
     #[command(flatten)]
     metrics: MetricsArgs,
     #[command(flatten)]
@@ -161,6 +173,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         access: args.access.load()?,
         audit_fraction: args.audit_fraction,
         memory_budget: u64::from(args.memory_budget) << 20,
+        web_listen: args.web_listen,
         metrics_listen: args.metrics.metrics_listen,
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })

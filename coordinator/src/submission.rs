@@ -1,9 +1,17 @@
 //! From an experiment file to an experiment that can be stored and run.
 
-use experiment_file::{ConfigError, ExperimentConfig};
+mod difference;
 
-use crate::{priority::Priority, store::NewExperiment};
-use evolution::{ALGORITHMS, Digest, Evolution};
+use experiment_file::{ConfigError, ExperimentConfig, Problem};
+use sim_core::Simulation;
+
+use crate::{
+    group::Membership,
+    labels::Labels,
+    priority::Priority,
+    store::{ExperimentRecord, ForkRecord, NewExperiment},
+};
+use evolution::{ALGORITHMS, Digest, Evolution, Fork};
 
 /// What a client submits.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +28,21 @@ pub struct Submission {
     pub generations: Option<u64>,
     /// Its share of the fleet.
     pub priority: Priority,
+    /// The group that it belongs to, if any.
+    pub membership: Option<Membership>,
+    /// What people find it by.
+    pub labels: Labels,
+    /// What it goes on from, if it is a fork.
+    pub parent: Option<Parent>,
+}
+
+/// What a fork goes on from.
+#[derive(Debug, Clone)]
+pub struct Parent {
+    /// The other experiment.
+    pub experiment: ExperimentRecord,
+    /// Its evolution after the last generation that is shared.
+    pub evolution: Evolution,
 }
 
 /// A submission that has passed all checks.
@@ -45,20 +68,66 @@ impl Submission {
             (config, _) =
                 ExperimentConfig::from_json(&config.to_canonical_json(), &name, ALGORITHMS)?;
         }
-        let experiment = sim_core::Simulation::compile(&config)?;
+        let experiment = Simulation::compile(&config)?;
         experiment.check_starts(&config.algorithm)?;
-        let evolution =
-            Evolution::new(&config, experiment.population_segments(), sim_core::FINGERPRINT);
+        let (evolution, fork) = match self.parent {
+            Some(parent) => {
+                let (evolution, fork) = parent.fork(&config, &experiment)?;
+                (evolution, Some(fork))
+            }
+            None => {
+                let segments = experiment.population_segments();
+                (Evolution::new(&config, segments, sim_core::FINGERPRINT), None)
+            }
+        };
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         warnings.extend(experiment.uncovered_parameters().iter().cloned());
         let new = NewExperiment {
             request_id: self.request_id,
             config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
             genotype_len: experiment.genotype_len(),
-            checkpoint: evolution.state(),
+            keyframe: evolution.keyframe(),
+            champion: evolution.champion().cloned(),
+            fork,
             priority: self.priority,
+            membership: self.membership,
+            labels: self.labels,
             config,
         };
         Ok(CheckedSubmission { new, warnings })
     }
+}
+
+impl Parent {
+    /// Goes on as an experiment of another configuration.
+    fn fork(
+        self,
+        config: &ExperimentConfig,
+        simulation: &Simulation,
+    ) -> Result<(Evolution, ForkRecord), ConfigError> {
+        let Self { experiment, evolution } = self;
+        let (parent, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)?;
+        let n_shared = evolution.n_generations();
+        let fork = Fork {
+            parent: &parent,
+            parent_simulation: &experiment.fingerprint,
+            child: config,
+            segments: simulation.population_segments(),
+            simulation: sim_core::FINGERPRINT,
+        };
+        let evolution = evolution.fork(&fork).map_err(|error| ConfigError {
+            problems: error.problems.into_iter().map(problem).collect(),
+        })?;
+        let record = ForkRecord {
+            parent: experiment.id,
+            generation: n_shared - 1,
+            link: evolution.digest().to_string(),
+            changes: difference::difference(&experiment.config_json, &config.to_canonical_json()),
+        };
+        Ok((evolution, record))
+    }
+}
+
+fn problem(message: String) -> Problem {
+    Problem { path: String::new(), line: None, message }
 }

@@ -8,9 +8,9 @@ use std::{
 
 use coordinator::{
     priority::Priority,
-    store::{GenerationCommit, GenerationRecord, NewExperiment, Store},
+    store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
-use evolution::{Advance, Digest, Evolution};
+use evolution::{Digest, Evolution, Told};
 use experiment_file::ExperimentConfig;
 use tempfile::TempDir;
 
@@ -41,8 +41,12 @@ pub fn measure(file: &str) -> Alone {
         request_id: None,
         config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
         genotype_len: experiment.genotype_len(),
-        checkpoint: evolution.state(),
+        keyframe: evolution.keyframe(),
         priority: Priority::default(),
+        membership: None,
+        labels: Default::default(),
+        fork: None,
+        champion: None,
         config,
     };
     let (id, _) = store.create(&new, 0).expect("the database can be written");
@@ -68,10 +72,12 @@ pub fn measure(file: &str) -> Alone {
             idle_share: 0.5,
         };
         let started = now();
-        let advance = evolution.advance();
+        let told = Told::of(trial_fitness).to_bytes();
+        let is_due = evolution.is_keyframe_due(told.len());
+        let keyframe = is_due.then(|| evolution.keyframe());
         let commit = GenerationCommit {
             generation: &generation,
-            checkpoint: &advance,
+            entry: Entry { told: &told, keyframe: keyframe.as_deref() },
             champion: evolution.champion(),
             digest: &generation.digest,
             notices: &[],
@@ -81,8 +87,7 @@ pub fn measure(file: &str) -> Alone {
         commits.push(ms(since(started)));
 
         let started = now();
-        let (Advance::State(bytes) | Advance::Step(bytes)) = advance;
-        scratch.write_all(&bytes).expect("it can be written");
+        scratch.write_all(&told).expect("it can be written");
         scratch.sync_data().expect("it can be written");
         syncs.push(ms(since(started)));
     }

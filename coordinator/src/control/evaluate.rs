@@ -9,6 +9,7 @@ use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     driver::DriverEvent,
+    engine::Batch,
     limits::{EVALUATION_VALUES_MAX, TRIAL_VALUES_MAX},
     priority::Priority,
     runs::Evaluation,
@@ -85,7 +86,11 @@ impl EvaluationOrder {
         Ok(CheckedEvaluation {
             measures: simulation.measure_names().iter().map(ToString::to_string).collect(),
             n_steps: simulation.n_steps(),
-            evaluation: Evaluation { spec, genotype, n_trials, n_values, priority },
+            evaluation: Evaluation {
+                spec,
+                batch: Batch::measures(genotype, n_trials, n_values),
+                priority,
+            },
             place,
         })
     }
@@ -112,12 +117,13 @@ impl Control {
     /// Dropping the future tells the driver that nobody waits.
     pub async fn evaluate(&self, checked: CheckedEvaluation) -> Result<Evaluated, ControlError> {
         let CheckedEvaluation { evaluation, place, .. } = checked;
-        let n_values = evaluation.n_values;
+        let n_values = evaluation.batch.values_per_trial;
         let permits = Arc::clone(&self.evaluations);
         let permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
         let result =
             self.ask(|reply| DriverEvent::EvaluationRequested(Box::new(evaluation), reply));
-        let values = result.await?.map_err(ControlError::EvaluationFailed)?;
+        let mut values = result.await?.map_err(ControlError::EvaluationFailed)?;
+        let values = values.swap_remove(0);
         Ok(Evaluated { values, n_values, _permit: permit, _place: place })
     }
 }

@@ -5,12 +5,17 @@
 
 mod evaluate;
 mod explain;
+mod fitness;
+mod import;
+mod keep;
 mod placement;
 mod readmit;
+mod reopen;
 mod requests;
 mod restart;
 mod steer;
 mod submit;
+mod watch;
 
 use std::{
     collections::BTreeSet,
@@ -35,6 +40,8 @@ use requests::Requests;
 
 pub use evaluate::{CheckedEvaluation, EvaluationOrder};
 pub use explain::Explanation;
+pub use fitness::FitnessOrder;
+pub use placement::Existing;
 pub use submit::Submitted;
 
 /// The way to a running coordinator.
@@ -70,6 +77,9 @@ pub enum ControlError {
         REQUESTS_LEN_MAX >> 20
     )]
     TooManyRequests,
+    /// An experiment is not in a state for it; the text says what to do.
+    #[error("{0}")]
+    NotNow(String),
     /// There is no memory for another experiment.
     #[error("{0}")]
     NoMemory(Shortage),
@@ -82,6 +92,9 @@ pub enum ControlError {
     /// The fleet could not evaluate a genotype.
     #[error("{0}")]
     EvaluationFailed(String),
+    /// A fork comes without the experiment that it is a fork of.
+    #[error("it is a fork of an experiment that this coordinator does not have: import that first")]
+    NoParent,
     /// A query without an answer.
     #[error(transparent)]
     Query(#[from] QueryError),

@@ -11,8 +11,10 @@ use crate::{
     limits::UNFINISHED_MAX,
     memory::{self, Shortage},
     runs::Runnable,
-    store::{ExperimentRecord, ExperimentState, NewExperiment, Store, StoreError},
+    store::{ExperimentRecord, ExperimentState, ForkRecord, NewExperiment, Store, StoreError},
 };
+
+use super::{ControlError, reopen};
 
 /// Where a submission ends up.
 pub enum Placement {
@@ -26,12 +28,39 @@ pub enum Placement {
     NoMemory(Shortage),
 }
 
+/// What of an existing experiment a submission may lead to.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Existing {
+    /// One of the same bits that can go on.
+    pub resume_unfinished: bool,
+    /// One of the same bits that has completed.
+    pub reuse: bool,
+}
+
 /// Stores a submission, or finds the experiment that it stands for: the one of the same
-/// request, or, if `resume_unfinished`, one of the same bits. `memory_budget`: bytes that
-/// all unfinished experiments may take together, whether they run or wait.
+/// request, or, as `existing` says, one of the same bits. `memory_budget`: bytes that
+/// all unfinished experiments may take together, whether they run or wait. Returns an identical
+/// experiment, too, if there was one.
 pub fn place(
     store: &mut Store,
     new: NewExperiment,
+    existing: Existing,
+    memory_budget: u64,
+) -> Result<(Placement, Option<ExperimentId>), StoreError> {
+    let experiments = store.experiments()?;
+    let identical = identical(&experiments, &new);
+    let completed = identical.filter(|same| same.state == ExperimentState::Completed);
+    let placement = match completed {
+        Some(completed) if existing.reuse => Placement::RunsAlready(completed.id),
+        _ => place_beside(store, &experiments, &new, existing.resume_unfinished, memory_budget)?,
+    };
+    Ok((placement, identical.map(|same| same.id)))
+}
+
+fn place_beside(
+    store: &mut Store,
+    experiments: &[ExperimentRecord],
+    new: &NewExperiment,
     resume_unfinished: bool,
     memory_budget: u64,
 ) -> Result<Placement, StoreError> {
@@ -40,31 +69,79 @@ pub fn place(
     {
         return Ok(Placement::RunsAlready(id));
     }
-    let experiments = store.experiments()?;
-    let shortage = shortage(&experiments, &new, memory_budget);
-    if resume_unfinished && let Some(placement) = resume(store, &experiments, &new, shortage)? {
+    let config_json = new.config.to_canonical_json();
+    let shortage = shortage(experiments, &config_json, new.genotype_len as u64, memory_budget);
+    if resume_unfinished && let Some(placement) = resume(store, experiments, new, shortage)? {
         return Ok(placement);
     }
-    let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
-    if experiments.iter().filter(is_unfinished).count() >= UNFINISHED_MAX {
+    if are_too_many(experiments) {
         return Ok(Placement::TooMany);
     }
     if let Some(shortage) = shortage {
         return Ok(Placement::NoMemory(shortage));
     }
-    let (id, is_new) = store.create(&new, clock::unix_ms())?;
+    let (id, is_new) = store.create(new, clock::unix_ms())?;
     Ok(if is_new {
         let genotype_len = new.genotype_len as u64;
-        Placement::Runs(Box::new(Runnable::new(id, new.config, genotype_len, new.priority)))
+        // Those that a fork shares with its parent.
+        let latest = store.experiment(id)?.and_then(|stored| stored.latest);
+        let runnable = Runnable::new(id, new.config.clone(), genotype_len, new.priority);
+        Placement::Runs(Box::new(Runnable { latest, ..runnable }))
     } else {
         Placement::RunsAlready(id)
     })
 }
 
-/// Why there is no memory for a submission, if there is none.
+/// An experiment of the same file, but for its name, of the same seed and version, and from the
+/// same state: the latest that has completed, or else the latest that has not ended.
+fn identical<'a>(
+    experiments: &'a [ExperimentRecord],
+    new: &NewExperiment,
+) -> Option<&'a ExperimentRecord> {
+    // The digest tells versions of the simulation apart.
+    let config_digest = new.config_digest.to_string();
+    let link = |fork: &Option<ForkRecord>| fork.as_ref().map(|fork| fork.link.clone());
+    let is_same = |it: &&ExperimentRecord| {
+        it.config_digest == config_digest
+            && link(&it.fork) == link(&new.fork)
+            && differs_in_name_only(&it.config_json, &new.config)
+    };
+    let same = || experiments.iter().rev().filter(is_same);
+    let completed = same().find(|it| it.state == ExperimentState::Completed);
+    completed.or_else(|| same().find(|it| it.state.is_unfinished()))
+}
+
+fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
+    ExperimentConfig::from_json(config_json, "", ALGORITHMS)
+        .is_ok_and(|(other, _)| ExperimentConfig { name: config.name.clone(), ..other } == *config)
+}
+
+/// Whether an experiment can become unfinished beside those that are; else why not.
+pub fn check_room(
+    experiments: &[ExperimentRecord],
+    config_json: &str,
+    genotype_len: u64,
+    memory_budget: u64,
+) -> Result<(), ControlError> {
+    if are_too_many(experiments) {
+        return Err(ControlError::TooManyUnfinished);
+    }
+    match shortage(experiments, config_json, genotype_len, memory_budget) {
+        Some(shortage) => Err(ControlError::NoMemory(shortage)),
+        None => Ok(()),
+    }
+}
+
+fn are_too_many(experiments: &[ExperimentRecord]) -> bool {
+    let n_unfinished = experiments.iter().filter(|e| e.state.is_unfinished()).count();
+    n_unfinished >= UNFINISHED_MAX
+}
+
+/// Why there is no memory for another experiment, if there is none.
 fn shortage(
     experiments: &[ExperimentRecord],
-    new: &NewExperiment,
+    config_json: &str,
+    genotype_len: u64,
     memory_budget: u64,
 ) -> Option<Shortage> {
     // One of another release does not run.
@@ -72,7 +149,7 @@ fn shortage(
         |e: &&ExperimentRecord| e.state.is_unfinished() && e.fingerprint == sim_core::FINGERPRINT;
     let taken = experiments.iter().filter(takes_memory);
     let in_use = taken.map(|e| memory::estimate(&e.config_json, e.genotype_len)).sum();
-    let needed = memory::estimate(&new.config.to_canonical_json(), new.genotype_len as u64);
+    let needed = memory::estimate(config_json, genotype_len);
     Shortage::check(needed, in_use, memory_budget).err()
 }
 
@@ -87,7 +164,9 @@ fn resume(
     let config_json = new.config.to_canonical_json();
     // The digest tells versions of the simulation apart.
     let config_digest = new.config_digest.to_string();
-    let same_bits = experiments.iter().rev().filter(|e| e.config_digest == config_digest);
+    // A fork has other bits than an experiment that begins with its file.
+    let is_same = |e: &&ExperimentRecord| e.config_digest == config_digest && e.fork.is_none();
+    let same_bits = experiments.iter().rev().filter(is_same);
     let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
     let mut unfinished = same_bits.clone().filter(is_unfinished);
     if let Some(same) = unfinished.find(|e| e.config_json == config_json) {
@@ -95,19 +174,19 @@ fn resume(
     }
     for experiment in same_bits {
         let n_done = experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1);
-        let can_go_on = experiment.state == ExperimentState::Completed
-            && experiment.reason.is_empty()
+        let can_go_on = experiment.can_be_continued()
             && n_done < new.config.algorithm.generations
             && differs_in_generations_only(&experiment.config_json, &new.config);
         if !can_go_on {
             continue;
         }
-        match reopened(store, experiment.id, &config_json) {
+        match reopen::runnable(store, experiment.id, &config_json) {
             Ok(_) if let Some(shortage) = shortage => {
                 return Ok(Some(Placement::NoMemory(shortage)));
             }
             Ok(runnable) => {
-                store.reopen(experiment.id, &config_json, clock::unix_ms())?;
+                let (completed, why) = (ExperimentState::Completed, "more generations");
+                store.reopen(experiment.id, completed, &config_json, why, clock::unix_ms())?;
                 return Ok(Some(Placement::Runs(Box::new(runnable))));
             }
             // It is computed anew instead.
@@ -118,13 +197,6 @@ fn resume(
         }
     }
     Ok(None)
-}
-
-/// A completed experiment under a configuration that asks for more generations.
-fn reopened(store: &Store, id: ExperimentId, config_json: &str) -> Result<Runnable, StoreError> {
-    let (experiment, checkpoint) = store.resumable(id)?;
-    let experiment = ExperimentRecord { config_json: config_json.to_owned(), ..experiment };
-    Runnable::restore(&experiment, &checkpoint).map_err(|what| store.unsound(id, what))
 }
 
 fn differs_in_generations_only(config_json: &str, config: &ExperimentConfig) -> bool {

@@ -1,18 +1,21 @@
-//! Steers an experiment: cancel, pause, resume, another priority.
+//! Steers an experiment: cancel, pause, resume, another priority, prune.
 
-use tokio::{sync::oneshot, time::timeout};
+use evolution::Evolution;
+use tokio::{sync::oneshot, task, time::timeout};
 
 use crate::{
+    clock,
     driver::DriverEvent,
     ids::ExperimentId,
     limits::{CHANGE_TIMEOUT, TEXT_LEN_MAX},
     priority::Priority,
+    queries::QueryError,
     runs::Request,
-    store::{ExperimentRecord, StoreError},
+    store::{ExperimentRecord, ExperimentState, Store, StoreError},
     text::printable,
 };
 
-use super::{Control, ControlError};
+use super::{Control, ControlError, reopen::Reopening};
 
 /// Why an experiment is paused that a client paused.
 const PAUSED: &str = "paused by a client";
@@ -38,14 +41,24 @@ impl Control {
             return Err(ControlError::Invalid(message));
         }
         let reason = match printable(reason) {
-            empty if empty.is_empty() => PAUSED.to_owned(),
+            // A pause without a reason keeps the reason of the one before.
+            empty if empty.is_empty() => {
+                let experiment = self.find(id).await?;
+                if experiment.state == ExperimentState::Paused {
+                    return Ok(experiment);
+                }
+                PAUSED.to_owned()
+            }
             reason => format!("{PAUSED}: {reason}"),
         };
         self.change(id, Request::Pause(reason)).await
     }
 
-    /// Lets a paused experiment go on, unless it is damaged.
+    /// Lets a paused experiment go on, unless it is damaged, or one that was cancelled.
     pub async fn resume(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
+        if !self.find(id).await?.state.is_unfinished() {
+            return self.reopen(id, Reopening::Resume).await;
+        }
         self.take_up(id).await?;
         self.change(id, Request::Resume).await
     }
@@ -57,6 +70,41 @@ impl Control {
         priority: Priority,
     ) -> Result<ExperimentRecord, ControlError> {
         self.change(id, Request::SetPriority(priority)).await
+    }
+
+    /// Deletes the fitness log of an experiment that has ended; returns how many bytes that
+    /// were.
+    pub async fn prune(&self, id: ExperimentId) -> Result<(ExperimentRecord, u64), ControlError> {
+        let experiment = self.find(id).await?;
+        if experiment.state.is_unfinished() {
+            return Err(StoreError::Unfinished(id).into());
+        }
+        let keyframe = match self.keyframe(id).await {
+            Ok(keyframe) => Some(keyframe),
+            // Of what ended early, older versions kept nothing to go on from.
+            Err(ControlError::Query(QueryError::Store(StoreError::Unsound { .. })))
+                if !experiment.can_be_continued() =>
+            {
+                None
+            }
+            Err(error) => return Err(error),
+        };
+        let now_ms = clock::unix_ms();
+        // The driver does not know it any more.
+        let prune = move |store: &mut Store| store.prune(id, keyframe.as_deref(), now_ms);
+        let n_bytes = self.store.try_write(prune).await?;
+        Ok((self.find(id).await?, n_bytes))
+    }
+
+    /// Evolution after the latest generation.
+    async fn keyframe(&self, id: ExperimentId) -> Result<Vec<u8>, ControlError> {
+        let (_, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
+        let restoring = task::spawn_blocking(move || Evolution::restore(&checkpoint));
+        let restored = restoring.await.map_err(|_| ControlError::Panicked("evolution"))?;
+        let evolution = restored.map_err(|error| {
+            StoreError::Corrupt(format!("the checkpoint of experiment {id}: {error}"))
+        })?;
+        Ok(evolution.keyframe())
     }
 
     /// Has the driver change an experiment that has not ended, and reads it again.
@@ -76,7 +124,7 @@ impl Control {
     }
 
     /// Has the driver change an experiment, and reads it again.
-    async fn request(
+    pub(super) async fn request(
         &self,
         id: ExperimentId,
         request: Request,

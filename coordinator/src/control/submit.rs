@@ -6,14 +6,16 @@ use crate::{
     driver::{DriverEvent, EventSender},
     failpoint,
     ids::ExperimentId,
+    labels,
     limits::KEY_LEN_MAX,
-    store::ExperimentRecord,
-    submission::{CheckedSubmission, Submission},
+    queries::{QueryError, StoredGeneration},
+    store::{ExperimentRecord, Store},
+    submission::{CheckedSubmission, Parent, Submission},
 };
 
 use super::{
     Control, ControlError,
-    placement::{Placement, place},
+    placement::{Existing, Placement, place},
 };
 
 /// A submission that was accepted.
@@ -24,15 +26,18 @@ pub struct Submitted {
     /// Keys of the file without effect, and parameters that keep their defaults; one
     /// line each.
     pub warnings: Vec<String>,
+    /// Another one of the same bits, or this one if it was there.
+    pub identical: Option<ExperimentId>,
 }
 
 impl Control {
-    /// Submits an experiment. `resume_unfinished`: whether to go on with one of the
-    /// same bits, if there is one.
+    /// Submits an experiment. `existing`: what of one that is there it may lead to. `fork_of`: the generation of an experiment after which it
+    /// goes on.
     pub async fn submit(
         &self,
         submission: Submission,
-        resume_unfinished: bool,
+        existing: Existing,
+        fork_of: Option<(ExperimentId, u64)>,
     ) -> Result<Submitted, ControlError> {
         let request_id = submission.request_id.as_deref().unwrap_or_default();
         for (key, value) in [("request_id", request_id), ("default_name", &submission.default_name)]
@@ -42,20 +47,39 @@ impl Control {
                 return Err(ControlError::Invalid(message));
             }
         }
+        labels::check(&submission.labels).map_err(ControlError::Invalid)?;
         let _place = self.requests.enter(submission.config_json.len())?;
-        let checked = self.requests.check(move || submission.check()).await?;
+        let stored = match fork_of {
+            Some((id, generation)) => {
+                let read = move |store: &Store| StoredGeneration::read(store, id, generation);
+                Some(self.store.read(read).await?)
+            }
+            None => None,
+        };
+        let check = move || {
+            let parent = match stored {
+                Some(stored) => {
+                    let evolution = stored.replay()?.after;
+                    Some(Parent { experiment: stored.experiment, evolution })
+                }
+                None => None,
+            };
+            Ok::<_, QueryError>(Submission { parent, ..submission }.check())
+        };
+        let checked = self.requests.check(check).await??;
         let CheckedSubmission { new, warnings } = checked?;
         // In a task of its own: what is stored must reach the driver even if the
         // client goes away meanwhile.
         let (store, events) = (self.store.clone(), self.events.clone());
         let memory_budget = self.memory_budget;
         let placing = tokio::spawn(async move {
-            let placing =
-                store.try_write(move |store| place(store, new, resume_unfinished, memory_budget));
-            run(placing.await?, &events).await
+            let placing = store.try_write(move |store| place(store, new, existing, memory_budget));
+            let (placement, identical) = placing.await?;
+            Ok::<_, ControlError>((run(placement, &events).await?, identical))
         });
-        let id = placing.await.map_err(|_| ControlError::Panicked("storing the experiment"))??;
-        Ok(Submitted { experiment: self.find(id).await?, warnings })
+        let (id, identical) =
+            placing.await.map_err(|_| ControlError::Panicked("storing the experiment"))??;
+        Ok(Submitted { experiment: self.find(id).await?, warnings, identical })
     }
 }
 

@@ -22,7 +22,8 @@ async fn what_is_stored_runs_although_its_client_is_gone() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
     let config_json = fs::read_to_string(path).unwrap();
     let submission = Submission { config_json, ..Submission::default() };
-    let client = tokio::spawn(async move { control.submit(submission, false).await });
+    let client =
+        tokio::spawn(async move { control.submit(submission, Existing::default(), None).await });
     news.changed().await.unwrap();
     // Stored, and not yet with the driver.
     client.abort();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sim_core::{Output, TrialSet};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
@@ -64,13 +64,15 @@ pub enum DriverEvent {
     /// A client wants to know what the fleet does for an experiment, and how much memory it
     /// waits for, if it does.
     ActivityRequested(ExperimentId, oneshot::Sender<(JobActivity, Option<Shortage>)>),
+    /// A client wants to hear of it when workers come, leave or are given nothing any more.
+    FleetWatched(oneshot::Sender<watch::Receiver<u64>>),
     /// A metrics endpoint wants the numbers of all.
     StatsRequested(oneshot::Sender<StatsSnapshot>),
 }
 
 /// Gets the numbers of all trials, one trial after the other, or why there are none.
 /// A dropped receiver ends the evaluation.
-pub type EvaluationReply = oneshot::Sender<Result<Vec<f64>, String>>;
+pub type EvaluationReply = oneshot::Sender<Result<Vec<Vec<f64>>, String>>;
 
 /// Gets the names of those that are in quarantine if the worker is not.
 pub type ReadmissionReply = oneshot::Sender<Result<(), Vec<String>>>;

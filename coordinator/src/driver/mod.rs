@@ -19,7 +19,7 @@ use std::{
 
 use swarm_telemetry::Histogram;
 use tokio::{
-    sync::{mpsc, oneshot},
+    sync::{mpsc, oneshot, watch},
     task::JoinSet,
     time::MissedTickBehavior,
 };
@@ -69,6 +69,8 @@ pub struct Driver {
     questions: Questions,
     /// Who enters and leaves quarantine and is not stored yet; the first is being written.
     quarantine_changes: VecDeque<QuarantineChange>,
+    /// Counts what happens to workers.
+    fleet_news: watch::Sender<u64>,
 }
 
 /// Who enters or leaves quarantine.
@@ -124,6 +126,7 @@ impl Driver {
             tasks: JoinSet::new(),
             questions: Questions::new(referee),
             quarantine_changes: VecDeque::new(),
+            fleet_news: watch::Sender::new(0),
         }
     }
 
@@ -198,6 +201,7 @@ impl Driver {
                 let activity = self.engine.activity(now, id.into());
                 drop(reply.send((activity, self.runs.shortage(id))));
             }
+            DriverEvent::FleetWatched(reply) => drop(reply.send(self.fleet_news.subscribe())),
             DriverEvent::StatsRequested(reply) => drop(reply.send(self.stats())),
         }
     }
@@ -210,7 +214,7 @@ impl Driver {
     }
 
     fn evaluate(&mut self, evaluation: Evaluation, reply: EvaluationReply) {
-        let trials = evaluation.n_trials;
+        let trials = evaluation.batch.n_trials;
         let id = self.runs.on_evaluation_requested(evaluation);
         debug!(evaluation = %id, trials, "evaluation starts");
         self.evaluations.insert(id, reply);
@@ -225,6 +229,7 @@ impl Driver {
     }
 
     fn change_quarantine(&mut self, change: QuarantineChange) {
+        self.fleet_news.send_modify(|count| *count += 1);
         self.quarantine_changes.push_back(change);
         if self.quarantine_changes.len() == 1 {
             self.write_quarantine();
@@ -358,8 +363,8 @@ impl Driver {
                 self.send(worker, ToWorker::Dropped(reason.clone()));
                 self.forget_worker(worker, &reason, n_items_requeued);
             }
-            Command::FinishBatch { job: JobId::Evaluation(id), mut evaluated } => {
-                self.runs.on_evaluation_finished(id, Ok(evaluated.values.swap_remove(0)));
+            Command::FinishBatch { job: JobId::Evaluation(id), evaluated } => {
+                self.runs.on_evaluation_finished(id, Ok(evaluated.values));
             }
             Command::AskReferee { question: id, spec, trial_set, output, genotype, trials } => {
                 let specification = spec;
@@ -411,7 +416,7 @@ fn log_verdict(question: QuestionId, verdict: &Verdict) {
 fn log_request(experiment: ExperimentId, request: &Request) {
     match request {
         // Its end is logged.
-        Request::Cancel => {}
+        Request::Cancel | Request::Settle => {}
         Request::Pause(reason) => info!(%experiment, reason, "experiment paused"),
         Request::Resume => info!(%experiment, "experiment resumed"),
         Request::SetPriority(priority) => {

@@ -16,7 +16,7 @@ use crate::{
     ids::ExperimentId,
     runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId, restore_evolution},
     shared_store::{Retry, SharedStore, Written},
-    store::{GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError},
+    store::{Entry, GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError},
 };
 
 /// Pause before a checkpoint that could not be read is read again.
@@ -104,16 +104,20 @@ pub async fn commit(
     ready: ReadyToCommit,
     disk: Disk,
 ) -> Done {
-    let ReadyToCommit { generation, evolution, champion, digest, notices, completed, next: _ } =
+    let ReadyToCommit { generation, told, evolution, champion, digest, notices, completed, .. } =
         ready;
     let id = run.experiment;
     let started = clock::now();
     let (row, remarks, reason, link) =
         (generation.clone(), notices.clone(), completed.clone(), digest.clone());
     let what = format!("generation {} of experiment {id}", generation.generation);
-    let checkpoint = task::spawn_blocking(move || evolution.advance())
-        .await
-        .expect("numbers and lists serialise");
+    let (told, keyframe) = task::spawn_blocking(move || {
+        let told = told.to_bytes();
+        let is_due = evolution.is_keyframe_due(told.len());
+        (told, is_due.then(|| evolution.keyframe()))
+    })
+    .await
+    .expect("numbers and lists serialise");
     failpoint::reached("before commit");
     let written = disk
         .store
@@ -123,7 +127,7 @@ pub async fn commit(
                 clock::unix_ms(),
                 &GenerationCommit {
                     generation: &row,
-                    checkpoint: &checkpoint,
+                    entry: Entry { told: &told, keyframe: keyframe.as_deref() },
                     champion: champion.as_ref(),
                     digest: &link,
                     notices: &remarks,

@@ -132,9 +132,7 @@ async fn an_evaluation_whose_client_has_gone_is_dropped() {
     let mut rig = Rig::new().await;
     let evaluation = Box::new(Evaluation {
         spec: "{}".into(),
-        genotype: vec![0.5],
-        n_trials: 1,
-        n_values: 1,
+        batch: engine::Batch::measures(vec![0.5], 1, 1),
         priority: crate::priority::Priority::default(),
     });
     let (reply, result) = oneshot::channel();

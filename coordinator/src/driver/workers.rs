@@ -32,6 +32,7 @@ impl Driver {
         // after this.
         self.workers.insert(id, ConnectedWorker { name: name.clone(), link, is_draining: false });
         self.send(id, ToWorker::Welcome(id));
+        self.fleet_news.send_modify(|count| *count += 1);
         let fleet = self.engine.fleet_size();
         info!(
             worker = %id, name, version, slots = n_slots,
@@ -48,6 +49,7 @@ impl Driver {
             info!(worker = %id, name = worker.name, "worker is draining");
         }
         self.engine.on_draining(clock::now(), id);
+        self.fleet_news.send_modify(|count| *count += 1);
     }
 
     pub(super) fn on_worker_left(&mut self, id: WorkerId, reason: &str) {
@@ -69,6 +71,7 @@ impl Driver {
             return;
         };
         link.dropped.cancel();
+        self.fleet_news.send_modify(|count| *count += 1);
         let workers = self.engine.fleet_size().n_workers;
         if is_draining {
             info!(worker = %id, name, items_requeued, workers, "worker left");

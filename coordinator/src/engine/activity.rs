@@ -132,10 +132,10 @@ impl Engine {
         });
         BatchActivity {
             trial_set: batch.trial_set(),
-            n_episodes: batch.n_episodes(),
-            n_episodes_left: batch.n_episodes_left(),
-            n_items_queued: batch.n_waiting() - batch.n_audits_waiting(),
-            n_audits_waiting: batch.n_audits_waiting(),
+            n_episodes: batch.known.n_episodes(),
+            n_episodes_left: batch.known.n_episodes_left(),
+            n_items_queued: batch.n_waiting() - batch.audits.n_waiting(),
+            n_audits_waiting: batch.audits.n_waiting(),
             n_individuals_failing: batch.n_individuals_failing(),
             held: held.collect(),
             running_for: batch.running_for(now),

@@ -2,7 +2,7 @@
 //! what waits.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     mem,
     ops::Range,
     sync::Arc,
@@ -14,13 +14,9 @@ use sim_core::{Output, TrialSet};
 use crate::ids::{AssignmentId, WorkerId};
 
 use super::{
-    Batch, EvaluatedBatch, SharedGenotype, fleet_time::FleetTime, item::Item, losses::LossRecord,
+    Batch, EvaluatedBatch, SharedGenotype, audits::Audits, fleet_time::FleetTime, item::Item,
+    known_results::KnownResults, losses::LossRecord,
 };
-
-/// Stands for the worker of a trial without a result.
-const NOBODY: WorkerId = WorkerId(0);
-/// Stands for the worker of a trial that the referee has computed.
-pub const REFEREE: WorkerId = WorkerId(u64::MAX);
 
 /// Numbers of one item of measures, half a MiB: results travel in messages of
 /// limited size.
@@ -46,19 +42,6 @@ struct Holder {
     is_audit: bool,
 }
 
-/// Two workers' results for the same trial differ.
-#[derive(Debug, Clone)]
-pub struct Disagreement {
-    /// The worker whose result came first.
-    pub first: WorkerId,
-    /// Its name.
-    pub first_name: Arc<str>,
-    /// The trial.
-    pub trial: u32,
-    /// The numbers of the trial, of the first result and of the second.
-    pub values: [Vec<f64>; 2],
-}
-
 /// A batch that is being computed.
 #[derive(Debug)]
 pub struct BatchInProgress {
@@ -80,21 +63,10 @@ pub struct BatchInProgress {
     pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
     /// Items that workers were lost with.
     pub losses: LossRecord,
-    /// Per individual the numbers of all trials, [`Batch::values_per_trial`] each;
-    /// meaningless for trials without a result.
-    values: Vec<Vec<f64>>,
-    /// The worker that computed each trial, or [`NOBODY`]: one row of all individuals
-    /// with all their trials.
-    evaluated_by: Vec<WorkerId>,
-    /// The names of all workers in `evaluated_by`.
-    names: BTreeMap<WorkerId, Arc<str>>,
-    n_trials_left: usize,
-    /// Items that another worker has to confirm, by the name of the first.
-    audits: BTreeMap<Arc<str>, VecDeque<Item>>,
-    n_audits_in_flight: usize,
-    n_audited: usize,
-    /// Workers that an audit agreed with.
-    confirmed: BTreeSet<Arc<str>>,
+    /// The results so far.
+    pub known: KnownResults,
+    /// What another worker has to confirm.
+    pub audits: Audits,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
@@ -115,7 +87,7 @@ impl BatchInProgress {
     pub fn new(batch: Batch, now: Instant, fleet_time: FleetTime) -> Self {
         let n_individuals = batch.genotypes.len();
         let n_episodes = n_individuals * batch.n_trials as usize;
-        let n_values = batch.n_trials as usize * batch.values_per_trial;
+        let known = KnownResults::new(n_individuals, batch.n_trials, batch.values_per_trial);
         Self {
             queue: items(&batch).collect(),
             n_trials_queued: n_episodes,
@@ -126,14 +98,8 @@ impl BatchInProgress {
             holders: BTreeMap::new(),
             uncovered: BTreeMap::new(),
             losses: LossRecord::default(),
-            values: vec![vec![f64::NAN; n_values]; n_individuals],
-            evaluated_by: vec![NOBODY; n_episodes],
-            names: BTreeMap::new(),
-            n_trials_left: n_episodes,
-            audits: BTreeMap::new(),
-            n_audits_in_flight: 0,
-            n_audited: 0,
-            confirmed: BTreeSet::new(),
+            known,
+            audits: Audits::default(),
             batch,
             started: now,
             fleet_time_at_start: fleet_time,
@@ -163,7 +129,7 @@ impl BatchInProgress {
     /// Queues everything without a result, as no worker computes it any more.
     pub fn requeue_all(&mut self) {
         self.holders.clear();
-        self.n_audits_in_flight = 0;
+        self.audits.n_in_flight = 0;
         self.uncovered.clear();
         self.queue.clear();
         self.n_trials_queued = 0;
@@ -187,26 +153,10 @@ impl BatchInProgress {
     /// Forgets all values of a worker, and the audits of them, and queues what is unknown
     /// then.
     pub fn discard(&mut self, name: &str) {
-        self.audits.remove(name);
-        self.confirmed.remove(name);
-        let its = self.names.extract_if(.., |_, of| **of == *name);
-        let by: BTreeSet<WorkerId> = its.map(|(id, _)| id).collect();
-        if by.is_empty() {
-            return;
-        }
-        for individual in 0..self.values.len() as u32 {
-            let is_its =
-                |trial: u32| by.contains(&self.evaluated_by[self.index(individual, trial)]);
-            let whole = Item { individual, trials: 0..self.batch.n_trials };
-            for part in self.parts(&whole, is_its) {
-                for trial in part.trials.clone() {
-                    let index = self.index(individual, trial);
-                    self.evaluated_by[index] = NOBODY;
-                }
-                self.n_trials_left += part.trials.len();
-                for part in self.unclaimed(&part) {
-                    self.queue_back(part);
-                }
+        self.audits.discard(name);
+        for item in self.known.discard(name) {
+            for part in self.unclaimed(&item) {
+                self.queue_back(part);
             }
         }
     }
@@ -260,19 +210,11 @@ impl BatchInProgress {
         items.any(|item| item.individual == individual && item.trials.contains(&trial))
     }
 
-    fn index(&self, individual: u32, trial: u32) -> usize {
-        individual as usize * self.batch.n_trials as usize + trial as usize
-    }
-
-    fn is_known(&self, individual: u32, trial: u32) -> bool {
-        self.evaluated_by[self.index(individual, trial)] != NOBODY
-    }
-
     /// The parts of an item that have no result, that no worker computes, and that
     /// are not held back.
     pub fn unclaimed(&self, item: &Item) -> Vec<Item> {
-        self.parts(item, |trial| {
-            !self.is_known(item.individual, trial)
+        item.parts(|trial| {
+            !self.known.has(item.individual, trial)
                 && self.n_copies(item.individual, trial) == 0
                 && !self.is_held_back(item.individual, trial)
         })
@@ -281,9 +223,9 @@ impl BatchInProgress {
     /// The first part of an item that may be given to another worker as well.
     pub fn duplicable(&self, item: &Item) -> Option<Item> {
         let may = |trial| {
-            !self.is_known(item.individual, trial) && !self.is_held_back(item.individual, trial)
+            !self.known.has(item.individual, trial) && !self.is_held_back(item.individual, trial)
         };
-        self.parts(item, may).into_iter().next()
+        item.parts(may).into_iter().next()
     }
 
     /// Whether a worker computes a part of an item, apart from audits.
@@ -298,19 +240,6 @@ impl BatchInProgress {
     fn n_copies(&self, individual: u32, trial: u32) -> usize {
         let holders = self.holders.get(&individual).into_iter().flatten();
         holders.filter(|holder| !holder.is_audit && holder.trials.contains(&trial)).count()
-    }
-
-    /// The contiguous parts of an item whose trials satisfy a condition.
-    fn parts(&self, item: &Item, is_in: impl Fn(u32) -> bool) -> Vec<Item> {
-        let individual = item.individual;
-        let mut parts: Vec<Item> = Vec::new();
-        for trial in item.trials.clone().filter(|&trial| is_in(trial)) {
-            match parts.last_mut() {
-                Some(part) if part.trials.end == trial => part.trials.end += 1,
-                _ => parts.push(Item { individual, trials: trial..trial + 1 }),
-            }
-        }
-        parts
     }
 
     /// Queues an item before all others; a suspect, with the suspects.
@@ -356,12 +285,7 @@ impl BatchInProgress {
 
     /// Items that wait for a worker, audits included.
     pub fn n_waiting(&self) -> usize {
-        self.queue.len() + self.suspects.len() + self.n_audits_waiting()
-    }
-
-    /// Audits that wait for a worker.
-    pub fn n_audits_waiting(&self) -> usize {
-        self.audits.values().map(VecDeque::len).sum()
+        self.queue.len() + self.suspects.len() + self.audits.n_waiting()
     }
 
     /// Items that workers have.
@@ -372,34 +296,6 @@ impl BatchInProgress {
     /// Trials that wait.
     pub fn n_trials_queued(&self) -> usize {
         self.n_trials_queued
-    }
-
-    /// Whether an audit waits.
-    pub fn has_audits(&self) -> bool {
-        !self.audits.is_empty()
-    }
-
-    /// Whether an audit waits for a worker of this name.
-    pub fn has_audit_for(&self, name: &str) -> bool {
-        self.audits.keys().any(|first| **first != *name)
-    }
-
-    /// Whether there is one of values whose worker is not in doubt already.
-    pub fn has_clear_audit_for(&self, name: &str, doubted: &Doubted) -> bool {
-        self.audits.keys().any(|first| **first != *name && !doubted.contains_key(first))
-    }
-
-    /// Takes the first such audit.
-    pub fn pop_audit_for(&mut self, name: &str, doubted: &Doubted) -> Option<Item> {
-        let mut audits = self.audits.iter_mut();
-        let (first, items) =
-            audits.find(|(first, _)| ***first != *name && !doubted.contains_key(*first))?;
-        let item = items.pop_front();
-        if items.is_empty() {
-            let first = Arc::clone(first);
-            self.audits.remove(&first);
-        }
-        item
     }
 
     /// Whether a suspect waits.
@@ -425,7 +321,7 @@ impl BatchInProgress {
         item: &Item,
         is_audit: bool,
     ) {
-        self.n_audits_in_flight += usize::from(is_audit);
+        self.audits.n_in_flight += usize::from(is_audit);
         let holder = Holder { assignment_id, worker, trials: item.trials.clone(), is_audit };
         self.holders.entry(item.individual).or_default().push(holder);
     }
@@ -441,7 +337,7 @@ impl BatchInProgress {
         if holders.is_empty() {
             self.holders.remove(&individual);
         }
-        self.n_audits_in_flight -= usize::from(holder.is_audit);
+        self.audits.n_in_flight -= usize::from(holder.is_audit);
     }
 
     /// The workers that compute parts of an individual, apart from audits.
@@ -455,90 +351,32 @@ impl BatchInProgress {
     /// Queues an audit of what workers have computed of an item, in parts that are each
     /// one worker's.
     pub fn push_audit(&mut self, item: &Item) {
-        let mut start = item.trials.start;
-        while start < item.trials.end {
-            let by = |trial| self.evaluated_by[self.index(item.individual, trial)];
-            let first = by(start);
-            let end = (start..item.trials.end).find(|&trial| by(trial) != first);
-            let end = end.unwrap_or(item.trials.end);
-            if let Some(name) = self.names.get(&first) {
-                let part = Item { individual: item.individual, trials: start..end };
-                self.audits.entry(Arc::clone(name)).or_default().push_back(part);
+        for part in self.known.by_worker(item) {
+            if let Some(name) = self.known.name(part.individual, part.trials.start) {
+                self.audits.push(name, part);
             }
-            start = end;
         }
     }
 
     /// The parts of an item without a result.
     pub fn unknown(&self, item: &Item) -> Vec<Item> {
-        self.parts(item, |trial| !self.is_known(item.individual, trial))
+        item.parts(|trial| !self.known.has(item.individual, trial))
     }
 
     /// The name of the worker whose values for an item are known.
     pub fn computed_by(&self, item: &Item) -> Option<&str> {
-        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
-        self.names.get(&first).map(|name| &**name)
-    }
-
-    /// Whether a worker's values agree with what is known.
-    pub fn compare(&self, item: &Item, fitness: &[f64]) -> Result<(), Disagreement> {
-        for (trial, values) in
-            item.trials.clone().zip(fitness.chunks_exact(self.batch.values_per_trial))
-        {
-            let first = self.evaluated_by[self.index(item.individual, trial)];
-            if first == NOBODY {
-                continue;
-            }
-            let known = &self.values[item.individual as usize][self.places(trial)];
-            if !same_bits(known, values) {
-                let first_name =
-                    self.names.get(&first).map_or_else(|| "referee".into(), Arc::clone);
-                let values = [known.to_vec(), values.to_vec()];
-                return Err(Disagreement { first, first_name, trial, values });
-            }
-        }
-        Ok(())
-    }
-
-    /// Where the numbers of a trial are among those of its individual.
-    fn places(&self, trial: u32) -> Range<usize> {
-        let first = self.n_values(trial as usize);
-        first..first + self.batch.values_per_trial
-    }
-
-    /// Records the results of those trials of an item that have none; returns their
-    /// number.
-    pub fn accept(&mut self, worker: WorkerId, name: &str, item: &Item, fitness: &[f64]) -> usize {
-        let mut n_new = 0;
-        for (trial, values) in
-            item.trials.clone().zip(fitness.chunks_exact(self.batch.values_per_trial))
-        {
-            let (index, places) = (self.index(item.individual, trial), self.places(trial));
-            if self.evaluated_by[index] == NOBODY {
-                self.evaluated_by[index] = worker;
-                self.values[item.individual as usize][places].copy_from_slice(values);
-                n_new += 1;
-            }
-        }
-        if n_new > 0 && worker != REFEREE && !self.names.contains_key(&worker) {
-            self.names.insert(worker, name.into());
-        }
-        self.n_trials_left -= n_new;
-        n_new
+        self.known.name(item.individual, item.trials.start).map(|name| &**name)
     }
 
     /// An audit by a worker has agreed.
     pub fn count_audited(&mut self, item: &Item, auditor: Arc<str>) {
-        self.n_audited += 1;
-        self.confirmed.insert(auditor);
-        let first = self.evaluated_by[self.index(item.individual, item.trials.start)];
-        self.confirmed.extend(self.names.get(&first).map(Arc::clone));
+        self.audits.count(auditor, self.known.name(item.individual, item.trials.start));
     }
 
     /// The names of those who contributed, and whether an audit has agreed with them.
     pub fn contributors(&self) -> impl Iterator<Item = (Arc<str>, bool)> {
-        let names = self.names.values();
-        names.map(|name| (Arc::clone(name), self.confirmed.contains(name)))
+        let names = self.known.names();
+        names.map(|name| (Arc::clone(name), self.audits.has_confirmed(name)))
     }
 
     /// Assignments of an individual, apart from audits, whose results are all known.
@@ -546,25 +384,15 @@ impl BatchInProgress {
         let holders = self.holders.get(&individual).into_iter().flatten();
         holders
             .filter(|holder| !holder.is_audit)
-            .filter(|holder| holder.trials.clone().all(|trial| self.is_known(individual, trial)))
+            .filter(|holder| holder.trials.clone().all(|trial| self.known.has(individual, trial)))
             .map(|holder| (holder.worker, holder.assignment_id))
             .collect()
-    }
-
-    /// Trials of all individuals.
-    pub fn n_episodes(&self) -> usize {
-        self.evaluated_by.len()
-    }
-
-    /// Trials without a result.
-    pub fn n_episodes_left(&self) -> usize {
-        self.n_trials_left
     }
 
     /// Individuals with trials that a worker was computing when it was lost, and that have
     /// no result since.
     pub fn n_individuals_failing(&self) -> usize {
-        self.losses.n_individuals(|individual, trial| !self.is_known(individual, trial))
+        self.losses.n_individuals(|individual, trial| !self.known.has(individual, trial))
     }
 
     /// Time since it began.
@@ -580,15 +408,15 @@ impl BatchInProgress {
     /// Whether all fitness is known and undisputed, and no audit is under way, or waits for
     /// a worker that is there.
     pub fn is_finished(&self, is_there: impl Fn(&Self) -> bool) -> bool {
-        self.n_trials_left == 0
+        self.is_known_throughout()
             && self.n_disagreements == 0
-            && self.n_audits_in_flight == 0
+            && self.audits.n_in_flight == 0
             && (self.audits.is_empty() || !is_there(self))
     }
 
     /// Whether all fitness is known.
     pub fn is_known_throughout(&self) -> bool {
-        self.n_trials_left == 0
+        self.known.n_episodes_left() == 0
     }
 
     /// The outcome.
@@ -601,12 +429,12 @@ impl BatchInProgress {
     ) -> EvaluatedBatch {
         EvaluatedBatch {
             trial_set: self.batch.trial_set,
-            n_unaudited: self.n_audits_waiting(),
-            values: self.values,
+            n_unaudited: self.audits.n_waiting(),
+            n_audited: self.audits.n_agreed(),
+            values: self.known.into_values(),
             duration: now.saturating_duration_since(self.started),
             n_workers,
             idle_share: fleet_time.idle_share_since(&self.fleet_time_at_start),
-            n_audited: self.n_audited,
             notices,
         }
     }
@@ -616,8 +444,7 @@ impl BatchInProgress {
     pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
         let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
         assert_eq!(n_queued, self.n_trials_queued);
-        let n_known = self.evaluated_by.iter().filter(|&&worker| worker != NOBODY).count();
-        assert_eq!(n_known + self.n_trials_left, self.evaluated_by.len());
+        self.known.sanity_check();
         let mut n_holders = 0;
         for (&individual, holders) in &self.holders {
             assert!(!holders.is_empty());
@@ -629,37 +456,29 @@ impl BatchInProgress {
         }
         assert_eq!(n_holders, in_flight.len(), "every holder is known");
         let n_audits = in_flight.values().filter(|(.., is_audit)| *is_audit).count();
-        assert_eq!(n_audits, self.n_audits_in_flight);
+        assert_eq!(n_audits, self.audits.n_in_flight);
         for ((_, assignment_id), worker) in &self.uncovered {
             assert_eq!(in_flight[assignment_id].0, *worker);
         }
         // Every trial has a result, is queued or is being computed, possibly by several, or
         // held back; and it is queued only if it is nothing else.
-        let mut claims = vec![0_u32; self.evaluated_by.len()];
+        let n_trials = self.batch.n_trials as usize;
+        let mut claims = vec![0_u32; self.known.n_episodes()];
         for item in self.queue.iter().chain(&self.suspects) {
             for trial in item.trials.clone() {
-                claims[self.index(item.individual, trial)] += 1;
+                claims[item.individual as usize * n_trials + trial as usize] += 1;
             }
         }
         for (index, n_queued) in claims.into_iter().enumerate() {
-            let n_trials = self.batch.n_trials as usize;
             let (individual, trial) = ((index / n_trials) as u32, (index % n_trials) as u32);
             let n_copies = self.n_copies(individual, trial);
-            let is_known = self.is_known(individual, trial);
+            let is_known = self.known.has(individual, trial);
             let is_held_back = self.is_held_back(individual, trial);
             let is_waited_for = !is_known && (n_copies > 0 || is_held_back);
             let n_states = u32::from(is_known) + n_queued + u32::from(is_waited_for);
             assert_eq!(n_states, 1, "individual {individual}, trial {trial}");
         }
     }
-}
-
-/// The names of workers whose word is in doubt, and for how many questions.
-pub type Doubted = BTreeMap<Arc<str>, usize>;
-
-/// Whether numbers agree in every bit.
-pub fn same_bits(a: &[f64], b: &[f64]) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
 /// What the batch of a trial set is called in messages.

@@ -83,7 +83,7 @@ impl Engine {
                     let name = self.workers[&worker].name().to_owned();
                     let work = self.jobs.get_mut(&job).expect("just seen");
                     let batch = work.batch.as_mut().expect("just seen");
-                    batch.pop_audit_for(&name, &self.doubted)
+                    batch.audits.pop_for(&name, &self.doubted)
                 }
                 Source::Suspects => self.batch_mut(job).pop_suspect(),
                 Source::Queue => {
@@ -113,10 +113,10 @@ impl Engine {
         let &(load, _, first) = available.first()?;
         for &(_, id) in &self.ready_queue {
             let Some(batch) = &self.jobs[&id].batch else { continue };
-            if batch.has_audits() {
+            if !batch.audits.is_empty() {
                 let mut workers = available.iter().map(|&(.., worker)| worker);
                 let may = |id: &WorkerId| {
-                    batch.has_clear_audit_for(self.workers[id].name(), &self.doubted)
+                    batch.audits.has_clear_for(self.workers[id].name(), &self.doubted)
                 };
                 if let Some(auditor) = workers.find(may) {
                     return Some((id, auditor, Source::Audits));

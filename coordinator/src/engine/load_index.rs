@@ -9,7 +9,8 @@ use super::worker::{FULL_LOAD, Worker};
 /// The workers, sorted by load.
 #[derive(Debug, Default)]
 pub struct WorkerLoadIndex {
-    /// Workers with credit, least loaded first, and among those the fastest.
+    /// Workers with credit: that which would be done first with another item first
+    /// ([`Worker::finish_rank`]), and among equals the fastest.
     pub available: BTreeSet<(u64, u32, WorkerId)>,
     /// Workers with items that wait behind others, most loaded last.
     pub backlogged: BTreeSet<(u64, WorkerId)>,
@@ -24,7 +25,7 @@ impl WorkerLoadIndex {
     pub fn add(&mut self, id: WorkerId, worker: &Worker) {
         let load = worker.load();
         if worker.has_credit() {
-            self.available.insert((load, worker.pace_rank(), id));
+            self.available.insert((worker.finish_rank(), worker.pace_rank(), id));
         }
         if load > FULL_LOAD {
             self.backlogged.insert((load, id));
@@ -37,7 +38,7 @@ impl WorkerLoadIndex {
     pub fn remove(&mut self, id: WorkerId, worker: &Worker) {
         let load = worker.load();
         if worker.has_credit() {
-            self.available.remove(&(load, worker.pace_rank(), id));
+            self.available.remove(&(worker.finish_rank(), worker.pace_rank(), id));
         }
         if load > FULL_LOAD {
             self.backlogged.remove(&(load, id));

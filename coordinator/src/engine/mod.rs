@@ -38,12 +38,14 @@
 //!   computed by a second worker, too, if there is one.
 
 mod activity;
+mod audits;
 mod batch;
 mod crash_loops;
 mod dispatch;
 mod fleet_time;
 mod item;
 mod job;
+mod known_results;
 mod load_index;
 mod losses;
 mod messages;
@@ -71,7 +73,8 @@ use crate::{
 };
 
 pub use activity::{BatchActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker};
-use batch::{BatchInProgress, Doubted};
+use audits::Doubted;
+use batch::BatchInProgress;
 use crash_loops::CrashLoops;
 use dispatch::Outgoing;
 use fleet_time::FleetTime;

@@ -11,8 +11,9 @@ use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
     Command, Engine, ItemResult,
-    batch::{BatchInProgress, Disagreement, REFEREE},
+    batch::BatchInProgress,
     item::Item,
+    known_results::{Disagreement, REFEREE},
     losses::AfterLoss,
     questions::{Doubt, Party},
     verdicts::{place, wrong},
@@ -144,7 +145,7 @@ impl Engine {
 
     fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, values: &[f64]) {
         let (job, item) = (assignment.job, &assignment.item);
-        if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
+        if let Err(disagreement) = self.batch_mut(job).known.compare(item, values) {
             if assignment.is_audit {
                 self.batch_mut(job).push_audit(item);
                 self.update_readiness(job);
@@ -190,7 +191,7 @@ impl Engine {
         // The referee is nobody's name.
         let name = self.workers.get(&id).map_or("", Worker::name);
         let new = if is_audited { batch.unknown(item) } else { Vec::new() };
-        let n_new = batch.accept(id, name, item, values);
+        let n_new = batch.known.accept(id, name, item, values);
         new.iter().for_each(|part| batch.push_audit(part));
         if may_be_queued && n_new > 0 {
             batch.unqueue(item.individual);
@@ -217,7 +218,7 @@ impl Engine {
         if !is_wanted || self.jobs[&job].is_paused {
             return;
         }
-        if let Err(disagreement) = self.batch_mut(job).compare(item, values) {
+        if let Err(disagreement) = self.batch_mut(job).known.compare(item, values) {
             self.on_disagreement(now, job, id, item, disagreement);
         } else if !assignment.is_audit {
             self.take_values(job, id, item, values, true);
@@ -239,7 +240,7 @@ impl Engine {
         let batch = work.and_then(|work| work.batch.as_ref());
         if let Some(batch) = batch
             && batch.trial_set() == recalled.trial_set
-            && let Err(disagreement) = batch.compare(&recalled.item, values)
+            && let Err(disagreement) = batch.known.compare(&recalled.item, values)
         {
             self.on_disagreement(now, job, id, &recalled.item, disagreement);
         }
@@ -331,7 +332,7 @@ impl Engine {
         let workers = &self.workers;
         let has_auditor = |batch: &BatchInProgress| {
             let mut auditors = workers.values().filter(|worker| worker.may_audit());
-            is_awaited || auditors.any(|worker| batch.has_audit_for(worker.name()))
+            is_awaited || auditors.any(|worker| batch.audits.has_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {
             return;

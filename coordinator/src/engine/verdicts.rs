@@ -9,8 +9,9 @@ use crate::{
 
 use super::{
     Command, Engine,
-    batch::{REFEREE, name_of, same_bits},
+    batch::name_of,
     item::Item,
+    known_results::{REFEREE, same_bits},
     questions::{Doubt, Party, Question},
     results::NoResult,
     worker::Worker,
@@ -157,7 +158,7 @@ impl Engine {
         if self.batch_of(question) {
             let (job, item) = (question.job, &question.item);
             // What a third worker returned meanwhile may be wrong, too.
-            while let Err(disagreement) = self.batch_mut(job).compare(item, values)
+            while let Err(disagreement) = self.batch_mut(job).known.compare(item, values)
                 && disagreement.first != REFEREE
             {
                 let party = Party { id: disagreement.first, name: disagreement.first_name };

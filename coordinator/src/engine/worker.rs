@@ -164,6 +164,18 @@ impl Worker {
         (self.n_held() as u64 * FULL_LOAD) / self.n_slots() as u64
     }
 
+    /// When it would be done with another item, for sorting: slots without an item first, then
+    /// by what it holds and how long it takes for that; from [`FULL_LOAD`] on if every slot has
+    /// an item.
+    pub fn finish_rank(&self) -> u64 {
+        let load = self.load();
+        if load < FULL_LOAD {
+            return load;
+        }
+        let load_then = (self.n_held() + 1) as f64 / self.n_slots() as f64;
+        FULL_LOAD + (load_then * self.pace * FULL_LOAD as f64) as u64
+    }
+
     /// Its pace as a whole number, for sorting.
     pub fn pace_rank(&self) -> u32 {
         (self.pace * 64.0) as u32

@@ -4,8 +4,14 @@
 //! one down. The gRPC services convert what they return; a page or a program that
 //! reads a database can use the same.
 
-mod champion;
+mod address;
+mod bundle;
+mod dynamics;
 mod explanation;
+mod fitness;
+mod generation;
+mod individuals;
+mod lineage;
 mod pages;
 mod watch;
 
@@ -14,9 +20,15 @@ use crate::{
     store::{ExperimentRecord, Store, StoreError},
 };
 
-pub use champion::{ChampionReport, StoredChampion};
+pub use address::{Address, NotAnAddress, Who};
+pub use bundle::bundle;
+pub use dynamics::{DynamicsPage, StoredDynamics};
 pub use explanation::{incompatibility, latest_notices};
-pub use pages::{events, generations};
+pub use fitness::fitness;
+pub use generation::{Gap, StoredGeneration};
+pub use individuals::{Individuals, StoredIndividuals};
+pub use lineage::{Lineage, StoredLineage};
+pub use pages::{Page, events, generations};
 pub use watch::{WatchError, watch};
 
 /// Why a query has no answer.
@@ -25,21 +37,88 @@ pub enum QueryError {
     /// There is no such experiment.
     #[error("there is no experiment {0}; `swarmctl list` shows all")]
     NotFound(ExperimentId),
+    /// A bundle is of an experiment that has ended.
+    #[error("experiment {0} has not ended: `swarmctl wait {0}` ends when it has")]
+    NotEnded(ExperimentId),
     /// There is no champion yet.
     #[error("experiment {0} has no champion yet: its first generation is not complete")]
     NoChampion(ExperimentId),
-    /// This release cannot decode the genotype.
+    /// There is no such generation yet.
     #[error(
-        "experiment {experiment} was computed with \"{theirs}\", this is \"{ours}\"; its network \
-         can be decoded with that release only"
+        "generation {generation} of experiment {experiment} is not complete; {}",
+        match n_generations {
+            0 => "none is".to_owned(),
+            n => format!("the latest complete one is {}", n - 1),
+        }
     )]
-    OtherSimulation {
+    NoGeneration {
         /// The experiment.
         experiment: ExperimentId,
+        /// The generation.
+        generation: u64,
+        /// Complete generations.
+        n_generations: u64,
+    },
+    /// The fitness log lacks a generation.
+    #[error("generation {generation} of experiment {experiment} cannot come back: {why}")]
+    NotInLog {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// The generation.
+        generation: u64,
+        /// Why it is not there.
+        why: Gap,
+    },
+    /// The fitness log is not what was stored.
+    #[error(
+        "the fitness log of experiment {experiment} is damaged near generation {generation}; \
+         `swarmctl doctor --data-dir DIR` says what of it is sound"
+    )]
+    DamagedLog {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// The generation that was to come back.
+        generation: u64,
+    },
+    /// A generation has no such individual.
+    #[error(
+        "generation {generation} of experiment {experiment} has no individual {individual}: they \
+         are 0 to {}",
+        n_individuals - 1
+    )]
+    NoIndividual {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// The generation.
+        generation: u64,
+        /// The index.
+        individual: u32,
+        /// Individuals of the generation.
+        n_individuals: u32,
+    },
+    /// The algorithm has no distribution.
+    #[error("the algorithm of experiment {experiment} keeps a population: it has no mean")]
+    NoMean {
+        /// The experiment.
+        experiment: ExperimentId,
+    },
+    /// An individual without a lineage, or one that is too large.
+    #[error("{0}")]
+    NoLineage(String),
+    /// What is computed again differs from what was stored.
+    #[error(
+        "generation {generation} of experiment {experiment} does not come back to the same bits: \
+         {what}; use the release that computed it, \"{theirs}\""
+    )]
+    OtherBits {
+        /// The experiment.
+        experiment: ExperimentId,
+        /// The generation.
+        generation: u64,
+        /// What differs.
+        what: String,
         /// Fingerprint of the simulation that computed it.
         theirs: String,
-        /// Fingerprint of this program's simulation.
-        ours: &'static str,
     },
     /// What is stored cannot be decoded.
     #[error("{0}")]

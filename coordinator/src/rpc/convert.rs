@@ -13,11 +13,11 @@ use crate::{
     engine::{Assignment, ItemResult, WorkerStatus},
     ids::{AssignmentId, JobId},
     priority::Priority,
-    queries::ChampionReport,
+    queries::{Address, DynamicsPage, Individuals, Lineage, Page},
     store::{Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord},
     text::printable,
 };
-use evolution::{ChampionSource, HeldOut, Judged};
+use evolution::{Ancestor, Champion, ChampionSource, Dynamics, HeldOut, Judged, Operator};
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]
@@ -142,6 +142,8 @@ pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
 /// An experiment for clients.
 pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
     let summary = ConfigSummary::of(&experiment.config_json);
+    let (group, variant) =
+        experiment.membership.map_or_else(Default::default, |it| (it.group, it.variant));
     v1::Experiment {
         id: experiment.id.0,
         name: summary.name,
@@ -162,6 +164,16 @@ pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
         priority: experiment.priority.weight(),
         last_sequence: experiment.last_sequence,
         simulation: experiment.fingerprint,
+        group,
+        variant,
+        forked_from: experiment.fork.map(|fork| v1::ForkOrigin {
+            experiment_id: fork.parent.0,
+            generation: fork.generation,
+            changes: fork.changes,
+        }),
+        labels: experiment.labels,
+        archived: experiment.is_archived,
+        recent_generation_ms: experiment.recent_generation_ms,
     }
 }
 
@@ -201,21 +213,89 @@ pub fn priority(weight: u32) -> Result<Priority, Status> {
     })
 }
 
-/// A champion for clients.
-pub fn champion(report: ChampionReport) -> v1::GetChampionResponse {
-    let ChampionReport { experiment, champion, network_json } = report;
+/// An experiment and its file for clients.
+pub fn stored_experiment(stored: ExperimentRecord) -> v1::GetExperimentResponse {
+    let config_json = stored.config_json.clone();
+    v1::GetExperimentResponse { experiment: Some(experiment(stored)), config_json }
+}
+
+/// An address from a client; INVALID_ARGUMENT if it is none.
+pub fn address(text: &str) -> Result<Address, Status> {
+    text.parse()
+        .map_err(|error: crate::queries::NotAnAddress| Status::invalid_argument(error.to_string()))
+}
+
+/// Genotypes for clients.
+pub fn individuals(found: Individuals) -> v1::GetIndividualsResponse {
+    let Individuals { experiment, individuals, network_json, next } = found;
+    let network_json = network_json.unwrap_or_default();
+    let individual = |it| individual(experiment.id.0, it, network_json.clone());
+    v1::GetIndividualsResponse {
+        individuals: individuals.into_iter().map(individual).collect(),
+        next_individual: next,
+    }
+}
+
+/// How evolution moved, for clients.
+pub fn dynamics((generations, next_generation): DynamicsPage) -> v1::ListDynamicsResponse {
+    let generation = |(generation, of): (u64, Dynamics)| v1::GenerationDynamics {
+        generation,
+        mean_step: of.mean_step,
+        deviations: of.deviations.map_or_else(Vec::new, |it| it.to_vec()),
+        rank_correlation: of.rank_correlation,
+    };
+    let generations = generations.into_iter().map(generation).collect();
+    v1::ListDynamicsResponse { generations, next_generation }
+}
+
+/// A lineage for clients.
+pub fn lineage(Lineage(populations): Lineage) -> v1::GetLineageResponse {
+    let ancestor = |it: Ancestor| v1::Ancestor {
+        generation: it.generation,
+        individual: it.individual,
+        fitness: it.fitness,
+        operator: match it.birth.as_ref().map(|birth| birth.operator) {
+            None => v1::BirthOperator::Unspecified,
+            Some(Operator::First) => v1::BirthOperator::First,
+            Some(Operator::Elite) => v1::BirthOperator::Elite,
+            Some(Operator::Copy) => v1::BirthOperator::Copy,
+            Some(Operator::Crossover) => v1::BirthOperator::Crossover,
+        }
+        .into(),
+        genes: it.n_surviving as u32,
+        new_genes: it.birth.as_ref().map_or(0, |birth| birth.n_new as u32),
+        parents: it
+            .birth
+            .into_iter()
+            .flat_map(|birth| birth.parents)
+            .map(|(individual, genes)| v1::GenesOfParent { individual, genes: genes as u32 })
+            .collect(),
+    };
+    let population = |(population, ancestors): (String, Vec<Ancestor>)| v1::PopulationLineage {
+        population,
+        ancestors: ancestors.into_iter().map(ancestor).collect(),
+    };
+    v1::GetLineageResponse { populations: populations.into_iter().map(population).collect() }
+}
+
+/// A genotype for clients; `network_json`: empty if it is not decoded.
+pub fn individual(
+    experiment_id: u64,
+    individual: Champion,
+    network_json: String,
+) -> v1::GetChampionResponse {
     v1::GetChampionResponse {
-        experiment_id: experiment.0,
-        generation: champion.generation,
-        individual: match champion.source {
-            ChampionSource::Individual(individual) => Some(individual),
+        experiment_id,
+        generation: individual.generation,
+        individual: match individual.source {
+            ChampionSource::Individual(index) => Some(index),
             ChampionSource::Mean => None,
         },
-        fitness: champion.fitness(),
-        held_out: champion.held_out.map(held_out),
-        judged: champion.judged.map(judged),
-        trial_fitness: champion.trial_fitness,
-        genotype: champion.genotype,
+        fitness: individual.fitness(),
+        held_out: individual.held_out.map(held_out),
+        judged: individual.judged.map(judged),
+        trial_fitness: individual.trial_fitness,
+        genotype: individual.genotype,
         network_json,
     }
 }
@@ -246,8 +326,24 @@ pub fn event(event: Event) -> v1::Event {
     v1::Event { sequence: event.sequence, at_ms: event.at_ms, kind: Some(kind) }
 }
 
+/// A page of generations for clients.
+pub fn generations(page: Page<(u64, GenerationRecord)>) -> v1::ListGenerationsResponse {
+    v1::ListGenerationsResponse {
+        generations: page.items.into_iter().map(completed_generation).collect(),
+        next_generation: page.next.map(|(_, generation)| generation.generation),
+    }
+}
+
+/// A page of events for clients.
+pub fn events(page: Page<Event>) -> v1::ListEventsResponse {
+    v1::ListEventsResponse {
+        events: page.items.into_iter().map(event).collect(),
+        next_sequence: page.next.map(|event| event.sequence),
+    }
+}
+
 /// A completed generation for clients.
-pub fn completed_generation(
+fn completed_generation(
     (completed_at_ms, completed): (u64, GenerationRecord),
 ) -> v1::CompletedGeneration {
     v1::CompletedGeneration { summary: Some(generation(completed)), completed_at_ms }

@@ -2,9 +2,12 @@
 
 use std::pin::Pin;
 
+use sim_core::TrialSet;
 use swarm_proto::v1::{
-    EvaluateRequest, EvaluateResponse, MeasuredTask, MeasuredTrial, evaluate_response::Message,
-    evaluation_service_server::EvaluationService,
+    ComparisonTrials, EvaluateFitnessRequest, EvaluateFitnessResponse, EvaluateRequest,
+    EvaluateResponse, EvolutionTrials, FitnessOfTrials, MeasuredTask, MeasuredTrial,
+    evaluate_response::Message, evaluation_service_server::EvaluationService,
+    evolution_trials::Trials,
 };
 use tokio::{sync::mpsc, time::timeout};
 use tokio_stream::{Stream, wrappers::ReceiverStream};
@@ -12,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
 use crate::{
-    control::{CheckedEvaluation, Control, EvaluationOrder},
+    control::{CheckedEvaluation, Control, EvaluationOrder, FitnessOrder},
     limits::WATCH_PATIENCE,
     priority::Priority,
 };
@@ -59,6 +62,40 @@ impl EvaluationService for Evaluations {
             final_slot.send(Err(status));
         });
         Ok(Response::new(Box::pin(ReceiverStream::new(inbox))))
+    }
+
+    async fn evaluate_fitness(
+        &self,
+        request: Request<EvaluateFitnessRequest>,
+    ) -> Result<Response<EvaluateFitnessResponse>, Status> {
+        let request = request.into_inner();
+        let order = FitnessOrder {
+            config_json: request.config_json,
+            genotypes: request.genotypes.into_iter().map(|genes| genes.values).collect(),
+            trial_set: trial_set(request.trials)?,
+            n_trials: request.trial_count,
+            priority: request.priority.map_or(Ok(Priority::default()), convert::priority)?,
+        };
+        let fitness = tokio::select! {
+            () = self.shutdown.cancelled() => return Err(shutting_down()),
+            fitness = self.control.fitness(order) => fitness?,
+        };
+        let fitness = fitness.into_iter().map(|values| FitnessOfTrials { values }).collect();
+        Ok(Response::new(EvaluateFitnessResponse { fitness }))
+    }
+}
+
+/// The trials that a client names, or what is wrong with them.
+fn trial_set(trials: Option<EvolutionTrials>) -> Result<TrialSet, Status> {
+    match trials.and_then(|it| it.trials) {
+        Some(Trials::Generation(generation)) => Ok(TrialSet::Generation(generation)),
+        Some(Trials::Judgement(generation)) => Ok(TrialSet::Judgement(generation)),
+        Some(Trials::Comparison(ComparisonTrials { generation, block })) => {
+            let block = u8::try_from(block)
+                .map_err(|_| Status::invalid_argument("a block is a number up to 255"))?;
+            Ok(TrialSet::HeldOut { generation, block })
+        }
+        None => Err(Status::invalid_argument("trials are missing")),
     }
 }
 

@@ -1,36 +1,54 @@
 //! `ExperimentService`: submit, look, watch, steer.
 
-use std::pin::Pin;
+use std::{pin::Pin, sync::Arc};
 
 use swarm_proto::v1::{
-    CancelExperimentRequest, CancelExperimentResponse, ExplainExperimentRequest,
-    ExplainExperimentResponse, GetChampionRequest, GetChampionResponse, GetExperimentRequest,
-    GetExperimentResponse, ListEventsRequest, ListEventsResponse, ListExperimentsRequest,
-    ListExperimentsResponse, ListGenerationsRequest, ListGenerationsResponse,
-    PauseExperimentRequest, PauseExperimentResponse, ResumeExperimentRequest,
-    ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse, SubmitExperimentRequest,
+    ArchiveExperimentRequest, ArchiveExperimentResponse, CancelExperimentRequest,
+    CancelExperimentResponse, DeleteExperimentRequest, DeleteExperimentResponse,
+    ExplainExperimentRequest, ExplainExperimentResponse, ExportExperimentRequest,
+    ExtendExperimentRequest, ExtendExperimentResponse, GetChampionRequest, GetChampionResponse,
+    GetExperimentRequest, GetExperimentResponse, GetIndividualsRequest, GetIndividualsResponse,
+    GetLineageRequest, GetLineageResponse, ImportExperimentRequest, ImportExperimentResponse,
+    LabelExperimentRequest, LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse,
+    ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
+    ListGenerationsRequest, ListGenerationsResponse, PauseExperimentRequest,
+    PauseExperimentResponse, PruneExperimentRequest, PruneExperimentResponse,
+    ResumeExperimentRequest, ResumeExperimentResponse, RetryExperimentRequest,
+    RetryExperimentResponse, SetPriorityRequest, SetPriorityResponse, SubmitExperimentRequest,
     SubmitExperimentResponse, WatchExperimentRequest, WatchExperimentResponse,
+    WatchExplanationRequest, WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse,
     experiment_service_server::ExperimentService,
 };
-use tokio::task;
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    task,
+};
 use tokio_stream::{Stream, StreamExt as _, wrappers::ReceiverStream};
 use tokio_util::sync::CancellationToken;
-use tonic::{Request, Response, Status};
+use tonic::{Request, Response, Status, Streaming};
 
 use crate::{
-    control::{Control, ControlError, Submitted},
+    control::{Control, ControlError, Existing, Submitted},
+    group::Membership,
     ids::ExperimentId,
     priority::Priority,
-    queries::{self, StoredChampion},
+    queries::{
+        self, Address, Individuals, QueryError, StoredDynamics, StoredIndividuals, StoredLineage,
+        Who,
+    },
     shared_store::SharedStore,
     submission::Submission,
 };
 
-use super::{convert, explain};
+use super::{bundles, convert, explain, status};
 
 /// The service.
 #[derive(Debug)]
 pub struct Experiments {
+    /// One for each generation that is computed again.
+    pub reconstructions: Semaphore,
+    /// One for each bundle that is in memory.
+    pub bundles: Arc<Semaphore>,
     /// For everything that is to be done.
     pub control: Control,
     /// For everything that is only read.
@@ -39,16 +57,47 @@ pub struct Experiments {
     pub shutdown: CancellationToken,
 }
 
+impl Experiments {
+    /// A place for a bundle in memory.
+    async fn place(&self) -> Result<OwnedSemaphorePermit, Status> {
+        let place = Arc::clone(&self.bundles).acquire_owned().await;
+        place.map_err(|_| status::shutting_down())
+    }
+
+    /// Genotypes, computed again if need be.
+    async fn individuals(
+        &self,
+        address: Address,
+        first: u32,
+        page_len: u32,
+    ) -> Result<Individuals, Status> {
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let read = move |store: &_| StoredIndividuals::read(store, address, first, page_len);
+        let stored = self.store.read(read).await?;
+        let found = task::spawn_blocking(move || stored.reconstruct())
+            .await
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        Ok(found)
+    }
+}
+
 #[tonic::async_trait]
 impl ExperimentService for Experiments {
     type WatchExperimentStream =
         Pin<Box<dyn Stream<Item = Result<WatchExperimentResponse, Status>> + Send>>;
+    type WatchExplanationStream =
+        Pin<Box<dyn Stream<Item = Result<WatchExplanationResponse, Status>> + Send>>;
+    type WatchNewsStream = Pin<Box<dyn Stream<Item = Result<WatchNewsResponse, Status>> + Send>>;
+
+    type ExportExperimentStream = bundles::Pieces;
 
     async fn submit_experiment(
         &self,
         request: Request<SubmitExperimentRequest>,
     ) -> Result<Response<SubmitExperimentResponse>, Status> {
         let request = request.into_inner();
+        let group = Some(request.group).filter(|group| !group.is_empty());
+        let membership = group.map(|group| Membership::new(&group, &request.variant)).transpose();
         let submission = Submission {
             request_id: Some(request.request_id).filter(|id| !id.is_empty()),
             config_json: request.config_json,
@@ -56,11 +105,21 @@ impl ExperimentService for Experiments {
             seed: request.seed,
             generations: request.generations,
             priority: request.priority.map_or(Ok(Priority::default()), convert::priority)?,
+            membership: membership.map_err(Status::invalid_argument)?,
+            labels: request.labels,
+            parent: None,
         };
-        let submitted = self.control.submit(submission, request.resume_unfinished).await?;
-        let Submitted { experiment, warnings } = submitted;
+        let fork_of = request.fork_of.map(|it| (ExperimentId(it.experiment_id), it.generation));
+        if fork_of.is_some() && request.resume_unfinished {
+            return Err(Status::invalid_argument("a fork resumes nothing that is unfinished"));
+        }
+        let existing =
+            Existing { resume_unfinished: request.resume_unfinished, reuse: request.reuse };
+        let submitted = self.control.submit(submission, existing, fork_of).await?;
+        let Submitted { experiment, warnings, identical } = submitted;
         let experiment = Some(convert::experiment(experiment));
-        Ok(Response::new(SubmitExperimentResponse { experiment, warnings }))
+        let identical = identical.map_or(0, |id| id.0);
+        Ok(Response::new(SubmitExperimentResponse { experiment, warnings, identical }))
     }
 
     async fn get_experiment(
@@ -69,9 +128,7 @@ impl ExperimentService for Experiments {
     ) -> Result<Response<GetExperimentResponse>, Status> {
         let id = ExperimentId(request.into_inner().experiment_id);
         let experiment = self.store.read(move |store| queries::experiment(store, id)).await?;
-        let config_json = experiment.config_json.clone();
-        let experiment = Some(convert::experiment(experiment));
-        Ok(Response::new(GetExperimentResponse { experiment, config_json }))
+        Ok(Response::new(convert::stored_experiment(experiment)))
     }
 
     async fn list_experiments(
@@ -138,16 +195,141 @@ impl ExperimentService for Experiments {
         Ok(Response::new(SetPriorityResponse { experiment }))
     }
 
+    async fn prune_experiment(
+        &self,
+        request: Request<PruneExperimentRequest>,
+    ) -> Result<Response<PruneExperimentResponse>, Status> {
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let (pruned, freed_bytes) = self.control.prune(id).await?;
+        let experiment = Some(convert::experiment(pruned));
+        Ok(Response::new(PruneExperimentResponse { experiment, freed_bytes }))
+    }
+
+    async fn extend_experiment(
+        &self,
+        request: Request<ExtendExperimentRequest>,
+    ) -> Result<Response<ExtendExperimentResponse>, Status> {
+        let ExtendExperimentRequest { experiment_id, generations } = request.into_inner();
+        let extended = self.control.extend(ExperimentId(experiment_id), generations).await?;
+        let experiment = Some(convert::experiment(extended));
+        Ok(Response::new(ExtendExperimentResponse { experiment }))
+    }
+
+    async fn retry_experiment(
+        &self,
+        request: Request<RetryExperimentRequest>,
+    ) -> Result<Response<RetryExperimentResponse>, Status> {
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let experiment = Some(convert::experiment(self.control.retry(id).await?));
+        Ok(Response::new(RetryExperimentResponse { experiment }))
+    }
+
+    async fn delete_experiment(
+        &self,
+        request: Request<DeleteExperimentRequest>,
+    ) -> Result<Response<DeleteExperimentResponse>, Status> {
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let (deleted, freed_bytes) = self.control.delete(id).await?;
+        let experiment = Some(convert::experiment(deleted));
+        Ok(Response::new(DeleteExperimentResponse { experiment, freed_bytes }))
+    }
+
+    async fn archive_experiment(
+        &self,
+        request: Request<ArchiveExperimentRequest>,
+    ) -> Result<Response<ArchiveExperimentResponse>, Status> {
+        let ArchiveExperimentRequest { experiment_id, restore } = request.into_inner();
+        let archiving = self.control.archive(ExperimentId(experiment_id), !restore);
+        let (archived, log_bytes) = archiving.await?;
+        let experiment = Some(convert::experiment(archived));
+        Ok(Response::new(ArchiveExperimentResponse { experiment, log_bytes }))
+    }
+
+    async fn label_experiment(
+        &self,
+        request: Request<LabelExperimentRequest>,
+    ) -> Result<Response<LabelExperimentResponse>, Status> {
+        let LabelExperimentRequest { experiment_id, set, remove } = request.into_inner();
+        let labelled = self.control.label(ExperimentId(experiment_id), set, remove).await?;
+        let experiment = Some(convert::experiment(labelled));
+        Ok(Response::new(LabelExperimentResponse { experiment }))
+    }
+
+    async fn export_experiment(
+        &self,
+        request: Request<ExportExperimentRequest>,
+    ) -> Result<Response<Self::ExportExperimentStream>, Status> {
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let place = self.place().await?;
+        let bundle = self.store.read(move |store| queries::bundle(store, id)).await?;
+        let bytes = task::spawn_blocking(move || bundle.to_bytes())
+            .await
+            .map_err(|_| ControlError::Panicked("packing a bundle"))?
+            .map_err(|error| Status::failed_precondition(error.to_string()))?;
+        Ok(Response::new(bundles::send(bytes, place)))
+    }
+
+    async fn import_experiment(
+        &self,
+        request: Request<Streaming<ImportExperimentRequest>>,
+    ) -> Result<Response<ImportExperimentResponse>, Status> {
+        let _place = self.place().await?;
+        let bytes = bundles::receive(request.into_inner()).await?;
+        let (experiment, is_new) = self.control.import(bytes).await?;
+        let experiment = Some(convert::experiment(experiment));
+        Ok(Response::new(ImportExperimentResponse { experiment, is_new }))
+    }
+
     async fn get_champion(
         &self,
         request: Request<GetChampionRequest>,
     ) -> Result<Response<GetChampionResponse>, Status> {
         let id = ExperimentId(request.into_inner().experiment_id);
-        let stored = self.store.read(move |store| StoredChampion::read(store, id)).await?;
-        let report = task::spawn_blocking(move || stored.decode())
+        let address = Address { experiment: id, who: Who::Champion };
+        let mut found = self.individuals(address, 0, 1).await?;
+        let champion = found.individuals.pop().ok_or(QueryError::NoChampion(id))?;
+        let network_json = found.network_json.unwrap_or_default();
+        Ok(Response::new(convert::individual(id.0, champion, network_json)))
+    }
+
+    async fn get_individuals(
+        &self,
+        request: Request<GetIndividualsRequest>,
+    ) -> Result<Response<GetIndividualsResponse>, Status> {
+        let GetIndividualsRequest { address, from_individual, page_size } = request.into_inner();
+        let address = convert::address(&address)?;
+        let found = self.individuals(address, from_individual, page_size).await?;
+        Ok(Response::new(convert::individuals(found)))
+    }
+
+    async fn list_dynamics(
+        &self,
+        request: Request<ListDynamicsRequest>,
+    ) -> Result<Response<ListDynamicsResponse>, Status> {
+        let ListDynamicsRequest { experiment_id, from_generation } = request.into_inner();
+        let id = ExperimentId(experiment_id);
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let read = move |store: &_| StoredDynamics::read(store, id, from_generation);
+        let stored = self.store.read(read).await?;
+        let found = task::spawn_blocking(move || stored.replay())
             .await
-            .map_err(|_| ControlError::Panicked("decoding the champion"))??;
-        Ok(Response::new(convert::champion(report)))
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        Ok(Response::new(convert::dynamics(found)))
+    }
+
+    async fn get_lineage(
+        &self,
+        request: Request<GetLineageRequest>,
+    ) -> Result<Response<GetLineageResponse>, Status> {
+        let GetLineageRequest { address, depth } = request.into_inner();
+        let address = convert::address(&address)?;
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let read = move |store: &_| StoredLineage::read(store, address, depth);
+        let stored = self.store.read(read).await?;
+        let found = task::spawn_blocking(move || stored.trace())
+            .await
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        Ok(Response::new(convert::lineage(found)))
     }
 
     async fn explain_experiment(
@@ -156,6 +338,27 @@ impl ExperimentService for Experiments {
     ) -> Result<Response<ExplainExperimentResponse>, Status> {
         let id = ExperimentId(request.into_inner().experiment_id);
         Ok(Response::new(explain::explanation(self.control.explain(id).await?)))
+    }
+
+    async fn watch_explanation(
+        &self,
+        request: Request<WatchExplanationRequest>,
+    ) -> Result<Response<Self::WatchExplanationStream>, Status> {
+        let id = ExperimentId(request.into_inner().experiment_id);
+        let explanations = self.control.watch_explanation(id, self.shutdown.clone()).await?;
+        let responses = ReceiverStream::new(explanations).map(|found| {
+            let explanation = Some(explain::explanation(found?));
+            Ok(WatchExplanationResponse { explanation })
+        });
+        Ok(Response::new(Box::pin(responses)))
+    }
+
+    async fn watch_news(
+        &self,
+        _request: Request<WatchNewsRequest>,
+    ) -> Result<Response<Self::WatchNewsStream>, Status> {
+        let news = ReceiverStream::new(self.control.watch_news(self.shutdown.clone()));
+        Ok(Response::new(Box::pin(news.map(|()| Ok(WatchNewsResponse {})))))
     }
 
     async fn list_generations(
@@ -167,10 +370,7 @@ impl ExperimentService for Experiments {
         let id = ExperimentId(experiment_id);
         let read = move |store: &_| queries::generations(store, id, from_generation, page_size);
         let page = self.store.read(read).await?;
-        Ok(Response::new(ListGenerationsResponse {
-            generations: page.items.into_iter().map(convert::completed_generation).collect(),
-            next_generation: page.next.map(|(_, generation)| generation.generation),
-        }))
+        Ok(Response::new(convert::generations(page)))
     }
 
     async fn list_events(
@@ -181,9 +381,6 @@ impl ExperimentService for Experiments {
         let id = ExperimentId(experiment_id);
         let read = move |store: &_| queries::events(store, id, from_sequence, page_size);
         let page = self.store.read(read).await?;
-        Ok(Response::new(ListEventsResponse {
-            events: page.items.into_iter().map(convert::event).collect(),
-            next_sequence: page.next.map(|event| event.sequence),
-        }))
+        Ok(Response::new(convert::events(page)))
     }
 }

@@ -1,11 +1,14 @@
 //! The gRPC services: they translate between the wire and the core, and nothing
 //! else.
 
+mod bundles;
 mod convert;
 mod evaluation_service;
 mod experiment_service;
 mod explain;
 mod fleet_service;
+mod offline;
+mod pages;
 mod status;
 mod worker_service;
 
@@ -13,6 +16,8 @@ pub use convert::WelcomeTimes;
 pub use evaluation_service::Evaluations;
 pub use experiment_service::Experiments;
 pub use fleet_service::Fleet;
+pub use offline::Offline;
+pub use pages::PagesArchive;
 pub use worker_service::Workers;
 
 use status::shutting_down;

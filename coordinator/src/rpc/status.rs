@@ -22,7 +22,9 @@ impl From<StoreError> for Status {
         match error {
             // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
             StoreError::Unavailable(_) => Self::resource_exhausted(text),
-            StoreError::Ended(_) | StoreError::Unsound { .. } => Self::failed_precondition(text),
+            StoreError::Ended(_) | StoreError::Unfinished(_) | StoreError::Unsound { .. } => {
+                Self::failed_precondition(text)
+            }
             StoreError::TakenOver { .. } => Self::unavailable(text),
             StoreError::Corrupt(_) => Self::data_loss(text),
             _ => Self::internal(text),
@@ -35,10 +37,15 @@ impl From<QueryError> for Status {
         let text = error.to_string();
         match error {
             QueryError::NotFound(_) => Self::not_found(text),
-            QueryError::NoChampion(_) | QueryError::OtherSimulation { .. } => {
-                Self::failed_precondition(text)
-            }
-            QueryError::Undecodable(_) => Self::data_loss(text),
+            QueryError::NoIndividual { .. }
+            | QueryError::NoMean { .. }
+            | QueryError::NoLineage(_) => Self::invalid_argument(text),
+            QueryError::NoChampion(_)
+            | QueryError::NotEnded(_)
+            | QueryError::NoGeneration { .. }
+            | QueryError::NotInLog { .. }
+            | QueryError::OtherBits { .. } => Self::failed_precondition(text),
+            QueryError::DamagedLog { .. } | QueryError::Undecodable(_) => Self::data_loss(text),
             QueryError::Store(error) => error.into(),
         }
     }
@@ -66,6 +73,8 @@ impl From<ControlError> for Status {
             | ControlError::TooManyRequests
             | ControlError::NoMemory(_)
             | ControlError::NotStoredYet(_) => Self::resource_exhausted(text),
+            ControlError::NotNow(_) => Self::failed_precondition(text),
+            ControlError::NoParent => Self::failed_precondition(text),
             ControlError::NotInQuarantine { .. } => Self::not_found(text),
             ControlError::EvaluationFailed(_) | ControlError::Panicked(_) => Self::internal(text),
             ControlError::Query(error) => error.into(),

@@ -1,12 +1,13 @@
 //! Watchers that do not read.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use rusqlite::params;
 use swarm_proto::v1::{
     SubmitExperimentRequest, WatchExperimentRequest,
     experiment_service_server::ExperimentService as _,
 };
+use tokio::sync::Semaphore;
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Status};
@@ -39,8 +40,13 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     };
     let driver = Driver::new(store.clone(), queue, config, shutdown.clone());
     tokio::spawn(driver.run());
-    let service =
-        Experiments { control: Control::new(events, store.clone(), u64::MAX), store, shutdown };
+    let service = Experiments {
+        reconstructions: Semaphore::new(1),
+        bundles: Arc::new(Semaphore::new(1)),
+        control: Control::new(events, store.clone(), u64::MAX),
+        store,
+        shutdown,
+    };
     let config_json = include_str!("../../../configs/quickstart.json").to_owned();
     let request = SubmitExperimentRequest { config_json, ..Default::default() };
     service.submit_experiment(Request::new(request)).await.unwrap();

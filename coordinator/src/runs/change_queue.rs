@@ -51,6 +51,13 @@ impl ChangeQueue {
         change
     }
 
+    /// Has a request answered when the last change so far of an experiment is written;
+    /// false if there is none.
+    pub fn join(&mut self, id: ExperimentId, request: RequestId) -> bool {
+        let last = self.pending.get_mut(&id).and_then(VecDeque::back_mut);
+        last.map(|last| last.requests.push(request)).is_some()
+    }
+
     /// The changes of an experiment that are not known to be stored, in order.
     pub fn pending(&self, id: ExperimentId) -> impl Iterator<Item = &Change> {
         self.pending.get(&id).into_iter().flatten().map(|pending| &pending.change)

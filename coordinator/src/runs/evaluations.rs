@@ -3,46 +3,42 @@
 
 use std::sync::Arc;
 
-use evolution::Genotype;
-
 use crate::{engine::Batch, ids::EvaluationId, priority::Priority};
 
 use super::{Command, Runs};
 
-/// A genotype to be evaluated; everything about it has been checked.
+/// Genotypes to be evaluated; everything about them has been checked.
 #[derive(Debug)]
 pub struct Evaluation {
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
-    /// Its genes.
-    pub genotype: Genotype,
-    /// Trials, from trial 0.
-    pub n_trials: u32,
-    /// Numbers that one trial gives.
-    pub n_values: usize,
+    /// What is to be evaluated.
+    pub batch: Batch,
     /// Its share of the fleet.
     pub priority: Priority,
 }
 
 impl Runs {
-    /// A client wants a genotype evaluated. Returns what the evaluation is called.
+    /// A client wants genotypes evaluated. Returns what the evaluation is called.
     pub fn on_evaluation_requested(&mut self, evaluation: Evaluation) -> EvaluationId {
-        let Evaluation { spec, genotype, n_trials, n_values, priority } = evaluation;
+        let Evaluation { spec, batch, priority } = evaluation;
         self.n_evaluations += 1;
         let id = EvaluationId(self.n_evaluations);
         self.evaluations.insert(id);
         self.commands.extend([
             Command::StartJob { job: id.into(), spec, priority, is_paused: false },
-            Command::Evaluate {
-                job: id.into(),
-                batch: Batch::measures(genotype, n_trials, n_values),
-            },
+            Command::Evaluate { job: id.into(), batch },
         ]);
         id
     }
 
-    /// An evaluation has its numbers, all trials one after the other, or has failed.
-    pub fn on_evaluation_finished(&mut self, id: EvaluationId, result: Result<Vec<f64>, String>) {
+    /// An evaluation has its numbers, of each genotype those of all trials one after the
+    /// other, or has failed.
+    pub fn on_evaluation_finished(
+        &mut self,
+        id: EvaluationId,
+        result: Result<Vec<Vec<f64>>, String>,
+    ) {
         if self.evaluations.remove(&id) {
             self.commands.extend([
                 Command::EndJob { job: id.into() },

@@ -121,8 +121,8 @@ pub enum Command {
     AnswerEvaluation {
         /// The evaluation.
         evaluation: EvaluationId,
-        /// The numbers of all trials, one trial after the other, or why there are none.
-        result: Result<Vec<f64>, String>,
+        /// Per genotype the numbers of all trials, one trial after the other, or why there are none.
+        result: Result<Vec<Vec<f64>>, String>,
     },
 }
 
@@ -150,6 +150,8 @@ pub enum Request {
     Resume,
     /// That its share of the fleet is another.
     SetPriority(Priority),
+    /// Nothing but an answer, once everything that was wanted before is stored.
+    Settle,
 }
 
 /// What became of a commit.

@@ -22,6 +22,9 @@
 //!   in which things happened. Each client is answered once its change is stored.
 //! - An experiment can be reopened before the end of its former run is reported
 //!   here. Each run has an epoch of its own, and what belongs to another is ignored.
+//! - Only the last commit of a former run may still be on its way then: whoever reopens
+//!   what has failed or was cancelled waits until that end is stored and reported here
+//!   ([`Request::Settle`]).
 //! - A run is loaded, which is to say that its evolution is read from the store and its
 //!   first generation drawn, as soon as its estimated memory fits into the budget beside
 //!   that of the runs that are loaded. Until then it waits; its owner is told.
@@ -301,6 +304,13 @@ impl Runs {
             Request::SetPriority(priority) => {
                 let command = Command::SetPriority { job: id.into(), priority };
                 (Change::Priority(priority), Some(command))
+            }
+            Request::Settle => {
+                if !self.changes.join(id, request_id) {
+                    let is_stored = true;
+                    self.commands.push_back(Command::Answer { request: request_id, is_stored });
+                }
+                return;
             }
         };
         self.commands.extend(command.filter(|_| is_active));

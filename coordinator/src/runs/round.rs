@@ -9,7 +9,8 @@ use sim_core::TrialSet;
 
 use crate::{engine::EvaluatedBatch, store::GenerationRecord};
 use evolution::{
-    Champion, ChampionSource, Evolution, EvolutionError, Judgement, Population, Reevaluation,
+    Champion, ChampionSource, End, Evolution, EvolutionError, Judgement, Population, Reevaluation,
+    Told,
 };
 
 /// A batch that the fleet evaluates, and what it is for.
@@ -39,6 +40,8 @@ pub enum Next {
 pub struct UpdatedEvolution {
     evolution: Evolution,
     generation: GenerationRecord,
+    /// What it was told.
+    told: Told,
     notices: Vec<String>,
     /// Why evolution is over, if it is; empty: all generations are done.
     completed: Option<String>,
@@ -49,7 +52,9 @@ pub struct UpdatedEvolution {
 pub struct ReadyToCommit {
     /// Its row of the history.
     pub generation: GenerationRecord,
-    /// Evolution after it: the checkpoint.
+    /// Its entry in the fitness log.
+    pub told: Told,
+    /// Evolution after it.
     pub evolution: Arc<Evolution>,
     /// The champion so far.
     pub champion: Option<Champion>,
@@ -137,8 +142,12 @@ impl Round {
                 let mut with_champion = updated.evolution.clone();
                 with_champion.set_champion(&reevaluation);
                 updated.notices.extend(with_champion.champion().map(describe));
+                let blocks = reevaluation.blocks().to_vec();
                 if updated.is_scheduled(config) {
                     updated.evolution = with_champion.clone();
+                    updated.told.blocks = blocks;
+                } else {
+                    updated.told.end = End { blocks, ..End::default() };
                 }
                 let is_last = updated.completed.is_some();
                 let judgement = with_champion.judgement().filter(|_| is_last);
@@ -152,6 +161,7 @@ impl Round {
             }
             Self::Judgement(mut ready, judgement) => {
                 let (champion, digest) = judgement.decide(&evaluated.values);
+                ready.told.end.judgement = evaluated.values.concat();
                 ready.notices.extend(evaluated.notices.iter().cloned());
                 ready.notices.push(describe_judgement(&champion));
                 ready.digest = digest.to_string();
@@ -171,7 +181,7 @@ impl UpdatedEvolution {
     /// the end, it is not what a longer run goes on from: more generations must
     /// give the same bits as if they had been asked for at once.
     fn into_ready(self, with_champion: Option<Evolution>) -> ReadyToCommit {
-        let Self { evolution, generation, notices, completed } = self;
+        let Self { evolution, generation, told, notices, completed } = self;
         let digest = match &with_champion {
             Some(with_champion) => with_champion.champion_digest(),
             None => evolution.digest(),
@@ -180,6 +190,7 @@ impl UpdatedEvolution {
         let evolution = Arc::new(evolution);
         ReadyToCommit {
             generation,
+            told,
             champion,
             digest: digest.to_string(),
             notices,
@@ -220,7 +231,8 @@ fn learn(
     } else {
         (evolution.n_generations() >= algorithm.generations).then(String::new)
     };
-    Ok(UpdatedEvolution { evolution, generation, notices, completed })
+    let told = Told::of(evaluated.values.clone());
+    Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 
 /// A champion after a re-evaluation, for the log.

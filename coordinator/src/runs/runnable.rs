@@ -84,11 +84,8 @@ fn evolution(
     }
     let evolution = Evolution::restore(checkpoint)
         .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
-    let (n_generations, link) = match &experiment.latest {
-        Some(latest) => (latest.generation + 1, &latest.digest),
-        None => (0, &config_digest),
-    };
-    if evolution.n_generations() != n_generations || evolution.digest().to_string() != *link {
+    let (n_generations, link) = (experiment.n_generations(), experiment.last_link());
+    if evolution.n_generations() != n_generations || evolution.digest().to_string() != link {
         return Err(format!(
             "its history has {n_generations} generations and digest {link}, its checkpoint {} and \
              {}",
@@ -106,7 +103,7 @@ mod tests {
     use evolution::Statistics;
 
     use super::*;
-    use crate::submission::Submission;
+    use crate::{labels::Labels, store::LogGap, submission::Submission};
 
     /// A new experiment and its checkpoint.
     fn stored() -> (ExperimentRecord, Checkpoint) {
@@ -128,8 +125,15 @@ mod tests {
             judged_fitness: None,
             priority: Priority::default(),
             last_sequence: 1,
+            membership: None,
+            labels: Labels::new(),
+            is_archived: false,
+            recent_generation_ms: None,
+            log_from: 0,
+            log_gap: LogGap::None,
+            fork: None,
         };
-        (experiment, Checkpoint { state: new.checkpoint, steps: Vec::new() })
+        (experiment, Checkpoint { keyframe: new.keyframe, log: Vec::new() })
     }
 
     #[test]
@@ -161,8 +165,9 @@ mod tests {
             seed: Some(2),
             ..Submission::default()
         };
-        let state = of_other_seed.check().unwrap().new.checkpoint;
-        let what = Runnable::restore(&sound, &Checkpoint { state, steps: Vec::new() }).unwrap_err();
+        let keyframe = of_other_seed.check().unwrap().new.keyframe;
+        let other = Checkpoint { keyframe, log: Vec::new() };
+        let what = Runnable::restore(&sound, &other).unwrap_err();
         assert!(what.contains("its history has 0 generations"), "{what}");
     }
 }

@@ -90,6 +90,11 @@ impl Tokens {
         Ok(Self { client, worker })
     }
 
+    /// What clients have to know.
+    pub fn client(&self) -> &Token {
+        &self.client
+    }
+
     /// Whose token this is. Looks at both, whatever it finds.
     pub fn role_of(&self, presented: &[u8]) -> Option<Role> {
         let is_client = self.client.matches(presented);

@@ -28,6 +28,8 @@ pub struct CoordinatorConfig {
     pub referee: RefereeProgram,
     /// Who may connect.
     pub access: Access,
+    /// Where pages are served, if anywhere; port 0 takes a free one.
+    pub web_listen: Option<SocketAddr>,
     /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
     pub metrics_listen: Option<SocketAddr>,
 }
@@ -46,6 +48,7 @@ impl CoordinatorConfig {
             memory_budget: u64::from(MEMORY_BUDGET_MIB) << 20,
             referee: RefereeProgram::this_program(),
             access: Access::default(),
+            web_listen: None,
             metrics_listen: None,
         }
     }

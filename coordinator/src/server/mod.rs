@@ -6,14 +6,20 @@ pub mod calls;
 mod config;
 mod gate;
 pub mod listener;
+mod pages;
 mod services;
 mod strangers;
 
-use std::{convert::Infallible, net::SocketAddr, path::PathBuf, sync::Mutex};
+use std::{
+    convert::Infallible,
+    net::SocketAddr,
+    path::PathBuf,
+    sync::{Arc, Mutex},
+};
 
 use swarm_telemetry::Endpoint;
 use swarm_transport::tls_diagnosis;
-use tokio::{net::TcpListener, task::JoinSet};
+use tokio::{net::TcpListener, sync::Semaphore, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Server;
 use tracing::{error, info, warn};
@@ -22,7 +28,7 @@ use crate::{
     control::Control,
     driver::{self, Driver, DriverConfig},
     engine::EngineConfig,
-    limits::{REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
+    limits::{BUNDLES_MAX, RECONSTRUCTIONS_MAX, REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
     referee::Referee,
     rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
@@ -40,6 +46,7 @@ use services::Services;
 #[derive(Debug)]
 pub struct Coordinator {
     local_addr: SocketAddr,
+    web_addr: Option<SocketAddr>,
     store: SharedStore,
     shutdown: CancellationToken,
     /// One task; none once its end is known. So is `server`.
@@ -47,6 +54,8 @@ pub struct Coordinator {
     server: JoinSet<Result<(), tonic::transport::Error>>,
     /// Ends when it is dropped.
     _metrics: JoinSet<Infallible>,
+    /// Ends at shutdown, or when it is dropped.
+    pages: JoinSet<()>,
 }
 
 impl Coordinator {
@@ -54,11 +63,19 @@ impl Coordinator {
     pub async fn start(config: CoordinatorConfig) -> Result<Self, StartError> {
         let Access { tokens, tls, .. } = config.access.clone();
         config.access.check(config.listen)?;
+        if let Some(address) = config.web_listen {
+            config.access.check(address)?;
+        }
+        let site = pages::Builder::new(&config.access)?;
         let (is_encrypted, has_tokens) = (tls.is_some(), tokens.is_some());
         let builder = with_tls(services::builder(), tls)?;
         let (listener, local_addr) = listen(config.listen).await?;
         let metrics_endpoint = match config.metrics_listen {
             Some(address) => Some(Endpoint::listen(address).await?),
+            None => None,
+        };
+        let web_listener = match config.web_listen {
+            Some(address) => Some(listen(address).await?),
             None => None,
         };
         let store = open(config.data_dir.clone()).await?;
@@ -97,6 +114,19 @@ impl Coordinator {
         }
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
+        let experiments = || Experiments {
+            control: control.clone(),
+            store: store.clone(),
+            shutdown: shutdown.clone(),
+            reconstructions: Semaphore::new(RECONSTRUCTIONS_MAX),
+            bundles: Arc::new(Semaphore::new(BUNDLES_MAX)),
+        };
+        let mut pages = JoinSet::new();
+        let web_addr = web_listener.as_ref().map(|(_, address)| *address);
+        if let Some((listener, _)) = web_listener {
+            let site = site.site(&config.data_dir, store.news(), experiments())?;
+            pages.spawn(pages::serve(site, listener, shutdown.clone()));
+        }
         let services = Services {
             workers: Workers {
                 events,
@@ -106,7 +136,7 @@ impl Coordinator {
             },
             fleet: Fleet { control: control.clone() },
             evaluations: Evaluations { control: control.clone(), shutdown: shutdown.clone() },
-            experiments: Experiments { control, store: store.clone(), shutdown: shutdown.clone() },
+            experiments: experiments(),
         };
         let mut server = JoinSet::new();
         let gate = Gate::new(tokens);
@@ -119,12 +149,20 @@ impl Coordinator {
         if !is_encrypted && !local_addr.ip().to_canonical().is_loopback() {
             warn!("there is no TLS: every member of the network can read all traffic, tokens too");
         }
-        Ok(Self { local_addr, store, shutdown, driver, server, _metrics: metrics })
+        if let Some(address) = web_addr {
+            info!(%address, "pages are served");
+        }
+        Ok(Self { local_addr, web_addr, store, shutdown, driver, server, _metrics: metrics, pages })
     }
 
     /// The address it listens on.
     pub fn local_addr(&self) -> SocketAddr {
         self.local_addr
+    }
+
+    /// The address of its pages, if it serves any.
+    pub fn web_addr(&self) -> Option<SocketAddr> {
+        self.web_addr
     }
 
     /// Waits for a part of it to end, which none does before [`Self::shutdown`].
@@ -156,7 +194,8 @@ impl Coordinator {
             error!("the driver panicked: {error}; please report this");
         }
         // If that takes too long, dropping the task ends it.
-        let _ = tokio::time::timeout(SHUTDOWN_GRACE, self.server.join_next()).await;
+        let servers = async { tokio::join!(self.server.join_next(), self.pages.join_next()) };
+        let _ = tokio::time::timeout(SHUTDOWN_GRACE, servers).await;
     }
 }
 

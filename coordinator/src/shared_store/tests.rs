@@ -20,7 +20,7 @@ fn new_experiment() -> NewExperiment {
     let config_json = fs::read_to_string(path).unwrap();
     let new = Submission { config_json, ..Submission::default() }.check().unwrap().new;
     // More than fits into what an empty database has reserved.
-    NewExperiment { checkpoint: vec![0; 1 << 16], ..new }
+    NewExperiment { keyframe: vec![0; 1 << 16], ..new }
 }
 
 async fn n_experiments(store: &SharedStore) -> usize {

@@ -52,6 +52,24 @@ pub enum StoreError {
         /// Version of this program.
         supported: i64,
     },
+    /// The database is of a version that is only read after it is migrated.
+    #[error(
+        "{} has schema version {found}, which has no seals; start a coordinator on its directory \
+         once, which migrates it",
+        path.display()
+    )]
+    TooOld {
+        /// Version of the database.
+        found: i64,
+        /// The database.
+        path: PathBuf,
+    },
+    /// The database was opened to be read.
+    #[error("{} is only read", path.display())]
+    ReadOnly {
+        /// The database.
+        path: PathBuf,
+    },
     /// The database's content makes no sense.
     #[error(
         "the database is damaged: {0}; restore it from a copy, or let \
@@ -116,6 +134,9 @@ pub enum StoreError {
     /// The experiment has ended meanwhile.
     #[error("experiment {0} has ended")]
     Ended(ExperimentId),
+    /// The experiment has not ended, and goes on from its fitness log.
+    #[error("experiment {0} has not ended, and goes on from its fitness log; prune it afterwards")]
+    Unfinished(ExperimentId),
     /// Anything else is a bug.
     #[error("the database refuses an operation: {0}; please report this")]
     Bug(rusqlite::Error),

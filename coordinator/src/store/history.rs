@@ -123,19 +123,39 @@ pub fn seal(
     Ok(())
 }
 
-/// An experiment's history from a generation on, with its seals, in order.
-pub fn read_from(
+/// An experiment's history, with its seals, in order.
+pub fn read_all(
+    connection: &Connection,
+    id: ExperimentId,
+) -> rusqlite::Result<Vec<(GenerationRecord, Vec<u8>)>> {
+    read(connection, id, 0, i64::MAX.unsigned_abs())
+}
+
+/// An experiment's generations from `first` to `end`, without that, in order.
+pub fn read_between(
     connection: &Connection,
     id: ExperimentId,
     first: u64,
+    end: u64,
+) -> rusqlite::Result<Vec<GenerationRecord>> {
+    let rows = read(connection, id, first, end)?;
+    Ok(rows.into_iter().map(|(generation, _)| generation).collect())
+}
+
+fn read(
+    connection: &Connection,
+    id: ExperimentId,
+    first: u64,
+    end: u64,
 ) -> rusqlite::Result<Vec<(GenerationRecord, Vec<u8>)>> {
     let mut statement = connection.prepare_cached(
         "SELECT seal, generation, best, mean, min, standard_deviation, digest,
                 duration_ms, episodes, workers, idle_share
-         FROM generations WHERE experiment_id = ?1 AND generation >= ?2 ORDER BY generation",
+         FROM generations
+         WHERE experiment_id = ?1 AND generation >= ?2 AND generation < ?3 ORDER BY generation",
     )?;
     let read = |row: &Row<'_>| Ok((read_generation(row, 1)?, row.get(0)?));
-    let rows = statement.query_map([id.0, first], read)?;
+    let rows = statement.query_map(params![id.0, first, end], read)?;
     // No outer join: there is a generation in every row.
     rows.filter_map(|row| row.map(|(generation, seal)| Some((generation?, seal))).transpose())
         .collect()

@@ -5,11 +5,16 @@
 //! returns, and refused if another coordinator owns the database by now.
 
 mod champions;
-mod checkpoints;
+mod deletion;
 mod error;
+mod evidence;
+mod experiments;
 mod file;
+mod fitness_log;
+mod forks;
 mod history;
 mod inspection;
+mod labels;
 mod quarantine;
 mod records;
 mod schema;
@@ -19,18 +24,22 @@ mod write_ahead_log;
 
 use std::path::{Path, PathBuf};
 
-use rusqlite::{Connection, OptionalExtension, Row, Transaction, TransactionBehavior, params};
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 
 use crate::{failpoint, ids::ExperimentId, priority::Priority};
-use evolution::{Advance, Champion};
+use evolution::{Champion, Checkpoint};
 
 pub use error::StoreError;
+pub use evidence::Imported;
+pub use fitness_log::Entry;
+pub use forks::ForkRecord;
 pub use inspection::{
     Backup, Fate, Finding, Inspection, Recovered, Recovery, backup, inspect, recover,
 };
 pub use quarantine::QuarantinedWorker;
 pub use records::{
-    Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, NewExperiment,
+    Event, EventKind, Evidence, ExperimentRecord, ExperimentState, GenerationRecord, LogEntry,
+    LogGap, NewExperiment,
 };
 
 use error::Result;
@@ -45,6 +54,13 @@ pub struct Store {
     path: PathBuf,
     /// Makes the seals of its rows.
     sealer: Sealer,
+    /// None if it is only read.
+    ownership: Option<Ownership>,
+}
+
+/// What lets a coordinator write.
+#[derive(Debug)]
+struct Ownership {
     /// What the database says as long as this coordinator owns it.
     owner: Vec<u8>,
     /// Released after the connection.
@@ -56,8 +72,8 @@ pub struct Store {
 pub struct GenerationCommit<'a> {
     /// History row.
     pub generation: &'a GenerationRecord,
-    /// What it changes in the checkpoint.
-    pub checkpoint: &'a Advance,
+    /// What it adds to the fitness log.
+    pub entry: Entry<'a>,
     /// The champion so far.
     pub champion: Option<&'a Champion>,
     /// Covers all generations and re-evaluations so far.
@@ -76,7 +92,33 @@ impl Store {
         let path = file::path_in(directory);
         let (owner, sealer) =
             claim(&connection).map_err(|error| StoreError::from(error).at(&path))?;
-        Ok(Self { connection, path, sealer, owner, _locks: locks })
+        Ok(Self { connection, path, sealer, ownership: Some(Ownership { owner, _locks: locks }) })
+    }
+
+    /// Opens the database in `directory` to read it, whether or not a coordinator uses it. It
+    /// may be of an earlier version, but for those without seals.
+    pub fn open_read_only(directory: &Path) -> Result<Self> {
+        let path = file::path_in(directory);
+        if !path.is_file() {
+            return Err(StoreError::NoDatabase { path });
+        }
+        let open = || {
+            let connection = file::open_read_only(&path)?;
+            let version = schema::version(&connection)?;
+            if version > schema::VERSION {
+                return Err(StoreError::Newer { found: version, supported: schema::VERSION });
+            }
+            if version < schema::SEALED {
+                return Err(StoreError::TooOld { found: version, path: path.clone() });
+            }
+            if version < schema::VERSION {
+                schema::read_as_latest(&connection, version)?;
+            }
+            let sealer = Sealer::of(&connection)?;
+            Ok((connection, sealer))
+        };
+        let (connection, sealer) = open().map_err(|error| error.at(&path))?;
+        Ok(Self { connection, path, sealer, ownership: None })
     }
 
     /// Adds an experiment. If `request_id` has been used before, nothing is
@@ -90,8 +132,9 @@ impl Store {
         self.write(|transaction, sealer| {
             transaction.execute(
                 "INSERT INTO experiments (request_id, name, config, config_digest, fingerprint,
-                                          genotype_len, state, submitted_at_ms, priority)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8)",
+                                          genotype_len, state, submitted_at_ms, priority,
+                                          group_name, variant, labels)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, 'running', ?7, ?8, ?9, ?10, ?11)",
                 params![
                     new.request_id,
                     new.config.name,
@@ -100,14 +143,31 @@ impl Store {
                     sim_core::FINGERPRINT,
                     new.genotype_len,
                     now_ms,
-                    new.priority.weight()
+                    new.priority.weight(),
+                    new.membership.as_ref().map(|membership| &membership.group),
+                    new.membership.as_ref().map(|membership| &membership.variant),
+                    labels::to_json(&new.labels),
                 ],
             )?;
             let id = ExperimentId(transaction.last_insert_rowid().unsigned_abs());
             seals::seal_experiment(transaction, sealer, id)?;
-            let seal = sealer.checkpoint(id, None, &new.checkpoint);
-            checkpoints::put(transaction, id, &new.checkpoint, seal)?;
             add_state_event(transaction, id, now_ms, ExperimentState::Running, "submitted")?;
+            let mut latest = None;
+            if let Some(fork) = &new.fork {
+                forks::put(transaction, sealer, id, fork)?;
+                forks::copy_history(transaction, sealer, id, fork)?;
+                let (first, end) = (fork.generation, fork.generation + 1);
+                latest = history::read_between(transaction, id, first, end)?.pop();
+                let sql = "UPDATE experiments SET digest = ?2 WHERE id = ?1";
+                transaction.execute(sql, params![id.0, fork.link])?;
+                if let Some(champion) = &new.champion {
+                    let (latest, link) = (Some(fork.generation), &fork.link);
+                    champions::put(transaction, sealer, id, champion, latest, link)?;
+                }
+            }
+            let n_generations = latest.as_ref().map_or(0, |latest| latest.generation + 1);
+            let seal = sealer.keyframe(id, latest.as_ref(), &new.keyframe);
+            fitness_log::put_keyframe(transaction, id, n_generations, &new.keyframe, seal)?;
             Ok((id, true))
         })
     }
@@ -132,18 +192,19 @@ impl Store {
     ) -> Result<()> {
         let generation = commit.generation;
         // Hashing takes longer than the rest, and needs no transaction.
-        let seal = self.sealer.advance(id, generation, commit.checkpoint);
+        let seals = commit.entry.seals(&self.sealer, id, generation);
         self.write(|transaction, sealer| {
-            let state: String = transaction
+            let state: Option<String> = transaction
                 .prepare_cached("SELECT state FROM experiments WHERE id = ?1")?
-                .query_row([id.0], |row| row.get(0))?;
-            if !ExperimentState::from_name(&state).is_some_and(ExperimentState::is_unfinished) {
+                .query_row([id.0], |row| row.get(0))
+                .optional()?;
+            let state = state.as_deref().and_then(ExperimentState::from_name);
+            if !state.is_some_and(ExperimentState::is_unfinished) {
                 return Err(StoreError::Ended(id));
             }
             history::put(transaction, sealer, id, generation)?;
             failpoint::reached("history written");
-            let number = generation.generation;
-            checkpoints::advance(transaction, id, number, commit.checkpoint, seal)?;
+            commit.entry.put(transaction, id, generation.generation, seals)?;
             transaction
                 .prepare_cached("UPDATE experiments SET digest = ?2 WHERE id = ?1")?
                 .execute(params![id.0, commit.digest])?;
@@ -174,8 +235,8 @@ impl Store {
         })
     }
 
-    /// Changes the state of an unfinished experiment; one that has ended, or is in
-    /// that state already, stays as it is.
+    /// Changes the state of an unfinished experiment, or the reason of a pause; one that
+    /// has ended, or is in that state already, stays as it is.
     pub fn set_state(
         &mut self,
         id: ExperimentId,
@@ -204,37 +265,114 @@ impl Store {
         self.write(|transaction, _| Ok(add_notice(transaction, id, now_ms, text)?))
     }
 
-    /// Lets a completed experiment go on under a configuration that asks for
-    /// more generations.
-    pub fn reopen(&mut self, id: ExperimentId, config_json: &str, now_ms: u64) -> Result<()> {
+    /// Lets an experiment go on that has ended in the state `from`, under a configuration
+    /// that may ask for more generations; one that is in another state stays as it is.
+    /// `why`: for its events.
+    pub fn reopen(
+        &mut self,
+        id: ExperimentId,
+        from: ExperimentState,
+        config_json: &str,
+        why: &str,
+        now_ms: u64,
+    ) -> Result<()> {
         self.write(|transaction, sealer| {
             let n_changed = transaction.execute(
-                "UPDATE experiments SET state = 'running', reason = '', config = ?2
-                 WHERE id = ?1 AND state = 'completed'",
-                params![id.0, config_json],
+                "UPDATE experiments SET state = 'running', reason = '', config = ?3, archived = 0
+                 WHERE id = ?1 AND state = ?2 AND state NOT IN ('running', 'paused')",
+                params![id.0, from.name(), config_json],
             )?;
             if n_changed > 0 {
                 seals::seal_experiment(transaction, sealer, id)?;
-                let state = ExperimentState::Running;
-                add_state_event(transaction, id, now_ms, state, "more generations")?;
+                add_state_event(transaction, id, now_ms, ExperimentState::Running, why)?;
             }
             Ok(())
         })
     }
 
+    /// Deletes the fitness log of an experiment that has ended. `keyframe`: evolution as it is
+    /// now, from which more generations would continue. Returns how many bytes are free.
+    pub fn prune(&mut self, id: ExperimentId, keyframe: Option<&[u8]>, now_ms: u64) -> Result<u64> {
+        self.write(|transaction, sealer| {
+            let Some(found) = experiments::get(transaction, id)? else { return Ok(0) };
+            if found.state.is_unfinished() {
+                return Err(StoreError::Unfinished(id));
+            }
+            let n_generations = found.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+            if found.log_from >= n_generations {
+                return Ok(0);
+            }
+            let n_deleted = fitness_log::delete(transaction, id)?;
+            fitness_log::begin_at(transaction, id, n_generations, LogGap::Pruned)?;
+            if let Some(state) = keyframe {
+                let seal = sealer.keyframe(id, found.latest.as_ref(), state);
+                fitness_log::put_keyframe(transaction, id, n_generations, state, seal)?;
+            }
+            add_notice(transaction, id, now_ms, "pruned: its fitness log is deleted")?;
+            Ok(n_deleted.saturating_sub(keyframe.map_or(0, |state| state.len() as u64)))
+        })
+    }
+
     /// Reads one experiment.
     pub fn experiment(&self, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
-        self.read(|connection| experiment(connection, id))
+        self.read(|connection| experiments::get(connection, id))
+    }
+
+    /// What a generation is computed again from: the checkpoint before it and what evolution
+    /// was told of it; none if that is not in the log, or is not what was stored.
+    pub fn generation_in_log(
+        &self,
+        id: ExperimentId,
+        generation: u64,
+    ) -> Result<Option<(Checkpoint, GenerationRecord, Vec<u8>)>> {
+        self.read(|connection| {
+            let sealer = Some(&self.sealer);
+            let checkpoint = fitness_log::checkpoint(connection, sealer, id, generation)?;
+            let of = history::read_between(connection, id, generation, generation + 1)?.pop();
+            let (Some(checkpoint), Some(of)) = (checkpoint, of) else { return Ok(None) };
+            let told = fitness_log::told(connection, sealer, id, &of)?;
+            Ok(told.map(|told| (checkpoint, of, told)))
+        })
+    }
+
+    /// What evolution was told of at most `limit` complete generations from `from` on; none
+    /// for one that is not what was stored.
+    pub fn fitness_log(
+        &self,
+        id: ExperimentId,
+        from: u64,
+        limit: u32,
+    ) -> Result<Vec<Option<Vec<u8>>>> {
+        self.read(|connection| {
+            let end = from.saturating_add(limit.into());
+            let history = history::read_between(connection, id, from, end)?;
+            let told = |of| fitness_log::told(connection, Some(&self.sealer), id, of);
+            Ok(history.iter().map(told).collect::<rusqlite::Result<_>>()?)
+        })
+    }
+
+    /// The fitness log of the generations from `first` to `end`, without that; none if it is not
+    /// what was stored.
+    pub fn log_between(
+        &self,
+        id: ExperimentId,
+        first: u64,
+        end: u64,
+    ) -> Result<Option<Vec<LogEntry>>> {
+        self.read(|connection| {
+            let mut log = Vec::new();
+            for of in history::read_between(connection, id, first, end)? {
+                let told = fitness_log::told(connection, Some(&self.sealer), id, &of)?;
+                let Some(told) = told else { return Ok(None) };
+                log.push((of, told));
+            }
+            Ok((log.len() as u64 == end - first).then_some(log))
+        })
     }
 
     /// Reads all experiments, oldest first.
     pub fn experiments(&self) -> Result<Vec<ExperimentRecord>> {
-        self.read(|connection| {
-            let mut statement =
-                connection.prepare_cached(&format!("{SELECT_EXPERIMENT} ORDER BY e.id"))?;
-            let rows = statement.query_map([], read_experiment)?;
-            rows.map(|row| row?).collect()
-        })
+        self.read(experiments::all)
     }
 
     /// The champion so far; none before the first generation.
@@ -262,9 +400,12 @@ impl Store {
         &mut self,
         operation: impl FnOnce(&Transaction<'_>, &Sealer) -> Result<T>,
     ) -> Result<T> {
+        let Some(Ownership { owner: expected, .. }) = &self.ownership else {
+            return Err(StoreError::ReadOnly { path: self.path.clone() });
+        };
         let transaction =
             self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        if owner(&transaction)? != self.owner {
+        if owner(&transaction)? != *expected {
             let path = self.path.parent().unwrap_or(&self.path).to_owned();
             return Err(StoreError::TakenOver { path });
         }
@@ -287,53 +428,6 @@ fn owner(connection: &Connection) -> rusqlite::Result<Vec<u8>> {
     connection.prepare_cached("SELECT owner FROM identity")?.query_row([], |row| row.get(0))
 }
 
-fn experiment(connection: &Connection, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
-    if i64::try_from(id.0).is_err() {
-        return Ok(None); // SQLite's integers are signed.
-    }
-    let mut statement =
-        connection.prepare_cached(&format!("{SELECT_EXPERIMENT} WHERE e.id = ?1"))?;
-    statement.query_row([id.0], read_experiment).optional()?.transpose()
-}
-
-const SELECT_EXPERIMENT: &str =
-    "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
-            e.submitted_at_ms, e.digest, c.held_out_mean, c.judged_mean,
-            g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
-            g.duration_ms, g.episodes, g.workers, g.idle_share, e.priority,
-            (SELECT max(sequence) FROM events WHERE experiment_id = e.id)
-     FROM experiments e
-     LEFT JOIN champions c ON c.experiment_id = e.id
-     LEFT JOIN generations g ON g.experiment_id = e.id AND g.generation =
-               (SELECT max(generation) FROM generations WHERE experiment_id = e.id)";
-
-fn read_experiment(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> {
-    let id = ExperimentId(row.get(0)?);
-    let state: String = row.get(5)?;
-    let Some(state) = ExperimentState::from_name(&state) else {
-        return Ok(Err(StoreError::Corrupt(format!("experiment {id} has state \"{state}\""))));
-    };
-    let Some(priority) = Priority::new(row.get(21)?) else {
-        return Ok(Err(StoreError::Corrupt(format!("experiment {id} has no valid priority"))));
-    };
-    Ok(Ok(ExperimentRecord {
-        id,
-        config_json: row.get(1)?,
-        config_digest: row.get(2)?,
-        fingerprint: row.get(3)?,
-        genotype_len: row.get(4)?,
-        state,
-        reason: row.get(6)?,
-        submitted_at_ms: row.get(7)?,
-        digest: row.get(8)?,
-        held_out_fitness: row.get(9)?,
-        judged_fitness: row.get(10)?,
-        latest: history::read_generation(row, 11)?,
-        priority,
-        last_sequence: row.get::<_, Option<u64>>(22)?.unwrap_or_default(),
-    }))
-}
-
 fn set_state(
     transaction: &Transaction<'_>,
     id: ExperimentId,
@@ -343,12 +437,12 @@ fn set_state(
 ) -> rusqlite::Result<()> {
     let n_changed = transaction.execute(
         "UPDATE experiments SET state = ?2, reason = ?3
-         WHERE id = ?1 AND state IN ('running', 'paused') AND state <> ?2",
+         WHERE id = ?1 AND state IN ('running', 'paused')
+           AND (state <> ?2 OR ?2 = 'paused' AND reason <> ?3)",
         params![id.0, state.name(), reason],
     )?;
     if n_changed > 0 {
         add_state_event(transaction, id, now_ms, state, reason)?;
-        checkpoints::delete_unless_of_use(transaction, id, state, reason)?;
     }
     Ok(())
 }
@@ -375,10 +469,12 @@ fn add_notice(
     now_ms: u64,
     text: &str,
 ) -> rusqlite::Result<()> {
+    // Of an experiment that is deleted, nothing is worth a line.
     transaction.execute(
         "INSERT INTO events (experiment_id, sequence, at_ms, kind, message)
-         VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
-                 ?2, 'notice', ?3)",
+         SELECT ?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
+                ?2, 'notice', ?3
+         WHERE EXISTS (SELECT 1 FROM experiments WHERE id = ?1)",
         params![id.0, now_ms, text],
     )?;
     Ok(())

@@ -1,9 +1,11 @@
 //! What the store keeps, as plain data.
 
+use bundle::Keyframes;
 use experiment_file::ExperimentConfig;
 
-use crate::{ids::ExperimentId, priority::Priority};
-use evolution::{Digest, Statistics};
+use super::ForkRecord;
+use crate::{group::Membership, ids::ExperimentId, labels::Labels, priority::Priority};
+use evolution::{Champion, Digest, Statistics};
 
 /// Where an experiment stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,10 +58,18 @@ pub struct NewExperiment {
     pub config_digest: Digest,
     /// Genes of a genotype.
     pub genotype_len: usize,
-    /// Evolution before its first generation: the state of its first checkpoint.
-    pub checkpoint: Vec<u8>,
+    /// Evolution before its first own generation.
+    pub keyframe: Vec<u8>,
     /// Its share of the fleet.
     pub priority: Priority,
+    /// The group that it belongs to, if any.
+    pub membership: Option<Membership>,
+    /// What people find it by.
+    pub labels: Labels,
+    /// Where it comes from, if it is a fork.
+    pub fork: Option<ForkRecord>,
+    /// The champion of its keyframe, if it has one.
+    pub champion: Option<Champion>,
 }
 
 /// An experiment as it stands.
@@ -95,6 +105,76 @@ pub struct ExperimentRecord {
     pub priority: Priority,
     /// Sequence number of its latest event.
     pub last_sequence: u64,
+    /// The group that it belongs to, if any.
+    pub membership: Option<Membership>,
+    /// What people find it by.
+    pub labels: Labels,
+    /// Whether lists leave it out.
+    pub is_archived: bool,
+    /// Mean wall-clock time of its latest generations, ms; none before the first.
+    pub recent_generation_ms: Option<f64>,
+    /// The first generation in its fitness log; one that is not complete if there is none.
+    pub log_from: u64,
+    /// Why that is not generation 0.
+    pub log_gap: LogGap,
+    /// Where it comes from, if it is a fork.
+    pub fork: Option<ForkRecord>,
+}
+
+impl ExperimentRecord {
+    /// Completed generations, with those that a fork shares with its parent.
+    pub fn n_generations(&self) -> u64 {
+        self.latest.as_ref().map_or(0, |latest| latest.generation + 1)
+    }
+
+    /// The link of the generations' digest chain on which the next generation hangs.
+    pub fn last_link(&self) -> &str {
+        match (&self.latest, &self.fork) {
+            (Some(latest), Some(fork)) if latest.generation == fork.generation => &fork.link,
+            (Some(latest), _) => &latest.digest,
+            (None, _) => &self.config_digest,
+        }
+    }
+
+    /// Whether more generations can be asked for although it has ended.
+    pub fn can_be_continued(&self) -> bool {
+        self.state == ExperimentState::Completed && self.reason.is_empty()
+    }
+}
+
+/// Why the fitness log lacks an experiment's first generations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogGap {
+    /// It does not.
+    None,
+    /// They were computed by a version that kept no log.
+    Older,
+    /// A client had them deleted.
+    Pruned,
+    /// They were damaged, and so were not taken into a recovered database.
+    Damaged,
+    /// They are the parent's, of which this is a fork.
+    Forked,
+}
+
+impl LogGap {
+    /// Its name in the database.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Older => "older",
+            Self::Pruned => "pruned",
+            Self::Damaged => "damaged",
+            Self::Forked => "forked",
+        }
+    }
+
+    /// The gap of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::None, Self::Older, Self::Pruned, Self::Damaged, Self::Forked]
+            .into_iter()
+            .find(|gap| gap.name() == name)
+    }
 }
 
 /// A completed generation.
@@ -115,6 +195,22 @@ pub struct GenerationRecord {
     /// Share of the fleet's time not spent computing.
     pub idle_share: f64,
 }
+
+/// Everything that an experiment's results follow from, with its configuration.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// All generations, with the time at which each was completed, ms since 1970 UTC.
+    pub history: Vec<(u64, GenerationRecord)>,
+    /// The fitness log.
+    pub log: Vec<Vec<u8>>,
+    /// States of evolution, by the number of generations before them, in order.
+    pub keyframes: Keyframes,
+    /// The champion.
+    pub champion: Option<Champion>,
+}
+
+/// A generation, and what evolution was told of it.
+pub type LogEntry = (GenerationRecord, Vec<u8>);
 
 /// Something that happened to an experiment.
 #[derive(Debug, Clone, PartialEq)]

@@ -171,6 +171,74 @@ const MIGRATIONS: &[&str] = &[
     ALTER TABLE champions ADD COLUMN judged_trials INTEGER;
     ALTER TABLE champions ADD COLUMN judged_generation INTEGER;
 ",
+    "
+    -- The group that an experiment belongs to, and what is particular about it there; NULL if
+    -- it belongs to none.
+    ALTER TABLE experiments ADD COLUMN group_name TEXT;
+    ALTER TABLE experiments ADD COLUMN variant TEXT;
+",
+    "
+    -- What evolution was told of each generation, in the format of the crate `evolution`.
+    CREATE TABLE fitness_log (
+        experiment_id INTEGER NOT NULL REFERENCES experiments (id),
+        generation INTEGER NOT NULL,
+        told BLOB NOT NULL,
+        seal BLOB NOT NULL,
+        PRIMARY KEY (experiment_id, generation)
+    ) STRICT, WITHOUT ROWID;
+    INSERT INTO fitness_log SELECT experiment_id, generation, step, seal FROM checkpoint_steps;
+
+    CREATE TABLE keyframes (
+        experiment_id INTEGER NOT NULL REFERENCES experiments (id),
+        -- The generations before it.
+        n_generations INTEGER NOT NULL,
+        -- Evolution after them, in the format of the crate `evolution`.
+        state BLOB NOT NULL,
+        seal BLOB NOT NULL,
+        PRIMARY KEY (experiment_id, n_generations)
+    ) STRICT;
+    INSERT INTO keyframes
+    SELECT experiment_id,
+           (SELECT count(*) FROM generations AS g WHERE g.experiment_id = c.experiment_id)
+           - (SELECT count(*) FROM checkpoint_steps AS s WHERE s.experiment_id = c.experiment_id),
+           state, seal
+    FROM checkpoints AS c;
+    DROP TABLE checkpoints;
+    DROP TABLE checkpoint_steps;
+
+    -- The first generation in the log; one that is not complete if there is none.
+    ALTER TABLE experiments ADD COLUMN log_from INTEGER NOT NULL DEFAULT 0;
+    -- Why that is not generation 0.
+    ALTER TABLE experiments ADD COLUMN log_gap TEXT NOT NULL DEFAULT ''
+          CHECK (log_gap IN ('', 'older', 'pruned', 'damaged', 'forked'));
+    UPDATE experiments SET log_from = ifnull(
+        (SELECT n_generations FROM keyframes WHERE experiment_id = id),
+        (SELECT count(*) FROM generations WHERE experiment_id = id));
+    UPDATE experiments SET log_gap = 'older' WHERE log_from > 0;
+",
+    "
+    -- Experiments that go on from the state of another one, whose history up to there is
+    -- theirs, too.
+    CREATE TABLE forks (
+        experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+        -- The experiment may be gone, in a recovered database.
+        parent_id INTEGER NOT NULL,
+        -- The last generation of the parent that is shared.
+        generation INTEGER NOT NULL,
+        -- The link of the digest chain on which the next generation hangs.
+        link TEXT NOT NULL,
+        -- What is changed: a JSON list of lines.
+        changes TEXT NOT NULL,
+        seal BLOB NOT NULL
+    ) STRICT;
+",
+    "
+    -- What people find an experiment by: a JSON object of text.
+    ALTER TABLE experiments ADD COLUMN labels TEXT NOT NULL DEFAULT '{}';
+    -- Whether lists leave it out.
+    ALTER TABLE experiments ADD COLUMN archived INTEGER NOT NULL DEFAULT 0
+          CHECK (archived IN (0, 1));
+",
 ];
 
 /// The first version with seals.
@@ -181,6 +249,18 @@ const WITH_STEPS: i64 = 5;
 
 /// The first version with judged champions.
 const JUDGED: i64 = 6;
+
+/// The first version with groups.
+const GROUPS: i64 = 7;
+
+/// The first version with a fitness log.
+const LOGGED: i64 = 8;
+
+/// The first version with forks.
+const FORKS: i64 = 9;
+
+/// The first version with labels and an archive.
+const LABELS: i64 = 10;
 
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
@@ -224,26 +304,62 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
 /// changing it. Seals that it does not have are empty.
 pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result<()> {
     // In the temporary schema, where names are looked up first.
-    if version < WITH_STEPS {
-        connection.execute_batch(
-            "CREATE TEMP VIEW checkpoint_steps AS
-             SELECT 0 AS experiment_id, 0 AS generation, x'' AS step, x'' AS seal WHERE false",
-        )?;
-    }
-    let if_before = |first, columns| if version < first { columns } else { "" };
-    let priority = if_before(2, ", 100 AS priority");
+    let if_before = |first, columns: &str| match version < first {
+        true => columns.to_owned(),
+        false => String::new(),
+    };
     let seal = if_before(SEALED, ", x'' AS seal");
-    let judged = if_before(
-        JUDGED,
-        ", NULL AS judged_mean, NULL AS judged_low, NULL AS judged_high,
-         NULL AS judged_trials, NULL AS judged_generation",
+    let mut views = vec![
+        ("generations", format!("*{seal} FROM main.generations")),
+        ("champions", {
+            let judged = ", NULL AS judged_mean, NULL AS judged_low, NULL AS judged_high,
+                            NULL AS judged_trials, NULL AS judged_generation";
+            format!("*{}{seal} FROM main.champions", if_before(JUDGED, judged))
+        }),
+    ];
+    if version < LOGGED {
+        let steps = match version < WITH_STEPS {
+            true => {
+                "(SELECT 0 AS experiment_id, 0 AS generation, x'' AS step, x'' AS seal
+                      WHERE false)"
+            }
+            false => "main.checkpoint_steps",
+        };
+        views.push((
+            "fitness_log",
+            format!("experiment_id, generation, step AS told, seal FROM {steps}"),
+        ));
+        views.push((
+            "keyframes",
+            format!(
+                "experiment_id,
+                 (SELECT count(*) FROM main.generations AS g
+                  WHERE g.experiment_id = c.experiment_id)
+                 - (SELECT count(*) FROM {steps} AS s WHERE s.experiment_id = c.experiment_id)
+                 AS n_generations,
+                 state, {} AS seal FROM main.checkpoints AS c",
+                if version < SEALED { "x''" } else { "seal" }
+            ),
+        ));
+    }
+    if version < FORKS {
+        let none = "0 AS experiment_id, 0 AS parent_id, 0 AS generation, '' AS link,
+                    '' AS changes, x'' AS seal WHERE false";
+        views.push(("forks", none.to_owned()));
+    }
+    let priority = if_before(2, ", 100 AS priority");
+    let log = if_before(
+        LOGGED,
+        ", ifnull((SELECT n_generations FROM keyframes WHERE experiment_id = id),
+                  (SELECT count(*) FROM main.generations WHERE experiment_id = id)) AS log_from,
+           'older' AS log_gap",
     );
-    for (table, more) in
-        [("experiments", priority), ("generations", ""), ("checkpoints", ""), ("champions", judged)]
-    {
-        connection.execute_batch(&format!(
-            "CREATE TEMP VIEW {table} AS SELECT *{more}{seal} FROM main.{table}"
-        ))?;
+    let group = if_before(GROUPS, ", NULL AS group_name, NULL AS variant");
+    let labels = if_before(LABELS, ", '{}' AS labels, 0 AS archived");
+    let experiments = format!("*{priority}{group}{seal}{log}{labels} FROM main.experiments");
+    views.push(("experiments", experiments));
+    for (name, select) in views {
+        connection.execute_batch(&format!("CREATE TEMP VIEW {name} AS SELECT {select}"))?;
     }
     Ok(())
 }
@@ -272,16 +388,16 @@ mod tests {
         let text =
             |sql: &str| connection.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap();
         assert_eq!(text(row), "3keyfailedwhylink100");
-        assert_eq!(text("SELECT count(*) || '' FROM checkpoints"), "0", "nothing can use it");
+        assert_eq!(text("SELECT count(*) || '' FROM keyframes"), "0", "nothing can use it");
         connection.execute("UPDATE experiments SET state = 'paused'", []).unwrap();
         connection
-            .execute("INSERT INTO checkpoints (experiment_id, state) VALUES (9, x'')", [])
+            .execute("INSERT INTO keyframes VALUES (9, 0, x'', x'')", [])
             .expect_err("references are checked again");
         connection
             .execute(
                 "INSERT INTO experiments SELECT NULL, NULL, name, config, config_digest,
                       fingerprint, genotype_len, state, reason, submitted_at_ms, digest, priority,
-                      seal FROM experiments",
+                      seal, NULL, NULL, log_from, log_gap, labels, archived FROM experiments",
                 [],
             )
             .unwrap();

@@ -7,10 +7,9 @@
 //! may write the database.
 
 use blake3::Hasher;
-use evolution::Advance;
 use rusqlite::{Connection, Transaction, params};
 
-use super::{GenerationRecord, Result, champions, checkpoints, history};
+use super::{GenerationRecord, Result, champions, fitness_log, history};
 use crate::ids::ExperimentId;
 
 /// A keyed digest.
@@ -45,13 +44,14 @@ impl Sealer {
             .finish()
     }
 
-    /// Of a checkpoint's state, which follows the `latest` generation.
-    pub fn checkpoint(
+    /// Of a keyframe, which follows the `latest` generation.
+    pub fn keyframe(
         &self,
         id: ExperimentId,
         latest: Option<&GenerationRecord>,
         state: &[u8],
     ) -> Seal {
+        // The names are those that older versions gave these rows.
         self.begin("checkpoint", id)
             .number(latest.map_or(0, |latest| latest.generation + 1))
             .text(latest.map_or("", |latest| latest.digest.as_str()).as_bytes())
@@ -59,17 +59,9 @@ impl Sealer {
             .finish()
     }
 
-    /// Of a step of a checkpoint, which leads to a generation.
-    pub fn step(&self, id: ExperimentId, of: &GenerationRecord, step: &[u8]) -> Seal {
-        self.begin("step", id).number(of.generation).text(of.digest.as_bytes()).text(step).finish()
-    }
-
-    /// Of what a generation changes in a checkpoint.
-    pub fn advance(&self, id: ExperimentId, of: &GenerationRecord, advance: &Advance) -> Seal {
-        match advance {
-            Advance::State(state) => self.checkpoint(id, Some(of), state),
-            Advance::Step(step) => self.step(id, of, step),
-        }
+    /// Of what evolution was told of a generation.
+    pub fn told(&self, id: ExperimentId, of: &GenerationRecord, told: &[u8]) -> Seal {
+        self.begin("step", id).number(of.generation).text(of.digest.as_bytes()).text(told).finish()
     }
 
     /// Of a row of the history.
@@ -160,12 +152,12 @@ pub fn seal_all(transaction: &Transaction<'_>) -> Result<()> {
     for id in ids {
         let id = id?;
         seal_experiment(transaction, &sealer, id)?;
-        let history = history::read_from(transaction, id, 0)?;
+        let history = history::read_all(transaction, id)?;
         for (generation, _) in &history {
             history::seal(transaction, &sealer, id, generation)?;
         }
         let latest = history.last().map(|(generation, _)| generation);
-        checkpoints::seal(transaction, &sealer, id, latest)?;
+        fitness_log::seal(transaction, &sealer, id, latest)?;
         champions::seal(transaction, &sealer, id)?;
     }
     Ok(())

@@ -4,8 +4,8 @@ use evolution::Checkpoint;
 use rusqlite::params;
 
 use super::{
-    ExperimentRecord, ExperimentState, GenerationRecord, Result, Store, StoreError, add_notice,
-    add_state_event, checkpoints, experiment, history, seals,
+    ExperimentRecord, ExperimentState, Result, Store, StoreError, add_notice, add_state_event,
+    experiments, fitness_log, forks, seals,
 };
 use crate::ids::ExperimentId;
 
@@ -15,7 +15,7 @@ impl Store {
     pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, Checkpoint)> {
         self.read(|connection| {
             let unsound = |what: &str| self.unsound(id, what.to_owned());
-            let found = match experiment(connection, id) {
+            let found = match experiments::get(connection, id) {
                 Err(StoreError::Corrupt(what)) => return Err(self.unsound(id, what)),
                 other => other?.ok_or_else(|| unsound("it is not there"))?,
             };
@@ -23,16 +23,18 @@ impl Store {
             if seal != expected {
                 return Err(unsound("its configuration is not what was stored"));
             }
-            let checkpoint = checkpoints::get(connection, id)?
-                .ok_or_else(|| unsound("its checkpoint is gone"))?;
-            let latest = found.latest.as_ref().map_or(0, |latest| latest.generation);
-            let first = latest.saturating_sub(checkpoint.n_steps() as u64);
-            let history = history::read_from(connection, id, first)?;
-            let history: Vec<GenerationRecord> = history.into_iter().map(|(of, _)| of).collect();
-            let checkpoint = checkpoint.check(Some(&self.sealer), id, &history);
-            let checkpoint = checkpoint.ok_or_else(|| {
-                unsound("its checkpoint, or the end of its history, is not what was stored")
-            })?;
+            // Its seal.
+            if let Err(StoreError::Corrupt(what)) = forks::get(connection, Some(&self.sealer), id) {
+                return Err(unsound(&what));
+            }
+            let n_generations = found.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+            let sealer = Some(&self.sealer);
+            let is_whole = fitness_log::ends_at(connection, id, n_generations)?;
+            let checkpoint = fitness_log::checkpoint(connection, sealer, id, n_generations)?
+                .filter(|_| is_whole)
+                .ok_or_else(|| {
+                    unsound("its checkpoint, or the end of its history, is not what was stored")
+                })?;
             Ok((found, checkpoint))
         })
     }

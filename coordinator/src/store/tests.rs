@@ -2,10 +2,8 @@
 
 use std::fs;
 
-use crate::submission::Submission;
-use evolution::{
-    Advance, Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Judged, Statistics,
-};
+use crate::{group::Membership, submission::Submission};
+use evolution::{Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Judged, Statistics};
 
 use super::*;
 
@@ -38,19 +36,11 @@ fn generation(generation: u64) -> GenerationRecord {
     }
 }
 
-/// Every second generation adds a step to the checkpoint.
-fn advance(number: u64) -> Advance {
-    match number % 2 {
-        0 => Advance::State(format!("after {number}").into()),
-        _ => Advance::Step(format!("to {number}").into()),
-    }
-}
-
-/// What [`advance`] leads to.
+/// There is a keyframe after every second generation, from the first on.
 pub fn checkpoint_after(number: u64) -> Checkpoint {
-    let state = format!("after {}", number / 2 * 2).into();
-    let steps = (number % 2 == 1).then(|| format!("to {number}").into());
-    Checkpoint { state, steps: steps.into_iter().collect() }
+    let keyframe = format!("after {}", number / 2 * 2).into();
+    let log = (number % 2 == 1).then(|| format!("told {number}").into());
+    Checkpoint { keyframe, log: log.into_iter().collect() }
 }
 
 pub fn commit(
@@ -67,12 +57,14 @@ pub fn commit(
         held_out: None,
         judged: None,
     };
+    let (told, keyframe) = (format!("told {number}"), format!("after {number}"));
+    let keyframe = number.is_multiple_of(2).then_some(keyframe.as_bytes());
     store.commit_generation(
         id,
         1000 + number,
         &GenerationCommit {
             generation: &generation(number),
-            checkpoint: &advance(number),
+            entry: Entry { told: told.as_bytes(), keyframe },
             champion: Some(&champion),
             digest: "link",
             notices: &["look".to_owned()],
@@ -81,13 +73,37 @@ pub fn commit(
     )
 }
 
-/// Takes a database from version 6 to version 5.
+/// Takes a database to version 7.
+pub const WITHOUT_LOG: &str = "
+    DROP TABLE forks;
+    CREATE TABLE checkpoints (experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
+                              state BLOB NOT NULL, seal BLOB NOT NULL DEFAULT x'') STRICT;
+    INSERT OR REPLACE INTO checkpoints SELECT experiment_id, state, seal FROM keyframes
+    ORDER BY n_generations;
+    CREATE TABLE checkpoint_steps (
+        experiment_id INTEGER NOT NULL REFERENCES experiments (id),
+        generation INTEGER NOT NULL, step BLOB NOT NULL, seal BLOB NOT NULL,
+        PRIMARY KEY (experiment_id, generation)) STRICT, WITHOUT ROWID;
+    INSERT INTO checkpoint_steps SELECT * FROM fitness_log AS l
+    WHERE generation >= (SELECT max(n_generations) FROM keyframes AS k
+                         WHERE k.experiment_id = l.experiment_id);
+    DROP TABLE keyframes;
+    DROP TABLE fitness_log;
+    ALTER TABLE experiments DROP COLUMN labels;
+    ALTER TABLE experiments DROP COLUMN archived;
+    ALTER TABLE experiments DROP COLUMN log_from;
+    ALTER TABLE experiments DROP COLUMN log_gap;
+    PRAGMA user_version = 7;";
+
+/// Takes it from there to version 5.
 pub const WITHOUT_JUDGEMENTS: &str = "
     ALTER TABLE champions DROP COLUMN judged_mean;
     ALTER TABLE champions DROP COLUMN judged_low;
     ALTER TABLE champions DROP COLUMN judged_high;
     ALTER TABLE champions DROP COLUMN judged_trials;
     ALTER TABLE champions DROP COLUMN judged_generation;
+    ALTER TABLE experiments DROP COLUMN group_name;
+    ALTER TABLE experiments DROP COLUMN variant;
     PRAGMA user_version = 5;";
 
 fn open() -> (tempfile::TempDir, Store) {
@@ -142,7 +158,7 @@ fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
                 1,
                 &GenerationCommit {
                     generation: &generation(number),
-                    checkpoint: &Advance::State(Vec::new()),
+                    entry: Entry { told: b"told", keyframe: None },
                     champion: Some(&champion),
                     digest: "link",
                     notices: &[],
@@ -163,10 +179,10 @@ fn a_new_experiment_can_be_resumed_before_its_first_generation() {
     let new = new_experiment(None);
     let (id, _) = store.create(&new, 5).unwrap();
     let checkpoint = store.resumable(id).unwrap().1;
-    assert_eq!(checkpoint.state, new.checkpoint);
+    assert_eq!(checkpoint.keyframe, new.keyframe);
     let evolution = Evolution::restore(&checkpoint).unwrap();
     assert_eq!(evolution.n_generations(), 0);
-    assert_eq!(evolution.state(), new.checkpoint);
+    assert_eq!(evolution.keyframe(), new.keyframe);
     assert_eq!(store.champion(id).unwrap(), None);
 }
 
@@ -211,6 +227,23 @@ fn events_tell_the_whole_story_in_order_and_from_any_number() {
 }
 
 #[test]
+fn an_experiment_keeps_its_group_also_when_the_database_is_recovered() {
+    let (directory, mut store) = open();
+    let membership = Membership::new("sizes", "algorithm.population_size=50").ok();
+    let new = NewExperiment { membership: membership.clone(), ..new_experiment(None) };
+    let (id, _) = store.create(&new, 5).unwrap();
+    let (of_none, _) = store.create(&new_experiment(None), 6).unwrap();
+    drop(store);
+    let to = directory.path().join("recovered");
+    recover(directory.path(), &to).unwrap();
+    for directory in [directory.path(), &to] {
+        let store = Store::open(directory).unwrap();
+        assert_eq!(store.experiment(id).unwrap().unwrap().membership, membership);
+        assert_eq!(store.experiment(of_none).unwrap().unwrap().membership, None);
+    }
+}
+
+#[test]
 fn history_is_read_in_parts_and_says_when_generations_were_completed() {
     let (_directory, mut store) = open();
     let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
@@ -246,21 +279,81 @@ fn an_ended_experiment_takes_no_more_generations_and_ends_once() {
 }
 
 #[test]
-fn a_completed_experiment_can_be_given_more_generations_and_others_cannot() {
+fn an_experiment_goes_on_from_the_end_that_is_meant_and_no_other() {
     let (_directory, mut store) = open();
     let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
-    commit(&mut store, ids[0], 0, Some("")).unwrap();
-    store.set_state(ids[1], 6, ExperimentState::Cancelled, "enough").unwrap();
-    let states = ids.map(|id| {
-        store.reopen(id, "longer", 7).unwrap();
-        store.experiment(id).unwrap().unwrap()
-    });
+    let [completed, cancelled] = ids;
+    commit(&mut store, completed, 0, Some("")).unwrap();
+    store.set_state(cancelled, 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.set_archived(completed, true).unwrap();
+    for id in ids {
+        store.reopen(id, ExperimentState::Completed, "longer", "more", 7).unwrap();
+    }
+    let states = ids.map(|id| store.experiment(id).unwrap().unwrap());
     assert_eq!(states[0].state, ExperimentState::Running);
-    assert_eq!(states[0].config_json, "longer");
+    assert_eq!((states[0].config_json.as_str(), states[0].is_archived), ("longer", false));
     assert_eq!(states[1].state, ExperimentState::Cancelled);
     assert_ne!(states[1].config_json, "longer");
-    assert_eq!(store.events(ids[1], 1, 100).unwrap().len(), 2, "nothing has happened to it");
-    commit(&mut store, ids[0], 1, None).unwrap();
+    assert_eq!(store.events(cancelled, 1, 100).unwrap().len(), 2, "nothing has happened to it");
+    commit(&mut store, completed, 1, None).unwrap();
+    store.reopen(cancelled, ExperimentState::Cancelled, "same", "resumed", 8).unwrap();
+    commit(&mut store, cancelled, 0, None).unwrap();
+}
+
+#[test]
+fn a_deleted_experiment_leaves_nothing_but_its_number() {
+    let (directory, mut store) = open();
+    let ids = [0, 1].map(|_| store.create(&new_experiment(Some("key")), 5).unwrap().0);
+    assert_eq!(ids[0], ids[1]);
+    let kept = store.create(&new_experiment(None), 5).unwrap().0;
+    let [id, _] = ids;
+    commit(&mut store, kept, 0, None).unwrap();
+    commit(&mut store, id, 0, None).unwrap();
+    assert!(matches!(store.delete(id), Err(StoreError::Unfinished(other)) if other == id));
+    store.set_state(id, 6, ExperimentState::Cancelled, "enough").unwrap();
+    store.delete(id).unwrap();
+    assert!(store.experiment(id).unwrap().is_none());
+    let n_rows = |table: &str| {
+        let sql = format!("SELECT count(*) FROM {table} WHERE experiment_id = ?1");
+        store.connection().query_row(&sql, [id.0], |row| row.get::<_, u64>(0)).unwrap()
+    };
+    let sql = "SELECT name FROM pragma_table_list AS t WHERE EXISTS
+               (SELECT 1 FROM pragma_table_info(t.name) WHERE name = 'experiment_id')";
+    let mut statement = store.connection().prepare(sql).unwrap();
+    let tables: Vec<String> =
+        statement.query_map([], |row| row.get(0)).unwrap().map(Result::unwrap).collect();
+    drop(statement);
+    assert!(tables.len() >= 6, "{tables:?}");
+    assert!(tables.iter().all(|table| n_rows(table) == 0), "{tables:?}");
+
+    // What comes too late does no harm.
+    store.notice(id, 7, "late").unwrap();
+    assert!(matches!(commit(&mut store, id, 1, None), Err(StoreError::Ended(_))));
+    let (again, is_new) = store.create(&new_experiment(Some("key")), 8).unwrap();
+    assert!(is_new && again > kept, "numbers are not used again");
+    drop(store);
+    let findings = inspect(directory.path()).unwrap().findings;
+    assert!(findings.iter().all(|it| it.experiment != Some(id)), "{findings:?}");
+}
+
+#[test]
+fn labels_and_the_archive_are_kept_through_recovery() {
+    let (directory, mut store) = open();
+    let labels = |text: &str| [("user".to_owned(), text.to_owned())].into();
+    let new = NewExperiment { labels: labels("ada"), ..new_experiment(None) };
+    let (id, _) = store.create(&new, 5).unwrap();
+    assert_eq!(store.experiment(id).unwrap().unwrap().labels, labels("ada"));
+    store.set_labels(id, &labels("grace")).unwrap();
+    store.set_archived(id, true).unwrap();
+    assert!(!store.experiment(id).unwrap().unwrap().is_archived, "it goes on");
+    commit(&mut store, id, 0, Some("")).unwrap();
+    store.set_archived(id, true).unwrap();
+    drop(store);
+    let copy = directory.path().join("copy");
+    recover(directory.path(), &copy).unwrap();
+    let found = Store::open(&copy).unwrap().experiment(id).unwrap().unwrap();
+    assert_eq!((found.labels, found.is_archived), (labels("grace"), true));
+    assert_eq!(found.recent_generation_ms, Some(found.latest.unwrap().duration_ms as f64));
 }
 
 #[test]
@@ -272,6 +365,41 @@ fn a_generation_that_cannot_be_committed_leaves_nothing_behind() {
     assert!(commit(&mut store, id, 0, None).is_err(), "a generation is committed once");
     assert_eq!(store.events(id, 1, 100).unwrap(), before);
     assert_eq!(store.resumable(id).unwrap().1, checkpoint_after(0));
+}
+
+#[test]
+fn pruning_frees_the_log_of_an_ended_experiment_and_leaves_what_it_continues_from() {
+    let (directory, mut store) = open();
+    let ids = [0, 1].map(|_| store.create(&new_experiment(None), 5).unwrap().0);
+    for number in 0..3 {
+        commit(&mut store, ids[1], number, None).unwrap();
+        commit(&mut store, ids[0], number, (number == 2).then_some("")).unwrap();
+    }
+    let refused = store.prune(ids[1], None, 7);
+    assert!(matches!(refused, Err(StoreError::Unfinished(id)) if id == ids[1]), "{refused:?}");
+    store.set_state(ids[1], 7, ExperimentState::Cancelled, "enough").unwrap();
+    let history = store.generations(ids[0], 0, 9).unwrap();
+
+    assert!(store.prune(ids[0], Some(b"now"), 8).unwrap() > 0);
+    assert!(store.prune(ids[1], None, 8).unwrap() > 0);
+    assert_eq!(store.prune(ids[0], Some(b"now"), 9).unwrap(), 0, "it is pruned already");
+    let now = Checkpoint { keyframe: b"now".to_vec(), log: Vec::new() };
+    assert_eq!(store.resumable(ids[0]).unwrap().1, now);
+    assert!(store.resumable(ids[1]).is_err(), "nothing continues from it");
+    for id in ids {
+        let found = store.experiment(id).unwrap().unwrap();
+        assert_eq!((found.log_from, found.log_gap), (3, LogGap::Pruned));
+        assert!(store.champion(id).unwrap().is_some());
+    }
+    assert_eq!(store.generations(ids[0], 0, 9).unwrap(), history);
+    store.reopen(ids[0], ExperimentState::Completed, "longer", "more", 10).unwrap();
+    commit(&mut store, ids[0], 3, None).unwrap();
+    let keyframe = b"now".to_vec();
+    let log = vec![b"told 3".to_vec()];
+    assert_eq!(store.resumable(ids[0]).unwrap().1, Checkpoint { keyframe, log });
+    drop(store);
+    let problems = inspect(directory.path()).unwrap().findings;
+    assert!(problems.iter().all(|problem| !problem.what.contains("keyframe")), "{problems:?}");
 }
 
 #[test]
@@ -317,7 +445,8 @@ fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
     let (directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
     store.set_state(id, 6, ExperimentState::Paused, "for lunch").unwrap();
-    store.set_state(id, 7, ExperimentState::Paused, "again").unwrap();
+    store.set_state(id, 7, ExperimentState::Paused, "for dinner").unwrap();
+    store.set_state(id, 7, ExperimentState::Paused, "for dinner").unwrap();
     commit(&mut store, id, 0, None).unwrap();
     drop(store);
 
@@ -326,7 +455,7 @@ fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
         let experiment = store.experiment(id).unwrap().unwrap();
         (experiment.state, experiment.reason)
     };
-    assert_eq!(state(&store), (ExperimentState::Paused, "for lunch".to_owned()));
+    assert_eq!(state(&store), (ExperimentState::Paused, "for dinner".to_owned()));
     store.set_state(id, 8, ExperimentState::Running, "").unwrap();
     assert_eq!(state(&store), (ExperimentState::Running, String::new()));
     let events = store.events(id, 1, 100).unwrap();
@@ -334,7 +463,12 @@ fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
         EventKind::State { state, .. } => Some(*state),
         _ => None,
     });
-    let expected = [ExperimentState::Running, ExperimentState::Paused, ExperimentState::Running];
+    let expected = [
+        ExperimentState::Running,
+        ExperimentState::Paused,
+        ExperimentState::Paused,
+        ExperimentState::Running,
+    ];
     assert_eq!(states.collect::<Vec<_>>(), expected);
 }
 

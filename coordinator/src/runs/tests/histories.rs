@@ -33,6 +33,7 @@ fn request() -> impl Strategy<Value = Request> {
         2 => Just(Request::Pause("by a test".to_owned())),
         3 => Just(Request::Resume),
         1 => Just(Request::SetPriority(Priority::new(7).unwrap())),
+        1 => Just(Request::Settle),
     ]
 }
 
@@ -70,9 +71,8 @@ fn take(world: &mut World, step: Step) {
         Step::Submit(generations) if world.store.len() < 3 => drop(world.submit(generations)),
         Step::Submit(_) => {}
         Step::Reopen(index) => {
-            let completed = |state| state == ExperimentState::Completed;
-            let ids = world.store.iter().filter(|(_, stored)| completed(stored.state));
-            if let Some(id) = pick(&index, ids.map(|(&id, _)| id)) {
+            let ids = world.store.keys().copied().filter(|&id| world.can_be_reopened(id));
+            if let Some(id) = pick(&index, ids) {
                 world.reopen(id);
             }
         }

@@ -225,6 +225,27 @@ fn a_change_that_is_on_its_way_holds_for_a_reopened_run() {
 }
 
 #[test]
+fn a_cancelled_experiment_goes_on_once_its_end_is_settled() {
+    let (mut world, id) = committing();
+    world.request(id, Request::Cancel);
+    world.write_commit(0);
+    world.report_commit(0);
+    world.write_change(0);
+    assert_eq!(world.store[&id].state, ExperimentState::Cancelled);
+    let settled = world.request(id, Request::Settle);
+    assert_eq!(world.answers[&settled], None, "the end is not reported");
+    world.report_change(0);
+    assert_eq!(world.answers[&settled], Some(true));
+    world.reopen(id);
+    world.settle();
+    world.check_settled();
+    assert_eq!(world.store[&id].state, ExperimentState::Completed);
+    assert_eq!(world.store[&id].n_done(), world.store[&id].config.algorithm.generations);
+    let at_once = world.request(id, Request::Settle);
+    assert_eq!(world.answers[&at_once], Some(true));
+}
+
+#[test]
 fn an_experiment_whose_generation_cannot_be_stored_fails() {
     let (mut world, id) = committing();
     world.fail_commit(0, CommitOutcome::Failed("a bad page".to_owned()));
@@ -265,9 +286,7 @@ fn an_abandoned_evaluation_is_dropped_and_a_finished_one_answered() {
     let mut runs = Runs::new(u64::MAX);
     let evaluation = || Evaluation {
         spec: "{}".into(),
-        genotype: vec![0.5],
-        n_trials: 1,
-        n_values: 2,
+        batch: Batch::measures(vec![0.5], 1, 2),
         priority: crate::priority::Priority::default(),
     };
     let abandoned = runs.on_evaluation_requested(evaluation());
@@ -277,9 +296,9 @@ fn an_abandoned_evaluation_is_dropped_and_a_finished_one_answered() {
     assert!(
         matches!(runs.poll_command(), Some(Command::EndJob { job }) if job == abandoned.into())
     );
-    runs.on_evaluation_finished(abandoned, Ok(vec![1.0, 2.0]));
+    runs.on_evaluation_finished(abandoned, Ok(vec![vec![1.0, 2.0]]));
     assert!(runs.poll_command().is_none());
-    runs.on_evaluation_finished(finished, Ok(vec![1.0, 2.0]));
+    runs.on_evaluation_finished(finished, Ok(vec![vec![1.0, 2.0]]));
     assert!(matches!(runs.poll_command(), Some(Command::EndJob { job }) if job == finished.into()));
     assert!(matches!(runs.poll_command(), Some(Command::AnswerEvaluation { result: Ok(_), .. })));
 }

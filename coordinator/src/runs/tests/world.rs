@@ -156,13 +156,24 @@ impl World {
         id
     }
 
-    /// A client asks for more generations of a completed experiment.
+    /// A client asks for more generations of a completed experiment, or takes back the end of
+    /// another one.
     pub fn reopen(&mut self, id: ExperimentId) {
         let stored = self.store.get_mut(&id).unwrap();
-        assert_eq!(stored.state, ExperimentState::Completed);
+        assert!(!stored.state.is_unfinished());
+        if stored.state == ExperimentState::Completed {
+            stored.config.algorithm.generations += 2;
+        }
         stored.state = ExperimentState::Running;
-        stored.config.algorithm.generations += 2;
         self.run(id);
+    }
+
+    /// Whether a client may reopen an experiment: its former end is settled.
+    pub fn can_be_reopened(&self, id: ExperimentId) -> bool {
+        match self.store[&id].state {
+            ExperimentState::Completed => true,
+            state => !state.is_unfinished() && self.runs.changes.pending(id).next().is_none(),
+        }
     }
 
     fn run(&mut self, id: ExperimentId) {

@@ -1,14 +1,16 @@
 //! An experiment, read part by part: what of it can be read and is as it was stored.
 
-use evolution::{ALGORITHMS, Champion, Checkpoint, Digest, Evolution};
+use evolution::{ALGORITHMS, Champion, Digest};
 use experiment_file::ExperimentConfig;
 use rusqlite::{Connection, Row};
 
 use super::{
     super::{
-        ExperimentState, GenerationRecord, StoreError, champions, checkpoints, history,
+        ExperimentState, ForkRecord, GenerationRecord, LogGap, StoreError, champions, forks,
+        history,
         seals::{self, Sealer},
     },
+    log::{self, SoundLog},
     source::Source,
 };
 use crate::ids::ExperimentId;
@@ -24,8 +26,10 @@ pub struct Inspected {
     pub history: Option<Vec<GenerationRecord>>,
     /// Its champion, if it has one.
     pub champion: Option<Option<Champion>>,
-    /// Its checkpoint, if it has one.
-    pub checkpoint: Option<Option<Checkpoint>>,
+    /// What of its fitness log can be kept. None is no damage if it has ended and has none.
+    pub log: Option<SoundLog>,
+    /// Whether it can go on from its log.
+    pub can_go_on: bool,
     /// All its events.
     pub events: Option<Vec<EventRow>>,
     /// What is wrong, one line each.
@@ -47,6 +51,31 @@ pub struct ExperimentRow {
     pub submitted_at_ms: u64,
     pub digest: String,
     pub priority: i64,
+    pub group: Option<String>,
+    pub variant: Option<String>,
+    pub labels: String,
+    pub is_archived: bool,
+    pub log_from: u64,
+    /// None if there is no such reason.
+    pub log_gap: Option<LogGap>,
+    /// Where it comes from, if it is a fork.
+    pub fork: Option<ForkRecord>,
+}
+
+impl ExperimentRow {
+    /// The link of the digest chain on which a generation hangs that follows `history`.
+    pub fn last_link<'a>(&'a self, history: &'a [GenerationRecord]) -> &'a str {
+        match (history.last(), &self.fork) {
+            (Some(latest), Some(fork)) if latest.generation == fork.generation => &fork.link,
+            (Some(latest), _) => &latest.digest,
+            (None, _) => &self.config_digest,
+        }
+    }
+
+    /// Whether it may still go on.
+    pub fn is_unfinished(&self) -> bool {
+        self.state.is_some_and(ExperimentState::is_unfinished)
+    }
 }
 
 /// A row of the table of events; see the schema.
@@ -92,10 +121,18 @@ impl Inspected {
         let row = keep(&mut problems, read_row(connection, sealer, id));
         let history = keep(&mut problems, read_history(connection, sealer, id));
         let champion = keep(&mut problems, read_champion(connection, sealer, id));
-        let checkpoint = read_checkpoint(connection, sealer, id, history.as_deref(), row.as_ref());
-        let checkpoint = keep(&mut problems, checkpoint);
+        let mut log = None;
+        let mut can_go_on = false;
+        if let (Some(row), Some(history)) = (&row, &history) {
+            log = log::read(connection, sealer, id, history, row, &mut problems);
+            // Another version of the simulation may have other algorithms.
+            can_go_on = log.is_some()
+                && (row.fingerprint != sim_core::FINGERPRINT
+                    || keep(&mut problems, log::check_end(connection, sealer, id, history, row))
+                        .is_some());
+        }
         let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
-        let mut inspected = Self { id, row, history, champion, checkpoint, events, problems };
+        let mut inspected = Self { id, row, history, champion, log, can_go_on, events, problems };
         inspected.find_what_is_missing();
         inspected
     }
@@ -106,29 +143,28 @@ impl Inspected {
         let has_all = match row.state {
             None => false,
             // The next generation brings the champion again.
-            Some(state) if state.is_unfinished() => {
-                matches!(self.checkpoint, Some(Some(_))) && self.history.is_some()
-            }
+            Some(state) if state.is_unfinished() => self.can_go_on,
             Some(_) => self.history.is_some() && self.champion.is_some(),
         };
         match has_all {
             true => Fate::Kept,
-            false if row.fingerprint == sim_core::FINGERPRINT => Fate::Restarted,
+            // A fork begins with the state of another experiment.
+            false if row.fingerprint == sim_core::FINGERPRINT && row.fork.is_none() => {
+                Fate::Restarted
+            }
             false => Fate::Lost,
         }
     }
 
     fn find_what_is_missing(&mut self) {
         let Some(row) = &self.row else { return };
-        match row.state {
-            None => self.problems.push("its state is not a state".to_owned()),
-            Some(state) if state.is_unfinished() && matches!(self.checkpoint, Some(None)) => {
-                self.problems.push("its checkpoint is gone".to_owned());
-            }
-            Some(_) => {}
+        if row.state.is_none() {
+            self.problems.push("its state is not a state".to_owned());
         }
         let has_ended = row.state.is_some_and(|state| !state.is_unfinished());
-        let has_history = self.history.as_ref().is_some_and(|history| !history.is_empty());
+        let n_shared = row.fork.as_ref().map_or(0, |fork| fork.generation + 1);
+        let n_generations = self.history.as_ref().map_or(0, |history| history.len() as u64);
+        let has_history = n_generations > n_shared;
         if has_ended && has_history && matches!(self.champion, Some(None)) {
             self.champion = None;
             self.problems.push("its champion is gone".to_owned());
@@ -141,7 +177,8 @@ fn keep<T>(problems: &mut Vec<String>, part: Result<T, String>) -> Option<T> {
     part.map_err(|problem| problems.push(problem)).ok()
 }
 
-fn unreadable(what: &str) -> impl Fn(rusqlite::Error) -> String {
+/// What is wrong with a part that cannot be read.
+pub fn unreadable(what: &str) -> impl Fn(rusqlite::Error) -> String {
     move |error| format!("{what} cannot be read: {error}")
 }
 
@@ -164,12 +201,22 @@ fn read_row(
             submitted_at_ms: row.get(8)?,
             digest: row.get(9)?,
             priority: row.get::<_, i64>(10)?.clamp(1, 1000),
+            group: row.get(11)?,
+            variant: row.get(12)?,
+            log_from: row.get(13)?,
+            log_gap: LogGap::from_name(&row.get::<_, String>(14)?),
+            labels: row.get(15)?,
+            is_archived: row.get(16)?,
+            fork: None,
         })
     };
     let sql = "SELECT request_id, name, config, config_digest, fingerprint, genotype_len, state,
-                      reason, submitted_at_ms, digest, priority
+                      reason, submitted_at_ms, digest, priority, group_name, variant,
+                      log_from, log_gap, labels, archived
                FROM experiments WHERE id = ?1";
     let row = connection.query_row(sql, [id.0], from_row).map_err(&unreadable)?;
+    let fork = forks::get(connection, sealer, id).map_err(|error| error.to_string())?;
+    let row = ExperimentRow { fork, ..row };
     if let Some(sealer) = sealer {
         let (seal, expected) =
             seals::experiment_seal(connection, sealer, id).map_err(&unreadable)?;
@@ -197,7 +244,7 @@ fn read_history(
     sealer: Option<&Sealer>,
     id: ExperimentId,
 ) -> Result<Vec<GenerationRecord>, String> {
-    let rows = history::read_from(connection, id, 0).map_err(unreadable("its history"))?;
+    let rows = history::read_all(connection, id).map_err(unreadable("its history"))?;
     let mut history = Vec::with_capacity(rows.len());
     for (number, (generation, seal)) in (0..).zip(rows) {
         if generation.generation != number {
@@ -220,36 +267,6 @@ fn read_champion(
         StoreError::Corrupt(what) => format!("its champion cannot be used: {what}"),
         error => format!("its champion cannot be read: {error}"),
     })
-}
-
-/// `history`: if it can be read.
-fn read_checkpoint(
-    connection: &Connection,
-    sealer: Option<&Sealer>,
-    id: ExperimentId,
-    history: Option<&[GenerationRecord]>,
-    row: Option<&ExperimentRow>,
-) -> Result<Option<Checkpoint>, String> {
-    let stored = checkpoints::get(connection, id).map_err(unreadable("its checkpoint"))?;
-    let Some(stored) = stored else { return Ok(None) };
-    let Some(history) = history else {
-        return Err("its checkpoint has no history to follow".to_owned());
-    };
-    let checkpoint = stored.check(sealer, id, history).ok_or_else(|| {
-        "its checkpoint, or the end of its history, is not what was stored".to_owned()
-    })?;
-    if let Some(row) = row.filter(|row| row.fingerprint == sim_core::FINGERPRINT) {
-        let evolution = Evolution::restore(&checkpoint)
-            .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
-        let link = history.last().map_or(&row.config_digest, |latest| &latest.digest);
-        if evolution.digest().to_string() != *link {
-            return Err(format!(
-                "its checkpoint has the digest {}, and the history {link}",
-                evolution.digest()
-            ));
-        }
-    }
-    Ok(Some(checkpoint))
 }
 
 /// Events have no seals, as no result depends on them.

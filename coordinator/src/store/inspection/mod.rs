@@ -3,6 +3,7 @@
 
 mod backup;
 mod experiment;
+mod log;
 mod recovery;
 mod source;
 

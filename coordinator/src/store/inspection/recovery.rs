@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use evolution::Checkpoint;
 use rusqlite::{Connection, Transaction, params};
 
 use super::{
     super::{
-        ExperimentState, GenerationRecord, NewExperiment, Result, StoreError, add_notice,
-        add_state_event, champions, checkpoints, file, history, quarantine, schema,
+        ExperimentState, GenerationRecord, LogGap, NewExperiment, Result, StoreError, add_notice,
+        add_state_event, champions, file, fitness_log, forks, history, quarantine, schema,
         seals::{self, Sealer},
     },
     backup::{abandon, prepare},
     experiment::{EventRow, ExperimentRow, Fate, Inspected},
+    log,
     source::Source,
 };
 use crate::{ids::ExperimentId, submission::Submission};
@@ -73,15 +73,18 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
     for id in source.experiments() {
         let mut inspected = Inspected::read(source, id);
         transaction.execute_batch("SAVEPOINT experiment")?;
-        let fate = write(&transaction, &sealer, &inspected).or_else(|error| match error {
-            // What was read contradicts itself.
-            StoreError::Bug(error) => {
-                transaction.execute_batch("ROLLBACK TO experiment")?;
-                inspected.problems.push(format!("it cannot be written: {error}"));
-                Ok(Fate::Lost)
-            }
-            error => Err(error),
-        })?;
+        let fate =
+            write(&source.connection, &transaction, &sealer, &inspected).or_else(|error| {
+                match error {
+                    // What was read contradicts itself.
+                    StoreError::Bug(error) => {
+                        transaction.execute_batch("ROLLBACK TO experiment")?;
+                        inspected.problems.push(format!("it cannot be written: {error}"));
+                        Ok(Fate::Lost)
+                    }
+                    error => Err(error),
+                }
+            })?;
         transaction.execute_batch("RELEASE experiment")?;
         experiments.push(Recovered { id, fate, problems: inspected.problems });
     }
@@ -98,11 +101,25 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
 }
 
 /// Writes what can be kept of an experiment.
-fn write(transaction: &Transaction<'_>, sealer: &Sealer, from: &Inspected) -> Result<Fate> {
+fn write(
+    source: &Connection,
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    from: &Inspected,
+) -> Result<Fate> {
     let Some(row) = &from.row else { return Ok(Fate::Lost) };
     match (from.fate(), &from.history, row.state) {
         (Fate::Kept, Some(history), Some(state)) => {
             write_whole(transaction, sealer, from, row, state, history)?;
+            match from.log {
+                Some(log) => log::copy(source, transaction, sealer, from.id, log, history)?,
+                None => {
+                    let gap = row.log_gap.unwrap_or(LogGap::Damaged);
+                    let gap = if gap == LogGap::None { LogGap::Damaged } else { gap };
+                    let n_generations = history.len() as u64;
+                    fitness_log::begin_at(transaction, from.id, n_generations, gap)?;
+                }
+            }
             Ok(Fate::Kept)
         }
         (Fate::Lost, ..) => Ok(Fate::Lost),
@@ -129,18 +146,12 @@ fn write_whole(
     for generation in history {
         history::put(transaction, sealer, id, generation)?;
     }
+    if let Some(fork) = &row.fork {
+        forks::put(transaction, sealer, id, fork)?;
+    }
     if let Some(Some(champion)) = &from.champion {
         let latest = history.last().map(|latest| latest.generation);
         champions::put(transaction, sealer, id, champion, latest, &row.digest)?;
-    }
-    if let Some(Some(checkpoint)) = &from.checkpoint {
-        let Checkpoint { state, steps } = checkpoint;
-        let (before, since) = history.split_at(history.len() - steps.len());
-        checkpoints::put(transaction, id, state, sealer.checkpoint(id, before.last(), state))?;
-        for (of, step) in since.iter().zip(steps) {
-            let seal = sealer.step(id, of, step);
-            checkpoints::add_step(transaction, id, of.generation, step, seal)?;
-        }
     }
     match &from.events {
         Some(events) => write_events(transaction, id, events)?,
@@ -180,8 +191,8 @@ fn write_beginning(
 ) -> Result<()> {
     let paused = ExperimentState::Paused;
     write_row(transaction, sealer, id, row, (paused, BEGINS_AGAIN, ""))?;
-    let seal = sealer.checkpoint(id, None, &new.checkpoint);
-    checkpoints::put(transaction, id, &new.checkpoint, seal)?;
+    let seal = sealer.keyframe(id, None, &new.keyframe);
+    fitness_log::put_keyframe(transaction, id, 0, &new.keyframe, seal)?;
     let at_ms = row.submitted_at_ms;
     add_state_event(transaction, id, at_ms, ExperimentState::Running, "submitted")?;
     add_notice(transaction, id, at_ms, BEGINS_AGAIN)?;
@@ -200,8 +211,10 @@ fn write_row(
 ) -> Result<()> {
     transaction.execute(
         "INSERT INTO experiments (id, request_id, name, config, config_digest, fingerprint,
-                                  genotype_len, state, reason, submitted_at_ms, digest, priority)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+                                  genotype_len, state, reason, submitted_at_ms, digest, priority,
+                                  group_name, variant, labels, archived)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15,
+                 ?16 AND ?8 NOT IN ('running', 'paused'))",
         params![
             id.0,
             row.request_id,
@@ -215,6 +228,10 @@ fn write_row(
             row.submitted_at_ms,
             digest,
             row.priority,
+            row.group,
+            row.variant,
+            row.labels,
+            row.is_archived,
         ],
     )?;
     Ok(seals::seal_experiment(transaction, sealer, id)?)

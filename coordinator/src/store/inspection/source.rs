@@ -77,7 +77,7 @@ impl Source {
         for sql in [
             "SELECT id FROM experiments ORDER BY id",
             "SELECT id FROM experiments ORDER BY id DESC",
-            "SELECT experiment_id FROM checkpoints ORDER BY experiment_id DESC LIMIT 1",
+            "SELECT experiment_id FROM keyframes ORDER BY experiment_id DESC LIMIT 1",
             "SELECT experiment_id FROM generations ORDER BY experiment_id DESC LIMIT 1",
             "SELECT experiment_id FROM events ORDER BY experiment_id DESC LIMIT 1",
         ] {

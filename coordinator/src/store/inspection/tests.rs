@@ -2,48 +2,46 @@
 
 use std::fs;
 
-use evolution::{Advance, Evolution};
+use evolution::{Evolution, Told};
 use rusqlite::Connection;
 use tempfile::TempDir;
 
 use super::{
     super::{
         file, schema,
-        tests::{WITHOUT_JUDGEMENTS, new_experiment},
+        tests::{WITHOUT_JUDGEMENTS, WITHOUT_LOG, new_experiment},
     },
     *,
 };
-use crate::store::{ExperimentState, GenerationCommit, GenerationRecord, Store, StoreError};
+use crate::store::{
+    Entry, ExperimentState, GenerationCommit, GenerationRecord, LogGap, Store, StoreError,
+};
 
 /// Commits a generation of a real evolution, whose fitness is its index.
 fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
-    advance_by(Evolution::advance, store, id, completed);
+    advance_to(false, store, id, completed);
 }
 
-/// `change`: what it changes in the checkpoint.
-fn advance_by(
-    change: impl Fn(&Evolution) -> Advance,
-    store: &mut Store,
-    id: ExperimentId,
-    completed: Option<&str>,
-) {
+/// `is_keyframe`: whether a keyframe is kept.
+fn advance_to(is_keyframe: bool, store: &mut Store, id: ExperimentId, completed: Option<&str>) {
     let (_, checkpoint) = store.resumable(id).unwrap();
     let mut evolution = Evolution::restore(&checkpoint).unwrap();
     let generation = evolution.ask();
     let fitness = vec![vec![generation.index as f64]; generation.genotypes.len()];
-    let told = evolution.tell(generation, &fitness).unwrap();
+    let summary = evolution.tell(generation, &fitness).unwrap();
     let record = GenerationRecord {
-        generation: told.generation,
-        statistics: told.statistics,
-        digest: told.digest.to_string(),
+        generation: summary.generation,
+        statistics: summary.statistics,
+        digest: summary.digest.to_string(),
         duration_ms: 5,
         episodes: 300,
         workers: 2,
         idle_share: 0.25,
     };
+    let keyframe = is_keyframe.then(|| evolution.keyframe());
     let commit = GenerationCommit {
         generation: &record,
-        checkpoint: &change(&evolution),
+        entry: Entry { told: &Told::of(fitness).to_bytes(), keyframe: keyframe.as_deref() },
         champion: evolution.champion(),
         digest: &record.digest,
         notices: &[],
@@ -88,7 +86,7 @@ fn contents(store: &Store) -> Vec<String> {
         let id = experiment.id;
         let generations = store.generations(id, 0, 100).unwrap();
         let events = store.events(id, 0, 100).unwrap();
-        let checkpoint = store.resumable(id).map_or_else(|_| None, |(_, state)| Some(state));
+        let checkpoint = store.resumable(id).ok().map(|(_, checkpoint)| checkpoint);
         format!("{experiment:?} {generations:?} {events:?} {:?} {checkpoint:?}", store.champion(id))
     });
     all.collect()
@@ -140,10 +138,15 @@ fn every_edit_is_found_and_named() {
         ),
         ("UPDATE champions SET genotype = '[]' WHERE experiment_id = 1", 1, "its champion"),
         ("DELETE FROM champions WHERE experiment_id = 1", 1, "its champion is gone"),
-        ("UPDATE checkpoints SET state = x'' WHERE experiment_id = 2", 2, "its checkpoint"),
-        ("UPDATE checkpoint_steps SET step = x'' WHERE experiment_id = 2", 2, "its checkpoint"),
-        ("DELETE FROM checkpoint_steps WHERE experiment_id = 2", 2, "its checkpoint"),
-        ("DELETE FROM checkpoints WHERE experiment_id = 2", 2, "its checkpoint is gone"),
+        ("UPDATE keyframes SET state = x'' WHERE experiment_id = 2", 2, "its keyframes"),
+        ("UPDATE fitness_log SET told = x'' WHERE experiment_id = 2", 2, "its keyframes"),
+        (
+            "DELETE FROM fitness_log WHERE experiment_id = 2 AND generation = 1",
+            2,
+            "its fitness log and its history",
+        ),
+        ("DELETE FROM fitness_log WHERE experiment_id = 1 AND generation = 0", 1, "its keyframes"),
+        ("DELETE FROM keyframes WHERE experiment_id = 2", 2, "its keyframes"),
         ("DELETE FROM events WHERE experiment_id = 2 AND sequence = 2", 2, "its events"),
     ] {
         let directory = data_directory();
@@ -197,7 +200,7 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
     edit(
         directory.path(),
         "UPDATE generations SET best = 9 WHERE experiment_id = 1;
-         UPDATE checkpoints SET state = x'7b7d' WHERE experiment_id = 2;
+         UPDATE keyframes SET state = x'7b7d' WHERE experiment_id = 2;
          UPDATE experiments SET config = '{}' WHERE id = 3;
          DELETE FROM events WHERE experiment_id = 4;
          INSERT INTO quarantine VALUES ('lab-2', 'it lies', 7);",
@@ -212,7 +215,7 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
         assert_eq!(experiment.state, ExperimentState::Paused);
         assert!(experiment.reason.contains("resume it"), "{}", experiment.reason);
         assert!(experiment.latest.is_none());
-        assert_eq!(checkpoint.state, new_experiment(None).checkpoint);
+        assert_eq!(checkpoint.keyframe, new_experiment(None).keyframe);
         advance(&mut store, id, None);
     }
     assert_eq!(store.experiment(ExperimentId(4)).unwrap().unwrap().state, ExperimentState::Running);
@@ -222,6 +225,33 @@ fn recovery_keeps_what_is_sound_and_begins_again_what_can_be_computed() {
     assert_eq!(next, ExperimentId(5), "ids are not used again");
     drop(store);
     assert!(inspect(&to).unwrap().findings.is_empty());
+}
+
+#[test]
+fn what_of_a_damaged_log_is_sound_is_kept() {
+    let directory = data_directory();
+    let [running, ended] = [2, 1].map(ExperimentId);
+    let mut store = Store::open(directory.path()).unwrap();
+    advance_to(true, &mut store, running, None);
+    advance(&mut store, running, None);
+    let before = store.resumable(running).unwrap().1;
+    drop(store);
+    edit(directory.path(), "UPDATE fitness_log SET told = x'' WHERE generation = 1");
+    let what = "the fitness of generations 0 to 2, or the keyframe before them";
+    let found = findings(directory.path());
+    assert!(found.iter().any(|(id, found)| *id == Some(2) && found.contains(what)), "{found:?}");
+    let to = directory.path().join("new");
+    let recovery = recover(directory.path(), &to).unwrap();
+    assert_eq!(fates(&recovery), [Fate::Kept, Fate::Kept, Fate::Kept, Fate::Kept]);
+    assert!(inspect(&to).unwrap().findings.is_empty());
+    let store = Store::open(&to).unwrap();
+    let log_of = |id| {
+        let found = store.experiment(id).unwrap().unwrap();
+        (found.log_from, found.log_gap)
+    };
+    assert_eq!(log_of(running), (3, LogGap::Damaged));
+    assert_eq!(store.resumable(running).unwrap().1, before);
+    assert_eq!(log_of(ended), (3, LogGap::Damaged), "its results are not damaged");
 }
 
 /// Whatever page is damaged, everything that the new directory has is as it was.
@@ -293,15 +323,16 @@ fn a_database_that_was_cut_off_is_read_as_far_as_it_goes() {
 fn older_schemas_are_looked_at_and_recovered_without_a_change() {
     let directory = data_directory();
     let mut store = Store::open(directory.path()).unwrap();
-    advance_by(|evolution| Advance::State(evolution.state()), &mut store, ExperimentId(2), None);
+    advance_to(true, &mut store, ExperimentId(2), None);
     drop(store);
+    edit(directory.path(), WITHOUT_LOG);
     edit(directory.path(), WITHOUT_JUDGEMENTS);
     let inspection = inspect(directory.path()).unwrap();
     assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
     assert_eq!((inspection.schema_version, inspection.n_generations), (5, 8));
     edit(
         directory.path(),
-        "DELETE FROM checkpoints WHERE experiment_id = 1;
+        "DELETE FROM checkpoints WHERE experiment_id IN (1, 3);
          DROP TABLE checkpoint_steps;
          ALTER TABLE experiments DROP COLUMN seal;
          ALTER TABLE generations DROP COLUMN seal;
@@ -358,7 +389,7 @@ fn an_interrupted_backup_is_made_again() {
 #[test]
 fn there_is_no_backup_of_a_damaged_database() {
     let directory = data_directory();
-    edit(directory.path(), "UPDATE checkpoints SET state = x'7b7d' WHERE experiment_id = 2");
+    edit(directory.path(), "UPDATE keyframes SET state = x'7b7d' WHERE experiment_id = 2");
     let to = directory.path().join("backup");
     let Backup::Damaged(inspection) = backup(directory.path(), &to).unwrap() else { panic!() };
     assert_eq!(inspection.findings[0].experiment, Some(ExperimentId(2)));

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{
-    tests::{WITHOUT_JUDGEMENTS, checkpoint_after, commit, new_experiment},
+    tests::{WITHOUT_JUDGEMENTS, WITHOUT_LOG, checkpoint_after, commit, new_experiment},
     *,
 };
 
@@ -25,21 +25,26 @@ fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
         ("UPDATE experiments SET config_digest = 'd' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET fingerprint = 'f' WHERE id = 1", "configuration"),
         ("UPDATE experiments SET seal = x'' WHERE id = 1", "configuration"),
-        ("UPDATE checkpoints SET state = x'ff' WHERE experiment_id = 1", "checkpoint"),
-        ("UPDATE checkpoint_steps SET step = x'ff' WHERE experiment_id = 1", "checkpoint"),
-        ("UPDATE checkpoint_steps SET generation = 2 WHERE experiment_id = 1", "checkpoint"),
-        ("DELETE FROM checkpoint_steps WHERE experiment_id = 1", "checkpoint"),
-        ("DELETE FROM checkpoints WHERE experiment_id = 1", "checkpoint is gone"),
+        ("UPDATE keyframes SET state = x'ff' WHERE experiment_id = 1", "checkpoint"),
+        ("UPDATE fitness_log SET told = x'ff' WHERE experiment_id = 1", "checkpoint"),
+        (
+            "UPDATE fitness_log SET generation = 2 WHERE experiment_id = 1 AND generation = 1",
+            "checkpoint",
+        ),
+        ("DELETE FROM fitness_log WHERE experiment_id = 1", "checkpoint"),
+        ("DELETE FROM keyframes WHERE experiment_id = 1", "checkpoint"),
         (
             // The neighbour's, with its seal.
-            "UPDATE checkpoints SET (state, seal) =
-                    (SELECT state, seal FROM checkpoints WHERE experiment_id = 2)
+            "UPDATE keyframes AS k SET (state, seal) =
+                    (SELECT state, seal FROM keyframes
+                     WHERE experiment_id = 2 AND n_generations = k.n_generations)
              WHERE experiment_id = 1",
             "checkpoint",
         ),
         (
-            "UPDATE checkpoint_steps SET (step, seal) =
-                    (SELECT step, seal FROM checkpoint_steps WHERE experiment_id = 2)
+            "UPDATE fitness_log AS l SET (told, seal) =
+                    (SELECT told, seal FROM fitness_log
+                     WHERE experiment_id = 2 AND generation = l.generation)
              WHERE experiment_id = 1",
             "checkpoint",
         ),
@@ -67,29 +72,30 @@ fn what_was_edited_or_moved_is_found_and_its_neighbour_is_not_blamed() {
 }
 
 #[test]
-fn an_earlier_checkpoint_of_the_same_experiment_is_not_taken_for_the_latest() {
-    let directory = tempfile::tempdir().unwrap();
-    let (mut store, [id, _]) = two_experiments(directory.path());
-    store.connection.execute_batch("CREATE TABLE kept AS SELECT * FROM checkpoints").unwrap();
-    commit(&mut store, id, 2, None).unwrap();
-    store.resumable(id).unwrap();
-    let put_back = "INSERT OR REPLACE INTO checkpoints SELECT * FROM kept";
-    store.connection.execute_batch(put_back).unwrap();
-    assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })));
-}
-
-#[test]
-fn an_earlier_step_of_the_same_experiment_is_not_taken_for_the_latest() {
-    let directory = tempfile::tempdir().unwrap();
-    let (mut store, [id, _]) = two_experiments(directory.path());
-    store.connection.execute_batch("CREATE TABLE kept AS SELECT * FROM checkpoint_steps").unwrap();
-    commit(&mut store, id, 2, None).unwrap();
-    commit(&mut store, id, 3, None).unwrap();
-    store.resumable(id).unwrap();
-    let put_back = "UPDATE checkpoint_steps SET (step, seal) =
-                           (SELECT step, seal FROM kept WHERE kept.experiment_id = 1)";
-    store.connection.execute_batch(put_back).unwrap();
-    assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })));
+fn an_earlier_keyframe_or_entry_of_the_same_experiment_is_not_taken_for_another() {
+    for (n_committed, put_back) in [
+        (
+            3,
+            "UPDATE keyframes SET (state, seal) =
+                    (SELECT state, seal FROM keyframes WHERE experiment_id = 1
+                     AND n_generations = 1) WHERE n_generations = 3",
+        ),
+        (
+            4,
+            "UPDATE fitness_log SET (told, seal) =
+                    (SELECT told, seal FROM fitness_log WHERE experiment_id = 1
+                     AND generation = 1) WHERE generation = 3",
+        ),
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let (mut store, [id, _]) = two_experiments(directory.path());
+        for number in 2..n_committed {
+            commit(&mut store, id, number, None).unwrap();
+        }
+        store.resumable(id).unwrap();
+        assert_eq!(store.connection.execute(put_back, []).unwrap(), 1);
+        assert!(matches!(store.resumable(id), Err(StoreError::Unsound { .. })), "{put_back}");
+    }
 }
 
 #[test]
@@ -144,27 +150,6 @@ fn a_coordinator_that_has_lost_the_database_writes_nothing_and_still_reads() {
     assert_eq!(store.experiments().unwrap().len(), 2);
 }
 
-#[test]
-fn only_checkpoints_that_nothing_can_continue_from_are_deleted() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut store = Store::open(directory.path()).unwrap();
-    let mut ended = |state: ExperimentState, reason: &str| {
-        let (id, _) = store.create(&new_experiment(None), 5).unwrap();
-        commit(&mut store, id, 0, None).unwrap();
-        if state == ExperimentState::Completed {
-            commit(&mut store, id, 1, Some(reason)).unwrap();
-        } else {
-            store.set_state(id, 6, state, reason).unwrap();
-        }
-        checkpoints::get(&store.connection, id).unwrap().is_some()
-    };
-    assert!(!ended(ExperimentState::Failed, "why"));
-    assert!(!ended(ExperimentState::Cancelled, "enough"));
-    assert!(!ended(ExperimentState::Completed, "the target is reached"));
-    assert!(ended(ExperimentState::Completed, ""), "it can be given more generations");
-    assert!(ended(ExperimentState::Paused, "for lunch"));
-}
-
 /// Copies the database of a directory, with or without its log.
 fn copy(directory: &Path, with_log: bool) -> tempfile::TempDir {
     let to = tempfile::tempdir().unwrap();
@@ -212,7 +197,7 @@ fn a_copy_of_a_database_in_use_is_refused_without_its_log() {
 fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = Store::open(directory.path()).unwrap();
-    let new = NewExperiment { checkpoint: vec![0; 1 << 20], ..new_experiment(None) };
+    let new = NewExperiment { keyframe: vec![0; 1 << 20], ..new_experiment(None) };
     let database = file::path_in(directory.path());
     let main_len = || fs::metadata(&database).unwrap().len();
     let mut n_folded = 0;
@@ -235,6 +220,7 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     commit(&mut store, running, 2, None).unwrap();
     drop(store);
     let database = Connection::open(file::path_in(directory.path())).unwrap();
+    database.execute_batch(WITHOUT_LOG).unwrap();
     database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
     database
         .execute_batch(
@@ -258,7 +244,12 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     assert_eq!(store.resumable(running).unwrap().1, checkpoint_after(2));
     store.champion(running).unwrap().unwrap();
     store.champion(ended).unwrap().unwrap();
-    assert!(checkpoints::get(&store.connection, ended).unwrap().is_none());
+    let log_of = |id| {
+        let found = store.experiment(id).unwrap().unwrap();
+        (found.log_from, found.log_gap)
+    };
+    assert_eq!(log_of(running), (3, LogGap::Older));
+    assert_eq!(log_of(ended), (2, LogGap::Older), "its checkpoint was deleted");
 }
 
 #[test]
@@ -268,6 +259,7 @@ fn a_champion_of_a_version_that_judged_nobody_keeps_what_it_has() {
     let champion = store.champion(id).unwrap();
     drop(store);
     let database = Connection::open(file::path_in(directory.path())).unwrap();
+    database.execute_batch(WITHOUT_LOG).unwrap();
     database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
     drop(database);
     let store = Store::open(directory.path()).unwrap();

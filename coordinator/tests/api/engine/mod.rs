@@ -65,6 +65,21 @@ fn generation_time(config: EngineConfig, speeds: &[f64], n_individuals: usize) -
 }
 
 #[test]
+fn a_fast_worker_is_given_more_items_ahead_than_a_slow_one() {
+    let model = FleetModel { trial: Duration::from_millis(3), dispersion: 0.0, ..MODEL };
+    let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));
+    fleet.join(1, 0.5);
+    fleet.join(1, 1.5);
+    fleet.submit(EXPERIMENT, 100);
+    fleet.ask(EXPERIMENT, 0, 100, 1);
+    assert!(fleet.run_until(HOUR, is_finished));
+    fleet.run_for(SECOND);
+    fleet.ask(EXPERIMENT, 1, 8, 1);
+    let held: Vec<usize> = fleet.status().iter().map(|worker| worker.n_in_flight).collect();
+    assert_eq!(held, [2, 6]);
+}
+
+#[test]
 fn a_thousand_workers_come_and_go_and_ten_thousand_individuals_are_evaluated() {
     let model = FleetModel { checks: false, trial: SECOND, ..MODEL };
     let mut fleet = SimulatedFleet::new(model, EngineConfig::new(LEASE));

@@ -1,0 +1,80 @@
+//! Has the fleet simulate again what an evolution was told.
+
+use std::sync::Arc;
+
+use evolution::{ALGORITHMS, Genotype};
+use experiment_file::{ExperimentConfig, limits};
+use sim_core::{Simulation, TrialSet};
+
+use crate::{
+    driver::DriverEvent, engine::Batch, limits::EVALUATION_VALUES_MAX, priority::Priority,
+    runs::Evaluation,
+};
+
+use super::{Control, ControlError};
+
+/// Genotypes whose fitness a client wants in trials of an evolution.
+#[derive(Debug)]
+pub struct FitnessOrder {
+    /// The experiment file.
+    pub config_json: String,
+    /// Genes in \[0, 1\].
+    pub genotypes: Vec<Genotype>,
+    /// Which worlds and noise.
+    pub trial_set: TrialSet,
+    /// Trials of each genotype, from trial 0.
+    pub n_trials: u32,
+    /// Its share of the fleet.
+    pub priority: Priority,
+}
+
+impl FitnessOrder {
+    /// Bytes that it takes until it is answered.
+    fn len(&self) -> usize {
+        let genes: usize = self.genotypes.iter().map(|genes| size_of_val(&**genes)).sum();
+        2 * self.config_json.len() + genes
+    }
+
+    /// Checks everything about an order; work for a CPU.
+    fn check(self) -> Result<Evaluation, ControlError> {
+        let Self { config_json, genotypes, trial_set, n_trials, priority } = self;
+        let invalid = |what: String| Err(ControlError::Invalid(what));
+        if n_trials == 0 || n_trials > limits::TRIALS {
+            return invalid(format!(
+                "trial_count is {n_trials}, not within 1..={}",
+                limits::TRIALS
+            ));
+        }
+        let n_values = genotypes.len() * n_trials as usize;
+        if n_values == 0 || n_values > EVALUATION_VALUES_MAX {
+            return invalid(format!(
+                "genotypes times trials are {n_values}, not within 1..={EVALUATION_VALUES_MAX}"
+            ));
+        }
+        if trial_set.generation().is_some_and(|generation| generation > limits::GENERATIONS) {
+            return invalid(format!("no run has more than {} generations", limits::GENERATIONS));
+        }
+        let (config, _) = ExperimentConfig::from_json(&config_json, "", ALGORITHMS)?;
+        let simulation = Simulation::compile(&config)?;
+        for genotype in &genotypes {
+            let checked = simulation.check_genotype(genotype);
+            checked.map_err(|error| ControlError::Invalid(error.to_string()))?;
+        }
+        let spec: Arc<str> = config.to_canonical_json().into();
+        let batch = Batch::fitness(trial_set, genotypes.into(), n_trials);
+        Ok(Evaluation { spec, batch, priority })
+    }
+}
+
+impl Control {
+    /// Has the fleet compute fitness: per genotype that of every trial. Dropping the future
+    /// tells the driver that nobody waits.
+    pub async fn fitness(&self, order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
+        let _place = self.requests.enter(order.len())?;
+        let evaluation = Box::new(self.requests.check(move || order.check()).await??);
+        let permits = Arc::clone(&self.evaluations);
+        let _permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
+        let result = self.ask(|reply| DriverEvent::EvaluationRequested(evaluation, reply));
+        result.await?.map_err(ControlError::EvaluationFailed)
+    }
+}

@@ -1,0 +1,57 @@
+//! Takes an experiment in that another coordinator has computed.
+
+use bundle::{Bundle, Sample, Verification};
+use experiment_file::ExperimentConfig;
+
+use crate::{
+    clock,
+    store::{ExperimentRecord, ExperimentState, ForkRecord, Imported, Store, StoreError},
+};
+
+use super::{Control, ControlError};
+
+impl Control {
+    /// Takes the experiment of a bundle in, once everything that follows from its log has been
+    /// checked. Returns the experiment, and whether it is new here.
+    pub async fn import(&self, bytes: Vec<u8>) -> Result<(ExperimentRecord, bool), ControlError> {
+        let imported = self.requests.check(move || check(&bytes)).await??;
+        let write = move |store: &mut Store| {
+            let Some(imported) = with_parent(store, imported)? else { return Ok(None) };
+            store.import(&imported, clock::unix_ms()).map(Some)
+        };
+        let Some((id, is_new)) = self.store.try_write(write).await? else {
+            return Err(ControlError::NoParent);
+        };
+        Ok((self.find(id).await?, is_new))
+    }
+}
+
+/// Checks everything but the fitness itself; work for a CPU.
+fn check(bytes: &[u8]) -> Result<Imported, ControlError> {
+    let invalid = |error: &dyn std::fmt::Display| ControlError::Invalid(error.to_string());
+    let bundle = Bundle::read(bytes).map_err(|error| invalid(&error))?;
+    let mut verification =
+        Verification::begin(&bundle, Sample::Drawn(0)).map_err(|flaw| invalid(&flaw))?;
+    let genotype_len = verification.simulation().genotype_len();
+    while verification.advance().map_err(|flaw| invalid(&flaw))?.is_some() {}
+    let champion = verification.finish().champion;
+    let state = ExperimentState::from_name(&bundle.manifest.state);
+    let state = state.filter(|state| !state.is_unfinished());
+    let state = state.ok_or_else(|| invalid(&"it says of no end that there is"))?;
+    let config = ExperimentConfig::from_canonical_json(&bundle.config_json)?;
+    Ok(Imported { name: config.name, genotype_len, state, champion, fork: None, bundle })
+}
+
+/// Finds the parent of a fork; none if it is not here.
+fn with_parent(store: &Store, imported: Imported) -> Result<Option<Imported>, StoreError> {
+    let Some(fork) = imported.bundle.manifest.fork.clone() else { return Ok(Some(imported)) };
+    let link = imported.bundle.history[fork.generation as usize].digest.to_string();
+    let Some(parent) = store.experiment_with_link(fork.generation, &link)? else { return Ok(None) };
+    let fork = ForkRecord {
+        parent,
+        generation: fork.generation,
+        link: fork.link.to_string(),
+        changes: fork.changes,
+    };
+    Ok(Some(Imported { fork: Some(fork), ..imported }))
+}

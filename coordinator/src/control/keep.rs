@@ -1,0 +1,58 @@
+//! What is kept of experiments, and what they are called: delete, archive, label.
+
+use crate::{
+    ids::ExperimentId,
+    labels::{self, Labels},
+    store::ExperimentRecord,
+};
+
+use super::{Control, ControlError};
+
+impl Control {
+    /// Deletes an experiment that has ended; returns it as it was, and how many bytes of the
+    /// database are free now.
+    pub async fn delete(&self, id: ExperimentId) -> Result<(ExperimentRecord, u64), ControlError> {
+        let experiment = self.ended(id, "delete").await?;
+        let n_bytes = self.store.try_write(move |store| store.delete(id)).await?;
+        Ok((experiment, n_bytes))
+    }
+
+    /// Marks an experiment that has ended as archived, or not; returns it, and how many bytes
+    /// its fitness log takes.
+    pub async fn archive(
+        &self,
+        id: ExperimentId,
+        is_archived: bool,
+    ) -> Result<(ExperimentRecord, u64), ControlError> {
+        self.ended(id, "archive").await?;
+        self.store.try_write(move |store| store.set_archived(id, is_archived)).await?;
+        let n_bytes = self.store.read(move |store| store.log_len(id)).await?;
+        Ok((self.find(id).await?, n_bytes))
+    }
+
+    /// Adds labels to an experiment, or gives them other values, and removes others.
+    pub async fn label(
+        &self,
+        id: ExperimentId,
+        set: Labels,
+        remove: Vec<String>,
+    ) -> Result<ExperimentRecord, ControlError> {
+        let mut labels = self.find(id).await?.labels;
+        labels.retain(|key, _| !remove.contains(key));
+        labels.extend(set);
+        labels::check(&labels).map_err(ControlError::Invalid)?;
+        self.store.try_write(move |store| store.set_labels(id, &labels)).await?;
+        self.find(id).await
+    }
+
+    /// An experiment, if it has ended. `what`: what is to be done with it.
+    async fn ended(&self, id: ExperimentId, what: &str) -> Result<ExperimentRecord, ControlError> {
+        let experiment = self.find(id).await?;
+        match experiment.state.is_unfinished() {
+            false => Ok(experiment),
+            true => Err(ControlError::NotNow(format!(
+                "experiment {id} has not ended; to {what} it, end it first: swarmctl cancel {id}"
+            ))),
+        }
+    }
+}

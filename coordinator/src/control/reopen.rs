@@ -1,0 +1,155 @@
+//! Has an experiment that has ended go on from its last stored generation.
+
+use evolution::ALGORITHMS;
+use experiment_file::ExperimentConfig;
+use tracing::info;
+
+use crate::{
+    clock,
+    driver::DriverEvent,
+    ids::ExperimentId,
+    queries,
+    runs::{Request, Runnable},
+    store::{ExperimentRecord, ExperimentState, Store, StoreError},
+};
+
+use super::{Control, ControlError, placement};
+
+/// Why an experiment goes on that had ended.
+#[derive(Debug, Clone, Copy)]
+pub enum Reopening {
+    /// A completed one shall have so many generations in all.
+    Extend(u64),
+    /// What made it fail is gone.
+    Retry,
+    /// It was cancelled, and that is taken back.
+    Resume,
+}
+
+impl Control {
+    /// Lets a completed experiment go on until it has `generations` in all.
+    pub async fn extend(
+        &self,
+        id: ExperimentId,
+        generations: u64,
+    ) -> Result<ExperimentRecord, ControlError> {
+        self.reopen(id, Reopening::Extend(generations)).await
+    }
+
+    /// Lets a failed experiment go on.
+    pub async fn retry(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
+        self.reopen(id, Reopening::Retry).await
+    }
+
+    /// Lets an experiment go on that has ended, to the bits of one that never had.
+    pub(super) async fn reopen(
+        &self,
+        id: ExperimentId,
+        reopening: Reopening,
+    ) -> Result<ExperimentRecord, ControlError> {
+        self.find(id).await?;
+        // The end that is taken back must not be on its way any more.
+        self.request(id, Request::Settle).await?;
+        let (store, events) = (self.store.clone(), self.events.clone());
+        let memory_budget = self.memory_budget;
+        // In a task of its own: what is stored must reach the driver even if the client goes
+        // away meanwhile.
+        let reopening = tokio::spawn(async move {
+            let runnable =
+                store.try_write(move |store| Ok(prepare(store, id, reopening, memory_budget)));
+            let runnable = runnable.await??;
+            info!(experiment = %id, name = runnable.config.name, "experiment goes on");
+            let ready = DriverEvent::ExperimentReady(Box::new(runnable));
+            events.send(ready).await.map_err(|_| ControlError::ShuttingDown)
+        });
+        reopening.await.map_err(|_| ControlError::Panicked("going on with the experiment"))??;
+        self.find(id).await
+    }
+}
+
+/// Checks that an experiment can go on, and stores that it does.
+fn prepare(
+    store: &mut Store,
+    id: ExperimentId,
+    reopening: Reopening,
+    memory_budget: u64,
+) -> Result<Runnable, ControlError> {
+    let experiment = queries::experiment(store, id)?;
+    let config_json = config_of(&experiment, reopening)?;
+    if let Some(incompatible) = queries::incompatibility(&experiment) {
+        return Err(ControlError::NotNow(format!("experiment {id} cannot go on: {incompatible}")));
+    }
+    placement::check_room(
+        &store.experiments()?,
+        &config_json,
+        experiment.genotype_len,
+        memory_budget,
+    )?;
+    let runnable = runnable(store, id, &config_json)?;
+    let why = match reopening {
+        Reopening::Extend(generations) => format!("extended to {generations} generations"),
+        Reopening::Retry => "retried".to_owned(),
+        Reopening::Resume => "resumed".to_owned(),
+    };
+    store.reopen(id, experiment.state, &config_json, &why, clock::unix_ms())?;
+    Ok(runnable)
+}
+
+/// The configuration under which an experiment goes on, or why it cannot.
+fn config_of(experiment: &ExperimentRecord, reopening: Reopening) -> Result<String, ControlError> {
+    use ExperimentState::{Cancelled, Completed, Failed, Paused, Running};
+    let ExperimentRecord { id, state, config_json, .. } = experiment;
+    let not_now = |what: String| Err(ControlError::NotNow(format!("experiment {id} {what}")));
+    match (reopening, state) {
+        (Reopening::Retry, Failed) | (Reopening::Resume, Cancelled) => Ok(config_json.clone()),
+        (Reopening::Extend(generations), Completed) if experiment.can_be_continued() => {
+            longer(experiment, generations)
+        }
+        (Reopening::Extend(_), Completed) => not_now(format!(
+            "has completed before its last generation: {}; go on from that one under another \
+             target with: swarmctl fork {id}@{} --set algorithm.target_fitness=F",
+            experiment.reason,
+            experiment.n_generations().saturating_sub(1)
+        )),
+        (Reopening::Extend(_), Running | Paused) => {
+            not_now(format!("has not ended; wait until it has completed: swarmctl wait {id}"))
+        }
+        (Reopening::Retry, Running) => not_now("is running already".to_owned()),
+        (_, Paused) => not_now(format!("is paused; continue it with: swarmctl resume {id}")),
+        (_, Failed) => not_now(format!("has failed; go on with: swarmctl retry {id}")),
+        (_, Cancelled) => not_now(format!("was cancelled; go on with: swarmctl resume {id}")),
+        (_, Completed) => {
+            not_now(format!("has completed; go on with: swarmctl extend {id} --generations N"))
+        }
+        (Reopening::Resume, Running) => Ok(config_json.clone()),
+    }
+}
+
+/// The configuration of a completed experiment with more generations.
+fn longer(experiment: &ExperimentRecord, generations: u64) -> Result<String, ControlError> {
+    let n_done = experiment.n_generations();
+    if generations <= n_done {
+        let message = format!(
+            "experiment {} has {n_done} generations already; ask for more than that in all",
+            experiment.id
+        );
+        return Err(ControlError::Invalid(message));
+    }
+    let (mut config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)?;
+    config.algorithm.generations = generations;
+    let config_json = config.to_canonical_json();
+    // The limits of a file hold here, too.
+    ExperimentConfig::from_json(&config_json, "", ALGORITHMS)?;
+    Ok(config_json)
+}
+
+/// An experiment that has ended, under a configuration by which it goes on.
+pub fn runnable(
+    store: &Store,
+    id: ExperimentId,
+    config_json: &str,
+) -> Result<Runnable, StoreError> {
+    let (experiment, checkpoint) = store.resumable(id)?;
+    let experiment = ExperimentRecord { config_json: config_json.to_owned(), ..experiment };
+    Runnable::restore(&experiment, &checkpoint).map_err(|what| store.unsound(id, what))
+}

@@ -1,0 +1,168 @@
+//! Says again and again what keeps experiments from being computed, and when there is news.
+
+use std::time::Duration;
+
+use tokio::{
+    sync::{mpsc, watch},
+    time::{sleep, timeout},
+};
+use tokio_util::sync::CancellationToken;
+
+use crate::{
+    driver::DriverEvent,
+    ids::ExperimentId,
+    limits::{NEWS_PAUSE, SITUATION_INTERVAL, WATCH_PATIENCE, WATCH_QUEUE_LEN},
+    store::ExperimentState,
+};
+
+use super::{Control, ControlError, Explanation};
+
+/// A round whose last items are held for so long waits for them.
+const LONG: Duration = Duration::from_secs(10);
+
+/// What of an explanation is worth another message, if it changes.
+#[derive(Debug, PartialEq)]
+struct Situation {
+    state: ExperimentState,
+    reason: String,
+    has_workers: bool,
+    has_workers_available: bool,
+    /// The workers that are given nothing, and why.
+    withheld: Vec<(String, String)>,
+    has_store_trouble: bool,
+    is_short_of_memory: bool,
+    has_referee_trouble: bool,
+    stage: Stage,
+}
+
+/// What a round waits for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stage {
+    /// Nothing, or nothing for long.
+    None,
+    /// The workers compute other experiments.
+    Others,
+    /// The last items, for long.
+    Barrier,
+    /// A second worker.
+    Audits,
+}
+
+impl Situation {
+    fn of(explanation: &Explanation) -> Self {
+        let Explanation { experiment, activity, shortage, store_trouble, .. } = explanation;
+        let withheld = activity.withheld.iter();
+        Self {
+            state: experiment.state,
+            reason: experiment.reason.clone(),
+            has_workers: activity.n_workers > 0,
+            has_workers_available: activity.n_workers_available > 0,
+            withheld: withheld.map(|it| (it.name.clone(), it.reason.clone())).collect(),
+            has_store_trouble: store_trouble.is_some(),
+            is_short_of_memory: shortage.is_some(),
+            has_referee_trouble: activity.questions.iter().any(|it| it.trouble.is_some()),
+            stage: Stage::of(explanation),
+        }
+    }
+}
+
+impl Stage {
+    fn of(Explanation { activity, .. }: &Explanation) -> Self {
+        let Some(batch) = &activity.batch else { return Self::None };
+        let is_long = batch.held.iter().any(|held| held.held_for >= LONG);
+        match (batch.n_items_queued, batch.held.is_empty()) {
+            (0, false) if is_long => Self::Barrier,
+            (0, true) if batch.n_audits_waiting > 0 => Self::Audits,
+            (1.., true) if !activity.rivals.is_empty() => Self::Others,
+            _ => Self::None,
+        }
+    }
+}
+
+impl Control {
+    /// Explains an experiment at once, and again whenever its situation changes, until it has
+    /// ended. A dropped receiver ends it, too.
+    pub async fn watch_explanation(
+        &self,
+        id: ExperimentId,
+        shutdown: CancellationToken,
+    ) -> Result<mpsc::Receiver<Result<Explanation, ControlError>>, ControlError> {
+        let first = self.explain(id).await?;
+        let (outbox, inbox) = mpsc::channel(WATCH_QUEUE_LEN);
+        let control = self.clone();
+        tokio::spawn(async move {
+            let last = outbox.clone();
+            let error = tokio::select! {
+                () = shutdown.cancelled() => ControlError::ShuttingDown,
+                () = outbox.closed() => return,
+                result = control.send_explanations(id, first, &outbox) => match result {
+                    Ok(()) => return,
+                    Err(error) => error,
+                },
+            };
+            // Whoever has left no room does not read.
+            let _ = last.try_send(Err(error));
+        });
+        Ok(inbox)
+    }
+
+    async fn send_explanations(
+        &self,
+        id: ExperimentId,
+        first: Explanation,
+        outbox: &mpsc::Sender<Result<Explanation, ControlError>>,
+    ) -> Result<(), ControlError> {
+        let mut stored = self.store.news();
+        let mut fleet = self.ask(DriverEvent::FleetWatched).await?;
+        let mut explanation = first;
+        let mut known = None;
+        loop {
+            let situation = Situation::of(&explanation);
+            let has_ended = !situation.state.is_unfinished();
+            if known.as_ref() != Some(&situation) {
+                if outbox.send_timeout(Ok(explanation), WATCH_PATIENCE).await.is_err() {
+                    return Ok(());
+                }
+                known = Some(situation);
+            }
+            if has_ended {
+                return Ok(());
+            }
+            sleep(NEWS_PAUSE).await;
+            // Time alone makes some of it, such as a barrier.
+            let _ = timeout(SITUATION_INTERVAL, changed(&mut stored, &mut fleet)).await;
+            explanation = self.explain(id).await?;
+        }
+    }
+
+    /// Sends something at once, and whenever something has been stored since. A dropped
+    /// receiver ends it.
+    pub fn watch_news(&self, shutdown: CancellationToken) -> mpsc::Receiver<()> {
+        let (outbox, inbox) = mpsc::channel(1);
+        let mut stored = self.store.news();
+        tokio::spawn(async move {
+            let sending = async {
+                while outbox.send(()).await.is_ok() {
+                    sleep(NEWS_PAUSE).await;
+                    if stored.changed().await.is_err() {
+                        return;
+                    }
+                }
+            };
+            tokio::select! {
+                () = shutdown.cancelled() => {}
+                () = outbox.closed() => {}
+                () = sending => {}
+            }
+        });
+        inbox
+    }
+}
+
+/// Waits until something has been stored, or the fleet has changed.
+async fn changed(stored: &mut watch::Receiver<u64>, fleet: &mut watch::Receiver<u64>) {
+    tokio::select! {
+        _ = stored.changed() => {}
+        _ = fleet.changed() => {}
+    }
+}

@@ -1,0 +1,31 @@
+//! How fit every individual was, generation by generation.
+
+use evolution::Told;
+
+use crate::{ids::ExperimentId, limits::PAGE_LEN_MAX, store::Store};
+
+use super::{QueryError, experiment};
+
+/// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations from
+/// the first one on that the fitness log has, but not before `from`; and the number of that
+/// one.
+pub fn fitness(
+    store: &Store,
+    id: ExperimentId,
+    from: u64,
+    n: u32,
+) -> Result<(u64, Vec<Vec<f32>>), QueryError> {
+    let first = from.max(experiment(store, id)?.log_from);
+    let log = store.fitness_log(id, first, n.min(PAGE_LEN_MAX))?;
+    let mut generations = Vec::with_capacity(log.len());
+    for (generation, told) in (first..).zip(log) {
+        let told = told.and_then(|told| Told::from_bytes(&told).ok());
+        let told = told.ok_or(QueryError::DamagedLog { experiment: id, generation })?;
+        generations.push(told.trial_fitness.iter().map(|trials| mean(trials)).collect());
+    }
+    Ok((first, generations))
+}
+
+fn mean(values: &[f64]) -> f32 {
+    (values.iter().sum::<f64>() / values.len() as f64) as f32
+}

@@ -1,0 +1,125 @@
+//! A generation that is computed again from the fitness log.
+
+use std::fmt;
+
+use evolution::{Checkpoint, Evolution, Generation, Told};
+
+use crate::{
+    ids::ExperimentId,
+    store::{ExperimentRecord, GenerationRecord, LogGap, Store},
+};
+
+use super::{QueryError, experiment};
+
+/// A generation as the store has it: what it is computed from.
+#[derive(Debug)]
+pub struct StoredGeneration {
+    /// Its experiment.
+    pub experiment: ExperimentRecord,
+    /// Its row of the history.
+    pub of: GenerationRecord,
+    checkpoint: Checkpoint,
+    told: Vec<u8>,
+}
+
+/// A generation, and what came of it.
+#[derive(Debug)]
+pub struct Replayed {
+    /// The genotypes.
+    pub generation: Generation,
+    /// What evolution was told of them.
+    pub told: Told,
+    /// Evolution after it.
+    pub after: Evolution,
+}
+
+impl StoredGeneration {
+    /// Reads what a generation is computed from.
+    pub fn read(store: &Store, id: ExperimentId, generation: u64) -> Result<Self, QueryError> {
+        let experiment = experiment(store, id)?;
+        check_in_log(&experiment, generation)?;
+        let (checkpoint, of, told) = store
+            .generation_in_log(id, generation)?
+            .ok_or(QueryError::DamagedLog { experiment: id, generation })?;
+        Ok(Self { experiment, of, checkpoint, told })
+    }
+
+    /// Goes through the generation again: work for a CPU. Genotypes and fitness have the
+    /// digest of the history, or there is an error.
+    pub fn replay(&self) -> Result<Replayed, QueryError> {
+        let Self { experiment, of, checkpoint, told } = self;
+        let other = |what: String| QueryError::OtherBits {
+            experiment: experiment.id,
+            generation: of.generation,
+            what,
+            theirs: experiment.fingerprint.clone(),
+        };
+        let mut after = Evolution::restore(checkpoint).map_err(|error| other(error.to_string()))?;
+        let told = Told::from_bytes(told).map_err(|error| other(error.to_string()))?;
+        let generation = after.ask();
+        after.replay(&told).map_err(|error| other(error.to_string()))?;
+        let found = after.digest().to_string();
+        if found != of.digest {
+            let what = format!("they have the digest {found}, and the history {}", of.digest);
+            return Err(other(what));
+        }
+        Ok(Replayed { generation, told, after })
+    }
+}
+
+/// That the fitness log of an experiment has a generation.
+pub(super) fn check_in_log(
+    experiment: &ExperimentRecord,
+    generation: u64,
+) -> Result<(), QueryError> {
+    let (id, n_generations) = (experiment.id, experiment.n_generations());
+    if generation >= n_generations {
+        return Err(QueryError::NoGeneration { experiment: id, generation, n_generations });
+    }
+    if generation < experiment.log_from {
+        let why = Gap::before(experiment, generation);
+        return Err(QueryError::NotInLog { experiment: id, generation, why });
+    }
+    Ok(())
+}
+
+/// Why a generation is not in a fitness log; displays as a sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gap {
+    /// The first generation that is.
+    first: u64,
+    gap: LogGap,
+    /// Where it is found instead.
+    elsewhere: Option<String>,
+}
+
+impl Gap {
+    pub(super) fn before(experiment: &ExperimentRecord, generation: u64) -> Self {
+        let elsewhere = experiment.fork.as_ref().filter(|fork| generation <= fork.generation);
+        Self {
+            first: experiment.log_from,
+            gap: experiment.log_gap,
+            elsewhere: elsewhere.map(|fork| format!("{}@{generation}", fork.parent)),
+        }
+    }
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let first = self.first;
+        match (&self.elsewhere, self.gap) {
+            (Some(elsewhere), _) => write!(f, "it is that of the parent: ask for {elsewhere}"),
+            (None, LogGap::Pruned) => {
+                write!(f, "its fitness log was pruned before generation {first}")
+            }
+            (None, LogGap::Damaged) => {
+                write!(f, "its fitness log was damaged, and kept from generation {first} on")
+            }
+            (None, LogGap::None | LogGap::Older | LogGap::Forked) => write!(
+                f,
+                "an older version computed it, which kept no fitness; the log begins with \
+                 generation {first}"
+            ),
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Genotypes: champions, and whoever else has lived, computed again from the fitness log.
+
+use evolution::{ALGORITHMS, Champion, ChampionSource};
+use experiment_file::ExperimentConfig;
+use sim_core::Simulation;
+
+use crate::{
+    limits::{INDIVIDUALS_LEN_MAX, PAGE_LEN_MAX},
+    store::{ExperimentRecord, Store},
+};
+
+use super::{Address, QueryError, StoredGeneration, Who, experiment, generation::Replayed};
+
+/// Genotypes as the store has them.
+#[derive(Debug)]
+pub enum StoredIndividuals {
+    /// A champion.
+    Champion(ExperimentRecord, Champion),
+    /// Some of a generation.
+    OfGeneration(StoredGeneration, Wanted),
+}
+
+/// Whom of a generation.
+#[derive(Debug, Clone, Copy)]
+pub enum Wanted {
+    /// Those from an index on.
+    Page {
+        /// The index.
+        first: u32,
+        /// How many at most.
+        len: u32,
+    },
+    /// The one of this index.
+    Individual(u32),
+    /// The mean of the distribution after it.
+    Mean,
+}
+
+/// Genotypes, and what is known of them.
+#[derive(Debug)]
+pub struct Individuals {
+    /// Their experiment.
+    pub experiment: ExperimentRecord,
+    /// In the order of their indices.
+    pub individuals: Vec<Champion>,
+    /// The network that the genotype of a single one encodes, as JSON; none if another
+    /// version of the simulation computed the experiment.
+    pub network_json: Option<String>,
+    /// The index of the next individual of the generation, if there are more.
+    pub next: Option<u32>,
+}
+
+impl StoredIndividuals {
+    /// Reads what there is to know of those at an address. Of a whole generation: those from
+    /// index `first` on, `page_len` at most, 0 for as many as possible.
+    pub fn read(
+        store: &Store,
+        address: Address,
+        first: u32,
+        page_len: u32,
+    ) -> Result<Self, QueryError> {
+        let id = address.experiment;
+        let page_len = if page_len == 0 { PAGE_LEN_MAX } else { page_len.min(PAGE_LEN_MAX) };
+        let (generation, wanted) = match address.who {
+            Who::Champion => {
+                let experiment = experiment(store, id)?;
+                let champion = store.champion(id)?.ok_or(QueryError::NoChampion(id))?;
+                return Ok(Self::Champion(experiment, champion));
+            }
+            Who::Generation(generation) => (generation, Wanted::Page { first, len: page_len }),
+            Who::Individual(generation, individual) => (generation, Wanted::Individual(individual)),
+            Who::Mean(generation) => (generation, Wanted::Mean),
+        };
+        Ok(Self::OfGeneration(StoredGeneration::read(store, id, generation)?, wanted))
+    }
+
+    /// Computes the generation again, and decodes a single genotype: work for a CPU.
+    pub fn reconstruct(self) -> Result<Individuals, QueryError> {
+        let (experiment, individuals, next, is_single) = match self {
+            Self::Champion(experiment, champion) => (experiment, vec![champion], None, true),
+            Self::OfGeneration(stored, wanted) => {
+                let (individuals, next) = individuals(&stored, wanted)?;
+                let is_single = !matches!(wanted, Wanted::Page { .. });
+                (stored.experiment, individuals, next, is_single)
+            }
+        };
+        let network_json = match &individuals[..] {
+            [only] if is_single && experiment.fingerprint == sim_core::FINGERPRINT => {
+                let network = network_json(&experiment.config_json, &only.genotype);
+                Some(network.map_err(QueryError::Undecodable)?)
+            }
+            _ => None,
+        };
+        Ok(Individuals { experiment, individuals, network_json, next })
+    }
+}
+
+/// Computes a generation again, and takes some of it.
+fn individuals(
+    stored: &StoredGeneration,
+    wanted: Wanted,
+) -> Result<(Vec<Champion>, Option<u32>), QueryError> {
+    let StoredGeneration { experiment, of, .. } = stored;
+    let Replayed { generation, told, after } = stored.replay()?;
+    let n_individuals = generation.genotypes.len() as u32;
+    let individual = |i: u32| Champion {
+        generation: of.generation,
+        source: ChampionSource::Individual(i),
+        genotype: generation.genotypes[i as usize].clone(),
+        trial_fitness: told.trial_fitness[i as usize].clone(),
+        held_out: None,
+        judged: None,
+    };
+    let no_individual = |individual| QueryError::NoIndividual {
+        experiment: experiment.id,
+        generation: of.generation,
+        individual,
+        n_individuals,
+    };
+    Ok(match wanted {
+        Wanted::Individual(i) if i >= n_individuals => return Err(no_individual(i)),
+        Wanted::Individual(i) => (vec![individual(i)], None),
+        Wanted::Page { first, .. } if first >= n_individuals => return Err(no_individual(first)),
+        Wanted::Page { first, len } => {
+            let numbers_per_individual =
+                generation.genotypes[0].len() + told.trial_fitness[0].len();
+            let fit = INDIVIDUALS_LEN_MAX / (numbers_per_individual * size_of::<f64>());
+            let end = n_individuals.min(first.saturating_add(len.min(fit.max(1) as u32)));
+            ((first..end).map(individual).collect(), (end < n_individuals).then_some(end))
+        }
+        Wanted::Mean => {
+            let genotype = after.mean().ok_or(QueryError::NoMean { experiment: experiment.id })?;
+            let mean = Champion {
+                generation: of.generation,
+                source: ChampionSource::Mean,
+                genotype,
+                trial_fitness: Vec::new(),
+                held_out: None,
+                judged: None,
+            };
+            (vec![mean], None)
+        }
+    })
+}
+
+fn network_json(config_json: &str, genotype: &[f64]) -> Result<String, String> {
+    let (config, _) = ExperimentConfig::from_json(config_json, "", ALGORITHMS)
+        .map_err(|error| error.to_string())?;
+    let simulation = Simulation::compile(&config).map_err(|error| error.to_string())?;
+    let network = simulation.network_json(genotype).map_err(|error| error.to_string())?;
+    Ok(network.to_string())
+}

@@ -1,0 +1,109 @@
+//! Whom an individual descends from, found by going through its generations again.
+
+use evolution::{Ancestor, Checkpoint, Evolution, Pedigree, Told};
+use experiment_file::ExperimentConfig;
+
+use crate::{
+    limits::{ANCESTORS_MAX, LINEAGE_GENES_MAX},
+    store::{ExperimentRecord, LogEntry, Store},
+};
+
+use super::{Address, QueryError, Who, experiment, generation::check_in_log};
+
+/// What a lineage is computed from.
+#[derive(Debug)]
+pub struct StoredLineage {
+    experiment: ExperimentRecord,
+    individual: u32,
+    /// Of the earliest generation.
+    checkpoint: Checkpoint,
+    first: u64,
+    /// From the earliest generation to that of the individual.
+    log: Vec<LogEntry>,
+}
+
+/// The lineage of an individual: per population its name, and the individual with its ancestors,
+/// later generations first. Populations descend on their own.
+#[derive(Debug)]
+pub struct Lineage(pub Vec<(String, Vec<Ancestor>)>);
+
+impl StoredLineage {
+    /// Reads what the lineage of an individual is computed from. `depth`: generations before
+    /// its own.
+    pub fn read(store: &Store, address: Address, depth: u32) -> Result<Self, QueryError> {
+        let id = address.experiment;
+        let Who::Individual(generation, individual) = address.who else {
+            return Err(QueryError::NoLineage(format!(
+                "`{address}` is no individual; name one, such as {id}@0/0"
+            )));
+        };
+        let experiment = experiment(store, id)?;
+        check_in_log(&experiment, generation)?;
+        let first = generation.saturating_sub(depth.into()).max(experiment.log_from);
+        let damaged = || QueryError::DamagedLog { experiment: id, generation };
+        let (checkpoint, ..) = store.generation_in_log(id, first)?.ok_or_else(damaged)?;
+        let log = store.log_between(id, first, generation + 1)?.ok_or_else(damaged)?;
+        Ok(Self { experiment, individual, checkpoint, first, log })
+    }
+
+    /// Goes through the generations again: work for a CPU.
+    pub fn trace(self) -> Result<Lineage, QueryError> {
+        let Self { experiment, individual, checkpoint, first, log } = self;
+        let (id, generation) = (experiment.id, first + log.len() as u64 - 1);
+        let other = |what: String| QueryError::OtherBits {
+            experiment: id,
+            generation,
+            what,
+            theirs: experiment.fingerprint.clone(),
+        };
+        let (config, _) =
+            ExperimentConfig::from_json(&experiment.config_json, "", evolution::ALGORITHMS)
+                .map_err(|error| other(error.to_string()))?;
+        let size = u64::from(config.algorithm.population_size);
+        if size * experiment.genotype_len * log.len() as u64 > LINEAGE_GENES_MAX {
+            return Err(too_deep());
+        }
+        let names: Vec<String> = config.algorithm.populations.keys().cloned().collect();
+        let mut pedigrees = vec![Pedigree::starting_at(first); names.len()];
+        let mut evolution =
+            Evolution::restore(&checkpoint).map_err(|error| other(error.to_string()))?;
+        for (of, entry) in &log {
+            let births = evolution.births().ok_or_else(|| {
+                QueryError::NoLineage(format!(
+                    "experiment {id} evolves a distribution, by {}: its individuals have no \
+                     parents",
+                    config.algorithm.name
+                ))
+            })?;
+            let told = Told::from_bytes(entry).map_err(|error| other(error.to_string()))?;
+            let n_individuals = told.trial_fitness.len() as u32;
+            if of.generation == generation && individual >= n_individuals {
+                let experiment = id;
+                return Err(QueryError::NoIndividual {
+                    experiment,
+                    generation,
+                    individual,
+                    n_individuals,
+                });
+            }
+            for (pedigree, births) in pedigrees.iter_mut().zip(births) {
+                pedigree.push(births, &told);
+            }
+            let replay = evolution.replay(&told).map_err(|error| other(error.to_string()))?;
+            let found = replay.summary.digest.to_string();
+            if found != of.digest {
+                return Err(other(format!("it has the digest {found}, and not {}", of.digest)));
+            }
+        }
+        let traced = names.into_iter().zip(pedigrees.iter().map(|it| it.trace(individual)));
+        let populations: Vec<(String, Vec<Ancestor>)> = traced.collect();
+        if populations.iter().map(|(_, ancestors)| ancestors.len()).sum::<usize>() > ANCESTORS_MAX {
+            return Err(too_deep());
+        }
+        Ok(Lineage(populations))
+    }
+}
+
+fn too_deep() -> QueryError {
+    QueryError::NoLineage("the lineage is too large: ask for less depth".to_owned())
+}

@@ -1,0 +1,142 @@
+//! What pages ask, answered as clients are.
+
+use std::{path::Path, time::Duration};
+
+use swarm_proto::v1::{
+    Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
+    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
+    SubmitExperimentRequest, Worker, experiment_service_server::ExperimentService as _,
+};
+use swarm_web::{Action, Archive, Control as WebControl};
+use tokio::{
+    sync::{Semaphore, watch},
+    task, time,
+};
+use tonic::{Request, Status, async_trait};
+
+use crate::{
+    clock,
+    control::ControlError,
+    ids::ExperimentId,
+    limits::RECONSTRUCTIONS_OF_PAGES_MAX,
+    queries::{self, QueryError, StoredIndividuals},
+    shared_store::SharedStore,
+    store::{Store, StoreError},
+};
+
+use super::{Experiments, convert, explain, status};
+
+/// How often a data directory is looked at that somebody else may write to.
+const LOOK_EVERY: Duration = Duration::from_secs(2);
+
+/// A database that pages read by a connection of their own, which writes nothing.
+#[derive(Debug)]
+pub struct PagesArchive {
+    store: SharedStore,
+    reconstructions: Semaphore,
+    news: watch::Receiver<u64>,
+}
+
+impl PagesArchive {
+    /// The database in `directory`; `news` changes when something has been written.
+    pub fn open(directory: &Path, news: watch::Receiver<u64>) -> Result<Self, StoreError> {
+        let store = SharedStore::new(Store::open_read_only(directory)?);
+        Ok(Self { store, reconstructions: Semaphore::new(RECONSTRUCTIONS_OF_PAGES_MAX), news })
+    }
+
+    /// The database in `directory`, to which a coordinator may write that is not here.
+    pub fn open_alone(directory: &Path) -> Result<Self, StoreError> {
+        let (sender, news) = watch::channel(0);
+        let archive = Self::open(directory, news)?;
+        tokio::spawn(async move {
+            let mut looks = time::interval(LOOK_EVERY);
+            while !sender.is_closed() {
+                looks.tick().await;
+                sender.send_modify(|count| *count += 1);
+            }
+        });
+        Ok(archive)
+    }
+}
+
+#[async_trait]
+impl Archive for PagesArchive {
+    async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
+        let experiments = self.store.read(Store::experiments).await?;
+        Ok(experiments.into_iter().map(convert::experiment).collect())
+    }
+
+    async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status> {
+        let read = move |store: &Store| queries::experiment(store, ExperimentId(id));
+        Ok(convert::stored_experiment(self.store.read(read).await?))
+    }
+
+    async fn generations(
+        &self,
+        request: ListGenerationsRequest,
+    ) -> Result<ListGenerationsResponse, Status> {
+        let ListGenerationsRequest { experiment_id, from_generation, page_size } = request;
+        let id = ExperimentId(experiment_id);
+        let read = move |store: &Store| queries::generations(store, id, from_generation, page_size);
+        Ok(convert::generations(self.store.read(read).await?))
+    }
+
+    async fn events(&self, request: ListEventsRequest) -> Result<ListEventsResponse, Status> {
+        let ListEventsRequest { experiment_id, from_sequence, page_size } = request;
+        let id = ExperimentId(experiment_id);
+        let read = move |store: &Store| queries::events(store, id, from_sequence, page_size);
+        Ok(convert::events(self.store.read(read).await?))
+    }
+
+    async fn fitness(&self, id: u64, from: u64, n: u32) -> Result<(u64, Vec<Vec<f32>>), Status> {
+        let read = move |store: &Store| queries::fitness(store, ExperimentId(id), from, n);
+        Ok(self.store.read(read).await?)
+    }
+
+    async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status> {
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let address = convert::address(address)?;
+        let read = move |store: &Store| StoredIndividuals::read(store, address, 0, 1);
+        let stored = self.store.read(read).await?;
+        let found = task::spawn_blocking(move || stored.reconstruct())
+            .await
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        let individual = convert::individuals(found).individuals.pop();
+        individual.ok_or_else(|| QueryError::NoChampion(address.experiment).into())
+    }
+
+    fn news(&self) -> watch::Receiver<u64> {
+        self.news.clone()
+    }
+}
+
+#[async_trait]
+impl WebControl for Experiments {
+    async fn workers(&self) -> Result<Vec<Worker>, Status> {
+        let workers = self.control.workers().await?;
+        let now_ms = clock::unix_ms();
+        Ok(workers.into_iter().map(|worker| convert::worker(worker, now_ms)).collect())
+    }
+
+    async fn explain(&self, id: u64) -> Result<ExplainExperimentResponse, Status> {
+        Ok(explain::explanation(self.control.explain(ExperimentId(id)).await?))
+    }
+
+    async fn steer(&self, id: u64, action: Action) -> Result<Experiment, Status> {
+        let id = ExperimentId(id);
+        let changed = match action {
+            Action::Pause => self.control.pause(id, "").await,
+            Action::Resume => self.control.resume(id).await,
+            Action::Cancel => self.control.cancel(id).await,
+            Action::Priority(weight) => {
+                self.control.set_priority(id, convert::priority(weight)?).await
+            }
+        };
+        Ok(convert::experiment(changed?))
+    }
+
+    async fn submit(&self, request: SubmitExperimentRequest) -> Result<Experiment, Status> {
+        let response = self.submit_experiment(Request::new(request)).await?.into_inner();
+        response.experiment.ok_or_else(|| Status::internal("there is no experiment"))
+    }
+}

@@ -1,0 +1,101 @@
+//! The table of forks.
+
+use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+
+use super::{
+    LogGap, Result, StoreError, fitness_log, history,
+    seals::{Seal, Sealer},
+};
+use crate::ids::ExperimentId;
+
+/// Where an experiment comes from that goes on from the state of another one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ForkRecord {
+    /// The other one.
+    pub parent: ExperimentId,
+    /// The last generation that it shares with that.
+    pub generation: u64,
+    /// The link of the digest chain on which its own first generation hangs.
+    pub link: String,
+    /// What is changed, one line each.
+    pub changes: Vec<String>,
+}
+
+/// Adds where an experiment comes from.
+pub fn put(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+    fork: &ForkRecord,
+) -> rusqlite::Result<()> {
+    let changes = serde_json::to_string(&fork.changes).expect("text serialises");
+    let seal = seal_of(sealer, id, fork, &changes);
+    transaction.execute(
+        "INSERT INTO forks (experiment_id, parent_id, generation, link, changes, seal)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+        params![id.0, fork.parent.0, fork.generation, fork.link, changes, seal],
+    )?;
+    Ok(())
+}
+
+/// Gives a new experiment the generations that it shares with its parent, and when they were
+/// completed.
+pub fn copy_history(
+    transaction: &Transaction<'_>,
+    sealer: &Sealer,
+    id: ExperimentId,
+    fork: &ForkRecord,
+) -> rusqlite::Result<()> {
+    let shared = history::read_between(transaction, fork.parent, 0, fork.generation + 1)?;
+    for generation in &shared {
+        history::put(transaction, sealer, id, generation)?;
+    }
+    transaction.execute(
+        "INSERT INTO events (experiment_id, sequence, at_ms, kind, generation)
+         SELECT ?1, (SELECT max(sequence) FROM events WHERE experiment_id = ?1) + 1 + generation,
+                at_ms, kind, generation
+         FROM events WHERE experiment_id = ?2 AND kind = 'generation' AND generation <= ?3",
+        params![id.0, fork.parent.0, fork.generation],
+    )?;
+    fitness_log::begin_at(transaction, id, fork.generation + 1, LogGap::Forked)
+}
+
+/// Where an experiment comes from, if it is a fork; something that is not what was stored is
+/// damage. `sealer`: none if the database has no seals yet.
+pub fn get(
+    connection: &Connection,
+    sealer: Option<&Sealer>,
+    id: ExperimentId,
+) -> Result<Option<ForkRecord>> {
+    let mut statement = connection.prepare_cached(
+        "SELECT parent_id, generation, link, changes, seal FROM forks WHERE experiment_id = ?1",
+    )?;
+    let read = |row: &Row<'_>| {
+        let text: String = row.get(3)?;
+        let changes: Option<Vec<String>> = serde_json::from_str(&text).ok();
+        let fork = ForkRecord {
+            parent: ExperimentId(row.get(0)?),
+            generation: row.get(1)?,
+            link: row.get(2)?,
+            changes: changes.clone().unwrap_or_default(),
+        };
+        let seal: Vec<u8> = row.get(4)?;
+        let is_sound = changes.is_some()
+            && sealer.is_none_or(|sealer| seal == seal_of(sealer, id, &fork, &text));
+        Ok(is_sound.then_some(fork))
+    };
+    match statement.query_row([id.0], read).optional()? {
+        Some(None) => {
+            let what = format!("where experiment {id} was forked is not what was stored");
+            Err(StoreError::Corrupt(what))
+        }
+        Some(fork) => Ok(fork),
+        None => Ok(None),
+    }
+}
+
+fn seal_of(sealer: &Sealer, id: ExperimentId, fork: &ForkRecord, changes: &str) -> Seal {
+    let ForkRecord { parent, generation, link, .. } = fork;
+    let seal = sealer.begin("fork", id).number(parent.0).number(*generation);
+    seal.text(link.as_bytes()).text(changes.as_bytes()).finish()
+}
