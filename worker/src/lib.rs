@@ -6,6 +6,7 @@
 mod assignment;
 mod backoff;
 mod convert;
+mod lifetime;
 pub mod metrics;
 mod pool;
 mod session;
@@ -16,12 +17,13 @@ use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use sim_core::Isa;
 use swarm_proto::{SLOTS_MAX, WORKER_NAME_LEN_MAX};
-use swarm_transport::{Credentials, Link, LinkError};
+use swarm_transport::{Credentials, Link, LinkError, banner};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
 pub use crate::{
     backoff::Backoff,
+    lifetime::{Expired, Lifetime, Watchdog},
     session_file::{Unhealthy, health_check},
     stats::{Stats, StatsSnapshot},
 };
@@ -101,6 +103,18 @@ pub enum WorkerError {
         /// The coordinator's reason, which names its version.
         refusal: String,
     },
+    /// Another service answers at the address, and this worker has never had a session.
+    /// Fix the address.
+    #[error(
+        "the server at {address} is not a coordinator: it answers \"{banner}\"; is this the right \
+         port?"
+    )]
+    AnotherService {
+        /// The address.
+        address: String,
+        /// The first line of the server's answer.
+        banner: String,
+    },
     /// The coordinator wants another token, or another certificate. Fix the
     /// credentials.
     #[error("the coordinator at {address} does not let this worker in: {refusal}")]
@@ -134,7 +148,8 @@ impl WorkerError {
 /// what it is computing, delivers that, and returns.
 ///
 /// A coordinator that is not up, or goes away, is tried again without end, after
-/// random delays that grow.
+/// random delays that grow; only another service, where a coordinator has never been
+/// reached, ends the worker.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
     let (isa, stats) = (config.isa, Arc::clone(&config.stats));
     let evaluator = move |config_json| convert::evaluator(config_json, isa, Arc::clone(&stats));
@@ -154,6 +169,7 @@ async fn run_with(
     // 0 means that it is not known.
     let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
+    let mut was_connected = false;
     loop {
         let opened = tokio::select! {
             biased;
@@ -163,6 +179,7 @@ async fn run_with(
         let (what, reason) = match opened {
             Ok(session) => {
                 stats.on_connected();
+                was_connected = true;
                 info!(
                     coordinator = config.coordinator,
                     name = config.name,
@@ -207,6 +224,12 @@ async fn run_with(
                 ("cannot connect", reason)
             }
         };
+        if !was_connected
+            && let Some(banner) = banner(&link.authority()).await
+            && !is_of_gateway(&banner)
+        {
+            return Err(WorkerError::AnotherService { address: config.coordinator, banner });
+        }
         let delay = backoff.next_delay(rand::random());
         warn!(
             coordinator = config.coordinator,
@@ -221,6 +244,12 @@ async fn run_with(
             () = tokio::time::sleep(delay) => {}
         }
     }
+}
+
+/// Whether it is the answer of a gateway in front of a coordinator that does not run.
+fn is_of_gateway(banner: &str) -> bool {
+    let status = banner.strip_prefix("HTTP/").and_then(|rest| rest.split(' ').nth(1));
+    matches!(status, Some("502" | "503" | "504"))
 }
 
 fn session_file(config: &WorkerConfig) -> Result<Option<SessionFile>, WorkerError> {
@@ -252,6 +281,8 @@ fn link(config: &WorkerConfig) -> Result<Link, WorkerError> {
 
 #[cfg(test)]
 mod tests {
+    use std::{io::Write as _, net::TcpListener, thread};
+
     use super::*;
 
     fn rejection(coordinator: &str, name: &str, slots: usize) -> WorkerError {
@@ -274,6 +305,26 @@ mod tests {
             assert!(error.is_input(), "{error}");
         }
         assert!(link(&WorkerConfig::new(url, "w", 4096)).is_ok());
+    }
+
+    #[tokio::test]
+    async fn another_service_ends_a_worker_and_a_gateway_does_not() {
+        let answering = |line: &'static [u8]| {
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            let address = format!("http://{}", listener.local_addr().unwrap());
+            thread::spawn(move || {
+                for stream in listener.incoming() {
+                    // A worker that is gone needs no answer.
+                    let _ = stream.and_then(|mut stream| stream.write_all(line));
+                }
+            });
+            address
+        };
+        let run = |address| run(WorkerConfig::new(address, "w", 1), CancellationToken::new());
+        let error = run(answering(b"HTTP/1.1 404 Not Found\r\n\r\n")).await.unwrap_err();
+        assert!(error.to_string().contains("HTTP/1.1 404 Not Found"), "{error}");
+        let gateway = run(answering(b"HTTP/1.1 503 Service Unavailable\r\n\r\n"));
+        assert!(tokio::time::timeout(Duration::from_secs(1), gateway).await.is_err());
     }
 
     #[test]

@@ -7,30 +7,35 @@ use std::{
     process::ExitCode,
     sync::Arc,
     thread,
+    time::Duration,
 };
 
 use clap::Parser;
 use sim_core::Isa;
-use swarm_telemetry::{Endpoint, LogArgs, MetricsArgs};
+use swarm_telemetry::{Endpoint, LogArgs, MetricsArgs, VERSION, parse_positive_duration};
 use swarm_transport::CredentialArgs;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::{
+    signal::unix::{SignalKind, signal},
+    time::{Instant, sleep},
+};
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info};
-use worker::{WorkerConfig, WorkerError, metrics};
+use tracing::{error, info, warn};
+use worker::{Expired, Lifetime, Stats, Watchdog, WorkerConfig, WorkerError, metrics};
 
 const EXIT_INTERNAL: u8 = 1;
 const EXIT_INPUT: u8 = 2;
-const EXIT_VERSION_MISMATCH: u8 = 6;
 const EXIT_DENIED: u8 = 7;
+const EXIT_NO_COORDINATOR: u8 = 9;
 const EXIT_INTERRUPTED: i32 = 130;
 
 /// Computes the fitness of genotypes for a coordinator.
 ///
-/// Connects, and reconnects without limit. On SIGTERM or SIGINT it finishes its items,
+/// Connects, and reconnects without limit. With --idle-timeout or --time-limit it ends by
+/// itself. On SIGTERM or SIGINT it finishes its items,
 /// sends the results and exits; a second signal ends it at once, and other workers
 /// repeat its items.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version = VERSION, after_help = EXIT_CODES)]
 struct Args {
     /// Address of the coordinator.
     #[arg(long, env = "SWARM_COORDINATOR", default_value = "http://127.0.0.1:7700")]
@@ -60,6 +65,13 @@ struct Args {
     /// that says why.
     #[arg(long, requires = "session_file")]
     health_check: bool,
+    /// End after this time without an item: 90s, 15m, 2h [default: wait without limit]
+    #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
+    idle_timeout: Option<Duration>,
+    /// Time after which this worker has ended, such as the time limit of a batch job: it
+    /// takes no more items and finishes those that it has early enough [default: no limit]
+    #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
+    time_limit: Option<Duration>,
     #[command(flatten)]
     metrics: MetricsArgs,
     #[command(flatten)]
@@ -68,11 +80,11 @@ struct Args {
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0    stopped by a signal
+  0    stopped by a signal, or after --idle-timeout or --time-limit
   1    internal error
   2    bad arguments; token or certificate unusable; address of metrics in use
-  6    coordinator and worker have different versions
   7    the coordinator does not accept the token
+  9    the server at the address is not a coordinator, or one of another version
   130  ended at once by a second signal";
 
 #[tokio::main]
@@ -120,6 +132,10 @@ async fn main() -> ExitCode {
         let scrape = move || ready(Some(metrics::scrape(&identity, &stats.snapshot())));
         tokio::spawn(endpoint.serve(scrape));
     }
+    let lifetime = Lifetime { idle_timeout: args.idle_timeout, time_limit: args.time_limit };
+    if lifetime.is_bounded() {
+        tokio::spawn(watch_over(lifetime, Arc::clone(&config.stats), shutdown.clone()));
+    }
     match worker::run(config, shutdown).await {
         Ok(()) => {
             info!("stopped");
@@ -128,11 +144,34 @@ async fn main() -> ExitCode {
         Err(error) => {
             error!("{error}");
             match error {
-                WorkerError::VersionMismatch { .. } => EXIT_VERSION_MISMATCH.into(),
+                WorkerError::VersionMismatch { .. } | WorkerError::AnotherService { .. } => {
+                    EXIT_NO_COORDINATOR.into()
+                }
                 WorkerError::Denied { .. } => EXIT_DENIED.into(),
                 error if error.is_input() => EXIT_INPUT.into(),
                 _ => EXIT_INTERNAL.into(),
             }
+        }
+    }
+}
+
+/// Has the worker finish when its life is over, and ends the process if that takes too long.
+async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: CancellationToken) {
+    let mut watchdog = Watchdog::new(lifetime, Instant::now().into_std());
+    loop {
+        sleep(watchdog.interval()).await;
+        let reason = match watchdog.look(Instant::now().into_std(), &stats.snapshot()) {
+            None => continue,
+            Some(Expired::Idle) => "idle for the time of --idle-timeout",
+            Some(Expired::TimeIsNear) => "near the end of --time-limit",
+            Some(Expired::TimeIsUp) => {
+                warn!("the time of --time-limit is over before all items are done: others do them");
+                std::process::exit(0);
+            }
+        };
+        if !shutdown.is_cancelled() {
+            info!(reason, "worker ends by itself");
+            shutdown.cancel();
         }
     }
 }

@@ -21,6 +21,7 @@ pub struct Stats {
     n_episodes: AtomicU64,
     n_robot_steps: AtomicU64,
     busy_ns: AtomicU64,
+    longest_item_ns: AtomicU64,
     n_items_queued: AtomicUsize,
     n_slots_busy: AtomicUsize,
 }
@@ -57,6 +58,8 @@ pub struct StatsSnapshot {
     pub n_robot_steps: u64,
     /// Time that slots have computed, summed over slots.
     pub busy: Duration,
+    /// Time that the longest item so far has taken.
+    pub longest_item: Duration,
     /// Items that wait for a slot.
     pub n_items_queued: usize,
     /// Slots that compute.
@@ -76,6 +79,7 @@ impl Stats {
             n_episodes: self.n_episodes.load(Relaxed),
             n_robot_steps: self.n_robot_steps.load(Relaxed),
             busy: Duration::from_nanos(self.busy_ns.load(Relaxed)),
+            longest_item: Duration::from_nanos(self.longest_item_ns.load(Relaxed)),
             n_items_queued: self.n_items_queued.load(Relaxed),
             n_slots_busy: self.n_slots_busy.load(Relaxed),
         }
@@ -101,6 +105,7 @@ impl Stats {
 
     pub(crate) fn on_item(&self, made: Made, busy: Duration) {
         self.busy_ns.fetch_add(busy.as_nanos() as u64, Relaxed);
+        self.longest_item_ns.fetch_max(busy.as_nanos() as u64, Relaxed);
         match made {
             Made::Fitness { n_episodes } => {
                 self.n_episodes.fetch_add(n_episodes, Relaxed);

@@ -1,0 +1,137 @@
+//! When a worker ends by itself: it has been idle for long, or its time is up.
+//!
+//! The decision is a plain struct: time and what the worker has done are arguments.
+
+use std::time::{Duration, Instant};
+
+use crate::StatsSnapshot;
+
+/// What is left for delivering results and closing the connection.
+const MARGIN: Duration = Duration::from_secs(5);
+/// Items like the longest so far, as which the last ones may take as long.
+const N_LONGEST: u32 = 2;
+
+/// Bounds on a worker's life; none: it lives until it is told to stop.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Lifetime {
+    /// Time without an item after which it ends.
+    pub idle_timeout: Option<Duration>,
+    /// Time since its start at which it has ended.
+    pub time_limit: Option<Duration>,
+}
+
+/// Why a worker ends by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expired {
+    /// It has had no item for long.
+    Idle,
+    /// Its time limit is near: it is time to finish its items.
+    TimeIsNear,
+    /// Its time limit is there: it has no time to finish them.
+    TimeIsUp,
+}
+
+/// Watches a worker's life.
+#[derive(Debug)]
+pub struct Watchdog {
+    lifetime: Lifetime,
+    started: Instant,
+    /// Since when it has had no item, as far as was seen.
+    idle_since: Instant,
+    /// Items that were done when it was looked at.
+    n_done: u64,
+}
+
+impl Lifetime {
+    /// Whether it has any bound.
+    pub fn is_bounded(&self) -> bool {
+        self.idle_timeout.is_some() || self.time_limit.is_some()
+    }
+}
+
+impl Watchdog {
+    /// Watches a worker that starts now.
+    pub fn new(lifetime: Lifetime, now: Instant) -> Self {
+        Self { lifetime, started: now, idle_since: now, n_done: 0 }
+    }
+
+    /// How long one may wait before looking again.
+    pub fn interval(&self) -> Duration {
+        let shortest = self.lifetime.idle_timeout.into_iter().chain(self.lifetime.time_limit).min();
+        let interval = shortest.unwrap_or(Duration::MAX) / 8;
+        interval.clamp(Duration::from_millis(10), Duration::from_secs(1))
+    }
+
+    /// Looks at what the worker does; says if it is to end.
+    pub fn look(&mut self, now: Instant, stats: &StatsSnapshot) -> Option<Expired> {
+        let n_done = stats.n_items_computed + stats.n_items_failed + stats.n_items_dropped;
+        if stats.n_items_queued + stats.n_slots_busy > 0 || n_done != self.n_done {
+            (self.idle_since, self.n_done) = (now, n_done);
+        }
+        if let Some(limit) = self.lifetime.time_limit {
+            let age = now - self.started;
+            // A short life is not all farewell.
+            let needed = (N_LONGEST * stats.longest_item + MARGIN).min(limit / 2);
+            if age >= limit {
+                return Some(Expired::TimeIsUp);
+            } else if age + needed >= limit {
+                return Some(Expired::TimeIsNear);
+            }
+        }
+        let is_idle = |timeout| now - self.idle_since >= timeout;
+        self.lifetime.idle_timeout.is_some_and(is_idle).then_some(Expired::Idle)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    fn busy(n_slots_busy: usize, longest_item: Duration) -> StatsSnapshot {
+        StatsSnapshot { n_slots_busy, longest_item, ..StatsSnapshot::default() }
+    }
+
+    fn watchdog(idle_s: Option<u32>, limit_s: Option<u32>) -> (Watchdog, Instant) {
+        let lifetime = Lifetime {
+            idle_timeout: idle_s.map(|s| s * SECOND),
+            time_limit: limit_s.map(|s| s * SECOND),
+        };
+        #[expect(clippy::disallowed_methods, reason = "any moment will do")]
+        let now = Instant::now();
+        (Watchdog::new(lifetime, now), now)
+    }
+
+    #[test]
+    fn idle_is_who_has_had_no_item_for_as_long_without_a_break() {
+        let (mut dog, start) = watchdog(Some(10), None);
+        let none = StatsSnapshot::default();
+        assert_eq!(dog.look(start + 9 * SECOND, &busy(1, SECOND)), None);
+        assert_eq!(dog.look(start + 18 * SECOND, &none), None);
+        assert_eq!(dog.look(start + 19 * SECOND, &none), Some(Expired::Idle));
+        // An item that came and went between two looks.
+        let done = StatsSnapshot { n_items_computed: 1, ..none };
+        assert_eq!(dog.look(start + 20 * SECOND, &done), None);
+        assert_eq!(dog.look(start + 30 * SECOND, &done), Some(Expired::Idle));
+    }
+
+    #[test]
+    fn items_that_take_long_are_given_time_to_finish() {
+        let (mut dog, start) = watchdog(None, Some(3600));
+        let long = busy(8, 300 * SECOND);
+        assert_eq!(dog.look(start + 2994 * SECOND, &long), None);
+        assert_eq!(dog.look(start + 2995 * SECOND, &long), Some(Expired::TimeIsNear));
+        assert_eq!(dog.look(start + 3594 * SECOND, &busy(8, Duration::ZERO)), None);
+        assert_eq!(dog.look(start + 3600 * SECOND, &long), Some(Expired::TimeIsUp));
+        let (mut dog, start) = watchdog(None, Some(4));
+        assert_eq!(dog.look(start + SECOND, &long), None, "a short life is not all farewell");
+    }
+
+    #[test]
+    fn whoever_has_no_bounds_lives_on() {
+        let (mut dog, start) = watchdog(None, None);
+        assert_eq!(dog.look(start + 1_000_000 * SECOND, &StatsSnapshot::default()), None);
+        assert!(!Lifetime::default().is_bounded());
+    }
+}
