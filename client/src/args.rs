@@ -1,21 +1,27 @@
 //! The command line: the options of all commands, and the arguments that several
 //! commands share. Each command's own arguments are in its module.
 
-use std::path::PathBuf;
+use std::{
+    fmt::{self, Display},
+    ops::RangeInclusive,
+    path::PathBuf,
+    str::FromStr,
+};
 
-use clap::{Args as ClapArgs, Parser, ValueEnum, value_parser};
+use clap::{Args as ClapArgs, Parser, ValueEnum};
+use clap_complete::ArgValueCompleter;
+use coordinator::{group, labels};
+use experiment_file::limits;
 use sim_core::Isa;
+use swarm_telemetry::VERSION;
 
 use crate::{
-    commands::Command,
-    error::Error,
-    experiment_file::{ExperimentFile, Overrides},
-    settings::Settings,
+    commands::Command, complete, experiment_file::Overrides, settings::Settings, sweep::SweepArgs,
 };
 
 /// Evolves controllers for swarms of robots.
 #[derive(Debug, Parser)]
-#[command(name = "swarmctl", version, after_help = HELP, max_term_width = 100)]
+#[command(name = "swarmctl", version = VERSION, after_help = HELP, max_term_width = 100)]
 pub struct Args {
     /// Format of standard output.
     #[arg(
@@ -81,25 +87,86 @@ Exit codes:
   9    the server at the address is not a coordinator, or one of another version
   10   the experiment has not ended within wait --timeout
   11   the database is damaged (doctor, backup)
+  12   the bundle is not what it says (verify)
   130  interrupted";
 
 /// The experiment that a command is about.
 #[derive(Debug, ClapArgs)]
 pub struct ExperimentId {
     /// Number of the experiment.
+    #[arg(value_parser = whole(1..=u64::MAX))]
     pub id: u64,
+}
+
+/// The experiment, or the group of them, that a command is about.
+#[derive(Debug, ClapArgs)]
+pub struct Target {
+    /// Number or name of the experiment, or name of a group of experiments.
+    #[arg(value_name = "ID|NAME", add = ArgValueCompleter::new(complete::experiments))]
+    pub subject: Subject,
+}
+
+/// A label: `KEY=VALUE`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    pub key: String,
+    pub value: String,
+}
+
+impl FromStr for Label {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
+        let (key, value) = (key.to_owned(), value.to_owned());
+        labels::check(&[(key.clone(), value.clone())].into())?;
+        Ok(Self { key, value })
+    }
+}
+
+/// What a command is about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Subject {
+    Experiment(u64),
+    Group(String),
+}
+
+impl Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Experiment(id) => id.fmt(f),
+            Self::Group(name) => name.fmt(f),
+        }
+    }
+}
+
+impl FromStr for Subject {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(id) = text.parse() {
+            return Ok(Self::Experiment(id));
+        }
+        group::check_name(text)?;
+        Ok(Self::Group(text.to_owned()))
+    }
 }
 
 /// An experiment file to evolve, and replacements of its values.
 #[derive(Debug, ClapArgs)]
 pub struct ExperimentArgs {
-    /// The experiment file.
+    /// The experiment file; - is standard input.
     pub config: PathBuf,
     /// Number of generations, instead of the file's.
-    #[arg(long, value_name = "G", value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
     pub generations: Option<u64>,
     #[command(flatten)]
     pub seed: SeedArg,
+    #[command(flatten)]
+    pub sweep: SweepArgs,
+    /// Label it, to find it by: `list --label KEY=VALUE`; may be given several times.
+    #[arg(long = "label", value_name = "KEY=VALUE")]
+    pub labels: Vec<Label>,
 }
 
 impl ExperimentArgs {
@@ -107,13 +174,6 @@ impl ExperimentArgs {
     pub fn overrides(&self) -> Overrides {
         let Self { seed: SeedArg { seed }, generations, .. } = *self;
         Overrides { seed, generations, ..Overrides::default() }
-    }
-
-    /// Reads the file; fails if the experiment cannot be evolved.
-    pub fn checked_file(&self) -> Result<ExperimentFile, Error> {
-        let file = ExperimentFile::read(&self.config);
-        let checked = file.and_then(|file| file.check(&self.overrides()).map(|_| file));
-        checked.map_err(|error| Error::invalid(&self.config, &error))
     }
 }
 
@@ -129,7 +189,7 @@ pub struct DataDirArg {
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct SeedArg {
     /// Seed of all randomness, instead of the file's.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = whole(0..=u64::MAX))]
     pub seed: Option<u64>,
 }
 
@@ -137,7 +197,7 @@ pub struct SeedArg {
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct StepsArg {
     /// Number of steps per trial, instead of the file's.
-    #[arg(long, value_name = "T", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "T", value_parser = whole(1..=limits::STEPS))]
     pub steps: Option<u32>,
 }
 
@@ -154,6 +214,21 @@ impl IsaArgs {
     /// The level to use.
     pub fn get(self) -> Isa {
         self.isa.unwrap_or_else(Isa::best)
+    }
+}
+
+/// Reads a whole number of a range, for errors that say what would be right.
+pub fn whole<T>(
+    range: RangeInclusive<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: FromStr + PartialOrd + Copy + Display + Send + Sync + 'static,
+{
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| {
+            format!("must be a whole number from {} to {}", range.start(), range.end())
+        })
     }
 }
 
@@ -211,7 +286,10 @@ mod tests {
             "swarmctl run a.json --workers 1025",
             "swarmctl run a.json --generations 0",
             "swarmctl submit a.json --seed -1",
-            "swarmctl watch first",
+            "swarmctl simulate a.json --steps 200000",
+            "swarmctl simulate a.json --trials 1001",
+            "swarmctl watch first/second",
+            "swarmctl watch -1",
             "swarmctl wait 1 --timeout 5",
             "swarmctl wait 1 --timeout s",
             "swarmctl wait 1 --timeout 99999999999h",

@@ -2,25 +2,30 @@
 
 use std::time::Duration;
 
+use experiment_file::suggestion;
 use swarm_proto::v1::{
-    CompletedGeneration, EvaluateRequest, EvaluateResponse, Event, Experiment, GetChampionRequest,
-    GetChampionResponse, GetExperimentRequest, ListEventsRequest, ListExperimentsRequest,
-    ListGenerationsRequest, SubmitExperimentRequest, SubmitExperimentResponse,
-    WatchExperimentRequest, WatchExperimentResponse,
+    CompletedGeneration, EvaluateFitnessRequest, EvaluateRequest, EvaluateResponse, Event,
+    Experiment, ExportExperimentRequest, GenerationDynamics, GetChampionRequest,
+    GetChampionResponse, GetExperimentRequest, ImportExperimentRequest, ListDynamicsRequest,
+    ListEventsRequest, ListExperimentsRequest, ListGenerationsRequest, SubmitExperimentRequest,
+    SubmitExperimentResponse, WatchExperimentRequest, WatchExperimentResponse,
+    WatchExplanationRequest, WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse,
     evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
 use swarm_transport::{
-    Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX,
+    Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, banner,
 };
 use tokio::time::{Instant, sleep};
 use tonic::{
-    Response, Status, Streaming, service::interceptor::InterceptedService, transport::Channel,
+    Response, Status, Streaming,
+    service::interceptor::InterceptedService,
+    transport::{Channel, Endpoint},
 };
 use worker::Backoff;
 
 use crate::{
-    banner::banner,
+    args::Subject,
     error::{Error, is_transient},
     settings::Settings,
 };
@@ -29,6 +34,8 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(2);
 /// The same, while a command follows an experiment.
 pub const PATIENCE_WHILE_FOLLOWING: Duration = Duration::from_secs(60);
+/// Bytes of a bundle in one message.
+const PIECE_LEN: usize = 1 << 20;
 /// Number of events per request.
 const EVENT_PAGE_LEN: u32 = 100;
 
@@ -58,16 +65,7 @@ impl Connection {
     pub fn new(address: &str, credentials: &Credentials) -> Result<Self, Error> {
         let link =
             Link::new(address, credentials).map_err(|error| Error::Input(error.to_string()))?;
-        let channel = link
-            .endpoint
-            .clone()
-            .connect_timeout(Duration::from_secs(5))
-            .timeout(Duration::from_secs(30))
-            // While a stream is silent, only pings tell a live coordinator from a dead
-            // one.
-            .http2_keep_alive_interval(Duration::from_secs(10))
-            .keep_alive_timeout(Duration::from_secs(10))
-            .connect_lazy();
+        let channel = endpoint(&link).timeout(Duration::from_secs(30)).connect_lazy();
         let fleet = FleetServiceClient::with_interceptor(channel.clone(), link.bearer.clone())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
@@ -133,11 +131,22 @@ impl Connection {
         Ok(response.experiments)
     }
 
-    /// An experiment's file in canonical form.
-    pub async fn config_json(&self, experiment_id: u64) -> Result<String, Error> {
-        let request = GetExperimentRequest { experiment_id };
-        let response = self.call(async |client| client.get_experiment(request).await).await?;
-        Ok(response.config_json)
+    /// One experiment, or all of a group.
+    pub async fn subject(&self, subject: &Subject) -> Result<Vec<Experiment>, Error> {
+        match subject {
+            Subject::Experiment(id) => Ok(vec![self.experiment(*id).await?]),
+            Subject::Group(name) => self.group(name).await,
+        }
+    }
+
+    /// The one experiment of a number or a name; an error if it is a group of several.
+    pub async fn one(&self, subject: &Subject) -> Result<Experiment, Error> {
+        one(&subject.to_string(), self.subject(subject).await?)
+    }
+
+    /// The experiments of a group, oldest first; or the one experiment of that name.
+    pub async fn group(&self, name: &str) -> Result<Vec<Experiment>, Error> {
+        named(name, &self.experiments().await?)
     }
 
     /// The measures of a genotype, as a stream; tried once.
@@ -167,6 +176,19 @@ impl Connection {
         Ok(generations)
     }
 
+    /// How evolution moved in all completed generations, of a fork in its own ones.
+    pub async fn dynamics(&self, experiment_id: u64) -> Result<Vec<GenerationDynamics>, Error> {
+        let mut generations = Vec::new();
+        let mut next = Some(0);
+        while let Some(from_generation) = next {
+            let request = ListDynamicsRequest { experiment_id, from_generation };
+            let page = self.call(async |client| client.list_dynamics(request).await).await?;
+            generations.extend(page.generations);
+            next = page.next_generation;
+        }
+        Ok(generations)
+    }
+
     /// Some of an experiment's past events, from a sequence number on.
     pub async fn events_page(
         &self,
@@ -187,6 +209,75 @@ impl Connection {
     ) -> Result<Streaming<WatchExperimentResponse>, Status> {
         let request = WatchExperimentRequest { experiment_id, from_sequence };
         self.client.clone().watch_experiment(request).await.map(Response::into_inner)
+    }
+
+    /// What an experiment waits for, at once and whenever that changes; tried once.
+    pub async fn explanations(
+        &self,
+        experiment_id: u64,
+    ) -> Result<Streaming<WatchExplanationResponse>, Status> {
+        let request = WatchExplanationRequest { experiment_id };
+        self.client.clone().watch_explanation(request).await.map(Response::into_inner)
+    }
+
+    /// A message at once, and whenever there may be events of any experiment; tried once.
+    pub async fn news(&self) -> Result<Streaming<WatchNewsResponse>, Status> {
+        let request = WatchNewsRequest {};
+        self.client.clone().watch_news(request).await.map(Response::into_inner)
+    }
+
+    /// An ended experiment as a bundle; tried once.
+    pub async fn export(&self, experiment_id: u64) -> Result<Vec<u8>, Error> {
+        let bundle = async {
+            let request = ExportExperimentRequest { experiment_id };
+            let mut pieces = self.patient().export_experiment(request).await?.into_inner();
+            let mut bytes = Vec::new();
+            while let Some(answer) = pieces.message().await? {
+                bytes.extend(answer.piece);
+            }
+            Ok::<_, Status>(bytes)
+        };
+        match bundle.await {
+            Ok(bytes) => Ok(bytes),
+            Err(status) => Err(self.diagnose(self.error(&status)).await),
+        }
+    }
+
+    /// Hands a bundle in; tried once. Returns its experiment, and whether it is new there.
+    pub async fn import(&self, bundle: &[u8]) -> Result<(Experiment, bool), Error> {
+        let pieces = bundle.chunks(PIECE_LEN).map(<[u8]>::to_vec).collect::<Vec<_>>();
+        let requests = pieces.into_iter().map(|piece| ImportExperimentRequest { piece });
+        let imported = async {
+            let answer = self.patient().import_experiment(tokio_stream::iter(requests)).await?;
+            Ok::<_, Status>(answer.into_inner())
+        };
+        match imported.await {
+            Ok(answer) => Ok((present(answer.experiment)?, answer.is_new)),
+            Err(status) => Err(self.diagnose(self.error(&status)).await),
+        }
+    }
+
+    /// The fitness of genotypes in trials of an evolution, however long that takes.
+    pub async fn fitness(&self, request: EvaluateFitnessRequest) -> Result<Vec<Vec<f64>>, Error> {
+        let evaluations = EvaluationServiceClient::with_interceptor(
+            endpoint(&self.link).connect_lazy(),
+            self.link.bearer.clone(),
+        )
+        .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+        .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
+        let answer = self
+            .with_patience(PATIENCE_WHILE_FOLLOWING)
+            .retry(async || evaluations.clone().evaluate_fitness(request.clone()).await)
+            .await?;
+        Ok(answer.fitness.into_iter().map(|of| of.values).collect())
+    }
+
+    /// A client for requests that take the coordinator long.
+    fn patient(&self) -> ExperimentServiceClient<Authorised> {
+        let channel = endpoint(&self.link).connect_lazy();
+        ExperimentServiceClient::with_interceptor(channel, self.link.bearer.clone())
+            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX)
     }
 
     /// Sends a request to the experiment service, again and again while the coordinator
@@ -226,17 +317,21 @@ impl Connection {
     /// If another server answers at the address, says so.
     async fn diagnose(&self, error: Error) -> Error {
         let Error::Unreachable { .. } = error else { return error };
-        match banner(self.authority()).await {
+        match banner(&self.link.authority()).await {
             Some(banner) => Error::foreign(&self.address, &banner),
             None => error,
         }
     }
+}
 
-    /// Host and port of the coordinator.
-    fn authority(&self) -> &str {
-        let rest = self.address.split_once("://").map_or(&*self.address, |(_, rest)| rest);
-        rest.split('/').next().unwrap_or(rest)
-    }
+/// A coordinator, connected to when it is first needed.
+fn endpoint(link: &Link) -> Endpoint {
+    link.endpoint
+        .clone()
+        .connect_timeout(Duration::from_secs(5))
+        // While a stream is silent, only pings tell a live coordinator from a dead one.
+        .http2_keep_alive_interval(Duration::from_secs(10))
+        .keep_alive_timeout(Duration::from_secs(10))
 }
 
 /// The delays between attempts: short, because a person may be waiting.
@@ -244,7 +339,82 @@ pub fn backoff() -> Backoff {
     Backoff::new(Duration::from_millis(250), Duration::from_secs(2))
 }
 
+/// The experiments of a group, in their order; or the one experiment of that name.
+pub fn named(name: &str, all: &[Experiment]) -> Result<Vec<Experiment>, Error> {
+    let of = |has: fn(&Experiment) -> &str| {
+        let found = all.iter().filter(|experiment| has(experiment) == name);
+        found.cloned().collect::<Vec<Experiment>>()
+    };
+    let members = of(|experiment| &experiment.group);
+    if !members.is_empty() {
+        return Ok(members);
+    }
+    let named = of(|experiment| &experiment.name);
+    if !named.is_empty() {
+        return if named.len() == 1 { Ok(named) } else { Err(several(name, &named)) };
+    }
+    let names = all.iter().flat_map(|experiment| [&*experiment.group, &*experiment.name]);
+    let mut names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let what = format!("no group or experiment is named `{name}`");
+    Err(Error::NotFound(match names.is_empty() {
+        true => format!("{what}: there are no experiments"),
+        false => format!("{what}; {}", suggestion(name, &names)),
+    }))
+}
+
+/// The only one of the experiments that a name stands for.
+pub fn one(name: &str, mut found: Vec<Experiment>) -> Result<Experiment, Error> {
+    match found.len() {
+        1 => Ok(found.remove(0)),
+        _ => Err(several(name, &found)),
+    }
+}
+
+/// The error that a name stands for several experiments where one is meant.
+fn several(name: &str, experiments: &[Experiment]) -> Error {
+    let ids: Vec<String> = experiments.iter().take(10).map(|it| it.id.to_string()).collect();
+    let more = if experiments.len() > ids.len() { ", ..." } else { "" };
+    let ids = ids.join(", ");
+    Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))
+}
+
 /// A field of an answer that every coordinator sets.
 pub fn present<T>(field: Option<T>) -> Result<T, Error> {
     field.ok_or_else(|| Error::Internal("the coordinator's answer is incomplete".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{io::Write as _, net::TcpListener, thread};
+
+    use super::*;
+    use crate::fake_coordinator::{FakeCoordinator, Script};
+
+    #[tokio::test]
+    async fn a_coordinator_has_no_banner() {
+        let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
+        assert_eq!(banner(&connection.link.authority()).await, None);
+    }
+
+    #[tokio::test]
+    async fn asking_another_service_says_so() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        thread::spawn(move || {
+            for stream in listener.incoming() {
+                // A client that is gone needs no answer.
+                let _ = stream.and_then(|mut stream| stream.write_all(b"220 mail ESMTP\r\n"));
+            }
+        });
+        let connection =
+            Connection::new(&format!("http://{address}"), &Credentials::default()).unwrap();
+        let error = connection.with_patience(Duration::ZERO).experiments().await.unwrap_err();
+        let expected = format!(
+            "the server at http://{address} is not a coordinator: it answers \"220 mail ESMTP\"; \
+             is this the right port?"
+        );
+        assert_eq!((error.exit_code(), error.to_string()), (9, expected));
+    }
 }

@@ -29,6 +29,19 @@ pub enum Error {
     /// The coordinator of `run` does not start, because of the data directory.
     #[error(transparent)]
     Start(#[from] coordinator::StartError),
+    /// Some runs of a group were submitted before this error.
+    #[error(
+        "{n_submitted} of {n_runs} runs are submitted, the same command again adds the others: \
+         {cause}"
+    )]
+    Incomplete {
+        /// Number of runs that the coordinator has.
+        n_submitted: usize,
+        /// Number of runs of the group.
+        n_runs: usize,
+        /// What happened to the next one.
+        cause: Box<Error>,
+    },
     /// No such experiment, or no champion.
     #[error("{0}")]
     NotFound(String),
@@ -87,6 +100,9 @@ pub enum Error {
     /// A database is damaged.
     #[error("{0}")]
     Damaged(String),
+    /// A bundle is not what it says.
+    #[error("{0}")]
+    Flawed(String),
     /// A signal interrupted the command; the text says what happens to the experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
@@ -126,6 +142,7 @@ impl Error {
             Self::OutputClosed => 0,
             Self::Write { .. } | Self::Internal(_) => 1,
             Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
+            Self::Incomplete { cause, .. } => cause.exit_code(),
             Self::NotFound(_) => 3,
             Self::Unreachable { .. } => 4,
             Self::Failed { .. } => 5,
@@ -135,6 +152,7 @@ impl Error {
             Self::Foreign(_) => 9,
             Self::TimedOut { .. } => 10,
             Self::Damaged(_) => 11,
+            Self::Flawed(_) => 12,
             Self::Interrupted(_) => 130,
         }
     }
@@ -264,6 +282,7 @@ mod tests {
         assert_eq!(cancelled.report().unwrap(), "error: experiment 3 was cancelled");
         assert_eq!(Error::TimedOut { id: 3 }.exit_code(), 10);
         assert_eq!(Error::Damaged("x".into()).exit_code(), 11);
+        assert_eq!(Error::Flawed("x".into()).exit_code(), 12);
         assert_eq!(Error::Interrupted("x".into()).exit_code(), 130);
         assert_eq!(Error::Input("x".into()).exit_code(), 2);
     }

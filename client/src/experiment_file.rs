@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, Read as _},
+    io::{self, Read},
     path::{Path, PathBuf},
 };
 
@@ -12,10 +12,14 @@ use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
 use sim_core::Simulation;
 use swarm_proto::v1::SubmitExperimentRequest;
 
-use crate::error::{Error, prefix_lines};
+use crate::{
+    change::{Change, Json, apply_all},
+    error::{Error, prefix_lines},
+    json,
+};
 
 /// The text of an experiment file.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct ExperimentFile {
     path: PathBuf,
     text: String,
@@ -51,13 +55,13 @@ impl ExperimentFile {
         Error::invalid(&self.path, error)
     }
 
-    /// Reads a file of UTF-8 text of at most 1 MiB.
+    /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let problem = |what: String| ConfigError {
             problems: vec![unlocated(format!("cannot be read: {what}"))],
         };
         let mut bytes = Vec::new();
-        File::open(path)
+        open(path)
             .and_then(|file| file.take(limits::FILE_BYTES as u64 + 1).read_to_end(&mut bytes))
             .map_err(|error: io::Error| problem(error.to_string()))?;
         if bytes.len() > limits::FILE_BYTES {
@@ -65,6 +69,22 @@ impl ExperimentFile {
         }
         let text = String::from_utf8(bytes).map_err(|error| problem(error.to_string()))?;
         Ok(Self { path: path.into(), text })
+    }
+
+    /// This file with changes, if they leave it one that can be read.
+    pub fn changed(&self, changes: &[Change]) -> Result<Self, ConfigError> {
+        if changes.is_empty() {
+            return Ok(self.clone());
+        }
+        let read = |text: &str| ExperimentConfig::from_json(text, &self.default_name(), ALGORITHMS);
+        read(&self.text)?;
+        let mut file = Json::parse(self.text.trim_start_matches('\u{feff}'));
+        apply_all(changes, &mut file).map_err(|problems| ConfigError {
+            problems: problems.into_iter().map(unlocated).collect(),
+        })?;
+        let text = json::line(&file);
+        read(&text).map_err(without_lines)?;
+        Ok(Self { path: self.path.clone(), text })
     }
 
     /// Checks the experiment as the coordinator will.
@@ -92,8 +112,7 @@ impl ExperimentFile {
             default_name: self.default_name(),
             seed: overrides.seed,
             generations: overrides.generations,
-            resume_unfinished: false,
-            priority: None,
+            ..SubmitExperimentRequest::default()
         }
     }
 
@@ -114,15 +133,27 @@ impl ExperimentFile {
 
     /// The file's stem, cut to the length that the protocol allows.
     fn default_name(&self) -> String {
+        if is_stdin(&self.path) {
+            return "stdin".into();
+        }
         let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
         let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= KEY_LEN_MAX;
         stem.char_indices().take_while(fits).map(|(_, c)| c).collect()
     }
 }
 
+/// A file to read; `-` is standard input.
+pub fn open(path: &Path) -> io::Result<Box<dyn Read>> {
+    Ok(if is_stdin(path) { Box::new(io::stdin()) } else { Box::new(File::open(path)?) })
+}
+
+fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
 impl Overrides {
     /// Replaces the values and checks the limits of the format again.
-    fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
+    pub fn apply(&self, mut config: ExperimentConfig) -> Result<ExperimentConfig, ConfigError> {
         if *self == Self::default() {
             return Ok(config);
         }
@@ -133,13 +164,15 @@ impl Overrides {
         algorithm.num_evaluations = self.trials.unwrap_or(algorithm.num_evaluations);
         match ExperimentConfig::from_json(&config.to_canonical_json(), &config.name, ALGORITHMS) {
             Ok((config, _)) => Ok(config),
-            Err(mut error) => {
-                // The lines are those of the canonical form, not of the user's file.
-                error.problems.iter_mut().for_each(|problem| problem.line = None);
-                Err(error)
-            }
+            Err(error) => Err(without_lines(error)),
         }
     }
+}
+
+/// The problems of a text that is not the user's, without the lines of it.
+fn without_lines(mut error: ConfigError) -> ConfigError {
+    error.problems.iter_mut().for_each(|problem| problem.line = None);
+    error
 }
 
 /// A problem of the file as a whole.
@@ -218,6 +251,31 @@ pub mod tests {
         let algorithm = config.algorithm;
         assert_eq!((config.seed, algorithm.generations), (u64::MAX, 2));
         assert_eq!((algorithm.evaluation_steps, algorithm.num_evaluations), (3, 4));
+    }
+
+    #[test]
+    fn changes_are_those_of_the_file_and_not_of_its_canonical_form() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let original = Change::new("semantics".into(), Json::parse("original"));
+        let changed = file.changed(&[original]).unwrap();
+        let config = |file: &ExperimentFile| file.compile(&Overrides::default()).unwrap().config;
+        assert!(!config(&changed).topology.bias_in_gain);
+        assert!(config(&file).topology.bias_in_gain);
+        assert_eq!(changed.path, file.path);
+    }
+
+    #[test]
+    fn all_that_changes_get_wrong_is_said_at_once() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let change = |path: &str, value| Change::new(path.into(), Json::parse(value));
+        let wrong =
+            [change("algorithm.population_sise", "3"), change("algorithm.generations", "0")];
+        let error = file.changed(&wrong).unwrap_err().to_string();
+        assert!(error.contains("did you mean `population_size`?"), "{error}");
+        assert!(error.contains("algorithm.generations: must be between"), "{error}");
+        assert!(!error.contains("line "), "{error}");
+        let nowhere = [change("seed.x", "3"), change("name.y", "0")];
+        assert_eq!(file.changed(&nowhere).unwrap_err().problems.len(), 2);
     }
 
     #[test]

@@ -8,22 +8,30 @@ use std::{
 };
 
 use swarm_proto::v1::{
-    CancelExperimentRequest, CancelExperimentResponse, CompletedGeneration, Event, Experiment,
-    ExperimentState, ExplainExperimentRequest, ExplainExperimentResponse, GenerationSummary,
-    GetChampionRequest, GetChampionResponse, GetExperimentRequest, GetExperimentResponse,
+    Ancestor, ArchiveExperimentRequest, ArchiveExperimentResponse, BirthOperator,
+    CancelExperimentRequest, CancelExperimentResponse, CompletedGeneration,
+    DeleteExperimentRequest, DeleteExperimentResponse, Event, Experiment, ExperimentState,
+    ExplainExperimentRequest, ExplainExperimentResponse, ExportExperimentRequest,
+    ExportExperimentResponse, ExtendExperimentRequest, ExtendExperimentResponse,
+    GenerationDynamics, GenerationSummary, GenesOfParent, GetChampionRequest, GetChampionResponse,
+    GetExperimentRequest, GetExperimentResponse, GetIndividualsRequest, GetIndividualsResponse,
+    GetLineageRequest, GetLineageResponse, ImportExperimentRequest, ImportExperimentResponse,
+    LabelExperimentRequest, LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse,
     ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
     ListGenerationsRequest, ListGenerationsResponse, ListWorkersRequest, ListWorkersResponse,
-    PauseExperimentRequest, PauseExperimentResponse, ReadmitWorkerRequest, ReadmitWorkerResponse,
-    ResumeExperimentRequest, ResumeExperimentResponse, SetPriorityRequest, SetPriorityResponse,
-    StateChange, SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
-    WatchExperimentResponse, Worker,
+    PauseExperimentRequest, PauseExperimentResponse, PopulationLineage, PruneExperimentRequest,
+    PruneExperimentResponse, ReadmitWorkerRequest, ReadmitWorkerResponse, ResumeExperimentRequest,
+    ResumeExperimentResponse, RetryExperimentRequest, RetryExperimentResponse, SetPriorityRequest,
+    SetPriorityResponse, StateChange, SubmitExperimentRequest, SubmitExperimentResponse,
+    WatchExperimentRequest, WatchExperimentResponse, WatchExplanationRequest,
+    WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse, Worker,
     event::Kind,
     experiment_service_server::{ExperimentService, ExperimentServiceServer},
     fleet_service_server::{FleetService, FleetServiceServer},
 };
 use tokio::net::TcpListener;
-use tokio_stream::{Stream, wrappers::TcpListenerStream};
-use tonic::{Request, Response, Status, transport::Server};
+use tokio_stream::{Stream, StreamExt as _, wrappers::TcpListenerStream};
+use tonic::{Code, Request, Response, Status, Streaming, transport::Server};
 
 use swarm_transport::Credentials;
 
@@ -43,10 +51,12 @@ pub struct Script {
     /// For each `Watch` in turn: its events, and what then ends the stream if
     /// not the end of events.
     pub watches: VecDeque<(Vec<Event>, Option<Status>)>,
-    /// For each `Submit` in turn: a refusal. Afterwards it is accepted.
+    /// For each `Submit` in turn: a refusal, or OK. Afterwards it is accepted.
     pub submit_refusals: VecDeque<Status>,
     pub watched_from: Vec<u64>,
     pub submitted: Vec<SubmitExperimentRequest>,
+    /// Number of an experiment that is identical to what is submitted; 0 for none.
+    pub identical: u64,
 }
 
 /// The script of a service, shared with the test.
@@ -103,6 +113,9 @@ pub fn state(sequence: u64, state: ExperimentState) -> Event {
 impl ExperimentService for FakeCoordinator {
     type WatchExperimentStream =
         Pin<Box<dyn Stream<Item = Result<WatchExperimentResponse, Status>> + Send>>;
+    type WatchExplanationStream =
+        Pin<Box<dyn Stream<Item = Result<WatchExplanationResponse, Status>> + Send>>;
+    type WatchNewsStream = Pin<Box<dyn Stream<Item = Result<WatchNewsResponse, Status>> + Send>>;
 
     async fn submit_experiment(
         &self,
@@ -111,10 +124,11 @@ impl ExperimentService for FakeCoordinator {
         self.script(|script| {
             script.submitted.push(request.into_inner());
             match script.submit_refusals.pop_front() {
-                Some(status) => Err(status),
-                None => Ok(Response::new(SubmitExperimentResponse {
+                Some(status) if status.code() != Code::Ok => Err(status),
+                _ => Ok(Response::new(SubmitExperimentResponse {
                     experiment: Some(script.experiment.clone()),
                     warnings: vec![],
+                    identical: script.identical,
                 })),
             }
         })
@@ -204,6 +218,146 @@ impl ExperimentService for FakeCoordinator {
         Ok(Response::new(SetPriorityResponse { experiment }))
     }
 
+    async fn list_dynamics(
+        &self,
+        request: Request<ListDynamicsRequest>,
+    ) -> Result<Response<ListDynamicsResponse>, Status> {
+        let generation = request.into_inner().from_generation;
+        let of = GenerationDynamics {
+            generation,
+            mean_step: Some(0.25),
+            deviations: vec![0.1, 0.125, 0.15, 0.175, 0.2],
+            rank_correlation: (generation > 0).then_some(0.5),
+        };
+        let next_generation = (generation < 2).then_some(generation + 1);
+        Ok(Response::new(ListDynamicsResponse { generations: vec![of], next_generation }))
+    }
+
+    async fn get_lineage(
+        &self,
+        _: Request<GetLineageRequest>,
+    ) -> Result<Response<GetLineageResponse>, Status> {
+        let ancestor = |generation, individual, fitness, genes| Ancestor {
+            generation,
+            individual,
+            fitness,
+            genes,
+            ..Ancestor::default()
+        };
+        let parent = |individual, genes| GenesOfParent { individual, genes };
+        let ancestors = vec![
+            Ancestor {
+                operator: BirthOperator::Crossover.into(),
+                parents: vec![parent(0, 7), parent(4, 2)],
+                new_genes: 1,
+                ..ancestor(2, 5, 1.5, 10)
+            },
+            Ancestor {
+                operator: BirthOperator::Elite.into(),
+                parents: vec![parent(4, 10)],
+                ..ancestor(1, 0, 1.25, 7)
+            },
+            Ancestor {
+                operator: BirthOperator::Copy.into(),
+                parents: vec![parent(4, 9)],
+                new_genes: 1,
+                ..ancestor(1, 4, 0.5, 2)
+            },
+            ancestor(0, 4, 1.0, 9),
+        ];
+        let lineage = PopulationLineage { population: "p1".into(), ancestors };
+        Ok(Response::new(GetLineageResponse { populations: vec![lineage] }))
+    }
+
+    type ExportExperimentStream =
+        Pin<Box<dyn Stream<Item = Result<ExportExperimentResponse, Status>> + Send>>;
+
+    async fn export_experiment(
+        &self,
+        request: Request<ExportExperimentRequest>,
+    ) -> Result<Response<Self::ExportExperimentStream>, Status> {
+        self.experiment(request.into_inner().experiment_id)?;
+        let pieces = [&b"two "[..], b"pieces"].map(|piece| piece.to_vec());
+        let pieces = pieces.map(|piece| Ok(ExportExperimentResponse { piece }));
+        Ok(Response::new(Box::pin(tokio_stream::iter(pieces))))
+    }
+
+    async fn import_experiment(
+        &self,
+        request: Request<Streaming<ImportExperimentRequest>>,
+    ) -> Result<Response<ImportExperimentResponse>, Status> {
+        let mut pieces = request.into_inner();
+        let mut bytes = Vec::new();
+        while let Some(ImportExperimentRequest { piece }) = pieces.message().await? {
+            bytes.extend(piece);
+        }
+        if bytes != b"two pieces" {
+            return Err(Status::invalid_argument("it is no bundle, or cut off or damaged: why"));
+        }
+        let experiment = self.experiment(3)?;
+        Ok(Response::new(ImportExperimentResponse { experiment, is_new: true }))
+    }
+
+    async fn prune_experiment(
+        &self,
+        request: Request<PruneExperimentRequest>,
+    ) -> Result<Response<PruneExperimentResponse>, Status> {
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        if experiment.as_ref().is_some_and(|it| it.state() == ExperimentState::Running) {
+            return Err(Status::failed_precondition("experiment 3 has not ended"));
+        }
+        Ok(Response::new(PruneExperimentResponse { experiment, freed_bytes: 5 << 20 }))
+    }
+
+    async fn extend_experiment(
+        &self,
+        request: Request<ExtendExperimentRequest>,
+    ) -> Result<Response<ExtendExperimentResponse>, Status> {
+        let ExtendExperimentRequest { experiment_id, generations } = request.into_inner();
+        let mut experiment = self.experiment(experiment_id)?;
+        experiment.iter_mut().for_each(|it| it.generations = generations);
+        Ok(Response::new(ExtendExperimentResponse { experiment }))
+    }
+
+    async fn retry_experiment(
+        &self,
+        request: Request<RetryExperimentRequest>,
+    ) -> Result<Response<RetryExperimentResponse>, Status> {
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        Ok(Response::new(RetryExperimentResponse { experiment }))
+    }
+
+    async fn delete_experiment(
+        &self,
+        request: Request<DeleteExperimentRequest>,
+    ) -> Result<Response<DeleteExperimentResponse>, Status> {
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        Ok(Response::new(DeleteExperimentResponse { experiment, freed_bytes: 6 << 20 }))
+    }
+
+    async fn archive_experiment(
+        &self,
+        request: Request<ArchiveExperimentRequest>,
+    ) -> Result<Response<ArchiveExperimentResponse>, Status> {
+        let ArchiveExperimentRequest { experiment_id, restore } = request.into_inner();
+        self.script(|script| script.experiment.archived = !restore);
+        let experiment = self.experiment(experiment_id)?;
+        Ok(Response::new(ArchiveExperimentResponse { experiment, log_bytes: 5 << 20 }))
+    }
+
+    async fn label_experiment(
+        &self,
+        request: Request<LabelExperimentRequest>,
+    ) -> Result<Response<LabelExperimentResponse>, Status> {
+        let LabelExperimentRequest { experiment_id, set, remove } = request.into_inner();
+        self.script(|script| {
+            script.experiment.labels.extend(set);
+            script.experiment.labels.retain(|key, _| !remove.contains(key));
+        });
+        let experiment = self.experiment(experiment_id)?;
+        Ok(Response::new(LabelExperimentResponse { experiment }))
+    }
+
     async fn get_champion(
         &self,
         request: Request<GetChampionRequest>,
@@ -213,6 +367,43 @@ impl ExperimentService for FakeCoordinator {
         self.script(|script| script.champion.clone()).map(Response::new).ok_or_else(no_champion)
     }
 
+    async fn get_individuals(
+        &self,
+        request: Request<GetIndividualsRequest>,
+    ) -> Result<Response<GetIndividualsResponse>, Status> {
+        let request = request.into_inner();
+        let (id, place) = request.address.split_once('@').unwrap_or((&request.address, ""));
+        self.experiment(id.parse().unwrap())?;
+        let champion = self.script(|script| script.champion.clone());
+        let champion =
+            champion.ok_or_else(|| Status::failed_precondition("there is no champion yet"))?;
+        if place.is_empty() {
+            let individuals = vec![champion];
+            return Ok(Response::new(GetIndividualsResponse {
+                individuals,
+                next_individual: None,
+            }));
+        }
+        let individual = |index: u32| GetChampionResponse {
+            individual: Some(index),
+            held_out: None,
+            judged: None,
+            ..champion.clone()
+        };
+        if let Some((_, index)) = place.split_once('/') {
+            let index = index.parse().map_err(|_| Status::invalid_argument("it has no mean"))?;
+            let individuals = vec![individual(index)];
+            return Ok(Response::new(GetIndividualsResponse {
+                individuals,
+                next_individual: None,
+            }));
+        }
+        // Two pages of one.
+        let individuals = vec![individual(request.from_individual)];
+        let next_individual = (request.from_individual == 0).then_some(1);
+        Ok(Response::new(GetIndividualsResponse { individuals, next_individual }))
+    }
+
     async fn explain_experiment(
         &self,
         request: Request<ExplainExperimentRequest>,
@@ -220,6 +411,25 @@ impl ExperimentService for FakeCoordinator {
         let experiment = self.experiment(request.into_inner().experiment_id)?;
         let explanation = self.script(|script| script.explanation.clone());
         Ok(Response::new(ExplainExperimentResponse { experiment, ..explanation }))
+    }
+
+    async fn watch_explanation(
+        &self,
+        request: Request<WatchExplanationRequest>,
+    ) -> Result<Response<Self::WatchExplanationStream>, Status> {
+        let experiment = self.experiment(request.into_inner().experiment_id)?;
+        let explanation = self.script(|script| script.explanation.clone());
+        let explanation = Some(ExplainExperimentResponse { experiment, ..explanation });
+        let first = tokio_stream::once(Ok(WatchExplanationResponse { explanation }));
+        Ok(Response::new(Box::pin(first.chain(tokio_stream::pending()))))
+    }
+
+    async fn watch_news(
+        &self,
+        _: Request<WatchNewsRequest>,
+    ) -> Result<Response<Self::WatchNewsStream>, Status> {
+        let first = tokio_stream::once(Ok(WatchNewsResponse {}));
+        Ok(Response::new(Box::pin(first)))
     }
 
     async fn list_generations(

@@ -3,6 +3,8 @@
 
 mod draw;
 
+pub use draw::{FONT, embed_font};
+
 use std::{fs, path::Path};
 
 use crate::error::Error;
@@ -13,6 +15,10 @@ pub const CURVES_MAX: usize = 14;
 /// Curves over the same axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
+    /// What is shown, above everything; empty: nothing.
+    pub title: String,
+    /// What line and band are, below the title.
+    pub caption: String,
     /// Label of the x axis.
     pub x_label: String,
     /// Label of the y axis, with the unit.

@@ -1,10 +1,19 @@
 //! What `--output json` prints. Numbers read back to the same bits; a fitness
 //! that is not finite is `null`.
 
+mod individuals;
+
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use swarm_proto::v1::{
-    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
+    Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
+    event::Kind,
 };
+
+use crate::{args::Subject, text};
+
+pub use self::individuals::{ChampionDocument, IndividualDocument, PopulationDocument};
 
 /// A value on one line.
 pub fn line(value: &impl Serialize) -> String {
@@ -206,11 +215,37 @@ pub struct ExperimentDocument<'a> {
     population_size: u32,
     genotype_len: u32,
     priority: u32,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    group: &'a str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    variant: &'a str,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    labels: &'a BTreeMap<String, String>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    archived: bool,
     submitted_at_ms: u64,
+    eta_ms: Option<u64>,
     champion_fitness: Option<f64>,
     champion_selection_fitness: Option<f64>,
     config_digest: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    forked_from: Option<Origin<'a>>,
     latest: Option<GenerationLine<'a>>,
+}
+
+/// Where a fork comes from.
+#[derive(Debug, Serialize)]
+struct Origin<'a> {
+    experiment: u64,
+    generation: u64,
+    changes: &'a [String],
+}
+
+impl<'a> From<&'a ForkOrigin> for Origin<'a> {
+    fn from(origin: &'a ForkOrigin) -> Self {
+        let ForkOrigin { experiment_id, generation, changes } = origin;
+        Self { experiment: *experiment_id, generation: *generation, changes }
+    }
 }
 
 impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
@@ -227,10 +262,16 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
             population_size: experiment.population_size,
             genotype_len: experiment.genotype_len,
             priority: experiment.priority,
+            group: &experiment.group,
+            variant: &experiment.variant,
+            labels: &experiment.labels,
+            archived: experiment.archived,
             submitted_at_ms: experiment.submitted_at_ms,
+            eta_ms: text::eta_ms(experiment),
             champion_fitness: experiment.champion_fitness,
             champion_selection_fitness: experiment.champion_selection_fitness,
             config_digest: &experiment.config_digest,
+            forked_from: experiment.forked_from.as_ref().map(Into::into),
             latest: experiment
                 .latest
                 .as_ref()
@@ -239,38 +280,12 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
     }
 }
 
-/// A champion with its genes, network and experiment, as `champion` prints it.
-#[derive(Debug, Serialize)]
-pub struct ChampionDocument<'a> {
-    experiment: u64,
-    name: &'a str,
-    seed: u64,
-    simulation: &'a str,
-    config_digest: &'a str,
-    #[serde(flatten)]
-    summary: ChampionSummary,
-    trial_fitness: &'a [f64],
-    genotype: &'a [f64],
-    network: serde_json::Value,
-}
-
-impl<'a> ChampionDocument<'a> {
-    /// Fails if the network is not JSON.
-    pub fn new(
-        experiment: &'a Experiment,
-        champion: &'a GetChampionResponse,
-    ) -> serde_json::Result<Self> {
-        Ok(Self {
-            experiment: champion.experiment_id,
-            name: &experiment.name,
-            seed: experiment.seed,
-            simulation: &experiment.simulation,
-            config_digest: &experiment.config_digest,
-            summary: champion.into(),
-            trial_fitness: &champion.trial_fitness,
-            genotype: &champion.genotype,
-            network: serde_json::from_str(&champion.network_json)?,
-        })
+/// The answer to a command about an experiment: the experiment; about a group: a list.
+pub fn experiments(subject: &Subject, experiments: &[Experiment]) -> String {
+    let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
+    match (subject, &documents[..]) {
+        (Subject::Experiment(_), [one]) => document(one),
+        _ => document(&documents),
     }
 }
 

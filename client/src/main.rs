@@ -2,10 +2,13 @@
 //! results; runs an experiment in this process, with its own coordinator and workers;
 //! and checks files and simulates trials without a coordinator.
 
+mod address;
+mod archive;
 mod args;
-mod banner;
+mod change;
 mod clock;
 mod commands;
+mod complete;
 mod connection;
 mod error;
 mod experiment_file;
@@ -15,8 +18,14 @@ mod figure;
 mod interrupt;
 mod json;
 mod progress;
+mod recorded;
+mod resimulation;
 mod settings;
+mod statistics;
+mod sweep;
+mod synonyms;
 mod table;
+mod tensorboard;
 mod text;
 
 use std::{
@@ -24,14 +33,17 @@ use std::{
     process::ExitCode,
 };
 
-use clap::Parser as _;
+use clap::{CommandFactory as _, Parser as _};
+use clap_complete::CompleteEnv;
 use swarm_telemetry::escape_lines;
 
-use crate::{args::Args, progress::Progress};
+use crate::{args::Args, progress::Progress, synonyms::with_suggestions};
 
 #[tokio::main]
 async fn main() -> ExitCode {
-    let args = Args::parse();
+    // Answers a shell that asks what a command line may become, and ends then.
+    CompleteEnv::with_factory(Args::command).complete();
+    let args = Args::try_parse().unwrap_or_else(|error| with_suggestions(error).exit());
     let progress = Progress::new(args.output);
     let result = commands::execute(args, progress).await;
     let Err(error) = result else { return ExitCode::SUCCESS };

@@ -2,11 +2,12 @@
 //! Results go to standard output, remarks to standard error.
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeMap, VecDeque},
     io::{self, IsTerminal as _, Write},
     time::Duration,
 };
 
+use console::measure_text_width;
 use indicatif::{FormattedDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GenerationSummary};
@@ -14,6 +15,7 @@ use swarm_telemetry::{escape, escape_lines};
 
 use crate::{
     args::OutputFormat,
+    commands::Finding,
     error::Error,
     json,
     table::{self, Screen, Table},
@@ -22,6 +24,12 @@ use crate::{
 
 /// Generations over which the estimate of the remaining time averages.
 const ETA_WINDOW: usize = 20;
+/// On narrower terminals there is no bar, and no name before it: only numbers.
+const BAR_SCREEN_WIDTH: usize = 70;
+/// Names before the bar are cut to this width.
+const NAME_WIDTH_MAX: usize = 24;
+/// The bar with the spaces around it.
+const BAR_WIDTH: usize = 26;
 
 /// The outputs of a command, and the progress bar.
 pub struct Progress {
@@ -32,10 +40,20 @@ pub struct Progress {
     has_terminal: bool,
     /// Hidden unless an experiment is followed on a terminal.
     bar: ProgressBar,
-    experiment_id: u64,
-    generations: u64,
-    /// The latest generations' durations.
+    /// The experiments that are followed, by their numbers.
+    followed: BTreeMap<u64, Followed>,
+    /// The latest generations' durations, of one experiment.
     durations_ms: VecDeque<u64>,
+}
+
+/// What is shown of an experiment that is followed.
+struct Followed {
+    /// Number of generations to do.
+    generations: u64,
+    done: u64,
+    /// What tells it apart from the others.
+    label: String,
+    has_ended: bool,
 }
 
 impl Progress {
@@ -54,8 +72,7 @@ impl Progress {
             screen: Screen::default(),
             has_terminal: false,
             bar: ProgressBar::hidden(),
-            experiment_id: 0,
-            generations: 0,
+            followed: BTreeMap::new(),
             durations_ms: VecDeque::new(),
         }
     }
@@ -94,7 +111,11 @@ impl Progress {
     /// A line, or several, on standard output. Nothing in it moves the cursor or changes
     /// the direction of text, whoever has chosen it.
     pub fn print(&mut self, text: &str) -> Result<(), Error> {
-        self.write(&escape_lines(text))
+        let text = escape_lines(text);
+        match self.screen.width.filter(|_| self.format == OutputFormat::Table) {
+            Some(width) => self.write(&text::wrapped(&text, width)),
+            None => self.write(&text),
+        }
     }
 
     fn write(&mut self, text: &str) -> Result<(), Error> {
@@ -105,8 +126,12 @@ impl Progress {
 
     /// A remark on standard error.
     pub fn remark(&self, text: &str) {
+        let text = match self.screen.width {
+            Some(width) => text::wrapped(text, width),
+            None => text.to_owned(),
+        };
         // If standard error is closed there is no place left to report to.
-        let _ = self.stderr()().write_all(format!("{}\n", escape_lines(text)).as_bytes());
+        let _ = self.stderr()().write_all(format!("{}\n", escape_lines(&text)).as_bytes());
     }
 
     /// Makes writers to standard error that hide the bar while they write.
@@ -115,39 +140,127 @@ impl Progress {
         move || BesideBar(bar.clone())
     }
 
-    /// Shows the bar of an experiment, if there is a terminal.
-    pub fn begin(&mut self, experiment: &Experiment) {
-        self.experiment_id = experiment.id;
-        self.generations = experiment.generations;
+    /// Shows the bar of experiments, if there is a terminal.
+    pub fn begin(&mut self, experiments: &[Experiment]) {
+        let followed = |experiment: &Experiment| Followed {
+            generations: experiment.generations,
+            done: 0,
+            label: text::run_label(experiment),
+            has_ended: false,
+        };
+        self.followed = experiments.iter().map(|it| (it.id, followed(it))).collect();
         if self.has_terminal && !self.is_json() {
-            let style = ProgressStyle::with_template("{prefix} {bar:24} {pos}/{len}  {msg}")
-                .expect("the template is valid");
+            let template = match self.screen.width {
+                Some(..BAR_SCREEN_WIDTH) => "{pos}/{len}  {msg}",
+                _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
+            };
+            let style = ProgressStyle::with_template(template).expect("the template is valid");
+            let name = experiments.first().map_or("", |first| match experiments.len() {
+                1 => &first.name,
+                _ => &first.group,
+            });
             self.bar.set_style(style);
-            self.bar.set_length(experiment.generations);
-            self.bar.set_prefix(escape(&experiment.name).into_owned());
+            self.bar.set_length(experiments.iter().map(|it| it.generations).sum());
+            self.bar.set_prefix(text::cut(&escape(name), NAME_WIDTH_MAX));
             self.bar.set_message("waiting for the first generation");
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
             self.bar.tick();
         }
     }
 
-    /// Shows a generation.
-    pub fn generation(&mut self, summary: &GenerationSummary) -> Result<(), Error> {
+    /// Shows a generation of an experiment that is followed.
+    pub fn generation(
+        &mut self,
+        experiment_id: u64,
+        summary: &GenerationSummary,
+    ) -> Result<(), Error> {
         self.durations_ms.truncate(ETA_WINDOW - 1);
         self.durations_ms.push_front(summary.duration_ms);
+        let is_alone = self.followed.len() == 1;
+        let (mut generations, mut label) = (0, String::new());
+        if let Some(followed) = self.followed.get_mut(&experiment_id) {
+            followed.done = summary.generation + 1;
+            generations = followed.generations;
+            label.clone_from(&followed.label);
+        }
         match self.format {
             OutputFormat::Json => {
-                self.print(&json::line(&json::GenerationLine::new(self.experiment_id, summary)))
+                self.print(&json::line(&json::GenerationLine::new(experiment_id, summary)))
             }
             _ if self.has_terminal => {
-                let done = summary.generation + 1;
-                let eta = remaining(&self.durations_ms, self.generations.saturating_sub(done));
+                let done = self.followed.values().map(|followed| followed.done).sum();
                 let fitness = text::fitness(summary);
                 self.bar.set_position(done);
-                self.bar.set_message(format!("{fitness}  ETA {}", FormattedDuration(eta)));
+                let parts = if is_alone {
+                    let eta = remaining(&self.durations_ms, generations.saturating_sub(done));
+                    [format!("ETA {}", FormattedDuration(eta)), fitness, String::new()]
+                } else {
+                    let n_ended = self.followed.values().filter(|it| it.has_ended).count();
+                    let ended = format!("{n_ended} of {} runs ended", self.followed.len());
+                    [ended, label, fitness]
+                };
+                self.set_message(&parts);
                 Ok(())
             }
-            _ => self.print(&text::generation(summary, self.generations)),
+            _ if is_alone => self.print(&text::generation(summary, generations)),
+            _ => self.print(&format!("{label}  {}", text::generation(summary, generations))),
+        }
+    }
+
+    /// Shows how much of something long is done, if there is a terminal.
+    pub fn step(&mut self, n_done: u64, n_all: u64, what: &str) {
+        if self.has_terminal && !self.is_json() {
+            let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {msg}");
+            self.bar.set_style(style.expect("the template is valid"));
+            self.bar.set_length(n_all);
+            self.bar.set_position(n_done);
+            self.bar.set_message(escape(what).into_owned());
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            self.bar.tick();
+        }
+    }
+
+    /// A remark about an experiment that is followed.
+    pub fn notice(&self, experiment_id: u64, text: &str) {
+        match self.followed.get(&experiment_id) {
+            Some(followed) if self.followed.len() > 1 => {
+                self.remark(&format!("{}  {text}", followed.label));
+            }
+            _ => self.remark(text),
+        }
+    }
+
+    /// Says what keeps an experiment from being computed; none: nothing any more.
+    pub fn situation(&self, experiment_id: u64, finding: Option<&Finding>) {
+        let what = match finding {
+            Some(finding) => format!("waiting: {finding}"),
+            None => "it is computed again".to_owned(),
+        };
+        let first_line = what.lines().next().unwrap_or_default();
+        self.set_message(&[text::cut(first_line, self.message_room())]);
+        self.notice(experiment_id, &what);
+    }
+
+    /// Shows as many of these beside the bar as there is room for, the first ones.
+    fn set_message(&self, parts: &[String]) {
+        self.bar.set_message(fitting(parts, self.message_room()));
+    }
+
+    /// Columns beside the bar and the numbers of generations.
+    fn message_room(&self) -> usize {
+        let Some(width) = self.screen.width else { return usize::MAX };
+        let numbers = format!("{0}/{0}  ", self.bar.length().unwrap_or_default()).len();
+        let bar = match width {
+            ..BAR_SCREEN_WIDTH => 0,
+            _ => measure_text_width(&self.bar.prefix()) + BAR_WIDTH,
+        };
+        width.saturating_sub(numbers + bar + 1)
+    }
+
+    /// Counts an experiment that is followed as ended.
+    pub fn ended(&mut self, experiment_id: u64) {
+        if let Some(followed) = self.followed.get_mut(&experiment_id) {
+            followed.has_ended = true;
         }
     }
 
@@ -155,6 +268,20 @@ impl Progress {
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// As many of these as there is room for, the first ones.
+fn fitting(parts: &[String], room: usize) -> String {
+    let mut message = String::new();
+    for part in parts.iter().filter(|part| !part.is_empty()) {
+        let separator = if message.is_empty() { "" } else { "  " };
+        if measure_text_width(&message) + separator.len() + measure_text_width(part) > room {
+            break;
+        }
+        message += separator;
+        message += part;
+    }
+    message
 }
 
 /// Time that `generations` more will take if they are as fast as the latest ones.
@@ -191,6 +318,12 @@ pub mod tests {
             Progress::to(format, Box::new(self.clone()))
         }
 
+        /// Output as on a terminal of this width.
+        pub fn progress_on(&self, format: OutputFormat, width: usize) -> Progress {
+            let screen = Screen { width: Some(width), has_colours: false };
+            Progress { screen, ..self.progress(format) }
+        }
+
         pub fn lines(&self) -> Vec<String> {
             let text = String::from_utf8(self.0.lock().unwrap().clone()).unwrap();
             text.lines().map(str::to_owned).collect()
@@ -224,13 +357,33 @@ pub mod tests {
     fn without_a_terminal_each_generation_is_a_line() {
         let captured = Captured::default();
         let mut progress = captured.progress(OutputFormat::Table);
-        progress.begin(&Experiment { id: 1, generations: 2, ..Experiment::default() });
+        progress.begin(&[Experiment { id: 1, generations: 2, ..Experiment::default() }]);
         for generation in 0..2 {
-            progress.generation(&GenerationSummary { generation, ..Default::default() }).unwrap();
+            let summary = GenerationSummary { generation, ..Default::default() };
+            progress.generation(1, &summary).unwrap();
         }
         let lines = captured.lines();
         assert_eq!(lines.len(), 2);
         assert!(lines[1].starts_with("2/2  generation 1  "), "{lines:?}");
+    }
+
+    #[test]
+    fn generations_of_a_group_say_whose_they_are() {
+        let captured = Captured::default();
+        let mut progress = captured.progress(OutputFormat::Table);
+        let run = |id, seed, variant: &str| Experiment {
+            id,
+            seed,
+            variant: variant.into(),
+            generations: 9,
+            ..Experiment::default()
+        };
+        progress.begin(&[run(4, 0, ""), run(5, 1, "algorithm.x=2")]);
+        progress.generation(5, &GenerationSummary::default()).unwrap();
+        progress.generation(4, &GenerationSummary::default()).unwrap();
+        let lines = captured.lines();
+        assert!(lines[0].starts_with("5 seed 1 algorithm.x=2  1/9  generation 0  "), "{lines:?}");
+        assert!(lines[1].starts_with("4 seed 0  1/9  generation 0  "), "{lines:?}");
     }
 
     #[test]
@@ -239,10 +392,19 @@ pub mod tests {
         assert_eq!(remaining(&VecDeque::new(), 10), Duration::ZERO);
         let mut progress = Captured::default().progress(OutputFormat::Json);
         for duration_ms in 0..100 {
-            progress.generation(&GenerationSummary { duration_ms, ..Default::default() }).unwrap();
+            let summary = GenerationSummary { duration_ms, ..Default::default() };
+            progress.generation(1, &summary).unwrap();
         }
         assert_eq!(progress.durations_ms.len(), ETA_WINDOW);
         assert_eq!(progress.durations_ms.front(), Some(&99));
+    }
+
+    #[test]
+    fn beside_the_bar_nothing_is_cut_in_the_middle() {
+        let parts = ["ETA 46s", "best 1.500  mean 0.333"].map(str::to_owned);
+        assert_eq!(fitting(&parts, 31), "ETA 46s  best 1.500  mean 0.333");
+        assert_eq!(fitting(&parts, 30), "ETA 46s");
+        assert_eq!(fitting(&parts, 6), "");
     }
 
     #[test]

@@ -65,17 +65,18 @@ struct SettingsFile {
 impl Settings {
     /// These settings, completed from the settings file.
     pub fn or_file(self) -> Result<Self, Error> {
+        let this = self.without_empty();
         let (path, must_exist) = match env::var_os(FILE_VARIABLE).filter(|path| !path.is_empty()) {
             Some(path) => (PathBuf::from(path), true),
             None => match user_file() {
                 Some(path) => (path, false),
-                None => return Ok(self),
+                None => return Ok(this),
             },
         };
         let mut others = match fs::read_to_string(&path) {
             Ok(text) => parse(&path, &text)?,
             Err(error) if error.kind() == io::ErrorKind::NotFound && !must_exist => {
-                return Ok(self);
+                return Ok(this);
             }
             Err(error) => {
                 return Err(Error::Input(format!(
@@ -87,7 +88,12 @@ impl Settings {
         if env::var_os(TOKEN_VARIABLE).is_some() {
             others.token_file = None;
         }
-        Ok(self.or(others))
+        Ok(this.or(others))
+    }
+
+    /// An empty variable is one that is not set.
+    fn without_empty(self) -> Self {
+        Self { coordinator: self.coordinator.filter(|url| !url.is_empty()), ..self }
     }
 
     /// The coordinator's address.
@@ -150,6 +156,8 @@ fn user_file() -> Option<PathBuf> {
 }
 
 fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
+    // Some editors begin a file with a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let file: SettingsFile = serde_json::from_str(text).map_err(|error| {
         let place = format!(" at line {} column {}", error.line(), error.column());
         let message = error.to_string();
@@ -173,6 +181,12 @@ mod tests {
         assert_eq!(flag.clone().or(file.clone()), flag);
         assert_eq!(settings(None).or(file.clone()), file);
         assert_eq!(settings(None).address(), "http://127.0.0.1:7700");
+    }
+
+    #[test]
+    fn an_empty_variable_is_one_that_is_not_set() {
+        let file = settings(Some("http://file:1"));
+        assert_eq!(settings(Some("")).without_empty().or(file.clone()), file);
     }
 
     #[test]
@@ -210,7 +224,9 @@ mod tests {
     #[test]
     fn a_mistake_in_the_file_is_named_with_its_line() {
         let path = Path::new("config.json");
-        assert_eq!(parse(path, "{}").unwrap(), settings(None));
+        for empty in ["{}", "\u{feff}{}"] {
+            assert_eq!(parse(path, empty).unwrap(), settings(None));
+        }
         for (text, expected) in [
             (
                 "{\n  \"coordinater\": \"http://h:1\"\n}",

@@ -13,6 +13,8 @@ const ELLIPSIS: &str = "…";
 const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 /// Columns of text are not made narrower than this.
 const COLUMN_WIDTH_MIN: usize = 8;
+/// As long as there are columns that can be left out, columns of text keep this width.
+const TEXT_WIDTH: usize = 32;
 
 /// The terminal of standard output.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,6 +45,8 @@ pub struct Column {
     is_number: bool,
     is_wide: bool,
     is_cuttable: bool,
+    /// Where there is no room, columns are left out, the largest first; 0: never.
+    drop_rank: u8,
     paint: fn(&str) -> Style,
 }
 
@@ -55,6 +59,7 @@ impl Column {
             is_number: false,
             is_wide: false,
             is_cuttable: false,
+            drop_rank: 0,
             paint: |_| Style::new(),
         }
     }
@@ -72,6 +77,11 @@ impl Column {
     /// Shown with `--output wide` only.
     pub fn wide(self) -> Self {
         Self { is_wide: true, ..self }
+    }
+
+    /// Left out where there is no room, before those of a smaller rank.
+    pub fn dropped(self, drop_rank: u8) -> Self {
+        Self { drop_rank, ..self }
     }
 
     /// Coloured by what a cell says.
@@ -112,8 +122,9 @@ impl Table {
     }
 
     fn render(&self, is_shown: impl Fn(&Column) -> bool, screen: Screen) -> String {
-        let shown: Vec<usize> =
+        let mut shown: Vec<usize> =
             (0..self.columns.len()).filter(|&i| is_shown(&self.columns[i])).collect();
+        self.drop_columns(&mut shown, screen.width);
         let widths = self.widths(&shown, screen.width);
         let headings = self.columns.iter().map(|column| column.heading.clone()).collect();
         let mut lines = Vec::with_capacity(1 + self.rows.len());
@@ -141,17 +152,38 @@ impl Table {
         lines.join("\n")
     }
 
+    /// Leaves out columns as long as the others have no room on the screen.
+    fn drop_columns(&self, shown: &mut Vec<usize>, screen_width: Option<usize>) {
+        let Some(screen_width) = screen_width else { return };
+        let width = |i: usize| match self.columns[i].is_cuttable {
+            true => self.width(i).min(TEXT_WIDTH),
+            false => self.width(i),
+        };
+        loop {
+            let gaps = GAP.len() * shown.len().saturating_sub(1);
+            if shown.iter().map(|&i| width(i)).sum::<usize>() + gaps <= screen_width {
+                return;
+            }
+            let rank = |&(_, &i): &(usize, &usize)| self.columns[i].drop_rank;
+            let Some((place, _)) =
+                shown.iter().enumerate().filter(|it| rank(it) > 0).max_by_key(rank)
+            else {
+                return;
+            };
+            shown.remove(place);
+        }
+    }
+
+    /// The width of a column's longest cell.
+    fn width(&self, i: usize) -> usize {
+        let cells = self.rows.iter().map(|row| &row[i]).chain([&self.columns[i].heading]);
+        cells.map(|cell| measure_text_width(cell)).max().unwrap_or(0)
+    }
+
     /// The shown columns' widths; if they are too wide for the screen together, the
     /// widest of those that may be cut are made narrower.
     fn widths(&self, shown: &[usize], screen_width: Option<usize>) -> Vec<usize> {
-        let mut widths: Vec<usize> = shown
-            .iter()
-            .map(|&i| {
-                let cells = self.rows.iter().map(|row| &row[i]);
-                let cells = cells.chain([&self.columns[i].heading]);
-                cells.map(|cell| measure_text_width(cell)).max().unwrap_or(0)
-            })
-            .collect();
+        let mut widths: Vec<usize> = shown.iter().map(|&i| self.width(i)).collect();
         let gaps = GAP.len() * shown.len().saturating_sub(1);
         let Some(room) = screen_width.map(|width| width.saturating_sub(gaps)) else {
             return widths;

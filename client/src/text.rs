@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use swarm_proto::v1::{
-    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, HeldOutFitness,
-    JudgedFitness, event::Kind,
+    Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
+    HeldOutFitness, JudgedFitness, event::Kind,
 };
 
+use console::truncate_str;
 use swarm_telemetry::escape;
 
 use crate::{clock, json::state_name};
@@ -49,6 +50,15 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
+/// A count that may be large, to three digits, such as "1.50 billion".
+pub fn large_number(number: f64) -> String {
+    let units = [(1e12, "trillion"), (1e9, "billion"), (1e6, "million"), (1e3, "thousand")];
+    match units.into_iter().find(|(unit, _)| number >= *unit) {
+        Some((unit, name)) => format!("{:.2} {name}", number / unit),
+        None => format!("{number:.0}"),
+    }
+}
+
 /// A share of 1, in percent.
 pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
@@ -82,6 +92,41 @@ pub fn title(experiment: &Experiment) -> String {
     format!("experiment {} ({})", experiment.id, escape(&experiment.name))
 }
 
+/// What tells a run of a group apart: "3 seed 7 algorithm.population_size=50".
+pub fn run_label(experiment: &Experiment) -> String {
+    let separator = if experiment.variant.is_empty() { "" } else { " " };
+    let variant = escape(&experiment.variant);
+    format!("{} seed {}{separator}{variant}", experiment.id, experiment.seed)
+}
+
+/// The runs of a group that has been submitted, one line each.
+pub fn submitted_group(name: &str, runs: &[Experiment]) -> String {
+    let mut lines = vec![format!("group {name}: {}", counted(runs.len() as u64, "run"))];
+    lines.extend(runs.iter().map(|run| {
+        let done = match run.generations_done {
+            0 => String::new(),
+            done => format!(", {} after {done}", state_name(run.state())),
+        };
+        format!("  {}: {} generations{done}", run_label(run), run.generations)
+    }));
+    lines.join("\n")
+}
+
+/// What to say of a submission of which an identical experiment exists; `identical`: its number,
+/// 0 for none.
+pub fn identical(submitted: &Experiment, identical: u64, reuse: bool) -> Option<String> {
+    match identical {
+        0 => None,
+        id if id == submitted.id => reuse.then(|| {
+            format!("experiment {id} is of the same file, seed and version, and is used again")
+        }),
+        id => Some(format!(
+            "experiment {id} is of the same file, seed and version, so it has the same results; \
+             `--reuse` answers with it once it has completed"
+        )),
+    }
+}
+
 /// A submitted experiment, on one line.
 pub fn submitted(experiment: &Experiment) -> String {
     format!(
@@ -105,6 +150,45 @@ pub fn state_line(experiment: &Experiment) -> String {
         experiment.generations,
     );
     with_reason(&text, &experiment.reason)
+}
+
+/// The labels of an experiment, separated by spaces.
+pub fn labels(experiment: &Experiment) -> String {
+    let labels = experiment.labels.iter().map(|(key, value)| format!("{key}={value}"));
+    labels.collect::<Vec<_>>().join(" ")
+}
+
+/// Milliseconds that the rest of a running experiment takes if its generations go on as fast
+/// as the latest ones; none before the first.
+pub fn eta_ms(experiment: &Experiment) -> Option<u64> {
+    let is_running = experiment.state() == ExperimentState::Running;
+    let n_left = experiment.generations.saturating_sub(experiment.generations_done);
+    let generation_ms = experiment.recent_generation_ms.filter(|_| is_running)?;
+    Some((generation_ms * n_left as f64).round() as u64)
+}
+
+/// How long a running experiment takes yet, on one line.
+pub fn eta_line(experiment: &Experiment) -> Option<String> {
+    let generation_ms = experiment.recent_generation_ms?;
+    let left = clock::duration_ms(eta_ms(experiment)?);
+    let each = match generation_ms {
+        ..10_000.0 => format!("{:.2} s", generation_ms / 1000.0),
+        _ => clock::duration_ms(generation_ms.round() as u64),
+    };
+    Some(format!("about {left} left, if generations go on to take {each}"))
+}
+
+/// Where an experiment comes from, and what is changed, if it is a fork.
+pub fn origin(experiment: &Experiment) -> Option<String> {
+    let origin = experiment.forked_from.as_ref()?;
+    let mut lines = vec![format!("forked from {}", origin_address(origin))];
+    lines.extend(origin.changes.iter().map(|change| format!("  {}", escape(change))));
+    Some(lines.join("\n"))
+}
+
+/// "3@499".
+pub fn origin_address(origin: &ForkOrigin) -> String {
+    format!("{}@{}", origin.experiment_id, origin.generation)
 }
 
 /// How an experiment ended: its state, fitness, champion and digest.
@@ -176,6 +260,28 @@ pub fn cancelled(experiment: &Experiment) -> String {
     }
 }
 
+/// Text whose lines fit a screen, broken between words. Lines with an advice stay whole, so
+/// that its command can be copied.
+pub fn wrapped(text: &str, width: usize) -> String {
+    let wrap = |line: &str| {
+        if line.trim_start().starts_with("-> ") {
+            return line.to_owned();
+        }
+        let indent = " ".repeat(line.len() - line.trim_start().len() + 2);
+        let options = textwrap::Options::new(width)
+            .subsequent_indent(&indent)
+            .break_words(false)
+            .word_splitter(textwrap::WordSplitter::NoHyphenation);
+        textwrap::wrap(line, options).join("\n")
+    };
+    text.split('\n').map(wrap).collect::<Vec<_>>().join("\n")
+}
+
+/// Text that is at most so wide.
+pub fn cut(text: &str, width: usize) -> String {
+    truncate_str(text, width, "…").into_owned()
+}
+
 /// A command line that a shell reads back to the same arguments.
 pub fn shell_command(args: impl IntoIterator<Item = String>) -> String {
     let quoted: Vec<String> = args
@@ -225,6 +331,12 @@ mod tests {
             digest: "1a2b3c4d5e6f7a8b".into(),
             ..Experiment::default()
         }
+    }
+
+    #[test]
+    fn large_numbers_have_three_digits_and_a_unit() {
+        let texts = [0.0, 999.0, 57_600.0, 1.5e9].map(large_number);
+        assert_eq!(texts, ["0", "999", "57.60 thousand", "1.50 billion"]);
     }
 
     #[test]

@@ -7,19 +7,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use clap::{Args, value_parser};
+use clap::Args;
 use experiment_file::ExperimentConfig;
 use numeric::random::{Purpose, Stream};
 use serde::Serialize;
 use sim_core::{Isa, Simulation};
 
 use crate::{
-    args::IsaArgs,
+    args::{IsaArgs, whole},
     clock,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
     json,
     progress::Progress,
+    text,
 };
 
 /// The experiment to simulate if none is named.
@@ -35,10 +36,10 @@ pub struct BenchArgs {
     /// The experiment file [default: the thesis's leader selection, by SNES]
     config: Option<PathBuf>,
     /// Duration of the measurement, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = whole::<u16>(1..=3600))]
     seconds: u16,
     /// Number of cores to keep busy [default: all]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     cores: Option<u16>,
     #[command(flatten)]
     isa: IsaArgs,
@@ -162,7 +163,7 @@ impl<'a> Report<'a> {
         format!(
             "{}, {} on {} {}\n  \
              speed of a core   {:.2} million robot-steps/s ({:.3} us each), {:.0} episodes/s\n  \
-             whole experiment  {:.2} billion robot-steps\n  \
+             whole experiment  {} robot-steps\n  \
              on this machine   {}\n  \
              on 16, 64 cores   {}, {}",
             self.experiment,
@@ -172,7 +173,7 @@ impl<'a> Report<'a> {
             self.robot_steps_per_second_per_core / 1e6,
             self.us_per_robot_step,
             self.episodes_per_second_per_core,
-            self.robot_steps / 1e9,
+            text::large_number(self.robot_steps),
             minutes(self.minutes),
             minutes(self.core_minutes / 16.0),
             minutes(self.core_minutes / 64.0),

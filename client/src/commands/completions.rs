@@ -14,6 +14,10 @@ pub struct CompletionsArgs {
 }
 
 const HELP: &str = "\
+Completions of experiments' numbers and names, too, of the coordinator of the
+environment or the settings file:
+  source <(COMPLETE=bash swarmctl)                # in ~/.bashrc; also zsh, fish
+
 Examples:
   source <(swarmctl completions bash)             # in ~/.bashrc
   swarmctl completions zsh > ~/.zfunc/_swarmctl   # a directory in $fpath

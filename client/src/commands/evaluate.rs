@@ -4,17 +4,17 @@ mod args;
 mod conditions;
 mod files;
 mod measured;
-mod patch;
 mod statistics;
 mod summary;
 
-use std::{fs, path::Path, thread};
+use std::thread;
 
 use swarm_proto::v1::EvaluateRequest;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
+    archive::Archive,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
     experiment_file::ExperimentFile,
@@ -27,6 +27,7 @@ use crate::{
 pub use self::args::EvaluateArgs;
 use self::{
     conditions::Condition,
+    files::Results,
     measured::Measured,
     summary::{Subject, Summary},
 };
@@ -61,23 +62,24 @@ async fn evaluate_all(
     args: &EvaluateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let remote = (!args.local || args.id.is_some()).then(|| Connection::open(settings));
-    let remote = remote.transpose()?.map(|it| it.with_patience(PATIENCE_WHILE_FOLLOWING));
-    let (file, genotype) = subject(remote.as_ref(), args).await?;
+    let (file, genotype) = subject(settings.clone(), args).await?;
+    let remote = (!args.local).then(|| Connection::open(settings)).transpose()?;
+    let remote = remote.map(|it| it.with_patience(PATIENCE_WHILE_FOLLOWING));
     let conditions = conditions::all(&file, args)?;
     for condition in &conditions {
         condition.check(&genotype)?;
     }
     // An unusable directory is an error now, not after the computation.
-    fs::create_dir_all(&args.to).map_err(|error| unwritable(&args.to, &error))?;
-    let measured = match remote.filter(|_| !args.local) {
+    let results = Results::begin(&args.to, args.replace)?;
+    let measured = match remote {
         Some(connection) => ask_all(&connection, &conditions, &genotype, args, progress).await?,
         None => compute_here(&conditions, &genotype, args, progress).await?,
     };
-    files::write_steps(&args.to, &conditions, &measured, args.every)?;
-    files::write_trials(&args.to, &conditions, &measured)?;
+    results.write_steps(&conditions, &measured, args.every)?;
+    results.write_trials(&conditions, &measured)?;
     let summary = Summary::new(&Subject::new(&conditions, &genotype), &conditions, &measured);
-    files::write(&args.to, "summary.json", &(json::document(&summary) + "\n"))?;
+    results.write("summary.json", &(json::document(&summary) + "\n"))?;
+    results.finish()?;
     if progress.is_json() {
         return progress.print(&json::document(&summary));
     }
@@ -91,17 +93,19 @@ async fn evaluate_all(
 
 /// The experiment file and the genes to evaluate.
 async fn subject(
-    remote: Option<&Connection>,
+    settings: Settings,
     args: &EvaluateArgs,
 ) -> Result<(ExperimentFile, Vec<f64>), Error> {
-    match (remote, args.id, &args.genotype, &args.config) {
-        (Some(connection), Some(id), ..) => {
-            let champion = connection.champion(id).await?;
-            let text = connection.config_json(id).await?;
-            let file = ExperimentFile::new(format!("experiment {id}").into(), text);
-            Ok((file, champion.genotype))
+    match (&args.address, &args.genotype, &args.config) {
+        (Some(address), ..) => {
+            let archive = Archive::open(settings, args.data_dir.as_deref())?;
+            let address = archive.resolve(address).await?;
+            let found = archive.one(address).await?;
+            let name = format!("experiment {}", address.experiment);
+            let file = ExperimentFile::new(name.into(), found.config_json);
+            Ok((file, found.individual.genotype))
         }
-        (_, _, Some(genotype), Some(config)) => {
+        (_, Some(genotype), Some(config)) => {
             let file =
                 ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error))?;
             Ok((file, Genotype::read(genotype)?.genes))
@@ -124,7 +128,7 @@ async fn compute_here(
     // An evaluation stores nothing, but its coordinator has a database.
     let data_dir = tempfile::tempdir()
         .map_err(|source| Error::Write { what: "a temporary directory".into(), source })?;
-    let mut fleet = Fleet::start(data_dir.path(), n_workers, args.isa.get()).await?;
+    let mut fleet = Fleet::start(data_dir.path(), n_workers, args.isa.get(), None).await?;
     let result = match fleet.connection() {
         Ok(connection) => tokio::select! {
             biased;
@@ -189,10 +193,6 @@ fn table(summary: &Summary) -> Table {
         table.push(std::iter::once(condition.name.clone()).chain(cells).collect::<Vec<_>>());
     }
     table
-}
-
-fn unwritable(path: &Path, error: &std::io::Error) -> Error {
-    Error::Input(format!("cannot write {}: {error}", path.display()))
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! `swarmctl explain`: what an experiment waits for, and the next steps.
 
 mod finding;
+mod fleet;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use serde::Serialize;
 use swarm_proto::v1::{
     Event, ExplainExperimentRequest, ExplainExperimentResponse, HeldItems, Round, event::Kind,
@@ -10,8 +12,8 @@ use swarm_proto::v1::{
 
 use super::Remote;
 use crate::{
-    args::ExperimentId,
-    clock,
+    args::Subject,
+    clock, complete,
     connection::{Connection, present},
     error::Error,
     json,
@@ -19,7 +21,7 @@ use crate::{
     text,
 };
 
-use self::finding::Finding;
+pub use self::finding::{Finding, stall};
 
 /// Most workers that are listed, so that everything fits one screen.
 const WORKERS_MAX: usize = 8;
@@ -30,34 +32,64 @@ struct Explanation<'a> {
     findings: &'a [Finding],
 }
 
-/// Explain what an experiment waits for, and what to do about it.
+/// Explain what an experiment waits for, or the whole fleet, and what to do about it.
 ///
 /// Prints on one screen what the coordinator knows: no workers, paused, queued
 /// behind other experiments, waiting at the barrier for the last items of a
 /// generation, failing items, a full disk; and for each the next steps.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    #[command(flatten)]
-    experiment: ExperimentId,
+    /// Number or name of the experiment, or name of a group [default: the fleet, with all
+    /// experiments that have not ended]
+    #[arg(value_name = "ID|NAME", add = ArgValueCompleter::new(complete::experiments))]
+    subject: Option<Subject>,
 }
 
 impl Remote for ExplainArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let request = ExplainExperimentRequest { experiment_id: self.experiment.id };
-        let answer =
-            connection.call(async |client| client.explain_experiment(request).await).await?;
-        let experiment = present(answer.experiment.clone())?;
-        let findings = finding::findings(&experiment, &answer, connection.address());
-        progress.print(&if progress.is_json() {
-            json::document(&Explanation { experiment: (&experiment).into(), findings: &findings })
-        } else {
-            let mut sections = vec![text::state_line(&experiment)];
+        let Some(subject) = &self.subject else { return fleet::fleet(connection, progress).await };
+        let mut explained = Vec::new();
+        for experiment in connection.subject(subject).await? {
+            explained.push(explain(connection, experiment.id).await?);
+        }
+        if progress.is_json() {
+            let documents: Vec<Explanation<'_>> = explained
+                .iter()
+                .filter_map(|(answer, findings)| {
+                    Some(Explanation { experiment: answer.experiment.as_ref()?.into(), findings })
+                })
+                .collect();
+            return progress.print(&match (subject, &documents[..]) {
+                (Subject::Experiment(_), [one]) => json::document(one),
+                _ => json::document(&documents),
+            });
+        }
+        let mut texts = Vec::new();
+        for (answer, findings) in &explained {
+            let experiment = present(answer.experiment.clone())?;
+            let mut head = vec![text::state_line(&experiment)];
+            head.extend(text::eta_line(&experiment));
+            let mut sections = vec![head.join("\n")];
+            sections.extend(text::origin(&experiment));
             sections.extend(findings.iter().map(Finding::to_string));
             sections.extend(answer.round.as_ref().map(batch_lines));
-            sections.extend(notices(&answer));
-            sections.join("\n\n")
-        })
+            sections.extend(notices(answer));
+            texts.push(sections.join("\n\n"));
+        }
+        progress.print(&texts.join("\n\n"))
     }
+}
+
+/// What the coordinator says of an experiment, and what follows from that.
+async fn explain(
+    connection: &Connection,
+    experiment_id: u64,
+) -> Result<(ExplainExperimentResponse, Vec<Finding>), Error> {
+    let request = ExplainExperimentRequest { experiment_id };
+    let answer = connection.call(async |client| client.explain_experiment(request).await).await?;
+    let experiment = present(answer.experiment.clone())?;
+    let findings = finding::findings(&experiment, &answer, connection.address());
+    Ok((answer, findings))
 }
 
 /// What a batch evaluates: "generation 12", or the champion after it.

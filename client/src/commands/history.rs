@@ -1,12 +1,14 @@
 //! `swarmctl history`: every generation of an experiment.
 
+mod dynamics;
+
 use clap::Args;
 use serde::Serialize;
 use swarm_proto::v1::GenerationSummary;
 
 use super::Remote;
 use crate::{
-    args::ExperimentId,
+    args::{Subject, Target},
     clock,
     connection::{Connection, present},
     error::Error,
@@ -39,12 +41,16 @@ struct Record<'a> {
     completed_at_ms: u64,
 }
 
-/// Print every completed generation of an experiment.
+/// Print every completed generation of an experiment, or of all of a group.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct HistoryArgs {
     #[command(flatten)]
-    experiment: ExperimentId,
+    target: Target,
+    /// Print how evolution moved instead: the step of the mean and the way so far, the genes'
+    /// standard deviations, and the rank correlation of fitness between trials.
+    #[arg(long)]
+    dynamics: bool,
 }
 
 const HELP: &str = "\
@@ -52,49 +58,65 @@ Tables and CSV have one row per generation. Best, mean, min and standard
 deviation are taken over the individuals' mean fitness. CSV and JSON have every
 digit.
 
+Of --dynamics, the rank correlation (Spearman's, mean over pairs of trials) says how
+much of selection was luck: at 0, another trial ranks the individuals in an unrelated
+order. Step, way and deviations are those of a distribution; a GA has none. All is
+computed again from the fitness log.
+
 Examples:
   swarmctl history 3 | tail -1
   swarmctl history 3 --output csv > history.csv
-  swarmctl history 3 --output json | jq '.[].best'";
+  swarmctl history 3 --output json | jq '.[].best'
+  swarmctl history 3 --dynamics --output csv > dynamics.csv";
 
 impl Remote for HistoryArgs {
     const HAS_TABLE: bool = true;
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let experiment_id = self.experiment.id;
-        let mut generations = Vec::new();
-        for completed in connection.generations(experiment_id).await? {
-            generations.push((present(completed.summary)?, completed.completed_at_ms));
+        let experiments = connection.subject(&self.target.subject).await?;
+        if self.dynamics {
+            return dynamics::print(&experiments, connection, progress).await;
         }
-        let records: Vec<Record<'_>> = generations
+        let mut rows = Vec::new();
+        for experiment in experiments {
+            for completed in connection.generations(experiment.id).await? {
+                let summary = present(completed.summary)?;
+                rows.push((experiment.id, summary, completed.completed_at_ms));
+            }
+        }
+        let records: Vec<Record<'_>> = rows
             .iter()
-            .map(|&(ref summary, completed_at_ms)| {
+            .map(|&(experiment_id, ref summary, completed_at_ms)| {
                 let generation = json::GenerationLine::new(experiment_id, summary);
                 Record { generation, completed_at_ms }
             })
             .collect();
         let empty = "no generation is complete yet";
-        progress.print_table(&table(&generations), &CSV_KEYS, &records, empty)
+        let is_group = matches!(self.target.subject, Subject::Group(_));
+        progress.print_table(&table(&rows, is_group), &CSV_KEYS, &records, empty)
     }
 }
 
-fn table(generations: &[(GenerationSummary, u64)]) -> Table {
+fn table(rows: &[(u64, GenerationSummary, u64)], is_group: bool) -> Table {
+    let experiment = Column::number("experiment");
     let mut table = Table::new([
+        if is_group { experiment } else { experiment.wide() },
         Column::number("generation"),
         Column::number("best"),
         Column::number("mean"),
-        Column::number("min"),
-        Column::number("std"),
-        Column::number("seconds"),
+        Column::number("min").dropped(3),
+        Column::number("std").dropped(4),
+        Column::number("seconds").dropped(2),
         Column::number("episodes").wide(),
         Column::number("episodes/s").wide(),
         Column::number("workers").wide(),
         Column::number("idle").wide(),
         Column::new("completed").wide(),
-        Column::text("digest"),
+        Column::text("digest").dropped(5),
     ]);
-    for (summary, completed_at_ms) in generations {
+    for (experiment_id, summary, completed_at_ms) in rows {
         table.push([
+            experiment_id.to_string(),
             summary.generation.to_string(),
             format!("{:.6}", summary.best),
             format!("{:.6}", summary.mean),

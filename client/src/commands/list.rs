@@ -1,5 +1,7 @@
 //! `swarmctl list`: all experiments.
 
+mod filter;
+
 use clap::Args;
 use console::Style;
 use swarm_proto::v1::Experiment;
@@ -12,10 +14,13 @@ use crate::{
     json::{ExperimentDocument, state_name},
     progress::Progress,
     table::{Column, Table},
+    text::{self, origin_address},
 };
 
+use self::filter::Filter;
+
 /// Columns of the CSV: keys of [`ExperimentDocument`].
-const CSV_KEYS: [&str; 13] = [
+const CSV_KEYS: [&str; 16] = [
     "id",
     "name",
     "state",
@@ -29,59 +34,99 @@ const CSV_KEYS: [&str; 13] = [
     "priority",
     "population_size",
     "submitted_at_ms",
+    "eta_ms",
+    "group",
+    "variant",
 ];
 
-/// List all experiments.
+/// List all experiments, or those of a group.
 ///
 /// `judged` is the mean fitness of the champion on trials that selected nothing, once the
 /// run has ended; `selection` that on the held-out trials by which it was selected, which
-/// is optimistic.
+/// is optimistic. `eta` is the time that the generations left take if they are as fast as the
+/// latest ones. A narrow terminal shows fewer columns, `--output wide` all.
 #[derive(Debug, Args)]
-pub struct ListArgs {}
+#[command(visible_alias = "ls", after_help = HELP)]
+pub struct ListArgs {
+    /// Name of a group of experiments [default: all experiments]
+    group: Option<String>,
+    #[command(flatten)]
+    filter: Filter,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl list --state running,paused
+  swarmctl list --label user=ada --sort best";
 
 impl Remote for ListArgs {
     const HAS_TABLE: bool = true;
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let experiments = connection.experiments().await?;
+        let experiments = self.filter.apply(match &self.group {
+            Some(group) => connection.group(group).await?,
+            None => connection.experiments().await?,
+        });
         let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
-        progress.print_table(&table(&experiments), &CSV_KEYS, &documents, "no experiments yet")
+        let table = table(&experiments, clock::unix_ms());
+        progress.print_table(&table, &CSV_KEYS, &documents, "no such experiments")
     }
 }
 
-fn table(experiments: &[Experiment]) -> Table {
+fn table(experiments: &[Experiment], now_ms: u64) -> Table {
     let fitness =
         |fitness: Option<f64>| fitness.map_or("-".into(), |fitness| format!("{fitness:.3}"));
+    // Where nobody has groups, there is nothing to show of them.
+    let shown_if = |is_used: bool, column: Column| if is_used { column } else { column.wide() };
+    let has_groups = experiments.iter().any(|experiment| !experiment.group.is_empty());
+    let has_labels = experiments.iter().any(|experiment| !experiment.labels.is_empty());
+    let has_variants = experiments.iter().any(|experiment| !experiment.variant.is_empty());
     let mut table = Table::new([
         Column::number("id"),
         Column::new("state").painted(state_style),
         Column::number("generations"),
-        Column::number("selection"),
-        Column::number("judged"),
-        Column::number("seed"),
-        Column::new("algorithm"),
+        Column::number("eta").dropped(2),
+        Column::number("selection").dropped(3),
+        Column::number("judged").dropped(1),
+        Column::number("seed").dropped(4),
+        Column::new("algorithm").dropped(6),
+        Column::number("age").dropped(5),
         Column::number("priority").wide(),
         Column::number("population").wide(),
         Column::number("genes").wide(),
         Column::new("submitted").wide(),
+        shown_if(has_groups, Column::new("group").dropped(7)),
+        shown_if(has_variants, Column::text("variant").dropped(8)),
+        shown_if(has_labels, Column::text("labels").dropped(9)),
+        Column::new("archived").wide(),
+        Column::new("forked from").wide(),
         Column::text("name"),
         Column::text("reason").wide(),
+        Column::text("changes").wide(),
     ]);
     for experiment in experiments {
         table.push([
             experiment.id.to_string(),
             state_name(experiment.state()).into(),
             format!("{}/{}", experiment.generations_done, experiment.generations),
+            text::eta_ms(experiment).map_or("-".into(), clock::duration_ms),
             fitness(experiment.champion_selection_fitness),
             fitness(experiment.champion_fitness),
             experiment.seed.to_string(),
             experiment.algorithm.clone(),
+            clock::duration_ms(now_ms.saturating_sub(experiment.submitted_at_ms) / 1000 * 1000),
             experiment.priority.to_string(),
             experiment.population_size.to_string(),
             experiment.genotype_len.to_string(),
             clock::utc(experiment.submitted_at_ms),
+            experiment.group.clone(),
+            experiment.variant.clone(),
+            text::labels(experiment),
+            if experiment.archived { "yes" } else { "-" }.into(),
+            experiment.forked_from.as_ref().map_or("-".into(), origin_address),
             experiment.name.clone(),
             experiment.reason.clone(),
+            experiment.forked_from.as_ref().map_or_else(String::new, |it| it.changes.join("; ")),
         ]);
     }
     table

@@ -1,31 +1,32 @@
 //! `swarmctl logs`: what has happened to one experiment, or to all of them in
 //! the order of time.
 //!
-//! The merged log polls for new events instead of watching: one stream per
-//! experiment would not scale, and events can be put in the order of time only
-//! when all events of a moment are known.
+//! The merged log does not watch every experiment: one stream per experiment would not scale,
+//! and events can be put in the order of time only when all events of a moment are known. It
+//! reads again when the coordinator says that there is news.
 
 mod merge;
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
 use clap::Args;
-use swarm_proto::v1::{Event, Experiment};
-use tokio::time::sleep;
+use clap_complete::ArgValueCompleter;
+use swarm_proto::v1::{Event, Experiment, WatchNewsResponse};
+use tokio::time::{Instant, sleep};
+use tonic::Streaming;
 
 use super::Remote;
 use crate::{
-    connection::{Connection, PATIENCE_WHILE_FOLLOWING},
-    error::Error,
+    args::Subject,
+    complete,
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING, backoff},
+    error::{Error, is_transient},
     json::{self, has_ended},
     progress::Progress,
     text,
 };
 
 use self::merge::Merge;
-
-/// Time between two requests for new events.
-const INTERVAL: Duration = Duration::from_secs(1);
 
 /// Print the events of an experiment, or of all of them.
 ///
@@ -34,9 +35,11 @@ const INTERVAL: Duration = Duration::from_secs(1);
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct LogsArgs {
-    /// Number of the experiment [default: all, in the order of time]
-    id: Option<u64>,
-    /// Keep printing new events; for one experiment, until it ends.
+    /// Number or name of the experiment, or name of a group [default: all, in the order of
+    /// time]
+    #[arg(value_name = "ID|NAME", add = ArgValueCompleter::new(complete::experiments))]
+    id: Option<Subject>,
+    /// Keep printing new events; for an experiment or a group, until it ends.
     #[arg(long, short)]
     follow: bool,
     /// Start at the event with this sequence number.
@@ -68,10 +71,16 @@ async fn print_events(
     let patience = if args.follow { PATIENCE_WHILE_FOLLOWING } else { connection.patience() };
     // The first request has the usual patience: an unreachable coordinator is an
     // error soon.
-    let mut experiments = chosen(connection, args.id).await?;
+    let mut experiments = chosen(connection, args.id.as_ref()).await?;
     let connection = connection.with_patience(patience);
     // Per experiment, the sequence number of the next event to print.
     let mut positions: BTreeMap<u64, u64> = BTreeMap::new();
+    let mut news = News { connection: &connection, stream: None };
+    if args.follow {
+        // Before the first reading, so that nothing falls between.
+        news.next().await?;
+        experiments = chosen(&connection, args.id.as_ref()).await?;
+    }
     loop {
         let with_news = experiments.iter().filter_map(|experiment| {
             let next = *positions.entry(experiment.id).or_insert(args.from_sequence);
@@ -86,14 +95,61 @@ async fn print_events(
         if !args.follow || is_over {
             return Ok(());
         }
-        sleep(INTERVAL).await;
-        experiments = chosen(&connection, args.id).await?;
+        news.next().await?;
+        experiments = chosen(&connection, args.id.as_ref()).await?;
     }
 }
 
-async fn chosen(connection: &Connection, id: Option<u64>) -> Result<Vec<Experiment>, Error> {
-    match id {
-        Some(id) => Ok(vec![connection.experiment(id).await?]),
+/// What says that there may be new events.
+struct News<'a> {
+    connection: &'a Connection,
+    stream: Option<Streaming<WatchNewsResponse>>,
+}
+
+impl News<'_> {
+    /// Waits for news, again and again while the coordinator cannot be reached, up to the
+    /// connection's patience.
+    async fn next(&mut self) -> Result<(), Error> {
+        let mut give_up_at = None;
+        let mut backoff = backoff();
+        loop {
+            let found = match &mut self.stream {
+                Some(stream) => stream.message().await,
+                None => match self.connection.news().await {
+                    Ok(stream) => {
+                        self.stream = Some(stream);
+                        continue;
+                    }
+                    Err(status) => Err(status),
+                },
+            };
+            match found {
+                Ok(Some(_)) => return Ok(()),
+                Err(status) if !is_transient(&status) => {
+                    return Err(self.connection.error(&status));
+                }
+                lost => {
+                    self.stream = None;
+                    let patience = self.connection.patience();
+                    let give_up_at = *give_up_at.get_or_insert(Instant::now() + patience);
+                    if let Err(status) = lost
+                        && Instant::now() >= give_up_at
+                    {
+                        return Err(self.connection.error(&status));
+                    }
+                    sleep(backoff.next_delay(rand::random())).await;
+                }
+            }
+        }
+    }
+}
+
+async fn chosen(
+    connection: &Connection,
+    subject: Option<&Subject>,
+) -> Result<Vec<Experiment>, Error> {
+    match subject {
+        Some(subject) => connection.subject(subject).await,
         None => connection.experiments().await,
     }
 }

@@ -3,24 +3,39 @@
 
 mod backup;
 mod bench;
-mod champion;
+mod compare;
 mod completions;
 mod control;
 mod doctor;
 mod evaluate;
 mod explain;
+mod export;
+mod fleet;
+mod fork;
+mod get;
 mod history;
+mod import;
+mod individual;
+mod keep;
+mod lineage;
 mod list;
 mod logs;
+mod man;
 mod plot;
+mod reopen;
+mod replay;
 mod run;
 mod schema;
 mod simulate;
 mod submit;
 mod validate;
+mod verify;
 mod wait;
 mod watch;
+mod web;
 mod workers;
+
+pub use explain::Finding;
 
 use clap::Subcommand;
 
@@ -40,13 +55,22 @@ pub enum Command {
     Remote(RemoteCommand),
     Validate(validate::ValidateArgs),
     Schema(schema::SchemaArgs),
+    #[command(visible_alias = "champion")]
+    Individual(individual::IndividualArgs),
     Simulate(simulate::SimulateArgs),
+    Replay(replay::ReplayArgs),
+    Web(web::WebArgs),
     Evaluate(evaluate::EvaluateArgs),
+    Lineage(lineage::LineageArgs),
+    Export(export::ExportArgs),
+    Verify(verify::VerifyArgs),
     Plot(plot::PlotArgs),
+    Compare(compare::CompareArgs),
     Bench(bench::BenchArgs),
     Doctor(doctor::DoctorArgs),
     Backup(backup::BackupArgs),
     Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
     /// Evaluate items for the coordinator of `run`, which starts this process itself.
     ///
     /// Reads requests from standard input and writes answers to standard output, in a
@@ -96,18 +120,27 @@ macro_rules! remote_commands {
 
 remote_commands! {
     Submit(submit::SubmitArgs),
+    Fork(fork::ForkArgs),
     List(list::ListArgs),
     Watch(watch::WatchArgs),
     Wait(wait::WaitArgs),
     Logs(logs::LogsArgs),
     History(history::HistoryArgs),
-    Champion(champion::ChampionArgs),
     Explain(explain::ExplainArgs),
     Workers(workers::WorkersArgs),
+    Fleet(fleet::FleetArgs),
     Pause(control::PauseArgs),
     Resume(control::ResumeArgs),
     Priority(control::PriorityArgs),
     Cancel(control::CancelArgs),
+    Extend(reopen::ExtendArgs),
+    Retry(reopen::RetryArgs),
+    Get(get::GetArgs),
+    Label(keep::LabelArgs),
+    Archive(keep::ArchiveArgs),
+    Prune(keep::PruneArgs),
+    Delete(keep::DeleteArgs),
+    Import(import::ImportArgs),
 }
 
 /// Executes the command of a command line.
@@ -128,17 +161,29 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Simulate(args) => {
             return simulate::simulate(settings, &args, &mut progress).await;
         }
+        Command::Individual(args) => {
+            return individual::individual(settings, &args, &mut progress).await;
+        }
+        Command::Replay(args) => return replay::replay(settings, &args, &mut progress).await,
+        Command::Lineage(args) => return lineage::lineage(settings, &args, &mut progress).await,
+        Command::Export(args) => return export::export(settings, &args, &mut progress).await,
+        Command::Verify(args) => return verify::verify(settings, &args, &mut progress).await,
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
+        Command::Compare(args) => return compare::compare(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
         Command::Doctor(args) => return doctor::doctor(&args, &mut progress),
         Command::Backup(args) => return backup::backup(&args, &mut progress),
         Command::Completions(args) => return completions::completions(args.shell, &mut progress),
+        Command::Man(args) => return man::man(&args, &mut progress),
         Command::Referee => {
             return coordinator::referee::serve_stdio()
                 .map_err(|error| Error::Internal(error.to_string()));
         }
         // These start a coordinator and workers, and stop them when interrupted.
-        Command::Run(args) => return run::run(&args, progress, interrupt::token()?).await,
+        Command::Run(args) => {
+            return run::run(settings, &args, progress, interrupt::token()?).await;
+        }
+        Command::Web(args) => return web::web(&args, &mut progress, interrupt::token()?).await,
         Command::Evaluate(args) => {
             return evaluate::evaluate(settings, &args, progress, interrupt::token()?).await;
         }

@@ -2,7 +2,6 @@
 //! the step.
 
 mod args;
-mod source;
 mod steps;
 
 use std::path::Path;
@@ -16,11 +15,11 @@ use crate::{
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     json,
     progress::Progress,
+    recorded::{Run, Source},
     settings::Settings,
 };
 
 pub use self::args::PlotArgs;
-use self::source::{Run, Source};
 
 /// Reads the runs and draws them. The coordinator is asked only for what is not in
 /// a file.
@@ -34,25 +33,31 @@ pub async fn plot(
     if let Some(dir) = &args.steps {
         return plot_steps(dir, args, progress);
     }
+    let too_many = || Error::Input(format!("a figure holds at most {CURVES_MAX} runs"));
     if args.runs.len() > CURVES_MAX {
-        return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} runs")));
+        return Err(too_many());
     }
     let sources: Vec<Source> = args.runs.iter().map(|run| Source::parse(run)).collect();
-    let remote = sources.iter().any(|source| matches!(source, Source::Experiment(_)));
+    let remote = sources.iter().any(|source| matches!(source, Source::Coordinator(_)));
     let connection = remote.then(|| Connection::open(settings)).transpose()?;
     let mut runs = Vec::new();
     for source in &sources {
-        runs.push(match source {
-            Source::File(path) => Run::read(path)?,
-            Source::Experiment(id) => {
-                let connection =
-                    connection.as_ref().expect("connected if a source is an experiment");
-                Run::fetch(connection, *id).await?
+        match source {
+            Source::File(path) => runs.push(Run::read(path)?),
+            Source::Coordinator(subject) => {
+                let connection = connection.as_ref().expect("connected if it is asked");
+                for experiment in connection.subject(subject).await? {
+                    runs.push(Run::fetch(connection, experiment).await?);
+                }
             }
-        });
+        }
+    }
+    if runs.len() > CURVES_MAX {
+        return Err(too_many());
     }
     let names = names(&runs);
-    figure(&runs, &names).write(&args.to)?;
+    let function = common_function(&runs)?;
+    figure(&runs, &names, function).write(&args.to)?;
     progress.print(&if progress.is_json() {
         json::document(&Plotted::new(&runs, &names, &args.to))
     } else {
@@ -113,15 +118,34 @@ fn names(runs: &[Run]) -> Vec<String> {
     runs.iter().map(name).collect()
 }
 
+/// The fitness function of all runs of which it is known; two cannot share an axis.
+fn common_function(runs: &[Run]) -> Result<Option<&str>, Error> {
+    let mut known = runs.iter().filter_map(|run| Some((run, run.function.as_deref()?)));
+    let Some((first, function)) = known.next() else { return Ok(None) };
+    match known.find(|(_, other)| *other != function) {
+        None => Ok(Some(function)),
+        Some((run, other)) => Err(Error::Input(format!(
+            "{} has the fitness function {function}, {} has {other}: their values cannot share an \
+             axis; draw a figure of each",
+            first.source, run.source
+        ))),
+    }
+}
+
 /// The mean over the individuals, between the worst and the best of them.
-fn figure(runs: &[Run], names: &[String]) -> Figure {
+fn figure(runs: &[Run], names: &[String], function: Option<&str>) -> Figure {
     let curve = |(run, name): (&Run, &String)| Curve {
         name: name.clone(),
         points: run.points.iter().map(Point::from).collect(),
     };
     Figure {
+        title: match names {
+            [one] => format!("Fitness of {one}"),
+            several => format!("Fitness of {} runs", several.len()),
+        },
+        caption: "line: mean of the individuals; band: worst to best individual".into(),
         x_label: "generation".into(),
-        y_label: "fitness".into(),
+        y_label: function.map_or("fitness".into(), |function| format!("fitness ({function})")),
         curves: runs.iter().zip(names).map(curve).collect(),
     }
 }

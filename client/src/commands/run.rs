@@ -5,30 +5,38 @@ pub mod log;
 
 use std::{
     env, fs,
+    net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
     thread,
+    time::Duration,
 };
 
-use clap::{Args, value_parser};
-use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse, SubmitExperimentRequest};
+use clap::Args;
+use evolution::Digest;
+use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse, ListWorkersRequest};
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    args::{ExperimentArgs, IsaArgs},
-    connection::{Connection, present},
+    args::{ExperimentArgs, IsaArgs, whole},
+    connection::Connection,
     error::Error,
-    experiment_file::{ExperimentFile, random_request_id},
     json,
     progress::Progress,
+    settings::Settings,
+    sweep::{self, SweepRun},
     text,
 };
 
 use self::fleet::Fleet;
 use super::{
-    champion::champion_document,
+    individual::champion_document,
+    submit::{Manner, submit_all},
     watch::{self, Followed},
 };
 
+/// How long a coordinator that may be running beside has to answer.
+const ANSWER_TIME: Duration = Duration::from_millis(300);
 /// Longest part of an experiment's name in a file's name, in characters.
 const FILE_NAME_CHARS_MAX: usize = 50;
 
@@ -36,21 +44,32 @@ const FILE_NAME_CHARS_MAX: usize = 50;
 ///
 /// Starts a coordinator and workers in this process, the same code as on a fleet,
 /// and follows the experiment to its end. An interrupt loses at most one
-/// generation: the same command continues the experiment.
+/// generation: the same command continues the experiment. What has completed in the data
+/// directory already is shown again, and not computed a second time.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct RunArgs {
     #[command(flatten)]
     pub experiment: ExperimentArgs,
     /// Number of workers, each of one slot [default: the number of cores]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     pub workers: Option<u16>,
     /// Directory of the database and the champion file.
     #[arg(long, value_name = "DIR", default_value = "./swarm-data")]
     pub data_dir: PathBuf,
+    /// Begin anew what has completed in this directory already, instead of showing it again.
+    #[arg(long)]
+    pub new: bool,
+    /// Serve pages with the curve, every individual and replays, and print their address. They
+    /// stay after the run, until an interrupt.
+    #[arg(long)]
+    pub web: bool,
     #[command(flatten)]
     pub isa: IsaArgs,
 }
+
+/// Where pages are: a free port.
+const PAGES: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
 const HELP: &str = "\
 With --output json it prints a line per generation (numbered from 0), then one
@@ -58,31 +77,49 @@ with state, digest and champion.
 
 Examples:
   swarmctl run experiment.json
+  swarmctl run experiment.json --web
+  swarmctl run experiment.json --seeds 0..4
   swarmctl run experiment.json --generations 20 --seed 7 --data-dir /tmp/try";
 
 /// Starts a fleet, evolves, and stops the fleet even if evolving failed.
 pub async fn run(
+    settings: Settings,
     args: &RunArgs,
     mut progress: Progress,
     interrupt: CancellationToken,
 ) -> Result<(), Error> {
     // A bad file is refused before the data directory is created.
-    let file = args.experiment.checked_file()?;
+    let mut runs = sweep::runs(&args.experiment)?;
+    for run in &mut runs {
+        // A run of a group is found by its request.
+        run.request.resume_unfinished = run.group().is_none();
+    }
     let n_workers = args
         .workers
         .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
     log::init(progress.stderr());
-    let mut fleet = Fleet::start(&args.data_dir, n_workers, args.isa.get()).await?;
+    if let Some(remark) = running_coordinator(settings, &args.experiment.config).await {
+        progress.remark(&remark);
+    }
+    let pages = args.web.then_some(PAGES);
+    let mut fleet = Fleet::start(&args.data_dir, n_workers, args.isa.get(), pages).await?;
+    if let Some(address) = fleet.pages() {
+        progress.remark(&format!("open in a browser: {address}"));
+    }
     let result = match fleet.connection() {
         Ok(connection) => tokio::select! {
             biased;
             () = interrupt.cancelled() => Err(interrupted(&args.data_dir)),
-            result = evolve(&connection, &file, args, &mut progress) => result,
+            result = evolve(&connection, &runs, args, &mut progress) => result,
             error = fleet.failure() => Err(error),
         },
         Err(error) => Err(error),
     };
     progress.clear();
+    if let (Ok(()), Some(address)) = (&result, fleet.pages()) {
+        progress.remark(&format!("the pages stay until you press Ctrl-C: {address}"));
+        interrupt.cancelled().await;
+    }
     if matches!(result, Err(Error::Interrupted(_))) {
         progress
             .remark("stopping when the running items are done; interrupt again to stop at once");
@@ -91,10 +128,10 @@ pub async fn run(
     result
 }
 
-/// Submits the experiment, or finds it unfinished, and follows it to its end.
+/// Submits the runs, or finds them unfinished, and follows them to their end.
 async fn evolve(
     connection: &Connection,
-    file: &ExperimentFile,
+    runs: &[SweepRun],
     args: &RunArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
@@ -104,62 +141,112 @@ async fn evolve(
         .into_iter()
         .filter(|experiment| experiment.state() == ExperimentState::Running)
         .collect();
-    let request = SubmitExperimentRequest {
-        resume_unfinished: true,
-        ..file.request(&args.experiment.overrides(), random_request_id("run"))
+    let submitted = match existing(connection, runs, args).await? {
+        Some(existing) => {
+            progress.remark(&already_completed(&existing));
+            vec![existing]
+        }
+        None => submit_all(runs, Manner::default(), connection, progress).await?,
     };
-    let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
-    let experiment = present(response.experiment)?;
-    let remarks =
-        file.warnings(&response.warnings).into_iter().chain(remarks(&experiment, &unfinished));
-    for remark in remarks {
+    for remark in remarks(&submitted, &unfinished) {
         progress.remark(&remark);
     }
     if !progress.is_json() {
-        progress.print(&text::submitted(&experiment))?;
+        progress.print(&match runs[0].group() {
+            Some(group) => text::submitted_group(group, &submitted),
+            None => text::submitted(&submitted[0]),
+        })?;
     }
 
-    let followed = watch::follow(connection, experiment.id, progress).await?;
-    let Followed { experiment, champion, first_best } = &followed;
-    let champion_file = match champion {
-        Some(champion) => Some(write_champion(&args.data_dir, experiment, champion)?),
-        None => None,
-    };
-    let champion_file = champion_file.as_deref();
-    progress.print(&if progress.is_json() {
-        let champion_file = champion_file.map(Path::to_string_lossy);
-        let end = json::EndLine::new(experiment, champion.as_ref());
-        json::line(&end.with_champion_file(champion_file.as_deref()))
-    } else {
-        format!(
-            "{}\n{}",
-            text::end(experiment, *first_best, champion.as_ref()),
-            text::files(&args.data_dir, champion_file)
-        )
-    })?;
-    watch::success(experiment)
+    let all = watch::follow(connection, submitted, progress).await?;
+    for Followed { experiment, champion, first_best } in &all {
+        let champion_file = match champion {
+            Some(champion) => Some(write_champion(&args.data_dir, experiment, champion)?),
+            None => None,
+        };
+        let champion_file = champion_file.as_deref();
+        progress.print(&if progress.is_json() {
+            let champion_file = champion_file.map(Path::to_string_lossy);
+            let end = json::EndLine::new(experiment, champion.as_ref());
+            json::line(&end.with_champion_file(champion_file.as_deref()))
+        } else {
+            format!(
+                "{}\n{}",
+                text::end(experiment, *first_best, champion.as_ref()),
+                text::files(&args.data_dir, champion_file)
+            )
+        })?;
+    }
+    all.iter().try_for_each(|followed| watch::success(&followed.experiment))
 }
 
-/// Remarks that the experiment is continued, and on other unfinished experiments.
-fn remarks(experiment: &Experiment, unfinished: &[Experiment]) -> Vec<String> {
-    let mut remarks = Vec::new();
-    let (this, others): (Vec<_>, Vec<_>) =
-        unfinished.iter().partition(|other| other.id == experiment.id);
-    if let [this] = this[..] {
-        remarks.push(format!(
+/// The experiment that has completed in the data directory with this file, seed and number of
+/// generations, unless it is to begin anew. Runs of a group are found by their requests.
+async fn existing(
+    connection: &Connection,
+    runs: &[SweepRun],
+    args: &RunArgs,
+) -> Result<Option<Experiment>, Error> {
+    let [run] = runs else { return Ok(None) };
+    if args.new || run.group().is_some() {
+        return Ok(None);
+    }
+    let compiled = run.file.check(&args.experiment.overrides());
+    let config = compiled.map_err(|error| run.file.invalid(&error))?.config;
+    let digest = Digest::of_config(&config, sim_core::FINGERPRINT).to_string();
+    let is_it = |it: &Experiment| {
+        it.state() == ExperimentState::Completed
+            && it.config_digest == digest
+            && it.generations == config.algorithm.generations
+            && it.forked_from.is_none()
+    };
+    Ok(connection.experiments().await?.into_iter().rev().find(is_it))
+}
+
+/// Says what exists, and what else can be wanted.
+fn already_completed(existing: &Experiment) -> String {
+    format!(
+        "{} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> the same once more: --new",
+        text::title(existing),
+        existing.generations.saturating_mul(2),
+        existing.seed.wrapping_add(1)
+    )
+}
+
+/// Suggests the coordinator of the settings, if one answers there.
+async fn running_coordinator(settings: Settings, config: &Path) -> Option<String> {
+    let connection = Connection::open(settings).ok()?.with_patience(Duration::ZERO);
+    let request = ListWorkersRequest {};
+    let listing = connection.call_fleet(async |client| client.list_workers(request).await);
+    let n_workers = timeout(ANSWER_TIME, listing).await.ok()?.ok()?.workers.len() as u64;
+    let command = ["swarmctl", "submit", &config.to_string_lossy()].map(str::to_owned);
+    Some(format!(
+        "a coordinator with {} runs at {}: {} evolves there; this command uses this machine only",
+        text::counted(n_workers, "worker"),
+        connection.address(),
+        text::shell_command(command)
+    ))
+}
+
+/// Remarks that experiments are continued, and on other unfinished experiments.
+fn remarks(submitted: &[Experiment], unfinished: &[Experiment]) -> Vec<String> {
+    let is_ours = |other: &&Experiment| submitted.iter().any(|ours| ours.id == other.id);
+    let (continued, others): (Vec<_>, Vec<_>) = unfinished.iter().partition(is_ours);
+    let continuing = continued.iter().map(|this| {
+        format!(
             "continuing {}, {} of {} generations done",
             text::title(this),
             this.generations_done,
             this.generations
-        ));
-    }
-    for other in others {
-        remarks.push(format!(
+        )
+    });
+    let company = others.iter().map(|other| {
+        format!(
             "{} in this data directory is also unfinished, and continues at the same time",
             text::title(other)
-        ));
-    }
-    remarks
+        )
+    });
+    continuing.chain(company).collect()
 }
 
 fn interrupted(data_dir: &Path) -> Error {
@@ -220,14 +307,22 @@ mod tests {
     }
 
     #[test]
+    fn what_exists_is_said_with_what_else_can_be_wanted() {
+        let text = already_completed(&Experiment { seed: u64::MAX, ..experiment(3, "a") });
+        for part in ["experiment 3 (a)", "--generations 80", "--seed 0", "--new"] {
+            assert!(text.contains(part), "{text}");
+        }
+    }
+
+    #[test]
     fn a_new_experiment_alone_needs_no_remark() {
-        assert!(remarks(&experiment(3, "a"), &[]).is_empty());
+        assert!(remarks(&[experiment(3, "a")], &[]).is_empty());
     }
 
     #[test]
     fn continuing_is_said_and_so_is_company() {
         let unfinished = [experiment(2, "b"), experiment(3, "a")];
-        let lines = remarks(&experiment(3, "a"), &unfinished);
+        let lines = remarks(&[experiment(3, "a")], &unfinished);
         assert_eq!(lines[0], "continuing experiment 3 (a), 12 of 40 generations done");
         assert!(lines[1].contains("experiment 2 (b)"));
         assert_eq!(lines.len(), 2);

@@ -10,7 +10,9 @@ use serde::Serialize;
 use sim_core::{EpisodeSummary, EvaluateError, Measures};
 
 use crate::{
+    archive::Archive,
     error::Error,
+    experiment_file::{Compiled, ExperimentFile},
     json,
     progress::Progress,
     settings::Settings,
@@ -20,23 +22,19 @@ use crate::{
 pub use self::args::SimulateArgs;
 use self::{genotype::Genotype, trace::Trace};
 
-/// Simulates the trials one after the other. The coordinator is asked only if the
-/// genotype is the champion of one of its experiments.
+/// Simulates the trials one after the other. A coordinator is asked only for a genotype of
+/// one of its experiments.
 pub async fn simulate(
     settings: Settings,
     args: &SimulateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let compiled = args.compiled()?;
-    for warning in &compiled.warnings {
-        progress.remark(&format!("warning: {}: {warning}", args.config.display()));
-    }
-    let genotype = Genotype::choose(settings, args, &compiled).await?;
+    let Subject { compiled, genotype, generation } = subject(settings, args, progress).await?;
     // A genotype that does not fit is refused before a file is touched.
     let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
     compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
     let mut trace = match &args.trace {
-        Some(path) => Some(Trace::create(path, &compiled.config)?),
+        Some(path) => Some(Trace::create(path, &compiled.config, &args.trace_columns)?),
         None => None,
     };
     let mut trials = Vec::new();
@@ -45,8 +43,7 @@ pub async fn simulate(
             Some(trace) => &mut |record| trace.record(trial, &record),
             None => &mut |_| {},
         };
-        let simulated =
-            compiled.experiment.simulate(&genotype.genes, args.generation, trial, observe);
+        let simulated = compiled.experiment.simulate(&genotype.genes, generation, trial, observe);
         let summary = simulated.map_err(|error| Error::Input(error.to_string()))?;
         trials.push(Trial { trial, summary });
     }
@@ -55,7 +52,7 @@ pub async fn simulate(
         name: &compiled.config.name,
         genotype: genotype.to_string(),
         seed: compiled.config.seed,
-        generation: args.generation,
+        generation,
         steps: compiled.config.algorithm.evaluation_steps,
         mean: mean(&trials),
         trials,
@@ -67,6 +64,43 @@ pub async fn simulate(
     } else {
         report.to_text(progress.screen())
     })
+}
+
+/// What to simulate.
+struct Subject {
+    compiled: Compiled,
+    genotype: Genotype,
+    /// Whose worlds.
+    generation: u64,
+}
+
+async fn subject(
+    settings: Settings,
+    args: &SimulateArgs,
+    progress: &mut Progress,
+) -> Result<Subject, Error> {
+    if let Some(address) = args.address() {
+        if args.genotype.is_some() || args.experiment.is_some() {
+            return Err(Error::Input(format!(
+                "`{address}` names a genotype; --genotype and --experiment go with an experiment \
+                 file"
+            )));
+        }
+        let archive = Archive::open(settings, args.data_dir.as_deref())?;
+        let address = archive.resolve(&address).await?;
+        let found = archive.one(address).await?;
+        let name = format!("experiment {}", address.experiment);
+        let compiled =
+            args.compiled(&ExperimentFile::new(name.into(), found.config_json.clone()))?;
+        let generation = args.generation.unwrap_or(found.individual.generation);
+        return Ok(Subject { compiled, genotype: Genotype::found(address, found), generation });
+    }
+    let compiled = args.compiled(&args.file()?)?;
+    for warning in &compiled.warnings {
+        progress.remark(&format!("warning: {}: {warning}", args.subject.display()));
+    }
+    let genotype = Genotype::choose(settings, args, &compiled).await?;
+    Ok(Subject { compiled, genotype, generation: args.generation.unwrap_or_default() })
 }
 
 /// What was simulated, with fitness and measures per trial.

@@ -1,29 +1,37 @@
 //! `swarmctl submit`: gives an experiment to the coordinator.
 
-use clap::{Args, value_parser};
-use swarm_proto::v1::SubmitExperimentRequest;
+use clap::Args;
+use swarm_proto::v1::{Experiment, SubmitExperimentRequest};
 
 use crate::{
-    args::ExperimentArgs,
+    args::{ExperimentArgs, Subject, whole},
     connection::{Connection, present},
     error::Error,
-    experiment_file::random_request_id,
     json,
     progress::Progress,
+    sweep::{self, SweepRun},
     text,
 };
 
 use super::{Remote, watch};
 
-/// Submit an experiment to the coordinator.
+/// Submit an experiment, or a group of runs of it, to the coordinator.
+///
+/// Runs of a group share the fleet: while one waits for the last items of its generation,
+/// others compute. The same command again adds what is missing: a run that the group has
+/// already is not computed again.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct SubmitArgs {
     #[command(flatten)]
     pub experiment: ExperimentArgs,
     /// Its share of the fleet relative to other experiments, 1 to 1000 [default: 100]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1000))]
     pub priority: Option<u32>,
+    /// If an experiment of the same file, seed and version has completed, answer with it instead
+    /// of computing it again.
+    #[arg(long)]
+    pub reuse: bool,
     /// Follow the experiment to its end, as `swarmctl watch` does.
     #[arg(long)]
     pub watch: bool,
@@ -32,6 +40,9 @@ pub struct SubmitArgs {
 const HELP: &str = "\
 Examples:
   swarmctl submit experiment.json --watch
+  swarmctl submit experiment.json --seeds 0..4
+  swarmctl submit experiment.json --seeds 0..4 --group sizes \\
+      --set algorithm.population_size=50,100,200
   swarmctl submit experiment.json --priority 200 --output json | jq .id";
 
 impl Remote for SubmitArgs {
@@ -45,36 +56,87 @@ async fn submit(
     connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let file = args.experiment.checked_file()?;
-    let request = SubmitExperimentRequest {
-        priority: args.priority,
-        ..file.request(&args.experiment.overrides(), random_request_id("submit"))
-    };
-    let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
-    if let Some(warnings) = file.warnings(&response.warnings) {
-        progress.remark(&warnings);
-    }
-    let experiment = present(response.experiment)?;
-    match (progress.is_json(), args.watch) {
-        (false, true) => progress.print(&text::submitted(&experiment))?,
-        (false, false) => progress.print(&format!(
-            "{}\nfollow it with: swarmctl watch {}",
-            text::submitted(&experiment),
-            experiment.id
-        ))?,
-        (true, true) => {}
-        (true, false) => {
-            progress.print(&json::document(&json::ExperimentDocument::from(&experiment)))?;
+    let runs = sweep::runs(&args.experiment)?;
+    let group = runs[0].group();
+    let submitted = submit_all(
+        &runs,
+        Manner { priority: args.priority, reuse: Some(args.reuse) },
+        connection,
+        progress,
+    )
+    .await?;
+    match (progress.is_json(), group) {
+        (true, _) if args.watch => {}
+        (true, Some(group)) => {
+            progress.print(&json::experiments(&Subject::Group(group.to_owned()), &submitted))?;
+        }
+        (true, None) => {
+            progress.print(&json::document(&json::ExperimentDocument::from(&submitted[0])))?;
+        }
+        (false, Some(group)) => {
+            progress.print(&text::submitted_group(group, &submitted))?;
+            if !args.watch {
+                progress.print(&format!("follow it with: swarmctl watch {group}"))?;
+            }
+        }
+        (false, None) => {
+            let experiment = &submitted[0];
+            progress.print(&text::submitted(experiment))?;
+            if !args.watch {
+                progress.print(&format!("follow it with: swarmctl watch {}", experiment.id))?;
+            }
         }
     }
-    if args.watch { watch::watch(connection, experiment.id, progress).await } else { Ok(()) }
+    if args.watch { watch::watch(connection, submitted, progress).await } else { Ok(()) }
+}
+
+/// How runs are submitted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Manner {
+    pub priority: Option<u32>,
+    /// Whether to answer with an identical experiment that has completed; none: nothing is said
+    /// of identical ones.
+    pub reuse: Option<bool>,
+}
+
+/// Submits runs one after the other. A run of a group that exists already is that one.
+pub async fn submit_all(
+    runs: &[SweepRun],
+    manner: Manner,
+    connection: &Connection,
+    progress: &Progress,
+) -> Result<Vec<Experiment>, Error> {
+    let mut submitted = Vec::new();
+    let mut last_warnings = None;
+    for run in runs {
+        let Manner { priority, reuse } = manner;
+        let request = SubmitExperimentRequest {
+            priority,
+            reuse: reuse.unwrap_or_default(),
+            ..run.request.clone()
+        };
+        let response = connection.submit(request).await.map_err(|error| match submitted.len() {
+            0 => run.file.locate(error),
+            n => Error::Incomplete { n_submitted: n, n_runs: runs.len(), cause: error.into() },
+        })?;
+        let warnings = run.file.warnings(&response.warnings);
+        // Runs of one file have the same, mostly.
+        if warnings != last_warnings {
+            warnings.iter().for_each(|warnings| progress.remark(warnings));
+            last_warnings = warnings;
+        }
+        let experiment = present(response.experiment)?;
+        let remark = reuse.and_then(|it| text::identical(&experiment, response.identical, it));
+        remark.iter().for_each(|remark| progress.remark(remark));
+        submitted.push(experiment);
+    }
+    Ok(submitted)
 }
 
 #[cfg(test)]
 mod tests {
     use std::{fs, path::PathBuf};
 
-    use swarm_proto::v1::Experiment;
     use tonic::Status;
 
     use super::*;
@@ -83,12 +145,15 @@ mod tests {
         experiment_file::tests::quickstart,
         fake_coordinator::{FakeCoordinator, Script},
         progress::tests::Captured,
+        sweep::SweepArgs,
     };
 
     fn args(config: PathBuf) -> SubmitArgs {
         let seed = SeedArg { seed: Some(7) };
-        let experiment = ExperimentArgs { config, generations: None, seed };
-        SubmitArgs { experiment, priority: Some(200), watch: false }
+        let sweep = SweepArgs::default();
+        let experiment =
+            ExperimentArgs { config, generations: None, seed, sweep, labels: Vec::new() };
+        SubmitArgs { experiment, priority: Some(200), reuse: false, watch: false }
     }
 
     #[tokio::test]
@@ -140,5 +205,42 @@ mod tests {
             assert!(error.report().unwrap().contains(key), "{}", error.report().unwrap());
         }
         assert!(fake.script(|script| script.submitted.is_empty()));
+    }
+
+    #[tokio::test]
+    async fn a_group_that_is_submitted_again_is_asked_for_under_the_same_ids() {
+        let (fake, connection) = FakeCoordinator::serve(Script::default()).await;
+        let mut progress = Captured::default().progress(OutputFormat::Json);
+        for _ in 0..2 {
+            let mut args = args(quickstart());
+            args.experiment.seed = SeedArg::default();
+            args.experiment.sweep.seeds = Some("0..2".parse().unwrap());
+            args.execute(&connection, &mut progress).await.unwrap();
+        }
+        let submitted = fake.script(|script| script.submitted.clone());
+        assert_eq!(submitted.len(), 6);
+        assert_eq!(submitted[..3], submitted[3..]);
+        let seeds: Vec<Option<u64>> = submitted.iter().map(|request| request.seed).collect();
+        assert_eq!(seeds[..3], [Some(0), Some(1), Some(2)]);
+        assert!(submitted.iter().all(|request| request.group == "quickstart"));
+    }
+
+    #[tokio::test]
+    async fn a_group_of_which_a_part_was_accepted_says_so() {
+        let full = Status::failed_precondition("1000 experiments are unfinished already");
+        let (_fake, connection) = FakeCoordinator::serve(Script {
+            submit_refusals: [Status::ok(""), full].into(),
+            ..Script::default()
+        })
+        .await;
+        let mut progress = Captured::default().progress(OutputFormat::Json);
+        let mut args = args(quickstart());
+        args.experiment.sweep.seeds = Some("0..2".parse().unwrap());
+        let error = args.execute(&connection, &mut progress).await.unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        let report = error.report().unwrap();
+        for part in ["1 of 3 runs", "1000 experiments", "same command again"] {
+            assert!(report.contains(part), "{report}");
+        }
     }
 }

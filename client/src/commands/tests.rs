@@ -13,6 +13,7 @@ use crate::{
     clock,
     fake_coordinator::{FakeCoordinator, Script, state},
     progress::tests::Captured,
+    synonyms::with_suggestions,
 };
 
 /// 2026-02-03, some time after noon.
@@ -72,7 +73,7 @@ fn script() -> Script {
             algorithm: "SNES".into(),
             population_size: 100,
             genotype_len: 455,
-            submitted_at_ms: NOON_MS,
+            submitted_at_ms: clock::unix_ms() - 7_500_000,
             latest: Some(summary(2)),
             champion_fitness: Some(1.25),
             champion_selection_fitness: Some(1.5),
@@ -81,6 +82,7 @@ fn script() -> Script {
             priority: 100,
             last_sequence: 5,
             simulation: "sim-core 0.0.0 format 0".into(),
+            recent_generation_ms: Some(1250.0),
             ..Experiment::default()
         },
         champion: Some(GetChampionResponse {
@@ -132,6 +134,12 @@ fn script() -> Script {
 
 /// What commands print, and how they end, one after the other.
 async fn transcript(script: Script, lines: &[&str]) -> String {
+    transcript_on(None, script, lines).await
+}
+
+/// The same on a terminal of some width.
+async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> String {
+    let submitted_at_ms = script.experiment.submitted_at_ms;
     let (_fake, connection) = FakeCoordinator::serve(script).await;
     let mut sections = Vec::new();
     for line in lines {
@@ -139,10 +147,16 @@ async fn transcript(script: Script, lines: &[&str]) -> String {
         let captured = Captured::default();
         let result = match Args::try_parse_from(at.into_iter().chain(line.split(' '))) {
             Ok(args) => {
-                let progress = captured.progress(args.output);
+                let progress = match width {
+                    Some(width) => captured.progress_on(args.output, width),
+                    None => captured.progress(args.output),
+                };
                 execute(args, progress).await.map_err(|error| (error.exit_code(), error.report()))
             }
-            Err(error) => Err((2, Some(error.to_string().trim_end().to_owned()))),
+            Err(error) => {
+                let text = with_suggestions(error).to_string();
+                Err((2, Some(text.trim_end().to_owned())))
+            }
         };
         let mut section = vec![format!("$ swarmctl {line}")];
         section.extend(captured.lines());
@@ -151,6 +165,9 @@ async fn transcript(script: Script, lines: &[&str]) -> String {
             section.push(format!("[exit code {code}]"));
         }
         let section = section.join("\n").replace(connection.address(), "http://HOST:PORT");
+        // Its age is the same in every transcript, and so the time is not.
+        let section = section.replace(&submitted_at_ms.to_string(), "SUBMITTED_MS");
+        let section = section.replace(&clock::utc(submitted_at_ms), "SUBMITTED-AT-IN--UTC");
         sections.push(section);
     }
     sections.join("\n\n")
@@ -193,7 +210,12 @@ async fn answers_for_people() {
         "explain 3",
         "resume 3",
         "priority 3 200",
+        "prune 3",
         "cancel 3",
+        "prune 3",
+        "history 3 --dynamics",
+        "lineage 3@2/5",
+        "lineage 3@2/5 --dot",
         "wait 3 --for ended",
         "wait 3",
         "explain 3",
@@ -208,6 +230,7 @@ async fn answers_for_programs() {
         "list --output csv",
         "history 3 --output json",
         "history 3 --output csv",
+        "history 3 --dynamics --output csv",
         "logs --output json",
         "explain 3 --output json",
         "champion 3",
@@ -231,6 +254,60 @@ async fn refusals() {
         "submit missing.json",
     ];
     insta::assert_snapshot!(transcript(script(), &commands).await);
+}
+
+#[tokio::test]
+async fn the_life_of_an_experiment() {
+    let commands = [
+        "label 3 user=ada purpose=thesis",
+        "list --label user=ada --state running",
+        "list --label user=grace",
+        "label leader --remove purpose",
+        "delete leader",
+        "archive 3",
+        "list",
+        "list --all --sort best",
+        "archive 3 --restore",
+        "extend 3 --generations 60",
+        "retry 3",
+        "label 3",
+        "label 3 ada",
+        "extend 3",
+    ];
+    insta::assert_snapshot!(transcript(script(), &commands).await);
+}
+
+#[tokio::test]
+async fn answers_fit_the_terminal() {
+    let commands = ["list", "history 3", "logs 3", "workers", "explain 3", "explain", "wait 3"];
+    let mut experiment = script().experiment;
+    experiment.name = "leader_selection_by_radio_alone".into();
+    experiment.group = "thesis".into();
+    experiment.labels = [("user".to_owned(), "ada".to_owned())].into();
+    for width in [40, 80, 200] {
+        let script = Script {
+            experiment: experiment.clone(),
+            watches: [(vec![state(6, ExperimentState::Completed)], None)].into(),
+            ..script()
+        };
+        let text = transcript_on(Some(width), script, &commands).await;
+        for line in text.lines() {
+            let is_whole = line.trim_start().starts_with("-> ");
+            assert!(is_whole || console::measure_text_width(line) <= width, "{width}: {line}");
+        }
+        insta::assert_snapshot!(format!("answers_at_{width}_columns"), text);
+    }
+}
+
+#[tokio::test]
+async fn a_name_stands_for_the_number() {
+    for command in ["champion X", "individual X@1/7", "logs X", "explain X", "get X"] {
+        let [by_number, by_name] = ["3", "leader"].map(|name| command.replace('X', name));
+        let numbered = transcript(script(), &[&by_number]).await.replace(&by_number, "");
+        let named = transcript(script(), &[&by_name]).await.replace(&by_name, "");
+        assert_eq!(numbered, named, "{command}");
+        assert!(!named.contains("exit code"), "{named}");
+    }
 }
 
 #[tokio::test]

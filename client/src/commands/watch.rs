@@ -1,16 +1,24 @@
-//! Follows an experiment to its end, across interruptions of the coordinator.
+//! Follows experiments to their end, across interruptions of the coordinator.
 
-use std::time::Duration;
+mod situation;
+
+use std::{sync::Arc, time::Duration};
 
 use clap::Args;
-use swarm_proto::v1::{Event, Experiment, ExperimentState, GetChampionResponse, event::Kind};
+use swarm_proto::v1::{
+    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
+};
 use swarm_telemetry::escape;
-use tokio::time::{Instant, sleep};
+use tokio::{
+    sync::{Semaphore, mpsc},
+    task::JoinSet,
+    time::{Instant, sleep},
+};
 use tonic::Streaming;
 
-use super::Remote;
+use super::{Remote, explain::Finding};
 use crate::{
-    args::ExperimentId,
+    args::Target,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
     error::{Error, is_transient, reason},
     json::{self, has_ended},
@@ -21,6 +29,11 @@ use crate::{
 /// A stream that lasted so long counts as contact with the coordinator, even if it
 /// brought no event.
 const LASTING: Duration = Duration::from_secs(5);
+/// Most experiments of a group that are followed at the same time, each by a stream of the
+/// one connection, which has one more for their situation; others follow when one has ended.
+const STREAMS_MAX: usize = 64;
+/// News that may wait to be shown.
+const NEWS_MAX: usize = 16;
 
 /// An experiment that has ended.
 #[derive(Debug)]
@@ -32,59 +45,119 @@ pub struct Followed {
     pub first_best: Option<f64>,
 }
 
-/// Follow an experiment from its first generation to its end.
+/// Follow an experiment, or a group of them, from the first generation to the end.
 ///
-/// Generations that are complete already are shown first. If the coordinator
+/// Generations that are complete already are shown first. What keeps the experiment from
+/// being computed, such as a pause or a lack of workers, is said at once, with the next step. If the coordinator
 /// becomes unreachable, this tries for a minute to reach it again. Interrupting
 /// this command does not interrupt the experiment.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WatchArgs {
     #[command(flatten)]
-    experiment: ExperimentId,
+    target: Target,
 }
 
 const HELP: &str = "\
 With --output json it prints a line per generation (numbered from 0), then one
-with state, digest and champion.
+for each experiment with state, digest and champion.
 
-Example:
-  swarmctl watch 3 --output json | jq .best";
+Examples:
+  swarmctl watch 3 --output json | jq .best
+  swarmctl watch leader_selection_snes";
 
 impl Remote for WatchArgs {
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        watch(connection, self.experiment.id, progress).await
+        let experiments = connection.subject(&self.target.subject).await?;
+        watch(connection, experiments, progress).await
     }
 }
 
-/// Follows an experiment to its end and prints how it ended.
+/// Follows experiments to their end and prints how each ended.
 pub async fn watch(
     connection: &Connection,
-    experiment_id: u64,
+    experiments: Vec<Experiment>,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let followed = follow(connection, experiment_id, progress).await?;
-    let Followed { experiment, champion, first_best } = &followed;
-    progress.print(&if progress.is_json() {
-        json::line(&json::EndLine::new(experiment, champion.as_ref()))
-    } else {
-        text::end(experiment, *first_best, champion.as_ref())
-    })?;
-    success(experiment)
+    let all = follow(connection, experiments, progress).await?;
+    for Followed { experiment, champion, first_best } in &all {
+        progress.print(&if progress.is_json() {
+            json::line(&json::EndLine::new(experiment, champion.as_ref()))
+        } else {
+            text::end(experiment, *first_best, champion.as_ref())
+        })?;
+    }
+    all.iter().try_for_each(|followed| success(&followed.experiment))
 }
 
-/// Shows an experiment's events until it ends.
+/// Shows the events of experiments until all of them have ended. They are returned in the
+/// order of their numbers.
 pub async fn follow(
     connection: &Connection,
-    experiment_id: u64,
+    experiments: Vec<Experiment>,
     progress: &mut Progress,
-) -> Result<Followed, Error> {
-    progress.begin(&connection.experiment(experiment_id).await?);
+) -> Result<Vec<Followed>, Error> {
+    progress.begin(&experiments);
     let connection = connection.with_patience(PATIENCE);
-    let follower =
-        Follower { connection: &connection, experiment_id, progress: Some(&mut *progress) };
-    let first_best = follower.run(1).await?;
+    let (sender, mut news) = mpsc::channel(NEWS_MAX);
+    let streams = Arc::new(Semaphore::new(STREAMS_MAX));
+    let ids: Vec<u64> = experiments.iter().map(|experiment| experiment.id).collect();
+    let n_followed = ids.len();
+    // Ends the tasks when this function ends.
+    let mut followers = JoinSet::new();
+    for experiment in experiments {
+        let follower = Follower {
+            connection: connection.clone(),
+            experiment_id: experiment.id,
+            news: Some(sender.clone()),
+        };
+        let (sender, streams) = (sender.clone(), streams.clone());
+        followers.spawn(async move {
+            let _stream = streams.acquire().await;
+            let last = match follower.run(1).await {
+                Ok(first_best) => News::Ended(follower.experiment_id, first_best),
+                Err(error) => News::Failed(error),
+            };
+            // Whoever is not interested any more has failed.
+            let _ = sender.send(last).await;
+        });
+    }
+    followers.spawn(situation::tell(connection.clone(), ids, sender));
+    let mut ended = Vec::new();
+    let mut last_loss = String::new();
+    while ended.len() < n_followed {
+        // One of the tasks goes on until the last experiment has ended.
+        let Some(news) = news.recv().await else { break };
+        match news {
+            News::Situation(id, finding) => progress.situation(id, finding.as_ref()),
+            News::Generation(id, summary) => progress.generation(id, &summary)?,
+            News::Notice(id, text) => progress.notice(id, &text),
+            // Those who follow one coordinator lose it together.
+            News::Lost(text) if text == last_loss => {}
+            News::Lost(text) => {
+                progress.remark(&text);
+                last_loss = text;
+            }
+            News::Ended(id, first_best) => {
+                progress.ended(id);
+                ended.push(final_state(&connection, id, first_best).await?);
+            }
+            News::Failed(error) => {
+                progress.clear();
+                return Err(error);
+            }
+        }
+    }
     progress.clear();
+    ended.sort_by_key(|followed| followed.experiment.id);
+    Ok(ended)
+}
+
+async fn final_state(
+    connection: &Connection,
+    experiment_id: u64,
+    first_best: Option<f64>,
+) -> Result<Followed, Error> {
     let experiment = connection.experiment(experiment_id).await?;
     let champion = match connection.champion(experiment_id).await {
         Ok(champion) => Some(champion),
@@ -100,8 +173,8 @@ pub async fn ended(connection: &Connection, experiment: Experiment) -> Result<Ex
         return Ok(experiment);
     }
     let (experiment_id, next) = (experiment.id, experiment.last_sequence + 1);
-    let connection = &connection.with_patience(PATIENCE);
-    Follower { connection, experiment_id, progress: None }.run(next).await?;
+    let connection = connection.with_patience(PATIENCE);
+    Follower { connection: connection.clone(), experiment_id, news: None }.run(next).await?;
     connection.experiment(experiment_id).await
 }
 
@@ -115,11 +188,29 @@ pub fn success(experiment: &Experiment) -> Result<(), Error> {
     }
 }
 
-struct Follower<'a> {
-    connection: &'a Connection,
+/// What is to be shown of an experiment.
+#[derive(Debug)]
+enum News {
+    /// A generation of the experiment of that number.
+    Generation(u64, GenerationSummary),
+    /// A line about the experiment of that number.
+    Notice(u64, String),
+    /// What keeps the experiment of that number from being computed; none: nothing any more.
+    Situation(u64, Option<Finding>),
+    /// The coordinator cannot be reached.
+    Lost(String),
+    /// The experiment of that number has ended; the best fitness of its first generation.
+    Ended(u64, Option<f64>),
+    /// It can be followed no further.
+    Failed(Error),
+}
+
+/// Reads the events of one experiment.
+struct Follower {
+    connection: Connection,
     experiment_id: u64,
     /// Shows what happens, if anybody looks.
-    progress: Option<&'a mut Progress>,
+    news: Option<mpsc::Sender<News>>,
 }
 
 /// How a stream of events ended.
@@ -130,10 +221,10 @@ enum StreamEnd {
     Broken(String),
 }
 
-impl Follower<'_> {
+impl Follower {
     /// Follows from an event on. Returns the best fitness of the first generation, if that
     /// was among the events, once the experiment has ended.
-    async fn run(mut self, next_sequence: u64) -> Result<Option<f64>, Error> {
+    async fn run(&self, next_sequence: u64) -> Result<Option<f64>, Error> {
         let mut seen = Seen { next_sequence, first_best: None, is_over: false };
         let mut backoff = backoff();
         let mut unreachable_since = None;
@@ -158,13 +249,14 @@ impl Follower<'_> {
                 Err(status) => return Err(self.connection.error(&status)),
             };
             let now = Instant::now();
-            let since = *unreachable_since.get_or_insert_with(|| {
-                self.remark(&format!(
+            if unreachable_since.is_none() {
+                self.tell(News::Lost(format!(
                     "lost the connection to the coordinator ({reason}); trying to reconnect for {} s",
                     PATIENCE.as_secs()
-                ));
-                now
-            });
+                )))
+                .await;
+            }
+            let since = *unreachable_since.get_or_insert(now);
             if now - since >= self.connection.patience() {
                 return Err(self.connection.unreachable(reason));
             }
@@ -173,14 +265,14 @@ impl Follower<'_> {
     }
 
     async fn read(
-        &mut self,
+        &self,
         mut events: Streaming<swarm_proto::v1::WatchExperimentResponse>,
         seen: &mut Seen,
     ) -> Result<StreamEnd, Error> {
         loop {
             match events.message().await {
                 Ok(Some(response)) => {
-                    self.show(present(response.event)?, seen)?;
+                    self.show(present(response.event)?, seen).await;
                 }
                 Ok(None) if seen.is_over => return Ok(StreamEnd::Final),
                 Ok(None) => {
@@ -194,16 +286,17 @@ impl Follower<'_> {
         }
     }
 
-    fn remark(&self, text: &str) {
-        if let Some(progress) = &self.progress {
-            progress.remark(text);
+    async fn tell(&self, news: News) {
+        if let Some(sender) = &self.news {
+            // Whoever is not interested any more ends this task.
+            let _ = sender.send(news).await;
         }
     }
 
     /// Shows an event once.
-    fn show(&mut self, event: Event, seen: &mut Seen) -> Result<(), Error> {
+    async fn show(&self, event: Event, seen: &mut Seen) {
         if event.sequence < seen.next_sequence {
-            return Ok(());
+            return;
         }
         seen.next_sequence = event.sequence + 1;
         match event.kind {
@@ -211,18 +304,18 @@ impl Follower<'_> {
                 if summary.generation == 0 {
                     seen.first_best = Some(summary.best);
                 }
-                if let Some(progress) = &mut self.progress {
-                    progress.generation(&summary)?;
-                }
+                self.tell(News::Generation(self.experiment_id, summary)).await;
             }
             Some(Kind::StateChanged(change)) => {
                 seen.is_over = has_ended(change.state());
             }
-            Some(Kind::Notice(notice)) => self.remark(&escape(&notice.message)),
+            Some(Kind::Notice(notice)) => {
+                let text = escape(&notice.message).into_owned();
+                self.tell(News::Notice(self.experiment_id, text)).await;
+            }
             // A kind of event that only newer versions know.
             None => {}
         }
-        Ok(())
     }
 }
 

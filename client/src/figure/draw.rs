@@ -22,8 +22,13 @@ const SIZE: (u32, u32) = (2400, 1500);
 const UNITS: u32 = 3;
 
 /// Known to SVG viewers as well.
-const FONT: &str = "sans-serif";
+pub const FONT: &str = "sans-serif";
 const FONT_SIZE: i32 = 54;
+const TITLE_SIZE: i32 = 66;
+const CAPTION_SIZE: i32 = 46;
+const GREY: RGBColor = RGBColor(90, 90, 90);
+/// Length of the marks at the numbers of an axis, and so the distance of the numbers.
+const TICK_LENGTH: i32 = 18;
 const LINE_WIDTH: u32 = 5;
 const BAND_OPACITY: f64 = 0.2;
 const MARGIN: i32 = 36;
@@ -86,6 +91,7 @@ impl Figure {
         embed_font();
         area.fill(&WHITE)?;
         let area = area.margin(MARGIN, MARGIN, MARGIN, MARGIN);
+        let area = self.draw_head(area)?;
         let legend = Legend::new(&self.curves, &area)?;
         let (top, plot) = area.split_vertically(legend.n_rows() * LEGEND_ROW);
         legend.draw(&top)?;
@@ -93,8 +99,8 @@ impl Figure {
         let mut chart = ChartBuilder::on(&plot)
             .margin_top(MARGIN)
             .margin_right(2 * MARGIN)
-            .x_label_area_size(130)
-            .y_label_area_size(180)
+            .x_label_area_size(150)
+            .y_label_area_size(200)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let (x_ticks, y_ticks) = (tick_step(&x), tick_step(&y));
         chart
@@ -105,6 +111,8 @@ impl Figure {
             .y_labels(N_TICKS)
             .x_label_formatter(&|x| tick(*x, x_ticks))
             .y_label_formatter(&|y| tick(*y, y_ticks))
+            .set_tick_mark_size(LabelAreaPosition::Left, TICK_LENGTH)
+            .set_tick_mark_size(LabelAreaPosition::Bottom, TICK_LENGTH)
             .label_style((FONT, FONT_SIZE))
             .axis_desc_style((FONT, FONT_SIZE))
             .axis_style(BLACK.stroke_width(3))
@@ -130,6 +138,28 @@ impl Figure {
             }
         }
         area.present()
+    }
+
+    /// Draws title and caption; returns what is left.
+    fn draw_head<'a, B: DrawingBackend>(
+        &self,
+        area: Canvas<'a, B>,
+    ) -> Result<Canvas<'a, B>, DrawingAreaErrorKind<B::ErrorType>> {
+        let mut rest = area;
+        for (text, size, colour) in
+            [(&self.title, TITLE_SIZE, BLACK), (&self.caption, CAPTION_SIZE, GREY)]
+        {
+            if text.is_empty() {
+                continue;
+            }
+            let height = size * 3 / 2;
+            let (head, below) = rest.split_vertically(height);
+            let anchor = Pos::new(HPos::Left, VPos::Center);
+            let style = TextStyle::from((FONT, size).into_font()).color(&colour).pos(anchor);
+            head.draw(&Text::new(text.as_str(), (MARGIN, height / 2), &style))?;
+            rest = below;
+        }
+        Ok(rest)
     }
 
     /// Of x all, of y a little more than what the bands cover.
@@ -248,7 +278,7 @@ impl<'a> Legend<'a> {
 }
 
 /// Makes the font known, which the size of all texts is measured with.
-fn embed_font() {
+pub fn embed_font() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let font = register_font(FONT, FontStyle::Normal, dejavu::sans::regular());

@@ -8,7 +8,13 @@ fn curve(name: &str, points: &[(f64, f64, f64, f64)]) -> Curve {
 }
 
 fn figure(curves: Vec<Curve>) -> Figure {
-    Figure { x_label: "generation".into(), y_label: "fitness".into(), curves }
+    Figure {
+        title: "two runs".into(),
+        caption: "line: mean".into(),
+        x_label: "generation".into(),
+        y_label: "fitness".into(),
+        curves,
+    }
 }
 
 fn two_runs() -> Figure {

@@ -2,9 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, value_parser};
+use clap::Args;
+use experiment_file::limits;
 
-use crate::args::{IsaArgs, StepsArg};
+use crate::{
+    address::NamedAddress,
+    args::{IsaArgs, StepsArg, whole},
+};
 
 /// Evaluate a genotype: many trials under several conditions, every step measured.
 ///
@@ -16,17 +20,21 @@ use crate::args::{IsaArgs, StepsArg};
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub struct EvaluateArgs {
-    /// Number of the experiment whose champion and experiment file are used.
-    #[arg(required_unless_present = "genotype")]
-    pub id: Option<u64>,
+    /// Whom to evaluate, with the file of its experiment: ID or NAME, the champion; ID@G/I,
+    /// individual I of generation G; ID@G/mean, the mean of the distribution after it.
+    #[arg(value_name = "ADDRESS", required_unless_present = "genotype")]
+    pub address: Option<NamedAddress>,
+    /// Read the address from the database in this directory instead of asking a coordinator.
+    #[arg(long, value_name = "DIR", requires = "address")]
+    pub data_dir: Option<PathBuf>,
     /// File with the genotype, such as a champion file.
-    #[arg(long, value_name = "FILE", conflicts_with = "id", requires = "config")]
+    #[arg(long, value_name = "FILE", conflicts_with = "address", requires = "config")]
     pub genotype: Option<PathBuf>,
     /// The experiment file that goes with --genotype.
     #[arg(long, value_name = "FILE", requires = "genotype")]
     pub config: Option<PathBuf>,
     /// Number of trials per condition.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = whole::<u32>(1..=1000))]
     pub trials: u32,
     #[command(flatten)]
     pub steps: StepsArg,
@@ -50,20 +58,23 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "PATH=VALUE[;...]")]
     pub base: Vec<String>,
     /// Write every K-th step, and the last one, to steps.csv.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = whole(1..=limits::STEPS))]
     pub every: u32,
     /// Share of the fleet relative to experiments, 1 to 1000 [default: 100]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1000))]
     pub priority: Option<u32>,
     /// Compute in this process, with its own coordinator and workers, as `run` does.
     #[arg(long)]
     pub local: bool,
     /// Number of workers of --local [default: the number of cores]
-    #[arg(long, value_name = "N", requires = "local", value_parser = value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", requires = "local", value_parser = whole::<u16>(1..=1024))]
     pub workers: Option<u16>,
     /// Directory of the results; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
+    /// Replace the evaluation that is in the directory.
+    #[arg(long)]
+    pub replace: bool,
     #[command(flatten)]
     pub isa: IsaArgs,
 }
@@ -73,6 +84,7 @@ A PATH is a place in the experiment file, as its error messages name it; a VALUE
 is JSON, or text. docs/evaluation.md explains files, measures and statistics.
 
 Examples:
+  swarmctl evaluate 3@59/mean --data-dir swarm-data --local --to mean
   swarmctl evaluate 3 --robots 5,10,20,30,50 --to leader/scalability
   swarmctl evaluate 3 --perturb leader_failure:time_to_failure=50 --to leader/fault
   swarmctl evaluate 3 --inhibit msg,receiving_direction,state --to leader/stimuli

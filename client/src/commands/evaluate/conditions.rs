@@ -4,11 +4,9 @@ use experiment_file::{ConfigError, ExperimentConfig, suggestion};
 use indexmap::IndexMap;
 use sim_core::Simulation;
 
-use super::{
-    EvaluateArgs,
-    patch::{Change, Json},
-};
+use super::EvaluateArgs;
 use crate::{
+    change::{Change, Json, apply_all, split},
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
     json,
@@ -61,11 +59,10 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
     let mut base = to_json(&compiled.config);
     let mut base_changes = Vec::new();
     for text in &args.base {
-        for change in parsed("--base", text)? {
-            change.apply(&mut base).map_err(|problem| Error::Input(format!("--base {problem}")))?;
-            base_changes.push(change);
-        }
+        base_changes.extend(parsed("--base", text)?);
     }
+    apply_all(&base_changes, &mut base)
+        .map_err(|problems| Error::Input(format!("--base {}", problems.join("; "))))?;
     let nominal = Nominal { config: read("--base", &base)?, base };
     let unchanged = nominal.condition("nominal".into(), Vec::new())?;
     let mut conditions = vec![Condition { changes: base_changes, ..unchanged }];
@@ -103,9 +100,7 @@ impl Nominal {
     fn condition(&self, name: String, changes: Vec<Change>) -> Result<Condition, Error> {
         let input = |problem: String| Error::Input(format!("condition {name}: {problem}"));
         let mut file = self.base.clone();
-        for change in &changes {
-            change.apply(&mut file).map_err(input)?;
-        }
+        apply_all(&changes, &mut file).map_err(|problems| input(problems.join("; ")))?;
         let config = read(&format!("condition {name}"), &file)?;
         let experiment = Simulation::compile(&config).map_err(|error| input(problems(&error)))?;
         Ok(Condition { name, changes, config, experiment })
@@ -204,20 +199,15 @@ fn parsed(option: &str, text: &str) -> Result<Vec<Change>, Error> {
     Change::parse_all(text).map_err(|problem| Error::Input(format!("{option} {problem}")))
 }
 
-/// Reads `KEY=VALUE,...`; commas within brackets do not separate.
+/// Reads `KEY=VALUE,...`; commas within a value do not separate.
 fn parameters(text: &str) -> Result<IndexMap<String, Json>, String> {
-    let mut depth = 0;
-    let separate = |c: char| {
-        depth += i32::from("[{".contains(c)) - i32::from("]}".contains(c));
-        c == ',' && depth == 0
-    };
-    let parts: Vec<&str> = text.split(separate).filter(|part| !part.trim().is_empty()).collect();
-    let parameter = |part: &&str| {
+    let parts = split(text, ',').into_iter().filter(|part| !part.trim().is_empty());
+    let parameter = |part: &str| {
         let (key, value) =
             part.split_once('=').ok_or_else(|| format!("`{part}`: expected KEY=VALUE"))?;
         Ok((key.trim().to_owned(), Json::parse(value.trim())))
     };
-    parts.iter().map(parameter).collect()
+    parts.map(parameter).collect()
 }
 
 fn to_json(config: &ExperimentConfig) -> Json {

@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use evolution::interval::interval;
 use serde::Serialize;
 
 /// Upper 2.5 % point of the standard normal distribution: 95 % of it lie within.
@@ -39,7 +40,8 @@ pub struct Estimate {
     pub mean: f64,
     /// Standard deviation of the sample, with n - 1 in its denominator; 0 for n = 1.
     pub standard_deviation: f64,
-    /// 95 % confidence interval of the mean: mean -+ z s / sqrt(n).
+    /// 95 % confidence interval of the mean, by empirical likelihood: see
+    /// [`evolution::interval`].
     pub ci95: [f64; 2],
     /// Of shares only: mean -+ z sqrt(mean (1 - mean) / n), Eq. 6.1 of the thesis.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,7 +53,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// None if there are no values; `is_share`: whether they lie in [0, 1].
+    /// None if there are no values, or one is not finite; `is_share`: whether they lie in
+    /// [0, 1].
     pub fn of(values: &[f64], is_share: bool) -> Option<Self> {
         let quartiles = Quartiles::of(values.to_vec())?;
         let n = values.len() as f64;
@@ -65,7 +68,7 @@ impl Estimate {
             n: values.len(),
             mean,
             standard_deviation: deviation,
-            ci95: around(Z * deviation / n.sqrt()),
+            ci95: interval(values)?.into(),
             proportion_ci95: is_share.then(proportion),
             quartiles,
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -76,7 +79,8 @@ impl Estimate {
 
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.4} +- {:.4}", self.mean, self.ci95[1] - self.mean)
+        let [low, high] = self.ci95;
+        write!(f, "{:.3} [{low:.3}, {high:.3}]", self.mean)
     }
 }
 
@@ -109,11 +113,19 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_mean_is_that_of_its_standard_error() {
+    fn the_interval_of_a_mean_is_as_lopsided_as_the_values() {
+        let estimate = Estimate::of(&[1.0, 1.0, 1.0, 1.0, 1.0, 0.0], true).unwrap();
+        let [low, high] = estimate.ci95;
+        assert!(0.0 < low && estimate.mean < high && high < 1.0, "{low} {high}");
+        assert!(estimate.mean - low > 2.0 * (high - estimate.mean), "{low} {high}");
+        assert_eq!(Estimate::of(&[1.0, f64::NAN], false), None);
+    }
+
+    #[test]
+    fn the_spread_is_that_of_a_sample() {
         let estimate = Estimate::of(&[1.0, 2.0, 3.0, 4.0], false).unwrap();
         assert_eq!((estimate.mean, estimate.min, estimate.max), (2.5, 1.0, 4.0));
         assert!((estimate.standard_deviation - 1.290_994).abs() < 1e-6);
-        assert!((estimate.ci95[1] - estimate.mean - 1.265_151).abs() < 1e-6);
         assert_eq!(estimate.proportion_ci95, None);
     }
 

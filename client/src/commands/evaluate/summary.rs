@@ -5,12 +5,12 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
+use crate::change::Json;
 use evolution::Digest;
 
 use super::{
     conditions::Condition,
     measured::Measured,
-    patch::Json,
     statistics::{Estimate, mean},
 };
 

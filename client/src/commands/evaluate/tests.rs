@@ -1,6 +1,6 @@
 //! Conditions, statistics and files of an evaluation, and how it is asked for.
 
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use serde_json::{Value, json};
 
@@ -12,7 +12,8 @@ use crate::{
 
 fn args() -> EvaluateArgs {
     EvaluateArgs {
-        id: None,
+        address: None,
+        data_dir: None,
         genotype: None,
         config: None,
         trials: 3,
@@ -27,6 +28,7 @@ fn args() -> EvaluateArgs {
         local: true,
         workers: None,
         to: PathBuf::from("unused"),
+        replace: false,
         isa: IsaArgs::default(),
     }
 }
@@ -159,8 +161,11 @@ fn measured() -> Measured {
 fn what_is_absent_is_left_out_of_means_and_files() {
     let dir = tempfile::tempdir().unwrap();
     let conditions = conditions("light_follower_snes", &args()).unwrap();
-    files::write_steps(dir.path(), &conditions, &[measured()], 1).unwrap();
-    files::write_trials(dir.path(), &conditions, &[measured()]).unwrap();
+    let results = Results::begin(dir.path(), false).unwrap();
+    results.write_steps(&conditions, &[measured()], 1).unwrap();
+    results.write_trials(&conditions, &[measured()]).unwrap();
+    results.write("summary.json", "").unwrap();
+    results.finish().unwrap();
     let read = |name| fs::read_to_string(dir.path().join(name)).unwrap();
     let steps = "\
 condition,step,metric,n,median,q1,q3,mean

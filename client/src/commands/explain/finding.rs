@@ -12,9 +12,11 @@ use crate::{clock, text};
 
 /// If a worker holds an item for longer, the findings suggest to look at the worker.
 const LONG_MS: u64 = 60_000;
+/// If the last items of a round are held for longer, nothing seems to happen.
+const STALL_MS: u64 = 10_000;
 
 /// One cause of an experiment's progress, or of the lack of it.
-#[derive(Debug, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     kind: Kind,
     /// The finding, in one sentence.
@@ -53,6 +55,48 @@ impl fmt::Display for Finding {
     }
 }
 
+impl Finding {
+    /// Whether it is about the fleet, and so the same for all experiments.
+    pub fn is_of_fleet(&self) -> bool {
+        use Kind::{NoWorkers, NoWorkersAvailable, Quarantine, StoreTrouble, WorkersWaiting};
+        matches!(
+            self.kind,
+            StoreTrouble | NoWorkers | NoWorkersAvailable | Quarantine | WorkersWaiting
+        )
+    }
+
+    /// Whether nothing of an experiment is computed because of it. `held_ms`: how long the
+    /// oldest items of its round have been with a worker.
+    fn is_stall(&self, held_ms: u64) -> bool {
+        use Kind::{
+            Audits, Barrier, Incompatible, Memory, NoWorkers, NoWorkersAvailable, Paused, Queued,
+            RefereeTrouble, StoreTrouble,
+        };
+        match self.kind {
+            Paused | Incompatible | StoreTrouble | Memory | NoWorkers | NoWorkersAvailable
+            | RefereeTrouble | Audits => true,
+            // Others are computed meanwhile.
+            Queued => held_ms == 0,
+            Barrier => held_ms >= STALL_MS,
+            _ => false,
+        }
+    }
+}
+
+/// What keeps an experiment from being computed, if anything does.
+pub fn stall(answer: &ExplainExperimentResponse, address: &str) -> Option<Finding> {
+    let held_ms = answer.round.as_ref().map_or(0, held_ms);
+    let findings = findings(answer.experiment.as_ref()?, answer, address);
+    let mut stall = findings.into_iter().find(|finding| finding.is_stall(held_ms))?;
+    if stall.kind == Kind::Barrier {
+        // Its times go on; the situation is the same.
+        stall.what = "the last items of the generation take long".to_owned();
+        let id = answer.experiment.as_ref().map_or(0, |experiment| experiment.id);
+        stall.next_steps = vec![format!("see which workers have them: swarmctl explain {id}")];
+    }
+    Some(stall)
+}
+
 /// All findings about an experiment, the most important first.
 pub fn findings(
     experiment: &Experiment,
@@ -71,7 +115,8 @@ pub fn findings(
         }
         ExperimentState::Paused => {
             let steps = [format!("continue it: swarmctl resume {id}")];
-            return vec![finding(Kind::Paused, "it is paused, for the reason above", steps)];
+            let what = text::with_reason("it is paused", &experiment.reason);
+            return vec![finding(Kind::Paused, what, steps)];
         }
         ExperimentState::Running | ExperimentState::Unspecified => {}
     }

@@ -12,9 +12,9 @@ use clap::Args;
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct PlotArgs {
-    /// Numbers of the coordinator's experiments, or files written by `swarmctl
-    /// history ID --output csv`; at most 14.
-    #[arg(required_unless_present = "steps", value_name = "ID|FILE")]
+    /// Numbers of the coordinator's experiments, names of groups, or files written by
+    /// `swarmctl history ID --output csv`; at most 14 runs.
+    #[arg(required_unless_present = "steps", value_name = "ID|GROUP|FILE")]
     pub runs: Vec<String>,
     /// Draw an evaluation instead, from the directory that `swarmctl evaluate` wrote.
     ///

@@ -5,7 +5,7 @@ use std::path::Path;
 use indexmap::{IndexMap, IndexSet};
 use serde::Deserialize;
 
-use super::source::plain;
+use crate::recorded::plain;
 use crate::{
     error::Error,
     figure::{Curve, Figure, Point},
@@ -58,9 +58,12 @@ pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result
             Err(problem(format!("no condition `{name}` with that measure; there are: {known}")))
         }
     };
+    let measure = metric.replace('_', " ");
     Ok(Figure {
+        title: format!("{measure} in each step"),
+        caption: "line: median of the trials; band: first to third quartile".into(),
         x_label: "step".into(),
-        y_label: metric.replace('_', " "),
+        y_label: measure,
         curves: names.iter().map(curve).collect::<Result<_, _>>()?,
     })
 }

@@ -72,7 +72,7 @@ async fn a_file_and_an_experiment_with_the_same_history_give_the_same_picture() 
 async fn the_band_goes_from_the_worst_to_the_best() {
     let dir = tempfile::tempdir().unwrap();
     let run = Run::read(csv(&dir, "leader.csv", HISTORY).as_ref()).unwrap();
-    let figure = figure(&[run], &["a".into()]);
+    let figure = figure(&[run], &["a".into()], None);
     let points = &figure.curves[0].points;
     assert_eq!(points[0], Point { x: 0.0, low: 0.0, middle: 0.25, high: 0.5 });
     assert_eq!(points[1], Point { x: 2.0, low: 0.5, middle: 1.0, high: 1.5 });
@@ -81,8 +81,12 @@ async fn the_band_goes_from_the_worst_to_the_best() {
 
 #[test]
 fn runs_of_the_same_name_are_told_apart() {
-    let run =
-        |name: &str, source: &str| Run { name: name.into(), source: source.into(), points: vec![] };
+    let run = |name: &str, source: &str| Run {
+        name: name.into(),
+        source: source.into(),
+        function: None,
+        points: vec![],
+    };
     let runs = [run("ga", "experiment 1"), run("snes", "experiment 2"), run("ga", "b/ga.csv")];
     assert_eq!(names(&runs), ["ga (experiment 1)", "snes", "ga (b/ga.csv)"]);
 }

@@ -1,7 +1,10 @@
 //! A coordinator and workers inside this process, connected over loopback as in any
 //! fleet.
 
-use std::{net::Ipv4Addr, path::Path};
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    path::Path,
+};
 
 use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
 use sim_core::Isa;
@@ -22,8 +25,13 @@ pub struct Fleet {
 
 impl Fleet {
     /// Starts a coordinator on a free port and workers of one slot each. Random tokens
-    /// exclude the machine's other users.
-    pub async fn start(data_dir: &Path, n_workers: usize, isa: Isa) -> Result<Self, Error> {
+    /// exclude the machine's other users. `web_listen`: where pages are served, if anywhere.
+    pub async fn start(
+        data_dir: &Path,
+        n_workers: usize,
+        isa: Isa,
+        web_listen: Option<SocketAddr>,
+    ) -> Result<Self, Error> {
         let listen = (Ipv4Addr::LOCALHOST, 0).into();
         let (client_token, worker_token) = (random_token(), random_token());
         let tokens =
@@ -32,6 +40,7 @@ impl Fleet {
             access: Access { tokens: Some(tokens), ..Access::default() },
             // Whoever submits here owns the machine, too.
             memory_budget: u64::MAX,
+            web_listen,
             ..CoordinatorConfig::new(listen, data_dir.into())
         };
         let coordinator = Coordinator::start(config).await?;
@@ -55,6 +64,12 @@ impl Fleet {
     /// A client's connection to the coordinator.
     pub fn connection(&self) -> Result<Connection, Error> {
         Connection::new(&self.address(), &credentials(&self.client_token))
+    }
+
+    /// Where its pages are, with what lets a browser in, if it serves any.
+    pub fn pages(&self) -> Option<String> {
+        let address = self.coordinator.web_addr()?;
+        Some(login_address(address, &self.client_token))
     }
 
     fn address(&self) -> String {
@@ -91,8 +106,14 @@ fn credentials(token: &Token) -> Credentials {
     Credentials { token: Some(token.clone()), ..Credentials::default() }
 }
 
+/// The address that logs a browser in. What follows `#` is not sent to anybody: a script of
+/// the page reads it.
+pub fn login_address(pages: SocketAddr, token: &Token) -> String {
+    format!("http://{pages}/login#{}", token.reveal())
+}
+
 /// 256 bits from the system's source of randomness.
-fn random_token() -> Token {
+pub fn random_token() -> Token {
     let [high, low]: [u128; 2] = rand::random();
     Token::parse(&format!("{high:032x}{low:032x}")).expect("hexadecimal digits are fit for a token")
 }
@@ -104,7 +125,7 @@ mod tests {
     #[tokio::test]
     async fn other_users_of_the_machine_are_kept_out() {
         let directory = tempfile::tempdir().unwrap();
-        let fleet = Fleet::start(directory.path(), 1, Isa::best()).await.unwrap();
+        let fleet = Fleet::start(directory.path(), 1, Isa::best(), None).await.unwrap();
         let stranger = Connection::new(&fleet.address(), &Credentials::default()).unwrap();
         assert_eq!(stranger.experiments().await.unwrap_err().exit_code(), 7);
         assert!(fleet.connection().unwrap().experiments().await.unwrap().is_empty());

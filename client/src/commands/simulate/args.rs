@@ -2,10 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, value_parser};
+use clap::Args;
+use coordinator::Address;
+use experiment_file::limits;
 
+use super::trace::ExtraColumns;
 use crate::{
-    args::{IsaArgs, SeedArg, StepsArg},
+    address::NamedAddress,
+    args::{IsaArgs, SeedArg, StepsArg, Subject, whole},
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
 };
@@ -17,26 +21,34 @@ use crate::{
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub struct SimulateArgs {
-    /// The experiment file.
-    pub config: PathBuf,
+    /// The experiment file; or an address, such as 3@5/7, individual 7 of generation 5 of
+    /// experiment 3, which is simulated with the file of its experiment, in the worlds of its
+    /// generation.
+    #[arg(value_name = "CONFIG|ADDRESS")]
+    pub subject: PathBuf,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
     /// such as a champion file.
     ///
-    /// Without this option and without --experiment, genes are drawn uniformly from
+    /// Without this option, without --experiment and without an address, genes are drawn uniformly from
     /// the streams (seed, generation 0, trial 0, evolution, population), as those of
     /// the first individual of a GA.
     #[arg(long, value_name = "FILE", conflicts_with = "experiment")]
     pub genotype: Option<PathBuf>,
-    /// Use the champion of the coordinator's experiment with this number.
-    #[arg(long, value_name = "ID")]
-    pub experiment: Option<u64>,
+    /// Use a genotype of an experiment: 3 is the champion of experiment 3, 3@5/7 individual 7
+    /// of its generation 5, 3@5/mean the mean of the distribution after that.
+    #[arg(long, value_name = "ADDRESS")]
+    pub experiment: Option<Address>,
+    /// Read addresses from the database in this directory instead of asking a coordinator.
+    #[arg(long, value_name = "DIR")]
+    pub data_dir: Option<PathBuf>,
     #[command(flatten)]
     pub seed: SeedArg,
-    /// Generation, from 0, whose worlds to simulate.
-    #[arg(long, value_name = "G", default_value_t = 0)]
-    pub generation: u64,
+    /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
+    /// experiment file]
+    #[arg(long, value_name = "G", value_parser = whole(0..=u64::MAX))]
+    pub generation: Option<u64>,
     /// Number of trials, instead of the file's.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=limits::TRIALS))]
     pub trials: Option<u32>,
     #[command(flatten)]
     pub steps: StepsArg,
@@ -64,12 +76,17 @@ pub struct SimulateArgs {
     /// The last three kinds of columns are the same for all robots of a step.
     #[arg(long, value_name = "FILE", verbatim_doc_comment)]
     pub trace: Option<PathBuf>,
+    /// More columns of the trace, at the end of its rows.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "COLUMNS", requires = "trace")]
+    pub trace_columns: Vec<ExtraColumns>,
     #[command(flatten)]
     pub isa: IsaArgs,
 }
 
 const HELP: &str = "\
 Examples:
+  swarmctl simulate 3@5/7
+  swarmctl simulate 3@5/7 --data-dir swarm-data --trace trace.csv
   swarmctl simulate experiment.json --experiment 3 --trials 100
   swarmctl simulate experiment.json --genotype champion.json --trace trace.csv";
 
@@ -80,11 +97,25 @@ impl SimulateArgs {
         Overrides { seed, steps, trials, ..Overrides::default() }
     }
 
-    /// Reads and compiles the file, with the replacements.
-    pub fn compiled(&self) -> Result<Compiled, Error> {
-        let file = ExperimentFile::read(&self.config);
-        let compiled = file.and_then(|file| file.compile(&self.overrides()));
-        let compiled = compiled.map_err(|error| Error::invalid(&self.config, &error))?;
+    /// The address of whom to simulate, if the subject is not a file.
+    /// A name alone is that of a file.
+    pub fn address(&self) -> Option<NamedAddress> {
+        let text = self.subject.to_str()?;
+        let address: Option<NamedAddress> = text.parse().ok();
+        let is_address = |it: &NamedAddress| {
+            matches!(it.experiment, Subject::Experiment(_)) || text.contains('@')
+        };
+        address.filter(is_address).filter(|_| !self.subject.exists())
+    }
+
+    /// Reads the experiment file.
+    pub fn file(&self) -> Result<ExperimentFile, Error> {
+        ExperimentFile::read(&self.subject).map_err(|error| Error::invalid(&self.subject, &error))
+    }
+
+    /// Compiles an experiment file, with the replacements.
+    pub fn compiled(&self, file: &ExperimentFile) -> Result<Compiled, Error> {
+        let compiled = file.compile(&self.overrides()).map_err(|error| file.invalid(&error))?;
         Ok(Compiled { experiment: compiled.experiment.with_isa(self.isa.get()), ..compiled })
     }
 }

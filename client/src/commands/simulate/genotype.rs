@@ -1,12 +1,18 @@
 //! The genotype to simulate: from a file, from a coordinator, or random.
 
-use std::{fmt, fs, path::Path};
+use std::{fmt, io, path::Path};
 
+use coordinator::Address;
 use numeric::random::{Purpose, Stream};
 use serde_json::Value;
 
 use super::SimulateArgs;
-use crate::{connection::Connection, error::Error, experiment_file::Compiled, settings::Settings};
+use crate::{
+    archive::{Archive, Found, described},
+    error::Error,
+    experiment_file::{Compiled, open},
+    settings::Settings,
+};
 
 /// Genes, and where they come from, which is what this displays as.
 #[derive(Debug)]
@@ -25,7 +31,12 @@ impl Genotype {
         Ok(Self { genes, source: format!("genotype in {}", path.display()) })
     }
 
-    /// The genotype that the arguments name, not yet checked against the experiment.
+    /// The genotype at an address.
+    pub fn found(address: Address, found: Found) -> Self {
+        Self { genes: found.individual.genotype, source: described(address) }
+    }
+
+    /// The genotype that goes with an experiment file, not yet checked against it.
     pub async fn choose(
         settings: Settings,
         args: &SimulateArgs,
@@ -34,10 +45,9 @@ impl Genotype {
         if let Some(path) = &args.genotype {
             return Self::read(path);
         }
-        if let Some(id) = args.experiment {
-            let champion = Connection::open(settings)?.champion(id).await?;
-            let source = format!("champion of experiment {id}");
-            return Ok(Self { genes: champion.genotype, source });
+        if let Some(address) = args.experiment {
+            let archive = Archive::open(settings, args.data_dir.as_deref())?;
+            return Ok(Self::found(address, archive.one(address).await?));
         }
         Ok(Self { genes: random(compiled), source: "random genotype".into() })
     }
@@ -51,7 +61,7 @@ impl fmt::Display for Genotype {
 
 /// Reads a list of genes, or the one in an object.
 fn read(path: &Path) -> Result<Vec<f64>, String> {
-    let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let text = open(path).and_then(io::read_to_string).map_err(|error| error.to_string())?;
     let value: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
     let genes = match &value {
         Value::Array(genes) => Some(genes),
@@ -76,6 +86,8 @@ fn random(compiled: &Compiled) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use evolution::Evolution;
 
     use super::*;

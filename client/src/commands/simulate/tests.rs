@@ -20,14 +20,16 @@ const N_GENES: usize = 424;
 
 fn args() -> SimulateArgs {
     SimulateArgs {
-        config: quickstart(),
+        subject: quickstart(),
         genotype: None,
         experiment: None,
+        data_dir: None,
         seed: SeedArg { seed: Some(7) },
-        generation: 0,
+        generation: None,
         trials: Some(2),
         steps: StepsArg { steps: Some(20) },
         trace: None,
+        trace_columns: Vec::new(),
         isa: IsaArgs::default(),
     }
 }
@@ -57,7 +59,7 @@ async fn a_champion_is_the_same_from_a_file_and_from_a_coordinator() {
         ..Script::default()
     })
     .await;
-    let from_coordinator = SimulateArgs { experiment: Some(3), ..args() };
+    let from_coordinator = SimulateArgs { experiment: "3".parse().ok(), ..args() };
     let fetched = run(connection.address(), &from_coordinator).await.unwrap();
     let dir = tempfile::tempdir().unwrap();
     let from_file = SimulateArgs { genotype: file(&dir, &json!(genotype)), ..args() };
@@ -65,7 +67,7 @@ async fn a_champion_is_the_same_from_a_file_and_from_a_coordinator() {
     assert_eq!(fetched["trials"], read["trials"]);
     assert_eq!(fetched["genotype"], "champion of experiment 3");
 
-    let unknown = SimulateArgs { experiment: Some(4), ..args() };
+    let unknown = SimulateArgs { experiment: "4".parse().ok(), ..args() };
     assert_eq!(run(connection.address(), &unknown).await.unwrap_err().exit_code(), 3);
 }
 
@@ -81,7 +83,7 @@ async fn seed_and_generation_choose_the_worlds() {
         fitness(&SimulateArgs { seed: SeedArg { seed: Some(8) }, ..first.clone() }).await,
         same
     );
-    assert_ne!(fitness(&SimulateArgs { generation: 1, ..first }).await, same);
+    assert_ne!(fitness(&SimulateArgs { generation: Some(1), ..first }).await, same);
 }
 
 #[tokio::test]

@@ -6,11 +6,23 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use clap::ValueEnum;
 use experiment_file::{ExperimentConfig, RobotController};
 use indexmap::IndexSet;
 use sim_core::{Mode, ReceivedFrame, RobotRecord, StepRecord};
 
 use crate::error::Error;
+
+/// Columns of a trace that have to be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExtraColumns {
+    /// neuron_ENSEMBLE_0, ...: activity of every neuron after the step.
+    Neurons,
+    /// frame_emitter, frame_message_0, ...: who was heard, and what it said.
+    Frames,
+    /// led_target: 1 if the task wants the LED on, 0 if off; empty where it does not say.
+    Targets,
+}
 
 /// A CSV file being written: one row per trial, step and robot.
 pub struct Trace {
@@ -22,9 +34,13 @@ pub struct Trace {
 
 impl Trace {
     /// Creates the file, or empties it.
-    pub fn create(path: &Path, config: &ExperimentConfig) -> Result<Self, Error> {
+    pub fn create(
+        path: &Path,
+        config: &ExperimentConfig,
+        extra: &[ExtraColumns],
+    ) -> Result<Self, Error> {
         let file = File::create(path).map_err(|error| unwritable(path, &error))?;
-        let rows = Rows::new(BufWriter::new(file), config);
+        let rows = Rows::new(BufWriter::new(file), config, extra);
         Ok(Self { path: path.into(), rows, result: Ok(()) })
     }
 
@@ -55,6 +71,10 @@ struct Rows<W> {
     objects: Vec<Object>,
     /// Names of all inputs of all controllers.
     stimuli: IndexSet<String>,
+    /// Names of all neurons, in the order of their activities; empty if nobody asked.
+    neurons: Vec<String>,
+    has_frames: bool,
+    has_targets: bool,
     n_rows: u64,
 }
 
@@ -66,7 +86,7 @@ struct Object {
 }
 
 impl<W: io::Write> Rows<W> {
-    fn new(out: W, config: &ExperimentConfig) -> Self {
+    fn new(out: W, config: &ExperimentConfig, extra: &[ExtraColumns]) -> Self {
         let (mut robots, mut objects, mut stimuli) = (Vec::new(), Vec::new(), IndexSet::new());
         for (name, robot) in config.robots() {
             let inputs: Vec<(&str, u32)> = match robot.controller {
@@ -84,7 +104,20 @@ impl<W: io::Write> Rows<W> {
             robots.extend((0..robot.num_instances).map(|_| objects.len()));
             objects.push(Object { name: name.to_owned(), inputs: inputs.collect() });
         }
-        Self { out, robots, objects, stimuli, n_rows: 0 }
+        let wants = |columns| extra.contains(&columns);
+        let ensembles = config.topology.ensembles.iter().filter(|_| wants(ExtraColumns::Neurons));
+        let neurons = ensembles
+            .flat_map(|(name, ensemble)| (0..ensemble.n).map(move |i| format!("{name}_{i}")));
+        Self {
+            out,
+            robots,
+            objects,
+            stimuli,
+            neurons: neurons.collect(),
+            has_frames: wants(ExtraColumns::Frames),
+            has_targets: wants(ExtraColumns::Targets),
+            n_rows: 0,
+        }
     }
 
     fn write(&mut self, trial: u32, record: &StepRecord) -> io::Result<()> {
@@ -108,10 +141,28 @@ impl<W: io::Write> Rows<W> {
             row.extend(record.lights.iter().flat_map(|light| [number(light.x), number(light.y)]));
             row.push(record.fitness.map(number).unwrap_or_default());
             row.extend(record.measures.values().copied().map(number));
+            row.extend(self.extra_cells(robot));
             writeln!(self.out, "{}", row.join(","))?;
             self.n_rows += 1;
         }
         Ok(())
+    }
+
+    /// The cells that were asked for.
+    fn extra_cells(&self, robot: &RobotRecord) -> Vec<String> {
+        // Robots without a network have no activity.
+        let activity = |i| robot.activity.get(i).copied().map(number).unwrap_or_default();
+        let mut cells: Vec<String> = (0..self.neurons.len()).map(activity).collect();
+        if self.has_frames {
+            cells.push(robot.received.map(|it| it.emitter.to_string()).unwrap_or_default());
+            let message = robot.received_message.iter();
+            let heard = |value: &f64| robot.received.map(|_| number(*value)).unwrap_or_default();
+            cells.extend(message.map(heard));
+        }
+        if self.has_targets {
+            cells.push(robot.target.map(|is_on| u8::from(is_on).to_string()).unwrap_or_default());
+        }
+        cells
     }
 
     /// Messages, lights and measures are the same in all steps of an experiment,
@@ -130,6 +181,14 @@ impl<W: io::Write> Rows<W> {
         heading.extend((0..record.lights.len()).flat_map(light));
         heading.push("step_fitness".into());
         heading.extend(record.measures.keys().map(|name| format!("metric_{name}")));
+        heading.extend(self.neurons.iter().map(|neuron| quoted(&format!("neuron_{neuron}"))));
+        if self.has_frames {
+            heading.push("frame_emitter".into());
+            heading.extend((0..message_len).map(|i| format!("frame_message_{i}")));
+        }
+        if self.has_targets {
+            heading.push("led_target".into());
+        }
         heading
     }
 }
@@ -147,7 +206,7 @@ fn robot_cells(robot: &RobotRecord) -> Vec<String> {
     cells.push(mode.into());
     cells.extend(robot.message.iter().copied().map(number));
     cells.extend(robot.received.map_or_else(Default::default, |frame| {
-        let ReceivedFrame { originator, hops, sector, signal } = frame;
+        let ReceivedFrame { originator, hops, sector, signal, .. } = frame;
         [originator.to_string(), hops.to_string(), sector.to_string(), number(signal)]
     }));
     cells

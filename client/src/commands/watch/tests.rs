@@ -5,7 +5,7 @@ use tonic::Status;
 
 use super::*;
 use crate::{
-    args::OutputFormat,
+    args::{OutputFormat, Subject},
     fake_coordinator::{FakeCoordinator, Script, generation, state, unreachable_connection},
     progress::tests::Captured,
 };
@@ -36,7 +36,8 @@ async fn events_are_shown_once_and_in_order_however_often_the_stream_breaks() {
     })
     .await;
     let captured = Captured::default();
-    watch(&connection, 3, &mut captured.progress(OutputFormat::Json)).await.unwrap();
+    let followed = vec![experiment(completed)];
+    watch(&connection, followed, &mut captured.progress(OutputFormat::Json)).await.unwrap();
     let lines: Vec<Value> =
         captured.lines().iter().map(|line| serde_json::from_str(line).unwrap()).collect();
     let generations: Vec<_> = lines.iter().filter_map(|line| line["generation"].as_u64()).collect();
@@ -57,7 +58,8 @@ async fn an_experiment_that_fails_is_reported_and_is_a_failure() {
     })
     .await;
     let captured = Captured::default();
-    let result = watch(&connection, 3, &mut captured.progress(OutputFormat::Table)).await;
+    let followed = vec![experiment(failed)];
+    let result = watch(&connection, followed, &mut captured.progress(OutputFormat::Table)).await;
     let error = result.unwrap_err();
     assert_eq!(error.exit_code(), 5);
     assert_eq!(error.to_string(), "experiment 3 failed: item 7");
@@ -87,7 +89,8 @@ async fn waiting_follows_the_events_instead_of_asking_again() {
 async fn an_unknown_experiment_is_not_found() {
     let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
     let mut progress = Captured::default().progress(OutputFormat::Table);
-    let error = watch(&connection, 9, &mut progress).await.unwrap_err();
+    let args = WatchArgs { target: Target { subject: Subject::Experiment(9) } };
+    let error = args.execute(&connection, &mut progress).await.unwrap_err();
     assert_eq!((error.exit_code(), error.to_string().as_str()), (3, "there is no experiment 9"));
 }
 
@@ -95,10 +98,10 @@ async fn an_unknown_experiment_is_not_found() {
 async fn a_coordinator_that_stays_away_is_unreachable() {
     let connection = unreachable_connection().await;
     let mut progress = Captured::default().progress(OutputFormat::Table);
-    let error = watch(&connection, 3, &mut progress).await.unwrap_err();
+    let args = WatchArgs { target: Target { subject: Subject::Experiment(3) } };
+    let error = args.execute(&connection, &mut progress).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
-    let follower =
-        Follower { connection: &connection, experiment_id: 3, progress: Some(&mut progress) };
+    let follower = Follower { connection, experiment_id: 3, news: None };
     let error = follower.run(1).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
     assert!(error.to_string().to_lowercase().contains("connection refused"), "{error}");

@@ -7,6 +7,8 @@ use sim_core::Simulation;
 use super::*;
 use crate::experiment_file::tests::quickstart;
 
+const ALL: &[ExtraColumns] = &[ExtraColumns::Neurons, ExtraColumns::Frames, ExtraColumns::Targets];
+
 /// The quickstart, shorter, with more objects before its own.
 fn config(objects: &str) -> ExperimentConfig {
     let text = fs::read_to_string(quickstart()).unwrap();
@@ -20,7 +22,7 @@ fn config(objects: &str) -> ExperimentConfig {
 fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
     let experiment = Simulation::compile(config).unwrap();
     let genotype = vec![0.6; experiment.genotype_len()];
-    let (mut rows, mut records) = (Rows::new(Vec::new(), config), Vec::new());
+    let (mut rows, mut records) = (Rows::new(Vec::new(), config, ALL), Vec::new());
     let mut observe = |record| {
         rows.write(4, &record).unwrap();
         records.push(record);
@@ -52,6 +54,10 @@ fn every_robot_has_a_row_in_every_step_and_numbers_read_back_exactly() {
         assert_eq!(text("led"), record.led.to_string());
         let originator = record.received.map(|frame| frame.originator.to_string());
         assert_eq!(text("frame_originator"), originator.unwrap_or_default());
+        assert_eq!(bits("neuron_H1_0"), record.activity[0].to_bits());
+        let emitter = record.received.map(|frame| frame.emitter.to_string());
+        assert_eq!(text("frame_emitter"), emitter.unwrap_or_default());
+        assert_eq!(text("led_target"), "", "no task of this file says who should shine");
         n_received += usize::from(record.received.is_some());
         let fitness = records[step].fitness.map(number).unwrap_or_default();
         assert_eq!(text("step_fitness"), fitness);
@@ -103,7 +109,7 @@ fn a_failure_is_reported_at_the_end() {
     let full = Path::new("/dev/full");
     if full.exists() {
         let config = config("");
-        let mut trace = Trace::create(full, &config).unwrap();
+        let mut trace = Trace::create(full, &config, &[]).unwrap();
         let experiment = Simulation::compile(&config).unwrap();
         let genotype = vec![0.5; experiment.genotype_len()];
         experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, &record)).unwrap();

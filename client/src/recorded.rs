@@ -1,10 +1,12 @@
-//! Reads runs to plot: from a coordinator, or from files that `history` wrote.
+//! Runs as they are recorded: by a coordinator, or in files that `history` wrote.
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use swarm_proto::v1::{Experiment, GetExperimentRequest};
 
 use crate::{
+    args::Subject,
     connection::{Connection, present},
     error::Error,
     figure::Point,
@@ -13,16 +15,16 @@ use crate::{
 /// A run that the command line names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Source {
-    /// A number: an experiment of the coordinator.
-    Experiment(u64),
+    /// A number or a name: what the coordinator has.
+    Coordinator(Subject),
     /// Anything else: a CSV file.
     File(PathBuf),
 }
 
 impl Source {
-    /// A file whose name is a number is reached as `./NUMBER`.
+    /// A file whose name could be that of a group, without an ending, is reached as `./NAME`.
     pub fn parse(text: &str) -> Self {
-        text.parse().map_or_else(|_| Self::File(text.into()), Self::Experiment)
+        text.parse().map_or_else(|_| Self::File(text.into()), Self::Coordinator)
     }
 }
 
@@ -30,56 +32,79 @@ impl Source {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub name: String,
+    /// The fitness function, if it is known.
+    pub function: Option<String>,
     /// "experiment 3", or the path of the file.
     pub source: String,
     pub points: Vec<GenerationFitness>,
 }
 
-/// The fitness of a generation; a row of the file.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+/// The fitness of a generation.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GenerationFitness {
+    pub generation: u64,
+    pub best: f64,
+    pub mean: f64,
+    pub min: f64,
+    /// Number of episodes, if it is recorded.
+    pub episodes: Option<u64>,
+}
+
+/// A row of the file; of values that are not finite, the place is empty.
+#[derive(Debug, Deserialize)]
+struct Row {
     generation: u64,
-    // Empty in a file if it is not finite.
     best: Option<f64>,
     mean: Option<f64>,
     min: Option<f64>,
+    episodes: Option<u64>,
 }
 
-impl GenerationFitness {
-    /// Whether there is something to draw.
-    fn is_finite(&self) -> bool {
-        [self.best, self.mean, self.min].iter().all(|value| value.is_some_and(f64::is_finite))
+impl Row {
+    /// None if there is a value that is not finite.
+    fn fitness(&self) -> Option<GenerationFitness> {
+        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+        Some(GenerationFitness {
+            generation: self.generation,
+            best: finite(self.best)?,
+            mean: finite(self.mean)?,
+            min: finite(self.min)?,
+            episodes: self.episodes,
+        })
     }
 }
 
 impl From<&GenerationFitness> for Point {
     fn from(generation: &GenerationFitness) -> Self {
-        let value = |value: Option<f64>| value.expect("only finite ones are kept");
         Self {
             x: generation.generation as f64,
-            low: value(generation.min),
-            middle: value(generation.mean),
-            high: value(generation.best),
+            low: generation.min,
+            middle: generation.mean,
+            high: generation.best,
         }
     }
 }
 
 impl Run {
     /// The history of an experiment of the coordinator.
-    pub async fn fetch(connection: &Connection, experiment_id: u64) -> Result<Self, Error> {
-        let experiment = connection.experiment(experiment_id).await?;
+    pub async fn fetch(connection: &Connection, experiment: Experiment) -> Result<Self, Error> {
+        let experiment_id = experiment.id;
         let mut generations = Vec::new();
         for completed in connection.generations(experiment_id).await? {
             let summary = present(completed.summary)?;
-            generations.push(GenerationFitness {
+            generations.push(Row {
                 generation: summary.generation,
                 best: Some(summary.best),
                 mean: Some(summary.mean),
                 min: Some(summary.min),
+                episodes: Some(summary.episodes),
             });
         }
         let source = format!("experiment {experiment_id}");
-        match Self::new(experiment.name, source.clone(), generations) {
+        let request = GetExperimentRequest { experiment_id };
+        let stored = connection.call(async |client| client.get_experiment(request).await).await?;
+        let function = fitness_function(&stored.config_json);
+        match (Self { function, ..Self::new(experiment.name, source.clone(), &generations) }) {
             run if run.points.is_empty() => {
                 Err(Error::NotFound(format!("{source} has no complete generation yet")))
             }
@@ -91,7 +116,7 @@ impl Run {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
         let mut reader = csv::Reader::from_path(path).map_err(|error| problem(plain(&error)))?;
-        let generations: Vec<GenerationFitness> =
+        let generations: Vec<Row> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
                 problem(format!(
                     "{}; expected what `swarmctl history ID --output csv` writes",
@@ -102,17 +127,23 @@ impl Run {
             return Err(problem("the generations are not those of one run, in order".into()));
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let run = Self::new(name, path.display().to_string(), generations);
+        let run = Self::new(name, path.display().to_string(), &generations);
         if run.points.is_empty() {
             return Err(problem("there is no generation with a fitness in it".into()));
         }
         Ok(run)
     }
 
-    fn new(name: String, source: String, mut points: Vec<GenerationFitness>) -> Self {
-        points.retain(GenerationFitness::is_finite);
-        Self { name, source, points }
+    fn new(name: String, source: String, rows: &[Row]) -> Self {
+        let points = rows.iter().filter_map(Row::fitness).collect();
+        Self { name, function: None, source, points }
     }
+}
+
+/// The fitness function of an experiment file in canonical form.
+fn fitness_function(config_json: &str) -> Option<String> {
+    let file: serde_json::Value = serde_json::from_str(config_json).ok()?;
+    Some(file["algorithm"]["fitness_function"].as_str()?.to_owned())
 }
 
 /// The error of a CSV file, in one line.

@@ -1,8 +1,12 @@
-//! Changes of an experiment file: a path and a new value.
+//! Changes of an experiment file: a path and a new value, as `--set` takes them.
+
+use std::fmt;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+use crate::json;
 
 /// JSON whose objects keep the order of their keys, which is the order of the genes in
 /// an experiment file; `serde_json`'s own objects lose it.
@@ -61,15 +65,19 @@ impl Change {
 
     /// Reads `PATH=VALUE; PATH=VALUE...`.
     pub fn parse_all(text: &str) -> Result<Vec<Self>, String> {
-        text.split(';').map(|change| Self::parse(change.trim())).collect()
+        let parse = |change: &str| {
+            let (path, value) = path_and_value(change)?;
+            Ok(Self::new(path.to_owned(), Json::parse(value)))
+        };
+        split(text, ';').into_iter().map(parse).collect()
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let (path, value) = text
-            .split_once('=')
-            .filter(|(path, _)| !path.trim().is_empty())
-            .ok_or_else(|| format!("`{text}`: expected PATH=VALUE"))?;
-        Ok(Self { path: path.trim().to_owned(), value: Json::parse(value.trim()) })
+    /// Reads `PATH=VALUE,VALUE...`: a change for each value. Commas within quotes, lists
+    /// and objects do not separate.
+    pub fn parse_variants(text: &str) -> Result<Vec<Self>, String> {
+        let (path, values) = path_and_value(text)?;
+        let value = |value: &str| Self::new(path.to_owned(), Json::parse(value.trim()));
+        Ok(split(values, ',').into_iter().map(value).collect())
     }
 
     /// Sets the value at its path; missing objects on the path are created.
@@ -90,6 +98,45 @@ impl Change {
     }
 }
 
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.value.text().map_or_else(|| json::line(&self.value), str::to_owned);
+        write!(f, "{}={value}", self.path)
+    }
+}
+
+/// Applies changes, or says what is wrong with each of them that has no place.
+pub fn apply_all(changes: &[Change], file: &mut Json) -> Result<(), Vec<String>> {
+    let applied = changes.iter().map(|change| change.apply(file));
+    let problems: Vec<String> = applied.filter_map(Result::err).collect();
+    if problems.is_empty() { Ok(()) } else { Err(problems) }
+}
+
+fn path_and_value(text: &str) -> Result<(&str, &str), String> {
+    let (path, value) = text.split_once('=').unwrap_or_default();
+    match (path.trim(), value.trim()) {
+        ("", _) => Err(format!("`{}`: expected PATH=VALUE", text.trim())),
+        parts => Ok(parts),
+    }
+}
+
+/// The parts of a text between separators that are in no quotes, list or object.
+pub fn split(text: &str, separator: char) -> Vec<&str> {
+    let (mut depth, mut is_quoted, mut is_escaped) = (0i32, false, false);
+    let separates = |c: char| {
+        let was_escaped = std::mem::replace(&mut is_escaped, false);
+        match c {
+            '\\' if is_quoted && !was_escaped => is_escaped = true,
+            '"' if !was_escaped => is_quoted = !is_quoted,
+            '[' | '{' if !is_quoted => depth += 1,
+            ']' | '}' if !is_quoted => depth -= 1,
+            _ => {}
+        }
+        c == separator && depth == 0 && !is_quoted
+    };
+    text.split(separates).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use serde_json::json;
@@ -98,9 +145,8 @@ mod tests {
 
     fn applied(change: &str) -> Result<Value, String> {
         let mut file = Json::parse(r#"{"a": {"b": [1, {"c": 2}]}, "d": "x"}"#);
-        for change in Change::parse_all(change)? {
-            change.apply(&mut file)?;
-        }
+        apply_all(&Change::parse_all(change)?, &mut file)
+            .map_err(|problems| problems.join("\n"))?;
         Ok(serde_json::to_value(file).unwrap())
     }
 
@@ -134,5 +180,29 @@ mod tests {
         for text in ["", "d", "=3", "a.b=1;", "a.b.7=1", "a.b.x=1", "d.e=1"] {
             assert_eq!(applied(text).unwrap_err().lines().count(), 1, "{text}");
         }
+    }
+
+    #[test]
+    fn all_changes_without_a_place_are_named() {
+        let problems = applied("a.b.7=1; d=2; d.e=1").unwrap_err();
+        assert_eq!(problems, "a.b.7: there is no place `7`\nd.e: there is no place `e`");
+    }
+
+    #[test]
+    fn a_semicolon_within_a_value_ends_no_change() {
+        let two = applied(r#"d="x;y"; a={"b": "; \"{;"}"#).unwrap();
+        assert_eq!(two, json!({"a": {"b": "; \"{;"}, "d": "x;y"}));
+    }
+
+    #[test]
+    fn variants_are_values_of_one_path() {
+        let variants = |text| -> Vec<String> {
+            let variants = Change::parse_variants(text).unwrap();
+            variants.iter().map(ToString::to_string).collect()
+        };
+        assert_eq!(variants("a.b=1, 2.5"), ["a.b=1", "a.b=2.5"]);
+        assert_eq!(variants(r#"a=x,[1,2],{"c":[3,4]}"#), ["a=x", "a=[1,2]", r#"a={"c":[3,4]}"#]);
+        assert_eq!(variants(r#"a="x,y",z"#), ["a=x,y", "a=z"]);
+        assert!(Change::parse_variants("a").is_err());
     }
 }

@@ -1,0 +1,136 @@
+//! `swarmctl compare`: samples of runs against each other.
+
+mod report;
+mod samples;
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::{
+    connection::Connection,
+    error::Error,
+    figure::{CURVES_MAX, Curve, Figure, Format, Point},
+    json,
+    progress::Progress,
+    recorded::Source,
+    settings::Settings,
+    statistics::{interquartile_mean, interval},
+};
+
+use self::{
+    report::Report,
+    samples::{Sample, Samples},
+};
+
+/// Points of a curve: an interval costs ten thousand draws.
+const POINTS_MAX: usize = 200;
+
+/// Compare groups of runs: how good they are, which is better, and how sure that is.
+///
+/// Prints, for each sample of runs, median and interquartile mean with their 95 % bootstrap
+/// intervals: of the champions' judged fitness, of the last generations, and of the time to
+/// a target. Then, for each pair, the probability that a run of the first is better than
+/// one of the second (the A of Vargha and Delaney) and the p-value of the Mann-Whitney test.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct CompareArgs {
+    /// Names of groups, numbers of experiments, or files: histories (.csv) that `swarmctl
+    /// history` wrote and champions (.json) that `swarmctl champion` wrote.
+    #[arg(required = true, value_name = "GROUP|ID|FILE")]
+    pub runs: Vec<String>,
+    /// Number of last generations of each run that are averaged.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
+    pub last: u64,
+    /// Also compare how many generations and episodes it takes until the mean fitness of a
+    /// generation first reaches F. A run that does not reach it counts as infinitely long.
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    pub target: Option<f64>,
+    /// Draw the mean fitness of the generations: the interquartile mean of the runs, in a
+    /// band of its 95 % interval. The name ends in .svg or .png.
+    #[arg(long, value_name = "FILE")]
+    pub to: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Runs of a group that differ in more than the seed are a sample for each variant. Files
+NAME-SEED.csv and NAME-SEED.json are of one run, and those of one NAME are a sample.
+p-values are two-sided, and not corrected for the number of pairs.
+
+Examples:
+  swarmctl compare leader_selection_snes leader_selection_ga --target 1
+  swarmctl compare results/{histories,champions}/leader_selection_{snes,ga}-*
+  swarmctl compare sizes --to sizes.svg --output json";
+
+/// Reads the runs and compares them. The coordinator is asked only for what is in no file.
+pub async fn compare(
+    settings: Settings,
+    args: &CompareArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    // A bad name of the figure is refused before anything is read.
+    args.to.as_deref().map(Format::of).transpose()?;
+    if args.target.is_some_and(|target| !target.is_finite()) {
+        return Err(Error::Input("--target is a finite number".into()));
+    }
+    let mut samples = Samples::default();
+    let (mut files, mut subjects) = (Vec::new(), Vec::new());
+    for text in &args.runs {
+        match Source::parse(text) {
+            Source::File(path) => files.push(path),
+            Source::Coordinator(subject) => subjects.push(subject),
+        }
+    }
+    samples.read(&files)?;
+    if !subjects.is_empty() {
+        let connection = Connection::open(settings)?;
+        for subject in &subjects {
+            samples.fetch(&connection, subject, progress).await?;
+        }
+    }
+    let samples = samples.finish()?;
+    let report = Report::new(&samples, args.last, args.target);
+    if let Some(to) = &args.to {
+        figure(&samples)?.write(to)?;
+    }
+    progress.print(&if progress.is_json() {
+        json::document(&report)
+    } else {
+        report.to_text(progress.screen())
+    })
+}
+
+/// The course of the samples, as far as all runs of a sample went.
+fn figure(samples: &[Sample]) -> Result<Figure, Error> {
+    let curves: Vec<Curve> = samples.iter().filter_map(curve).collect();
+    match curves.len() {
+        0 => Err(Error::Input("there is no history to draw; give .csv files".into())),
+        n if n > CURVES_MAX => {
+            Err(Error::Input(format!("a figure holds at most {CURVES_MAX} samples")))
+        }
+        _ => Ok(Figure {
+            title: "mean fitness of the generations".into(),
+            caption: "line: interquartile mean of the runs; band: its 95 % interval".into(),
+            x_label: "generation".into(),
+            y_label: "mean fitness".into(),
+            curves,
+        }),
+    }
+}
+
+fn curve(sample: &Sample) -> Option<Curve> {
+    let histories: Vec<_> = sample.histories().collect();
+    let n_generations = histories.iter().map(|history| history.len()).min()?;
+    let point = |generation: usize| {
+        let means: Vec<f64> = histories.iter().map(|history| history[generation].mean).collect();
+        let found = interval(&means, interquartile_mean);
+        let [low, high] = found.ci95;
+        Point { x: histories[0][generation].generation as f64, low, middle: found.value, high }
+    };
+    let step = n_generations.div_ceil(POINTS_MAX).max(1);
+    let points: Vec<Point> = (0..n_generations).step_by(step).map(point).collect();
+    (!points.is_empty()).then(|| Curve { name: sample.name.clone(), points })
+}
+
+#[cfg(test)]
+mod tests;

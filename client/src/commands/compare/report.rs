@@ -1,0 +1,239 @@
+//! What the comparison found, as numbers and as text.
+
+use serde::Serialize;
+
+use crate::{
+    statistics::{
+        Interval, interquartile_mean, interval, interval_of_two, mann_whitney, median,
+        probability_of_improvement,
+    },
+    table::{Column, Screen, Table},
+};
+
+use super::samples::{RecordedRun, Sample};
+
+/// All quantities that are compared.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    quantities: Vec<Quantity>,
+}
+
+/// A number of each run, in all samples.
+#[derive(Debug, Serialize)]
+struct Quantity {
+    name: &'static str,
+    /// For people.
+    #[serde(skip)]
+    title: String,
+    /// Whether less is better.
+    less_is_better: bool,
+    samples: Vec<Summary>,
+    pairs: Vec<Pair>,
+}
+
+/// A number of each run of a sample.
+#[derive(Debug, Serialize)]
+struct Summary {
+    sample: String,
+    /// By ascending seed; what is infinite is null.
+    values: Vec<f64>,
+    median: Interval,
+    iqm: Interval,
+}
+
+/// Two samples.
+#[derive(Debug, Serialize)]
+struct Pair {
+    first: String,
+    second: String,
+    /// The probability that a run of the first is better than one of the second.
+    probability_of_improvement: Interval,
+    /// Two-sided, of the Mann-Whitney test.
+    p: f64,
+}
+
+impl Report {
+    pub fn new(samples: &[Sample], last: u64, target: Option<f64>) -> Self {
+        let mut quantities = vec![
+            Quantity::new(
+                "judged",
+                "fitness of the champion, on trials that selected nothing".into(),
+                false,
+                samples,
+                |run| run.judged,
+            ),
+            Quantity::new(
+                "mean",
+                format!("mean fitness of a generation, average of the last {last}"),
+                false,
+                samples,
+                |run| average(run, last, |generation| generation.mean),
+            ),
+            Quantity::new(
+                "best",
+                format!("best fitness of a generation, average of the last {last}"),
+                false,
+                samples,
+                |run| average(run, last, |generation| generation.best),
+            ),
+        ];
+        if let Some(target) = target {
+            quantities.push(Quantity::new(
+                "generations_to_target",
+                format!("generations until the mean reaches {target}"),
+                true,
+                samples,
+                |run| generations_to(run, target),
+            ));
+            quantities.push(Quantity::new(
+                "episodes_to_target",
+                format!("episodes until the mean reaches {target}"),
+                true,
+                samples,
+                |run| episodes_to(run, target),
+            ));
+        }
+        quantities.retain(|quantity| !quantity.samples.is_empty());
+        Self { quantities }
+    }
+
+    pub fn to_text(&self, screen: Screen) -> String {
+        let sections: Vec<String> =
+            self.quantities.iter().map(|quantity| quantity.to_text(screen)).collect();
+        sections.join("\n\n")
+    }
+}
+
+impl Quantity {
+    fn new(
+        name: &'static str,
+        title: String,
+        less_is_better: bool,
+        samples: &[Sample],
+        value: impl Fn(&RecordedRun) -> Option<f64>,
+    ) -> Self {
+        let summaries = samples.iter().filter_map(|sample| {
+            let values: Vec<f64> = sample.runs.values().filter_map(&value).collect();
+            (!values.is_empty()).then(|| Summary {
+                sample: sample.name.clone(),
+                median: interval(&values, median),
+                iqm: interval(&values, interquartile_mean),
+                values,
+            })
+        });
+        let samples: Vec<Summary> = summaries.collect();
+        let pairs = samples
+            .iter()
+            .enumerate()
+            .flat_map(|(i, first)| samples[i + 1..].iter().map(move |second| (first, second)));
+        let pairs = pairs.map(|(first, second)| Pair::new(first, second, less_is_better)).collect();
+        Self { name, title, less_is_better, samples, pairs }
+    }
+
+    fn to_text(&self, screen: Screen) -> String {
+        let digits = if self.less_is_better { 0 } else { 3 };
+        let mut table = Table::new([
+            Column::text(self.name),
+            Column::number("runs").dropped(1),
+            Column::number("median"),
+            Column::number("95 %"),
+            Column::number("IQM").dropped(3),
+            Column::number("95 %").dropped(2),
+            Column::number("least").dropped(4),
+            Column::number("most").dropped(5),
+        ]);
+        for Summary { sample, values, median, iqm } in &self.samples {
+            let fold =
+                |start: f64, pick: fn(f64, f64) -> f64| values.iter().copied().fold(start, pick);
+            table.push([
+                sample.clone(),
+                values.len().to_string(),
+                number(median.value, digits),
+                span(median, digits),
+                number(iqm.value, digits),
+                span(iqm, digits),
+                number(fold(f64::INFINITY, f64::min), digits),
+                number(fold(f64::NEG_INFINITY, f64::max), digits),
+            ]);
+        }
+        let mut text = format!("{}: {}\n\n{}", self.name, self.title, table.to_text(screen));
+        if !self.pairs.is_empty() {
+            let mut table = Table::new([
+                Column::text("better"),
+                Column::text("than"),
+                Column::number("probability"),
+                Column::number("95 %").dropped(1),
+                Column::number("p").dropped(2),
+            ]);
+            for pair in &self.pairs {
+                let probability = &pair.probability_of_improvement;
+                table.push([
+                    pair.first.clone(),
+                    pair.second.clone(),
+                    format!("{:.2}", probability.value),
+                    span(probability, 2),
+                    format!("{:.4}", pair.p),
+                ]);
+            }
+            text += &format!("\n\n{}", table.to_text(screen));
+        }
+        text
+    }
+}
+
+impl Pair {
+    fn new(first: &Summary, second: &Summary, less_is_better: bool) -> Self {
+        let (better, worse) = match less_is_better {
+            true => (&second.values, &first.values),
+            false => (&first.values, &second.values),
+        };
+        Self {
+            first: first.sample.clone(),
+            second: second.sample.clone(),
+            probability_of_improvement: interval_of_two(better, worse, |better, worse| {
+                probability_of_improvement(better, worse)
+            }),
+            p: mann_whitney(&first.values, &second.values).expect("both have values"),
+        }
+    }
+}
+
+/// A number, or that it is infinite.
+fn number(value: f64, digits: usize) -> String {
+    if value == f64::INFINITY { "never".into() } else { format!("{value:.digits$}") }
+}
+
+fn span(interval: &Interval, digits: usize) -> String {
+    let [low, high] = interval.ci95.map(|end| number(end, digits));
+    format!("{low} to {high}")
+}
+
+fn average(
+    run: &RecordedRun,
+    last: u64,
+    value: impl Fn(&crate::recorded::GenerationFitness) -> f64,
+) -> Option<f64> {
+    let history = run.history.as_ref()?;
+    let first = history.len().saturating_sub(usize::try_from(last).unwrap_or(usize::MAX));
+    let values: Vec<f64> = history[first..].iter().map(value).collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// Number of generations until the mean first reaches the target; infinite if it does not.
+fn generations_to(run: &RecordedRun, target: f64) -> Option<f64> {
+    let history = run.history.as_ref()?;
+    let reached = history.iter().find(|generation| generation.mean >= target);
+    Some(reached.map_or(f64::INFINITY, |generation| (generation.generation + 1) as f64))
+}
+
+/// As [`generations_to`], in episodes; none if the history does not tell them.
+fn episodes_to(run: &RecordedRun, target: f64) -> Option<f64> {
+    let mut episodes = 0;
+    for generation in run.history.as_ref()? {
+        episodes += generation.episodes?;
+        if generation.mean >= target {
+            return Some(episodes as f64);
+        }
+    }
+    Some(f64::INFINITY)
+}

@@ -1,0 +1,174 @@
+//! Samples: runs of the same experiment that differ in their seed.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::Deserialize;
+use swarm_proto::v1::{Experiment, ExperimentState};
+
+use crate::{
+    args::Subject,
+    connection::Connection,
+    error::Error,
+    progress::Progress,
+    recorded::{GenerationFitness, Run},
+    text,
+};
+
+/// Runs that differ in their seed only.
+#[derive(Debug)]
+pub struct Sample {
+    pub name: String,
+    /// By seed.
+    pub runs: BTreeMap<u64, RecordedRun>,
+}
+
+/// What is known of a run.
+#[derive(Debug, Default)]
+pub struct RecordedRun {
+    /// Its generations, if known.
+    pub history: Option<Vec<GenerationFitness>>,
+    /// Fitness of its champion on trials that selected nothing, if known.
+    pub judged: Option<f64>,
+    /// What it was read from.
+    sources: Vec<String>,
+}
+
+impl Sample {
+    /// The histories that are known.
+    pub fn histories(&self) -> impl Iterator<Item = &[GenerationFitness]> {
+        self.runs.values().filter_map(|run| run.history.as_deref())
+    }
+}
+
+/// Samples that are being read, in the order in which they are named.
+#[derive(Debug, Default)]
+pub struct Samples {
+    samples: Vec<Sample>,
+    problems: Vec<String>,
+}
+
+/// The part of a champion file that is compared.
+#[derive(Debug, Deserialize)]
+struct ChampionFile {
+    seed: u64,
+    judged: Option<JudgedFile>,
+}
+
+#[derive(Debug, Deserialize)]
+struct JudgedFile {
+    mean: f64,
+}
+
+impl Samples {
+    /// Reads files; fails with all that is wrong with them.
+    pub fn read(&mut self, paths: &[PathBuf]) -> Result<(), Error> {
+        for path in paths {
+            if let Err(problem) = self.read_file(path) {
+                self.problems.push(format!("{}: {problem}", path.display()));
+            }
+        }
+        self.check()
+    }
+
+    fn read_file(&mut self, path: &Path) -> Result<(), String> {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name_and_seed = stem.rsplit_once('-');
+        let (name, seed) = name_and_seed
+            .and_then(|(name, seed)| Some((name, seed.parse::<u64>().ok()?)))
+            .ok_or("expected a file NAME-SEED.csv or NAME-SEED.json")?;
+        let source = path.display().to_string();
+        if path.extension().is_some_and(|ending| ending == "json") {
+            let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+            let champion: ChampionFile = serde_json::from_str(&text)
+                .map_err(|error| format!("{error}; expected what `swarmctl champion` writes"))?;
+            if champion.seed != seed {
+                return Err(format!("it is of seed {}", champion.seed));
+            }
+            let run = self.run(name, seed);
+            run.sources.push(source);
+            if run.judged.is_some() {
+                return Err(twice(run));
+            }
+            run.judged = champion.judged.map(|judged| judged.mean);
+        } else {
+            let history = Run::read(path).map_err(|error| error.to_string())?;
+            let run = self.run(name, seed);
+            run.sources.push(source);
+            if run.history.is_some() {
+                return Err(twice(run));
+            }
+            run.history = Some(history.points);
+        }
+        Ok(())
+    }
+
+    /// Adds the experiments of a coordinator that have completed.
+    pub async fn fetch(
+        &mut self,
+        connection: &Connection,
+        subject: &Subject,
+        progress: &Progress,
+    ) -> Result<(), Error> {
+        for experiment in connection.subject(subject).await? {
+            if experiment.state() != ExperimentState::Completed {
+                let line = text::state_line(&experiment);
+                progress.remark(&format!("left out: {line}"));
+                continue;
+            }
+            let history = Run::fetch(connection, experiment.clone()).await?.points;
+            let name = name(&experiment);
+            let run = self.run(&name, experiment.seed);
+            run.sources.push(format!("experiment {}", experiment.id));
+            if run.history.is_some() {
+                let problem = format!("{name}, seed {}: {}", experiment.seed, twice(run));
+                self.problems.push(problem);
+                continue;
+            }
+            run.history = Some(history);
+            run.judged = experiment.champion_fitness;
+        }
+        self.check()
+    }
+
+    /// The samples; fails if there is none.
+    pub fn finish(self) -> Result<Vec<Sample>, Error> {
+        if self.samples.is_empty() {
+            return Err(Error::NotFound("no run has completed yet".into()));
+        }
+        Ok(self.samples)
+    }
+
+    fn check(&mut self) -> Result<(), Error> {
+        match self.problems.is_empty() {
+            true => Ok(()),
+            false => Err(Error::Input(self.problems.join("\n"))),
+        }
+    }
+
+    fn run(&mut self, name: &str, seed: u64) -> &mut RecordedRun {
+        let place = self.samples.iter().position(|sample| sample.name == name);
+        let place = place.unwrap_or_else(|| {
+            self.samples.push(Sample { name: name.to_owned(), runs: BTreeMap::new() });
+            self.samples.len() - 1
+        });
+        self.samples[place].runs.entry(seed).or_default()
+    }
+}
+
+fn twice(run: &RecordedRun) -> String {
+    format!("the run is given twice: {}", run.sources.join(", "))
+}
+
+/// Runs of a group are a sample if they are of the same variant, others if their names are
+/// the same.
+fn name(experiment: &Experiment) -> String {
+    match (&*experiment.group, &*experiment.variant) {
+        ("", _) => experiment.name.clone(),
+        (group, "") => group.to_owned(),
+        (group, variant) => format!("{group} {variant}"),
+    }
+}

@@ -1,0 +1,153 @@
+//! `swarmctl export`: an ended experiment as a file for others.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read as _, Write as _},
+    path::{Path, PathBuf},
+};
+
+use bundle::LEN_MAX;
+use clap::Args;
+use serde::Serialize;
+use sha2::{Digest as _, Sha256};
+use tempfile::NamedTempFile;
+
+use crate::{
+    archive::Archive, args::ExperimentId, connection::present, error::Error, json,
+    progress::Progress, settings::Settings, tensorboard::EventFile, text,
+};
+
+/// Write an ended experiment to a file that others can verify and import.
+///
+/// The bundle is a ZIP archive, described as an RO-Crate: experiment file, seed, versions,
+/// history, the fitness of every individual in every trial, keyframes and the champion. It is
+/// what a publication needs beside the program: `swarmctl verify` computes everything in it
+/// again. The same experiment and version give the same file, byte by byte.
+///
+/// With --tensorboard, the history so far is written for TensorBoard instead.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct ExportArgs {
+    #[command(flatten)]
+    experiment: ExperimentId,
+    /// The bundle; a file that exists is replaced.
+    #[arg(long, value_name = "FILE", required_unless_present = "tensorboard")]
+    to: Option<PathBuf>,
+    /// Write an event file for TensorBoard into a directory of its own in this one.
+    #[arg(long, value_name = "DIR", conflicts_with = "to")]
+    tensorboard: Option<PathBuf>,
+    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
+    /// a coordinator. One may use it meanwhile.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl export 3 --to leader.zip
+  swarmctl export 1 --to quickstart.zip --data-dir swarm-data
+  swarmctl export 3 --tensorboard runs && tensorboard --logdir runs";
+
+/// A written bundle.
+#[derive(Debug, Serialize)]
+struct Written {
+    experiment: u64,
+    file: String,
+    bytes: usize,
+    sha256: String,
+}
+
+/// Writes the file.
+pub async fn export(
+    settings: Settings,
+    args: &ExportArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let archive = Archive::open(settings, args.data_dir.as_deref())?;
+    let id = args.experiment.id;
+    let (path, bytes, next) = match (&args.to, &args.tensorboard) {
+        (Some(path), _) => {
+            let next = format!("check it with: swarmctl verify {}", path.display());
+            (path.clone(), archive.bundle(id).await?, next)
+        }
+        (None, Some(directory)) => {
+            let (path, bytes) = events(&archive, id, directory).await?;
+            (path, bytes, format!("open it with: tensorboard --logdir {}", directory.display()))
+        }
+        (None, None) => return Err(Error::Input("name a file to write with --to".into())),
+    };
+    write(&path, &bytes)?;
+    let file = path.display().to_string();
+    let written = Written { experiment: id, file, bytes: bytes.len(), sha256: sha256(&bytes) };
+    progress.print(&if progress.is_json() {
+        json::document(&written)
+    } else {
+        let Written { experiment, file, bytes, sha256 } = written;
+        format!("experiment {experiment} is in {file}, {bytes} bytes, SHA-256 {sha256}\n{next}")
+    })
+}
+
+/// The history of an experiment as an event file, and where it belongs: TensorBoard takes each
+/// directory for a run.
+async fn events(archive: &Archive, id: u64, directory: &Path) -> Result<(PathBuf, Vec<u8>), Error> {
+    let (experiment, _) = archive.experiment(id).await?;
+    let mut file = EventFile::new(experiment.submitted_at_ms);
+    for completed in archive.generations(id).await? {
+        let of = present(completed.summary)?;
+        let values = [
+            ("fitness/best", of.best),
+            ("fitness/mean", of.mean),
+            ("fitness/min", of.min),
+            ("fitness/standard_deviation", of.standard_deviation),
+            ("speed/episodes_per_second", text::episodes_per_s(&of)),
+        ];
+        file.scalars(of.generation, completed.completed_at_ms, values);
+    }
+    let is_plain = |c: char| c.is_alphanumeric() || "-_".contains(c);
+    let name = experiment.name.chars().map(|c| if is_plain(c) { c } else { '_' });
+    let run: String = name.take(80).collect::<String>() + &format!("-{id}");
+    let run = directory.join(run);
+    let failed = |source| Error::Input(format!("cannot make {}: {source}", run.display()));
+    fs::create_dir_all(&run).map_err(failed)?;
+    let name = format!("events.out.tfevents.{}.swarmevo", experiment.submitted_at_ms / 1000);
+    Ok((run.join(name), file.into_bytes()))
+}
+
+/// Writes a file whole or not at all.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let failed =
+        |source: io::Error| Error::Input(format!("cannot write {}: {source}", path.display()));
+    let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
+    let mut file = NamedTempFile::new_in(directory.unwrap_or(Path::new("."))).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.as_file().sync_all().map_err(failed)?;
+    let readable = fs::metadata(path).map(|found| found.permissions());
+    file.persist(path).map_err(|error| failed(error.error))?;
+    make_readable(path, readable.ok()).map_err(failed)
+}
+
+/// A temporary file is its owner's alone; a bundle is for others.
+#[cfg(unix)]
+fn make_readable(path: &Path, before: Option<fs::Permissions>) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    fs::set_permissions(path, before.unwrap_or_else(|| fs::Permissions::from_mode(0o644)))
+}
+
+#[cfg(not(unix))]
+fn make_readable(_: &Path, _: Option<fs::Permissions>) -> io::Result<()> {
+    Ok(())
+}
+
+/// Reads a bundle that others may have made: no more of it than one can have.
+pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    let failed = |source: io::Error| Error::Input(format!("{}: {source}", path.display()));
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    file.take(LEN_MAX + 1).read_to_end(&mut bytes).map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,297 @@
+//! `swarmctl fleet`: as many workers as the experiments need, as jobs of a batch system.
+
+mod autoscaler;
+mod slurm;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
+
+use clap::{Args, Subcommand};
+use serde::Serialize;
+use swarm_proto::v1::{ExperimentState, ExplainExperimentRequest};
+use swarm_telemetry::parse_positive_duration;
+use tokio::time::{Instant, sleep};
+
+use self::{
+    autoscaler::{Autoscaler, Bounds, ITEMS_PER_WORKER, Job, Plan},
+    slurm::Slurm,
+};
+use super::Remote;
+use crate::{
+    args::whole,
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING},
+    error::Error,
+    json,
+    progress::Progress,
+    text,
+};
+
+/// A worker's job that ends sooner has not worked, unless its worker may be idle for less.
+const SHORT_LIFE: Duration = Duration::from_secs(30);
+/// So many of them, one after the other, and something is wrong with all.
+const SHORT_LIVES_MAX: u32 = 3;
+
+/// Keep as many workers as the experiments need, as jobs of a batch system.
+#[derive(Debug, Args)]
+pub struct FleetArgs {
+    #[command(subcommand)]
+    system: System,
+}
+
+/// The batch systems.
+#[derive(Debug, Subcommand)]
+enum System {
+    Slurm(SlurmArgs),
+}
+
+/// Submit and end jobs with workers in Slurm, as the coordinator's queue needs them.
+///
+/// Runs until it is interrupted; then no more jobs are submitted, and the workers end after
+/// their --idle-timeout. One worker is wanted for 16 open items of running experiments: more
+/// after half a minute, fewer after ten minutes, as with the autoscaler for Kubernetes. A job
+/// that waits is withdrawn first; a worker that runs finishes its items. Started again, it
+/// finds its jobs by their name.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+struct SlurmArgs {
+    /// Fewest workers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    min: u32,
+    /// Most workers.
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=4096))]
+    max: u32,
+    /// Time after which a worker without an item ends by itself.
+    #[arg(long, value_name = "TIME", default_value = "10m", value_parser = parse_positive_duration)]
+    idle_timeout: Duration,
+    /// Time after which a worker has ended by itself: shorter than the job's [default: none]
+    #[arg(long, value_name = "TIME", value_parser = parse_positive_duration)]
+    time_limit: Option<Duration>,
+    /// Time between two looks at the queues.
+    #[arg(long, value_name = "TIME", default_value = "15s", value_parser = parse_positive_duration)]
+    interval: Duration,
+    /// The worker's program on the nodes.
+    #[arg(long, value_name = "PROGRAM", env = "SWARM_WORKER", default_value = "worker")]
+    worker: String,
+    /// Name of the jobs, of no other jobs [default: swarm-HOST-PORT of the coordinator]
+    #[arg(long, value_name = "NAME")]
+    job_name: Option<String>,
+    /// More arguments for sbatch.
+    #[arg(last = true, value_name = "SBATCH ARGUMENT")]
+    sbatch_args: Vec<String>,
+}
+
+const HELP: &str = "\
+Workers take token and certificates from the environment, which sbatch passes on:
+SWARM_WORKER_TOKEN_FILE, SWARM_TLS_CA. --coordinator must be an address that the
+nodes reach. A worker has the slots of --cpus-per-task.
+
+Examples:
+  swarmctl fleet slurm --max 40 -- --partition=short --cpus-per-task=8
+  swarmctl fleet slurm --max 40 --time-limit 235m -- --time=4:00:00";
+
+impl Remote for FleetArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let System::Slurm(args) = self.system;
+        if args.min > args.max {
+            let SlurmArgs { min, max, .. } = args;
+            return Err(Error::Input(format!("--min {min} is more than --max {max}")));
+        }
+        let connection = connection.with_patience(PATIENCE_WHILE_FOLLOWING);
+        let address = connection.address();
+        let slurm = Slurm {
+            job_name: args.job_name.unwrap_or_else(|| job_name(address)),
+            script: slurm::script(&args.worker, address, args.idle_timeout, args.time_limit),
+            idle_timeout: args.idle_timeout,
+            sbatch_args: args.sbatch_args,
+        };
+        let bounds = Bounds { min: args.min, max: args.max };
+        scale(&connection, &slurm, bounds, args.interval, progress).await
+    }
+}
+
+/// A look at the queues after which something was done, as JSON.
+#[derive(Debug, Serialize)]
+struct Look<'a> {
+    items: u64,
+    jobs: usize,
+    wanted: u32,
+    submitted: &'a [String],
+    withdrawn: &'a [String],
+    finishing: &'a [String],
+}
+
+async fn scale(
+    connection: &Connection,
+    slurm: &Slurm,
+    bounds: Bounds,
+    interval: Duration,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let mut autoscaler = Autoscaler::new(bounds);
+    let mut lives = Lives::new(slurm.idle_timeout);
+    if !progress.is_json() {
+        progress.remark(&format!(
+            "jobs are named {}; one worker for {ITEMS_PER_WORKER} open items, {} to {}",
+            slurm.job_name, bounds.min, bounds.max
+        ));
+    }
+    loop {
+        let n_items = open_items(connection).await?;
+        let mut jobs = slurm.jobs().await?;
+        lives.see(Instant::now(), &jobs)?;
+        jobs.retain(|job| !lives.finishing.contains(&job.id));
+        let n_wanted = autoscaler.wanted(Instant::now(), n_items, jobs.len() as u32);
+        let plan = Plan::new(&jobs, n_wanted);
+        if !plan.is_empty() {
+            let submitted = slurm.carry_out(&plan).await?;
+            lives.acted(Instant::now(), &submitted, &plan);
+            let look = Look {
+                items: n_items,
+                jobs: jobs.len(),
+                wanted: n_wanted,
+                submitted: &submitted,
+                withdrawn: &plan.withdraw,
+                finishing: &plan.finish,
+            };
+            progress.print(&if progress.is_json() { json::line(&look) } else { look.line() })?;
+        }
+        sleep(interval).await;
+    }
+}
+
+impl Look<'_> {
+    fn line(&self) -> String {
+        let done = [
+            (self.submitted, "submitted"),
+            (self.withdrawn, "withdrawn"),
+            (self.finishing, "finishing"),
+        ];
+        let done = done.into_iter().filter(|(ids, _)| !ids.is_empty());
+        let done: Vec<String> =
+            done.map(|(ids, what)| format!("{what} {}", ids.join(", "))).collect();
+        format!(
+            "{} open, {} of {} wanted: {}",
+            text::counted(self.items, "item"),
+            text::counted(self.jobs as u64, "job"),
+            self.wanted,
+            done.join("; ")
+        )
+    }
+}
+
+/// Items of running experiments that wait for a worker or are with one.
+async fn open_items(connection: &Connection) -> Result<u64, Error> {
+    let mut n_items = 0;
+    for experiment in connection.experiments().await? {
+        if experiment.state() != ExperimentState::Running {
+            continue;
+        }
+        let request = ExplainExperimentRequest { experiment_id: experiment.id };
+        let answer = connection.call(async |client| client.explain_experiment(request).await);
+        if let Some(round) = answer.await?.round {
+            let held: u64 = round.held.iter().map(|held| u64::from(held.items)).sum();
+            n_items += u64::from(round.items_queued) + held;
+        }
+    }
+    Ok(n_items)
+}
+
+/// The lives of jobs, to notice when none comes to anything.
+#[derive(Debug)]
+struct Lives {
+    /// A job that ends sooner has not worked.
+    short: Duration,
+    /// When each job was submitted, or began to run.
+    since: BTreeMap<String, Instant>,
+    /// Jobs that were told to finish.
+    finishing: BTreeSet<String>,
+    n_short: u32,
+}
+
+impl Lives {
+    /// Of jobs whose workers end by themselves when they have been idle for so long.
+    fn new(idle_timeout: Duration) -> Self {
+        let short = SHORT_LIFE.min(idle_timeout);
+        Self { short, since: BTreeMap::new(), finishing: BTreeSet::new(), n_short: 0 }
+    }
+
+    /// Sees which jobs there are; an error if the last ones ended at once.
+    fn see(&mut self, now: Instant, jobs: &[Job]) -> Result<(), Error> {
+        let is_there = |id: &String| jobs.iter().any(|job| job.id == *id);
+        let gone: Vec<(String, Instant)> =
+            self.since.extract_if(.., |id, _| !is_there(id)).collect();
+        for (id, since) in &gone {
+            match now - *since < self.short {
+                _ if self.finishing.contains(id) => {}
+                true => self.n_short += 1,
+                false => self.n_short = 0,
+            }
+            if self.n_short >= SHORT_LIVES_MAX {
+                return Err(Error::Input(format!(
+                    "the last {SHORT_LIVES_MAX} worker jobs ended as soon as they began; the \
+                     reason is in swarm-worker-{id}.log"
+                )));
+            }
+        }
+        self.finishing.retain(is_there);
+        for job in jobs {
+            match job.is_running {
+                true => drop(self.since.entry(job.id.clone()).or_insert(now)),
+                // Its life has not begun.
+                false => drop(self.since.insert(job.id.clone(), now)),
+            }
+        }
+        Ok(())
+    }
+
+    fn acted(&mut self, now: Instant, submitted: &[String], plan: &Plan) {
+        self.since.extend(submitted.iter().map(|id| (id.clone(), now)));
+        self.finishing.extend(plan.withdraw.iter().chain(&plan.finish).cloned());
+    }
+}
+
+/// `swarm-HOST-PORT`.
+fn job_name(address: &str) -> String {
+    let authority = address.split_once("://").map_or(address, |(_, authority)| authority);
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
+    format!("swarm-{}", authority.trim_end_matches('/').chars().map(plain).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jobs_that_end_at_once_are_not_submitted_for_ever() {
+        let mut lives = Lives::new(2 * SHORT_LIFE);
+        let mut now = Instant::now();
+        let mut run = |id: &str, lasts: Duration, is_told: bool| {
+            let ids = [id.to_owned()];
+            let job = Job { id: id.to_owned(), is_running: true };
+            lives.acted(now, &ids, &Plan::default());
+            lives.see(now, std::slice::from_ref(&job)).unwrap();
+            if is_told {
+                lives.acted(now, &[], &Plan { finish: ids.into(), ..Plan::default() });
+            }
+            now += lasts;
+            lives.see(now, &[])
+        };
+        let second = Duration::from_secs(1);
+        run("1", second, false).unwrap();
+        run("2", second, false).unwrap();
+        run("3", SHORT_LIFE, false).unwrap();
+        run("4", second, false).unwrap();
+        run("5", second, true).unwrap();
+        run("6", second, false).unwrap();
+        let error = run("7", second, false).unwrap_err().to_string();
+        assert!(error.contains("swarm-worker-7.log"), "{error}");
+    }
+
+    #[test]
+    fn names_of_jobs_tell_fleets_apart() {
+        assert_eq!(job_name("https://login1.hpc:7700/"), "swarm-login1.hpc-7700");
+        assert_eq!(job_name("http://[::1]:7700"), "swarm----1--7700");
+    }
+}

@@ -1,0 +1,171 @@
+//! How many workers a fleet needs, and which jobs to submit and to end for it.
+//!
+//! The rule is that of Kubernetes' autoscaler, with the numbers of
+//! `docs/deploy/kubernetes/autoscaler.yaml`: the same queue makes the same fleet. Time is an
+//! argument.
+
+use std::{collections::VecDeque, time::Duration};
+
+use tokio::time::Instant;
+
+/// Open items for each worker.
+pub const ITEMS_PER_WORKER: u64 = 16;
+/// More workers are wanted once the queue has been long for this time.
+pub const UP_WINDOW: Duration = Duration::from_secs(30);
+/// Fewer are wanted once it has been short for this time: at the end of every generation no
+/// item is left, and the number of workers does not follow that.
+pub const DOWN_WINDOW: Duration = Duration::from_secs(600);
+
+/// Bounds of the number of workers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    pub min: u32,
+    /// At least `min`.
+    pub max: u32,
+}
+
+/// Decides how many workers are wanted.
+#[derive(Debug)]
+pub struct Autoscaler {
+    bounds: Bounds,
+    /// What the queue alone would have wanted, and when, oldest first; of [`DOWN_WINDOW`].
+    recent: VecDeque<(Instant, u32)>,
+}
+
+impl Autoscaler {
+    pub fn new(bounds: Bounds) -> Self {
+        Self { bounds, recent: VecDeque::new() }
+    }
+
+    /// The number of workers wanted, of which there are `n_workers` now. `n_items`: items of
+    /// running experiments that wait or are computed.
+    pub fn wanted(&mut self, now: Instant, n_items: u64, n_workers: u32) -> u32 {
+        let Bounds { min, max } = self.bounds;
+        let by_queue = u32::try_from(n_items.div_ceil(ITEMS_PER_WORKER)).unwrap_or(u32::MAX);
+        self.recent.push_back((now, by_queue.clamp(min, max)));
+        while self.recent.front().is_some_and(|(at, _)| now - *at > DOWN_WINDOW) {
+            self.recent.pop_front();
+        }
+        let recent =
+            |window| self.recent.iter().filter(move |(at, _)| now - *at <= window).map(|(_, n)| *n);
+        let up = recent(UP_WINDOW).min().unwrap_or(min);
+        let down = recent(DOWN_WINDOW).max().unwrap_or(max);
+        // Whatever the queue says, the bounds hold.
+        n_workers.max(up).min(down).clamp(min, max)
+    }
+}
+
+/// A job of the batch system that runs a worker, or will.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Job {
+    pub id: String,
+    /// Whether it has a node; else it waits for one.
+    pub is_running: bool,
+}
+
+/// What to do about jobs.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// Number of jobs to submit.
+    pub n_submit: u32,
+    /// Jobs to take out of the queue.
+    pub withdraw: Vec<String>,
+    /// Jobs whose workers are to finish their items.
+    pub finish: Vec<String>,
+}
+
+impl Plan {
+    /// What leads from these jobs, oldest first, to as many as are wanted. Jobs that wait go
+    /// before those that run, the newest first.
+    pub fn new(jobs: &[Job], n_wanted: u32) -> Self {
+        let n_wanted = n_wanted as usize;
+        let n_submit = n_wanted.saturating_sub(jobs.len()) as u32;
+        let newest = |is_running| jobs.iter().rev().filter(move |job| job.is_running == is_running);
+        let surplus = newest(false).chain(newest(true)).take(jobs.len().saturating_sub(n_wanted));
+        let (finish, withdraw): (Vec<&Job>, Vec<&Job>) = surplus.partition(|job| job.is_running);
+        let ids = |jobs: Vec<&Job>| jobs.into_iter().map(|job| job.id.clone()).collect();
+        Self { n_submit, withdraw: ids(withdraw), finish: ids(finish) }
+    }
+
+    /// Whether there is nothing to do.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const BOUNDS: Bounds = Bounds { min: 1, max: 40 };
+
+    #[test]
+    fn the_manifest_of_kubernetes_has_the_same_numbers() {
+        let path = "/../docs/deploy/kubernetes/autoscaler.yaml";
+        let path = format!("{}{path}", env!("CARGO_MANIFEST_DIR"));
+        let manifest = std::fs::read_to_string(path).unwrap();
+        let (_, up_and_down) = manifest.split_once("scaleUp:").unwrap();
+        let (up, down) = up_and_down.split_once("scaleDown:").unwrap();
+        let window = |part: &str, window: Duration| {
+            part.contains(&format!("stabilizationWindowSeconds: {}", window.as_secs()))
+        };
+        assert!(manifest.contains(&format!("averageValue: \"{ITEMS_PER_WORKER}\"")));
+        assert!(window(up, UP_WINDOW) && window(down, DOWN_WINDOW));
+    }
+
+    #[test]
+    fn the_end_of_a_generation_sends_nobody_away_and_a_long_idleness_does() {
+        let start = Instant::now();
+        let at = |s| start + Duration::from_secs(s);
+        let mut scaler = Autoscaler::new(Bounds { min: 0, max: 40 });
+        assert_eq!(scaler.wanted(at(0), 160, 0), 10, "the first is answered at once");
+        assert_eq!(scaler.wanted(at(15), 0, 10), 10);
+        assert_eq!(scaler.wanted(at(30), 640, 10), 10, "not yet for long");
+        assert_eq!(scaler.wanted(at(46), 640, 10), 40);
+        assert_eq!(scaler.wanted(at(646), 0, 40), 40);
+        assert_eq!(scaler.wanted(at(647), 0, 40), 0);
+    }
+
+    proptest! {
+        #[test]
+        fn the_bounds_hold_and_a_steady_queue_gets_what_it_needs(
+            queue in prop::collection::vec((0..2000_u64, 1..100_u64), 1..40),
+            n_workers in 0..60_u32,
+        ) {
+            let mut scaler = Autoscaler::new(BOUNDS);
+            let mut now = Instant::now();
+            let mut n = n_workers;
+            for (n_items, pause_s) in &queue {
+                now += Duration::from_secs(*pause_s);
+                n = scaler.wanted(now, *n_items, n);
+                prop_assert!((BOUNDS.min..=BOUNDS.max).contains(&n));
+            }
+            let (steady, _) = queue[queue.len() - 1];
+            for _ in 0..2 {
+                now += DOWN_WINDOW + Duration::from_secs(1);
+                n = scaler.wanted(now, steady, n);
+            }
+            prop_assert_eq!(u64::from(n), steady.div_ceil(ITEMS_PER_WORKER).clamp(1, 40));
+        }
+
+        #[test]
+        fn a_plan_leads_to_as_many_jobs_as_are_wanted_and_ends_no_worker_before_a_job_that_waits(
+            running in prop::collection::vec(any::<bool>(), 0..30),
+            n_wanted in 0..30_u32,
+        ) {
+            let job = |(i, &is_running): (usize, &bool)| Job { id: i.to_string(), is_running };
+            let jobs: Vec<Job> = running.iter().enumerate().map(job).collect();
+            let plan = Plan::new(&jobs, n_wanted);
+            let n_ended = plan.withdraw.len() + plan.finish.len();
+            prop_assert_eq!(jobs.len() - n_ended + plan.n_submit as usize, n_wanted as usize);
+            prop_assert!(n_ended == 0 || plan.n_submit == 0);
+            let n_waiting = running.iter().filter(|is_running| !**is_running).count();
+            prop_assert!(plan.finish.is_empty() || plan.withdraw.len() == n_waiting);
+            let is_running = |id: &String| running[id.parse::<usize>().unwrap()];
+            prop_assert!(plan.finish.iter().all(is_running));
+            prop_assert!(!plan.withdraw.iter().any(is_running));
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! `swarmctl fork`: an experiment that goes on from a generation of another one.
+
+use clap::Args;
+use coordinator::Who;
+use experiment_file::limits;
+use swarm_proto::v1::{ForkPoint, GetExperimentRequest};
+
+use crate::{
+    address::NamedAddress,
+    args::{SeedArg, whole},
+    change::{self, Change, Json},
+    connection::{Connection, present},
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides, random_request_id},
+    json,
+    progress::Progress,
+    text,
+};
+
+use super::{Remote, watch};
+
+/// Continue an experiment from one of its generations as a new one, with something changed.
+///
+/// The new experiment has the history of the other one up to that generation, and the same
+/// state after it: the next genotypes are drawn from where the other one was. Fitness, world,
+/// perturbations, the number of robots, trials or individuals and the seed may change; the
+/// algorithm, its parameters and the length of genotypes may not. What is changed is part of
+/// all further digests; a fork of which nothing is changed has those of its parent.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct ForkArgs {
+    /// Where: ID@G or NAME@G, after generation G of an experiment.
+    #[arg(value_name = "ID@G")]
+    address: NamedAddress,
+    /// Change the experiment file; may be given several times.
+    #[arg(long, value_name = "PATH=VALUE[;...]")]
+    set: Vec<String>,
+    #[command(flatten)]
+    seed: SeedArg,
+    /// Number of generations, with those that are shared, instead of the parent's.
+    #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
+    generations: Option<u64>,
+    /// Name of the new experiment [default: the parent's]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// Its share of the fleet relative to other experiments, 1 to 1000 [default: 100]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=1000))]
+    priority: Option<u32>,
+    /// Follow the experiment to its end, as `swarmctl watch` does.
+    #[arg(long)]
+    watch: bool,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl fork 3@499 --seed 8
+  swarmctl fork 3@499 --set world.objects.robotA.num_instances=20 --generations 1500 --watch";
+
+impl Remote for ForkArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let Who::Generation(generation) = self.address.who else {
+            return Err(Error::Input(format!(
+                "`{}` is no generation; name one, such as {}@9",
+                self.address, self.address.experiment
+            )));
+        };
+        let experiment_id = connection.one(&self.address.experiment).await?.id;
+        let request = GetExperimentRequest { experiment_id };
+        let parent = connection.call(async |client| client.get_experiment(request).await).await?;
+        let file = self.changed(&parent.config_json)?;
+        let overrides = Overrides {
+            seed: self.seed.seed,
+            generations: self.generations,
+            ..Overrides::default()
+        };
+        let mut request = file.request(&overrides, random_request_id("fork"));
+        request.priority = self.priority;
+        request.fork_of = Some(ForkPoint { experiment_id, generation });
+        let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
+        let experiment = present(response.experiment)?;
+        if !progress.is_json() {
+            let mut lines = vec![text::submitted(&experiment)];
+            lines.extend(text::origin(&experiment));
+            if !self.watch {
+                lines.push(format!("follow it with: swarmctl watch {}", experiment.id));
+            }
+            progress.print(&lines.join("\n"))?;
+        } else if !self.watch {
+            progress.print(&json::document(&json::ExperimentDocument::from(&experiment)))?;
+        }
+        if self.watch { watch::watch(connection, vec![experiment], progress).await } else { Ok(()) }
+    }
+}
+
+impl ForkArgs {
+    /// The parent's file with the changes.
+    fn changed(&self, config_json: &str) -> Result<ExperimentFile, Error> {
+        let mut file = Json::parse(config_json);
+        let mut changes = Vec::new();
+        let mut problems = Vec::new();
+        for text in &self.set {
+            match Change::parse_all(text) {
+                Ok(parsed) => changes.extend(parsed),
+                Err(problem) => problems.push(format!("--set: {problem}")),
+            }
+        }
+        if let Some(name) = &self.name {
+            let name = Json::Scalar(name.clone().into());
+            changes.push(Change::new("name".to_owned(), name));
+        }
+        if let Err(unplaced) = change::apply_all(&changes, &mut file) {
+            problems.extend(unplaced.into_iter().map(|problem| format!("--set: {problem}")));
+        }
+        if !problems.is_empty() {
+            return Err(Error::Input(problems.join("\n")));
+        }
+        let name = format!("experiment {} with changes", self.address.experiment);
+        Ok(ExperimentFile::new(name.into(), json::line(&file)))
+    }
+}

@@ -1,0 +1,165 @@
+//! `swarmctl delete`, `prune`, `archive` and `label`: what is kept of experiments, and what
+//! they are found by.
+
+use clap::Args;
+use swarm_proto::v1::{
+    ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, LabelExperimentRequest,
+    PruneExperimentRequest,
+};
+
+use super::{
+    Remote,
+    control::{each_that, print},
+};
+use crate::{
+    args::{Label, Target},
+    connection::{Connection, present},
+    error::Error,
+    json::has_ended,
+    progress::Progress,
+    text,
+};
+
+/// Why a command for what has ended applies to none of a group.
+const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
+
+/// Delete an experiment that has ended, or those of a group, with all that is stored of it.
+///
+/// There is no way back but a backup. Its number is not used again, forks of it stay. The room
+/// in the database is used again; the file does not get shorter, a backup is. `prune` deletes
+/// less, `archive` nothing.
+#[derive(Debug, Args)]
+pub struct DeleteArgs {
+    #[command(flatten)]
+    target: Target,
+}
+
+impl Remote for DeleteArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let delete = async |experiment_id| {
+            let request = DeleteExperimentRequest { experiment_id };
+            let call = connection.call(async |client| client.delete_experiment(request).await);
+            let response = call.await?;
+            Ok((present(response.experiment)?, response.freed_bytes))
+        };
+        let deleted =
+            each_that(&self.target, connection, has_ended, NONE_HAS_ENDED, delete).await?;
+        print_with(&self.target, deleted, progress, |bytes| {
+            format!("deleted, {} of the database are free", mib(bytes))
+        })
+    }
+}
+
+/// Delete the fitness log of an experiment that has ended, or of those of a group.
+///
+/// Its individuals cannot be brought back any more. History, champion and digests stay, and
+/// more generations can be asked for as before. The room in the database is used again; a
+/// backup is shorter.
+#[derive(Debug, Args)]
+pub struct PruneArgs {
+    #[command(flatten)]
+    target: Target,
+}
+
+impl Remote for PruneArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let prune = async |experiment_id| {
+            let request = PruneExperimentRequest { experiment_id };
+            let call = connection.call(async |client| client.prune_experiment(request).await);
+            let response = call.await?;
+            Ok((present(response.experiment)?, response.freed_bytes))
+        };
+        let pruned = each_that(&self.target, connection, has_ended, NONE_HAS_ENDED, prune).await?;
+        print_with(&self.target, pruned, progress, |bytes| {
+            format!("{} of the database are free", mib(bytes))
+        })
+    }
+}
+
+/// Archive an experiment that has ended, or those of a group: `list` leaves it out.
+///
+/// Nothing is deleted, and every command still takes it; `list --all` has it. An experiment
+/// that goes on leaves the archive.
+#[derive(Debug, Args)]
+pub struct ArchiveArgs {
+    #[command(flatten)]
+    target: Target,
+    /// Take it out of the archive.
+    #[arg(long)]
+    restore: bool,
+}
+
+impl Remote for ArchiveArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let Self { target, restore } = self;
+        let archive = async |experiment_id| {
+            let request = ArchiveExperimentRequest { experiment_id, restore };
+            let call = connection.call(async |client| client.archive_experiment(request).await);
+            let response = call.await?;
+            Ok((present(response.experiment)?, response.log_bytes))
+        };
+        let archived = each_that(&target, connection, has_ended, NONE_HAS_ENDED, archive).await?;
+        print_with(&target, archived, progress, |bytes| match restore {
+            true => "listed again".to_owned(),
+            false => format!("archived; its fitness log takes {}, see swarmctl prune", mib(bytes)),
+        })
+    }
+}
+
+/// Label an experiment, or all of a group, to find it by: `list --label KEY=VALUE`.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct LabelArgs {
+    #[command(flatten)]
+    target: Target,
+    /// Labels to add, or to give another value.
+    #[arg(value_name = "KEY=VALUE", required_unless_present = "remove")]
+    labels: Vec<Label>,
+    /// Keys of labels to remove.
+    #[arg(long, value_name = "KEY")]
+    remove: Vec<String>,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl label 3 user=ada purpose=thesis
+  swarmctl label leader_selection_snes --remove purpose";
+
+impl Remote for LabelArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let set: std::collections::BTreeMap<String, String> =
+            self.labels.into_iter().map(|Label { key, value }| (key, value)).collect();
+        let label = async |experiment_id| {
+            let (set, remove) = (set.clone(), self.remove.clone());
+            let request = LabelExperimentRequest { experiment_id, set, remove };
+            let call =
+                connection.call(async |client| client.label_experiment(request.clone()).await);
+            present(call.await?.experiment)
+        };
+        let changed = each_that(&self.target, connection, |_| true, NONE_HAS_ENDED, label).await?;
+        let line = |it: &Experiment| match text::labels(it) {
+            labels if labels.is_empty() => format!("{}: no labels", text::title(it)),
+            labels => format!("{}: {labels}", text::title(it)),
+        };
+        print(&self.target, &changed, changed.iter().map(line), progress)
+    }
+}
+
+/// Prints experiments, each with what became of so many bytes.
+fn print_with(
+    target: &Target,
+    changed: Vec<(Experiment, u64)>,
+    progress: &mut Progress,
+    what: impl Fn(u64) -> String,
+) -> Result<(), Error> {
+    let lines: Vec<String> = changed
+        .iter()
+        .map(|(experiment, bytes)| format!("{}: {}", text::title(experiment), what(*bytes)))
+        .collect();
+    let experiments: Vec<Experiment> = changed.into_iter().map(|(it, _)| it).collect();
+    print(target, &experiments, lines.into_iter(), progress)
+}
+
+fn mib(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}

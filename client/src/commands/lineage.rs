@@ -1,0 +1,127 @@
+//! `swarmctl lineage`: whom an individual descends from.
+
+mod draw;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use coordinator::Address;
+use serde::Serialize;
+use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
+
+use crate::{
+    archive::Archive, args::whole, error::Error, json, progress::Progress, settings::Settings,
+};
+
+/// Print whom an individual of a genetic algorithm descends from, and which genes it has from
+/// whom.
+///
+/// Nothing of this is stored: the generations are gone through again from the fitness log. A
+/// gene is from a parent that has the very same one; the others mutated, or blend both
+/// parents. Of each ancestor, `genes` is how many of the individual's genes have come down from
+/// it unchanged.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct LineageArgs {
+    /// Whom: ID@G/I, individual I of generation G.
+    #[arg(value_name = "ID@G/I")]
+    address: Address,
+    /// Number of generations to go back.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u32>(1..=1000))]
+    depth: u32,
+    /// Print a graph for Graphviz instead of a tree.
+    #[arg(long)]
+    dot: bool,
+    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
+    /// a coordinator. One may use it meanwhile.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl lineage 3@40/7
+  swarmctl lineage 3@40/7 --depth 40 --output json | jq '.populations[].ancestors[-1]'
+  swarmctl lineage 3@40/7 --depth 6 --dot | dot -Tsvg > lineage.svg";
+
+/// A lineage, for programs.
+#[derive(Debug, Serialize)]
+struct LineageDocument<'a> {
+    address: String,
+    populations: Vec<PopulationDocument<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct PopulationDocument<'a> {
+    population: &'a str,
+    ancestors: Vec<AncestorDocument>,
+}
+
+#[derive(Debug, Serialize)]
+struct AncestorDocument {
+    generation: u64,
+    individual: u32,
+    fitness: Option<f64>,
+    operator: Option<&'static str>,
+    parents: Vec<ParentDocument>,
+    new_genes: u32,
+    genes: u32,
+}
+
+#[derive(Debug, Serialize)]
+struct ParentDocument {
+    individual: u32,
+    genes: u32,
+}
+
+/// Prints the lineage.
+pub async fn lineage(
+    settings: Settings,
+    args: &LineageArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let archive = Archive::open(settings, args.data_dir.as_deref())?;
+    let GetLineageResponse { populations } = archive.lineage(args.address, args.depth).await?;
+    progress.print(&match (args.dot, progress.is_json()) {
+        (true, _) => draw::graph(&populations),
+        (_, true) => json::document(&LineageDocument::new(args.address, &populations)),
+        _ => draw::trees(&populations, args.address.experiment.0),
+    })
+}
+
+/// What was done to make an individual; none in the earliest generation of a lineage.
+fn operator(ancestor: &Ancestor) -> Option<&'static str> {
+    match ancestor.operator() {
+        BirthOperator::Unspecified => None,
+        BirthOperator::First => Some("first"),
+        BirthOperator::Elite => Some("elite"),
+        BirthOperator::Copy => Some("copy"),
+        BirthOperator::Crossover => Some("crossover"),
+    }
+}
+
+impl<'a> LineageDocument<'a> {
+    fn new(address: Address, populations: &'a [PopulationLineage]) -> Self {
+        let ancestor = |it: &Ancestor| AncestorDocument {
+            generation: it.generation,
+            individual: it.individual,
+            fitness: Some(it.fitness).filter(|fitness| fitness.is_finite()),
+            operator: operator(it),
+            parents: it
+                .parents
+                .iter()
+                .map(|of| ParentDocument { individual: of.individual, genes: of.genes })
+                .collect(),
+            new_genes: it.new_genes,
+            genes: it.genes,
+        };
+        let population = |it: &'a PopulationLineage| PopulationDocument {
+            population: &it.population,
+            ancestors: it.ancestors.iter().map(ancestor).collect(),
+        };
+        Self {
+            address: address.to_string(),
+            populations: populations.iter().map(population).collect(),
+        }
+    }
+}

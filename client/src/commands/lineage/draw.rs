@@ -1,0 +1,111 @@
+//! Lineages as text: trees for people, graphs for Graphviz.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use swarm_proto::v1::{Ancestor, PopulationLineage};
+
+use super::operator;
+
+/// Ancestors by generation and index.
+type Ancestors<'a> = BTreeMap<(u64, u32), &'a Ancestor>;
+
+/// A tree per population: the individual, under it its parents, under those theirs.
+pub fn trees(populations: &[PopulationLineage], experiment: u64) -> String {
+    let mut lines = Vec::new();
+    for PopulationLineage { population, ancestors } in populations {
+        if populations.len() > 1 {
+            lines.push(format!("population {population}"));
+        }
+        let all: Ancestors<'_> =
+            ancestors.iter().map(|it| ((it.generation, it.individual), it)).collect();
+        let Some(root) = ancestors.first() else { continue };
+        let mut tree = Tree { experiment, all, shown: BTreeSet::new(), lines: Vec::new() };
+        tree.grow(root, String::new(), "", "");
+        lines.append(&mut tree.lines);
+    }
+    lines.join("\n")
+}
+
+struct Tree<'a> {
+    experiment: u64,
+    all: Ancestors<'a>,
+    /// Those whose parents are in the tree already.
+    shown: BTreeSet<(u64, u32)>,
+    lines: Vec<String>,
+}
+
+impl Tree<'_> {
+    /// Adds an ancestor and its own. `before`: what stands before all their lines; `branch`,
+    /// `below`: what follows that in its own line, and in those of its ancestors.
+    fn grow(&mut self, of: &Ancestor, before: String, branch: &str, below: &str) {
+        let place = (of.generation, of.individual);
+        let is_new = self.shown.insert(place);
+        let again = if is_new || of.parents.is_empty() { "" } else { ", see above" };
+        let born = match operator(of) {
+            Some("crossover") => format!(
+                ", crossover of {}, {} new",
+                of.parents
+                    .iter()
+                    .map(|it| format!("{} ({} genes)", it.individual, it.genes))
+                    .collect::<Vec<_>>()
+                    .join(" and "),
+                of.new_genes
+            ),
+            Some("copy") => format!(", copy with {} new", of.new_genes),
+            Some("elite") => ", elite".to_owned(),
+            Some(_) => ", first generation".to_owned(),
+            None => String::new(),
+        };
+        self.lines.push(format!(
+            "{before}{branch}{}@{}/{}  fitness {:.6}, {} genes{born}{again}",
+            self.experiment, of.generation, of.individual, of.fitness, of.genes
+        ));
+        if !is_new {
+            return;
+        }
+        let parents: Vec<&Ancestor> = of
+            .parents
+            .iter()
+            .filter_map(|it| self.all.get(&(of.generation.checked_sub(1)?, it.individual)).copied())
+            .collect();
+        for (i, parent) in parents.iter().enumerate() {
+            let (branch, under) = match i + 1 == parents.len() {
+                true => ("└─ ", "   "),
+                false => ("├─ ", "│  "),
+            };
+            self.grow(parent, format!("{before}{below}"), branch, under);
+        }
+    }
+}
+
+/// A graph in Graphviz's language: children point to their parents, with the number of genes.
+pub fn graph(populations: &[PopulationLineage]) -> String {
+    let mut lines = vec!["digraph lineage {".to_owned(), "  node [shape=box];".to_owned()];
+    for (p, PopulationLineage { population, ancestors }) in populations.iter().enumerate() {
+        let known: BTreeSet<(u64, u32)> =
+            ancestors.iter().map(|it| (it.generation, it.individual)).collect();
+        let label = match populations.len() {
+            1 => String::new(),
+            _ => format!("{}\\n", population.replace(['"', '\\'], "_")),
+        };
+        for of in ancestors {
+            let (g, i) = (of.generation, of.individual);
+            lines.push(format!(
+                "  \"{p}_{g}_{i}\" [label=\"{label}{g}/{i}\\n{:.4}\\n{} genes\"];",
+                of.fitness, of.genes
+            ));
+            for parent in &of.parents {
+                let Some(before) = g.checked_sub(1) else { continue };
+                let j = parent.individual;
+                if known.contains(&(before, j)) {
+                    let genes = parent.genes;
+                    lines.push(format!(
+                        "  \"{p}_{g}_{i}\" -> \"{p}_{before}_{j}\" [label={genes}];"
+                    ));
+                }
+            }
+        }
+    }
+    lines.push("}".to_owned());
+    lines.join("\n")
+}

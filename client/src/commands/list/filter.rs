@@ -1,0 +1,161 @@
+//! Which experiments a list has, and in which order.
+
+use std::cmp::{Ordering, Reverse};
+
+use clap::{Args, ValueEnum};
+use swarm_proto::v1::{Experiment, ExperimentState};
+
+use crate::text;
+
+/// Which experiments to list, and in which order.
+#[derive(Debug, Default, Args)]
+pub struct Filter {
+    /// Only those in this state, or one of these.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "STATE")]
+    state: Vec<State>,
+    /// Only those with this label, with any value or with this one; of several all.
+    #[arg(long, value_name = "KEY[=VALUE]")]
+    label: Vec<String>,
+    /// Those that are archived, too.
+    #[arg(long)]
+    all: bool,
+    /// Order: best begins with the largest fitness, age with the newest, eta with those that
+    /// end first.
+    #[arg(long, value_enum, default_value_t, value_name = "COLUMN")]
+    sort: Sort,
+}
+
+/// A state, as people name it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum State {
+    Running,
+    Paused,
+    Completed,
+    Failed,
+    Cancelled,
+}
+
+/// By what a list is ordered; equal ones by their numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Sort {
+    #[default]
+    Id,
+    Name,
+    State,
+    Best,
+    Age,
+    Eta,
+}
+
+impl From<State> for ExperimentState {
+    fn from(state: State) -> Self {
+        match state {
+            State::Running => Self::Running,
+            State::Paused => Self::Paused,
+            State::Completed => Self::Completed,
+            State::Failed => Self::Failed,
+            State::Cancelled => Self::Cancelled,
+        }
+    }
+}
+
+impl Filter {
+    /// Those that are wanted, in order. Experiments come in the order of their numbers.
+    pub fn apply(&self, mut experiments: Vec<Experiment>) -> Vec<Experiment> {
+        experiments.retain(|experiment| self.has(experiment));
+        experiments.sort_by(|a, b| self.sort.compare(a, b));
+        experiments
+    }
+
+    fn has(&self, experiment: &Experiment) -> bool {
+        let state = experiment.state();
+        let is_state = self.state.is_empty() || self.state.iter().any(|&it| state == it.into());
+        let has_label = |label: &String| match label.split_once('=') {
+            Some((key, value)) => experiment.labels.get(key).is_some_and(|it| it == value),
+            None => experiment.labels.contains_key(label),
+        };
+        is_state && self.label.iter().all(has_label) && (self.all || !experiment.archived)
+    }
+}
+
+impl Sort {
+    fn compare(self, a: &Experiment, b: &Experiment) -> Ordering {
+        match self {
+            Self::Id => Ordering::Equal,
+            Self::Name => a.name.cmp(&b.name),
+            Self::State => a.state.cmp(&b.state),
+            // What is not known comes last.
+            Self::Best => descending(best(a), best(b)),
+            Self::Age => Reverse(a.submitted_at_ms).cmp(&Reverse(b.submitted_at_ms)),
+            Self::Eta => {
+                let eta = |it| text::eta_ms(it).unwrap_or(u64::MAX);
+                eta(a).cmp(&eta(b))
+            }
+        }
+    }
+}
+
+/// What the champion is worth, or else the fitness by which it was selected.
+fn best(experiment: &Experiment) -> Option<f64> {
+    experiment.champion_fitness.or(experiment.champion_selection_fitness)
+}
+
+fn descending(a: Option<f64>, b: Option<f64>) -> Ordering {
+    let or_last = |fitness: Option<f64>| fitness.unwrap_or(f64::NEG_INFINITY);
+    or_last(b).total_cmp(&or_last(a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn experiments() -> Vec<Experiment> {
+        let labels = |user: &str| [("user".to_owned(), user.to_owned())].into();
+        vec![
+            Experiment {
+                id: 1,
+                state: ExperimentState::Completed.into(),
+                champion_fitness: Some(1.0),
+                labels: labels("ada"),
+                submitted_at_ms: 5,
+                ..Experiment::default()
+            },
+            Experiment {
+                id: 2,
+                state: ExperimentState::Running.into(),
+                champion_selection_fitness: Some(2.0),
+                labels: labels("grace"),
+                generations: 9,
+                recent_generation_ms: Some(1.0),
+                submitted_at_ms: 6,
+                ..Experiment::default()
+            },
+            Experiment { id: 3, archived: true, ..Experiment::default() },
+        ]
+    }
+
+    fn ids(filter: Filter) -> Vec<u64> {
+        filter.apply(experiments()).iter().map(|it| it.id).collect()
+    }
+
+    #[test]
+    fn filters_hold_together() {
+        let label = |text: &str| Filter { label: vec![text.into()], ..Filter::default() };
+        assert_eq!(ids(Filter::default()), [1, 2]);
+        assert_eq!(ids(Filter { all: true, ..Filter::default() }), [1, 2, 3]);
+        assert_eq!(ids(label("user")), [1, 2]);
+        assert_eq!(ids(label("user=ada")), [1]);
+        assert_eq!(ids(Filter { state: vec![State::Running], ..label("user=ada") }), [0_u64; 0]);
+        let states = vec![State::Running, State::Completed];
+        assert_eq!(ids(Filter { state: states, ..Filter::default() }), [1, 2]);
+    }
+
+    #[test]
+    fn what_is_not_known_comes_last() {
+        let sorted = |sort| ids(Filter { sort, all: true, ..Filter::default() });
+        assert_eq!(sorted(Sort::Best), [2, 1, 3]);
+        assert_eq!(sorted(Sort::Age), [2, 1, 3]);
+        assert_eq!(sorted(Sort::Eta), [2, 1, 3]);
+        assert_eq!(sorted(Sort::Name), [1, 2, 3]);
+    }
+}

@@ -1,0 +1,46 @@
+//! `swarmctl man`: manual pages.
+
+use std::{fs, path::PathBuf};
+
+use clap::{Args as ClapArgs, CommandFactory as _};
+
+use crate::{args::Args, error::Error, progress::Progress};
+
+/// Write the manual pages of this program and its commands to a directory.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = HELP)]
+pub struct ManArgs {
+    /// The directory; created if it does not exist.
+    pub directory: PathBuf,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl man ~/.local/share/man/man1    # then: man swarmctl, man swarmctl-run";
+
+/// Writes a page per command.
+pub fn man(args: &ManArgs, progress: &mut Progress) -> Result<(), Error> {
+    let directory = &args.directory;
+    fs::create_dir_all(directory)
+        .and_then(|()| clap_mangen::generate_to(Args::command(), directory))
+        .map_err(|error| Error::Input(format!("cannot write {}: {error}", directory.display())))?;
+    progress.print(&format!("manual pages are in {}", directory.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::OutputFormat;
+
+    #[test]
+    fn every_command_has_its_page() {
+        let dir = tempfile::tempdir().unwrap();
+        let directory = dir.path().join("man1");
+        let mut progress = Progress::to(OutputFormat::Table, Box::new(std::io::sink()));
+        man(&ManArgs { directory: directory.clone() }, &mut progress).unwrap();
+        let page = fs::read_to_string(directory.join("swarmctl-submit.1")).unwrap();
+        assert!(page.contains("Submit an experiment"), "{page}");
+        assert!(directory.join("swarmctl.1").exists());
+        assert!(!directory.join("swarmctl-referee.1").exists());
+    }
+}

@@ -1,0 +1,186 @@
+//! `swarmctl replay`: an episode in one HTML file, to be watched in a browser, or as PNG.
+
+mod picture;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use experiment_file::limits;
+use sim_core::TrialSet;
+use swarm_web::{Episode, Replay, ReplayError, replay_file};
+
+use self::picture::Moments;
+use super::simulate::genotype::Genotype;
+use crate::{
+    address::NamedAddress,
+    archive::Archive,
+    args::{SeedArg, StepsArg, whole},
+    change::Change,
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides},
+    progress::Progress,
+    settings::Settings,
+};
+
+/// Write an HTML file in which an episode can be watched, step by step, in any browser.
+///
+/// The swarm is simulated again, to the same bits as in evolution: any individual of any
+/// generation plays, and nothing has to be recorded for it. The file needs no network and
+/// no program beside a browser, so it can go with a paper. It shows the world, who hears
+/// whom, LEDs, measures, and what every neuron of a robot does.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct ReplayArgs {
+    /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
+    /// ID@G/mean, the mean of the distribution after generation G.
+    #[arg(required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
+    address: Option<NamedAddress>,
+    /// Experiment file, instead of that of an experiment; with --genotype.
+    #[arg(long, value_name = "FILE", requires = "genotype")]
+    config: Option<PathBuf>,
+    /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
+    /// such as a champion file; with --config.
+    #[arg(long, value_name = "FILE", requires = "config")]
+    genotype: Option<PathBuf>,
+    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
+    /// a coordinator. One may use it meanwhile.
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    seed: SeedArg,
+    /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
+    /// experiment file]
+    #[arg(long, value_name = "G", value_parser = whole(0..=u64::MAX))]
+    generation: Option<u64>,
+    /// Which world of the generation.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(0..=limits::TRIALS - 1))]
+    trial: u32,
+    #[command(flatten)]
+    steps: StepsArg,
+    /// Change values of the experiment file, such as world.objects.robot.num_instances=20.
+    #[arg(long, value_name = "PATH=VALUE")]
+    set: Vec<String>,
+    /// Step that a .png shows; FIRST..LAST, both included, makes an animated one [default: the
+    /// last step]
+    #[arg(long, value_name = "STEP|FIRST..LAST", requires = "to")]
+    at: Option<Moments>,
+    /// File to write; its name ends in .html, or in .png for a picture of the world
+    /// [default: replay-ADDRESS.html, replay.html]
+    #[arg(long, value_name = "FILE")]
+    to: Option<PathBuf>,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl replay 3
+  swarmctl replay 3@0/17 --data-dir swarm-data --to early.html
+  swarmctl replay 3 --set world.objects.robot.num_instances=20 --steps 500
+  swarmctl replay 3 --to swarm.png --at 120
+  swarmctl replay 3 --to swarm.png --at 0..200
+  swarmctl replay --config experiment.json --genotype champion.json";
+
+/// Simulates, and writes the file.
+pub async fn replay(
+    settings: Settings,
+    args: &ReplayArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let (path, format) = args.path()?;
+    let (file, genotype, generation) = args.subject(settings).await?;
+    let mut changes = Vec::new();
+    for text in &args.set {
+        let parsed = Change::parse_all(text);
+        changes.extend(parsed.map_err(|problem| Error::Input(format!("--set {problem}")))?);
+    }
+    let overrides =
+        Overrides { seed: args.seed.seed, steps: args.steps.steps, ..Overrides::default() };
+    let compiled = file.changed(&changes).and_then(|file| file.compile(&overrides));
+    let compiled = compiled.map_err(|error| file.invalid(&error))?;
+    let name = genotype.to_string();
+    let episode = Episode {
+        config: &compiled.config,
+        simulation: &compiled.experiment,
+        genotype: &genotype.genes,
+        name: &name,
+        trial_set: TrialSet::Generation(args.generation.unwrap_or(generation)),
+        trial: args.trial,
+    };
+    let bytes = match format {
+        Format::Html => html(&episode)?.into_bytes(),
+        Format::Png => png(&episode, args.at)?,
+    };
+    fs::write(&path, bytes)
+        .map_err(|error| Error::Input(format!("cannot write {}: {error}", path.display())))?;
+    progress.print(&path.display().to_string())
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Html,
+    Png,
+}
+
+fn html(episode: &Episode<'_>) -> Result<String, Error> {
+    let replay = Replay::simulate(episode).map_err(|error| match error {
+        ReplayError::Evaluate(error) => Error::Input(format!("{}: {error}", episode.name)),
+        error => Error::Input(error.to_string()),
+    })?;
+    Ok(replay_file(&replay))
+}
+
+fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error> {
+    let mut steps = Vec::new();
+    let Episode { config, simulation, genotype, trial_set, trial, name } = *episode;
+    simulation
+        .simulate(genotype, trial_set, trial, &mut |step| steps.push(step))
+        .map_err(|error| Error::Input(format!("{name}: {error}")))?;
+    picture::png(config, &steps, moments)
+}
+
+impl ReplayArgs {
+    /// The experiment, who of it, and whose worlds.
+    async fn subject(&self, settings: Settings) -> Result<(ExperimentFile, Genotype, u64), Error> {
+        if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
+            let file = ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error));
+            return Ok((file?, Genotype::read(genotype)?, 0));
+        }
+        let address = self.address.as_ref().expect("clap requires an address or a file");
+        let archive = Archive::open(settings, self.data_dir.as_deref())?;
+        let address = archive.resolve(address).await?;
+        let found = archive.one(address).await?;
+        let name = format!("experiment {}", address.experiment);
+        let file = ExperimentFile::new(name.into(), found.config_json.clone());
+        let generation = found.individual.generation;
+        Ok((file, Genotype::found(address, found), generation))
+    }
+
+    /// The file to write.
+    fn path(&self) -> Result<(PathBuf, Format), Error> {
+        let path = match (&self.to, &self.address) {
+            (Some(path), _) => path.clone(),
+            (None, Some(address)) => {
+                format!("replay-{}.html", address.to_string().replace('/', "-")).into()
+            }
+            (None, None) => "replay.html".into(),
+        };
+        let format = match Path::extension(&path).and_then(|extension| extension.to_str()) {
+            Some("html") => Format::Html,
+            Some("png") => Format::Png,
+            _ => {
+                let path = path.display();
+                return Err(Error::Input(format!("{path}: the name must end in .html or .png")));
+            }
+        };
+        if format == Format::Html && self.at.is_some() {
+            return Err(Error::Input("--at is for .png; a .html has all steps".into()));
+        }
+        Ok((path, format))
+    }
+}
+
+#[cfg(test)]
+mod tests;

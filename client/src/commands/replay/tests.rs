@@ -1,0 +1,94 @@
+//! Files that are written, and what is refused before one is.
+
+use clap::Parser;
+use serde_json::json;
+
+use super::*;
+use crate::{
+    args::{Args, OutputFormat},
+    commands::Command,
+    experiment_file::tests::quickstart,
+    progress::tests::Captured,
+};
+
+/// Genes of the quickstart.
+const N_GENES: usize = 424;
+
+/// Runs `swarmctl replay` on the quickstart, in a directory.
+async fn run(directory: &Path, options: &[&str]) -> Result<Vec<String>, Error> {
+    let genotype = directory.join("genotype.json");
+    fs::write(&genotype, json!(vec![0.6; N_GENES]).to_string()).unwrap();
+    let config = quickstart();
+    let line = ["swarmctl", "replay", "--config", config.to_str().unwrap(), "--genotype"];
+    let line = line.iter().copied().chain([genotype.to_str().unwrap()]).chain(options.to_vec());
+    let Command::Replay(args) = Args::try_parse_from(line).unwrap().command else { panic!() };
+    let captured = Captured::default();
+    replay(Settings::default(), &args, &mut captured.progress(OutputFormat::Table)).await?;
+    Ok(captured.lines())
+}
+
+#[tokio::test]
+async fn the_file_stands_alone_and_is_small() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("swarm.html");
+    let to = path.to_str().unwrap();
+    let robots = "world.objects.robot.num_instances=20";
+    let options = ["--to", to, "--steps", "1000", "--set", robots, "--trial", "1"];
+    assert_eq!(run(directory.path(), &options).await.unwrap(), [to]);
+    let html = fs::read_to_string(&path).unwrap();
+    assert!(html.len() < 2_000_000, "{} bytes", html.len());
+    assert!(!html.contains("http:") && !html.contains("https:"));
+    assert!(html.contains("default-src 'none'"));
+}
+
+#[tokio::test]
+async fn a_png_is_one_step_or_an_animation_of_several() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("swarm.png");
+    let to = path.to_str().unwrap();
+    let frames = async |at: &str| {
+        run(directory.path(), &["--to", to, "--at", at]).await.unwrap();
+        let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(&path).unwrap()));
+        let reader = decoder.read_info().unwrap();
+        reader.info().animation_control().map(|control| control.num_frames)
+    };
+    assert_eq!(frames("99").await, None);
+    assert_eq!(frames("3..7").await, Some(5));
+    let error = run(directory.path(), &["--to", to, "--at", "100"]).await.unwrap_err();
+    assert_eq!(error.to_string(), "--at 100: the episode has steps 0 to 99");
+}
+
+#[test]
+fn steps_are_read_like_seeds() {
+    assert_eq!("0..9".parse::<Moments>(), "00..9".parse());
+    assert_ne!("9".parse::<Moments>(), "0..9".parse());
+    for text in ["", "-1", "x", "9..0", "0..", "1..2..3"] {
+        let error = text.parse::<Moments>().unwrap_err();
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+#[tokio::test]
+async fn what_cannot_be_played_leaves_no_file() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("swarm.html");
+    let to = path.to_str().unwrap();
+    for (options, expected) in [
+        (["--to", "swarm.txt"], "swarm.txt: the name must end in .html or .png"),
+        (["--set", "world.objects.robot.num_instances=0"], "is not a valid experiment file"),
+        (["--set", "nonsense"], "--set "),
+    ] {
+        let mut options = options.to_vec();
+        if options[0] != "--to" {
+            options.extend(["--to", to]);
+        }
+        let error = run(directory.path(), &options).await.unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{error}");
+        assert!(error.to_string().contains(expected), "{error}");
+        assert!(!path.exists());
+    }
+    let nowhere = directory.path().join("missing/swarm.html");
+    let error = run(directory.path(), &["--to", nowhere.to_str().unwrap()]).await.unwrap_err();
+    assert!(error.to_string().starts_with("cannot write"), "{error}");
+    assert_eq!(error.exit_code(), 2);
+}

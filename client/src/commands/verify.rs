@@ -1,0 +1,111 @@
+//! `swarmctl verify`: says what of a bundle is proven.
+
+use std::path::PathBuf;
+
+use bundle::{Bundle, Claim, Flaw, Proof, Sample, Verification};
+use clap::Args;
+use serde::Serialize;
+
+use super::export;
+use crate::{
+    args::IsaArgs, error::Error, json, progress::Progress, resimulation::Resimulation,
+    settings::Settings,
+};
+
+/// Check a bundle without trusting whoever made it.
+///
+/// Evolution is gone through again from the experiment file and the fitness log: every link of
+/// the digest chain, the history, the keyframes and the champion have to come out to the same
+/// bits. Of some generations, drawn by the last link of the chain, and of the champion's
+/// judgement, the fitness is simulated again, here or on a fleet.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct VerifyArgs {
+    /// The bundle that `swarmctl export` wrote.
+    file: PathBuf,
+    /// Number of generations to simulate again, or `all`.
+    #[arg(long, value_name = "N|all", default_value = "5", value_parser = sample)]
+    generations: Sample,
+    /// Number of threads that simulate here [default: one per core]
+    #[arg(long, value_name = "N", value_parser = crate::args::whole::<u16>(1..=1024))]
+    workers: Option<u16>,
+    #[command(flatten)]
+    isa: IsaArgs,
+}
+
+const HELP: &str = "\
+It simulates in this process, or, where --coordinator or SWARM_COORDINATOR names a
+coordinator, on its fleet.
+
+Exit code 12 if the bundle is not what it says.
+
+Examples:
+  swarmctl verify leader.zip
+  swarmctl verify leader.zip --generations all --coordinator http://fleet.example:7700";
+
+fn sample(text: &str) -> Result<Sample, String> {
+    match (text, text.parse()) {
+        ("all", _) => Ok(Sample::All),
+        (_, Ok(n)) => Ok(Sample::Drawn(n)),
+        _ => Err("must be a whole number, or `all`".to_owned()),
+    }
+}
+
+/// What was found, for programs.
+#[derive(Debug, Serialize)]
+struct Report {
+    file: String,
+    sha256: String,
+    proven: Vec<Line>,
+    unproven: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Line {
+    claim: String,
+    what: String,
+}
+
+/// Checks the file.
+pub async fn verify(
+    settings: Settings,
+    args: &VerifyArgs,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let bytes = export::read(&args.file)?;
+    let name = args.file.display();
+    let bundle = Bundle::read(&bytes).map_err(|error| Error::Input(format!("{name}: {error}")))?;
+    let resimulation = Resimulation::open(settings, &bundle.config_json, args.workers, args.isa)?;
+    let flawed = |flaw: Flaw| Error::Flawed(format!("{name}: {flaw}"));
+    let mut verification = Verification::begin(&bundle, args.generations).map_err(flawed)?;
+    while let Some(batches) = verification.advance().map_err(flawed)? {
+        let (n_done, n_all) = verification.progress();
+        progress.step(n_done, n_all, "generations");
+        for batch in batches {
+            let what = format!("generations; simulating {}", batch.trial_set);
+            progress.step(n_done, n_all, &what);
+            let simulated = resimulation.simulate(verification.simulation(), &batch).await?;
+            batch.compare(&simulated).map_err(flawed)?;
+        }
+    }
+    progress.clear();
+    let Proof { proven, unproven, .. } = verification.finish();
+    let line = |(claim, what): (Claim, String)| Line { claim: claim.to_string(), what };
+    let report = Report {
+        file: name.to_string(),
+        sha256: export::sha256(&bytes),
+        proven: proven.into_iter().map(line).collect(),
+        unproven,
+    };
+    progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
+}
+
+impl Report {
+    fn to_text(&self) -> String {
+        let Self { file, sha256, proven, unproven } = self;
+        let proven = proven.iter().map(|Line { claim, what }| format!("proven    {claim}: {what}"));
+        let unproven = unproven.iter().map(|what| format!("unproven  {what}"));
+        let first = format!("{file}, SHA-256 {sha256}");
+        std::iter::once(first).chain(proven).chain(unproven).collect::<Vec<_>>().join("\n")
+    }
+}

@@ -1,0 +1,89 @@
+//! What keeps experiments from being computed, while they are followed.
+
+use std::time::Duration;
+
+use swarm_proto::v1::{ExplainExperimentResponse, WatchExplanationResponse};
+use tokio::{
+    sync::mpsc,
+    time::{sleep, timeout},
+};
+use tonic::Streaming;
+
+use super::News;
+use crate::{
+    commands::explain::{Finding, stall},
+    connection::{Connection, backoff},
+    error::is_transient,
+    json::has_ended,
+};
+
+/// A situation that passes within this time is not worth a line.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// Tells what keeps experiments from being computed, of one after the other: what holds for
+/// the fleet holds for all of them. Ends when all have ended, or if the coordinator cannot say
+/// such things.
+pub async fn tell(connection: Connection, ids: Vec<u64>, news: mpsc::Sender<News>) {
+    for id in ids {
+        let mut told = None;
+        let mut backoff = backoff();
+        loop {
+            match connection.explanations(id).await {
+                Ok(explanations) => {
+                    if (Reader { connection: &connection, id, news: &news, told: &mut told })
+                        .read(explanations)
+                        .await
+                    {
+                        break;
+                    }
+                }
+                // Whoever reads the events says that the connection is lost.
+                Err(status) if is_transient(&status) => {}
+                Err(_) => return,
+            }
+            sleep(backoff.next_delay(rand::random())).await;
+        }
+    }
+}
+
+/// Reads explanations of one experiment.
+struct Reader<'a> {
+    connection: &'a Connection,
+    id: u64,
+    news: &'a mpsc::Sender<News>,
+    /// What was told last; none: that nothing keeps it.
+    told: &'a mut Option<Finding>,
+}
+
+impl Reader<'_> {
+    /// Tells what changes and lasts. Returns whether the experiment has ended.
+    async fn read(&mut self, mut explanations: Streaming<WatchExplanationResponse>) -> bool {
+        let mut found = self.told.clone();
+        loop {
+            let next = if found == *self.told {
+                Ok(explanations.message().await)
+            } else {
+                timeout(GRACE, explanations.message()).await
+            };
+            match next {
+                Ok(Ok(Some(WatchExplanationResponse { explanation: Some(explanation) }))) => {
+                    if is_over(&explanation) {
+                        return true;
+                    }
+                    found = stall(&explanation, self.connection.address());
+                }
+                Ok(_) => return false,
+                // It has lasted.
+                Err(_) => {
+                    self.told.clone_from(&found);
+                    // Whoever is not interested any more ends this task.
+                    let _ = self.news.send(News::Situation(self.id, found.clone())).await;
+                }
+            }
+        }
+    }
+}
+
+fn is_over(explanation: &ExplainExperimentResponse) -> bool {
+    explanation.experiment.as_ref().is_none_or(|experiment| has_ended(experiment.state()))
+}

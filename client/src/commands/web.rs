@@ -1,0 +1,60 @@
+//! `swarmctl web`: the pages of a data directory, without a coordinator.
+
+use std::{net::SocketAddr, path::PathBuf, sync::Arc};
+
+use clap::Args;
+use coordinator::PagesArchive;
+use swarm_transport::listen_address;
+use swarm_web::Site;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+use super::run::fleet::{login_address, random_token};
+use crate::{error::Error, progress::Progress};
+
+/// Serve pages of the experiments in a data directory, to be looked at in a browser.
+///
+/// They show curves, every individual that ever lived, comparisons and replays. Nothing is
+/// written to the directory, and a coordinator may use it meanwhile. The address that is
+/// printed lets a browser in, and nobody else on this machine. Ends with an interrupt.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct WebArgs {
+    /// The data directory of a coordinator, or of `run`.
+    #[arg(long, env = "SWARM_DATA_DIR", value_name = "DIR", default_value = "./swarm-data")]
+    data_dir: PathBuf,
+    /// Address to listen on, of this machine only; port 0 takes a free one.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:0", value_parser = listen_address)]
+    web_listen: SocketAddr,
+}
+
+const HELP: &str = "\
+From another machine: ssh -L 8080:127.0.0.1:8080 HOST swarmctl web --web-listen 127.0.0.1:8080
+
+Examples:
+  swarmctl web
+  swarmctl web --data-dir backups/today";
+
+/// Serves until an interrupt.
+pub async fn web(
+    args: &WebArgs,
+    progress: &mut Progress,
+    interrupt: CancellationToken,
+) -> Result<(), Error> {
+    let listen = args.web_listen;
+    if !listen.ip().to_canonical().is_loopback() {
+        return Err(Error::Input(format!(
+            "--web-listen {listen}: these pages are for this machine only; use `ssh -L`, or \
+             `coordinator --web-listen`, which has tokens and TLS"
+        )));
+    }
+    let archive =
+        PagesArchive::open_alone(&args.data_dir).map_err(|error| Error::from_store(&error))?;
+    let cannot = |error| Error::Input(format!("cannot listen on {listen}: {error}"));
+    let listener = TcpListener::bind(listen).await.map_err(cannot)?;
+    let address = listener.local_addr().map_err(cannot)?;
+    let token = random_token();
+    progress.print(&login_address(address, &token))?;
+    let site = Site { archive: Arc::new(archive), control: None, token: Some(token), tls: None };
+    site.serve(listener, interrupt).await.map_err(cannot)
+}

@@ -1,0 +1,146 @@
+//! Simulates again what a bundle says was simulated.
+
+use std::{
+    ops::Range,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+};
+
+use bundle::Batch;
+use sim_core::{EvaluateError, Isa, Simulation, TrialSet};
+use swarm_proto::v1::{
+    ComparisonTrials, EvaluateFitnessRequest, EvolutionTrials, Genes, evolution_trials::Trials,
+};
+
+use crate::{args::IsaArgs, connection::Connection, error::Error, settings::Settings};
+
+/// Trials of a genotype that a thread simulates at once, side by side.
+const TRIALS_PER_ITEM: u32 = 25;
+
+/// Bytes of genes in one request to a coordinator.
+const REQUEST_LEN: usize = 4 << 20;
+
+/// Where it is simulated.
+#[derive(Debug)]
+pub enum Resimulation {
+    /// In this process.
+    Here { n_threads: usize, isa: Isa },
+    /// On the fleet of a coordinator.
+    Fleet { connection: Box<Connection>, config_json: String },
+}
+
+impl Resimulation {
+    /// On the fleet of the coordinator that the command line or the environment names, else
+    /// here.
+    pub fn open(
+        settings: Settings,
+        config_json: &str,
+        n_threads: Option<u16>,
+        isa: IsaArgs,
+    ) -> Result<Self, Error> {
+        if settings.coordinator.is_some() {
+            let connection = Box::new(Connection::open(settings)?);
+            return Ok(Self::Fleet { connection, config_json: config_json.to_owned() });
+        }
+        let n_threads = n_threads
+            .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
+        Ok(Self::Here { n_threads, isa: isa.get() })
+    }
+
+    /// The fitness of the genotypes of a batch, trial by trial.
+    pub async fn simulate(
+        &self,
+        simulation: &Simulation,
+        batch: &Batch,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        match self {
+            Self::Here { n_threads, isa } => {
+                let simulation = simulation.clone().with_isa(*isa);
+                here(&simulation, batch, *n_threads)
+                    .map_err(|error| Error::Flawed(format!("it cannot be simulated: {error}")))
+            }
+            Self::Fleet { connection, config_json } => fleet(connection, config_json, batch).await,
+        }
+    }
+}
+
+/// Has a fleet simulate.
+async fn fleet(
+    connection: &Connection,
+    config_json: &str,
+    batch: &Batch,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let n_trials = batch.trial_fitness.first().map_or(0, Vec::len);
+    let genotype_len = batch.genotypes.first().map_or(1, |genes| size_of_val(&**genes).max(1));
+    let mut fitness = Vec::new();
+    for genotypes in batch.genotypes.chunks((REQUEST_LEN / genotype_len).max(1)) {
+        let request = EvaluateFitnessRequest {
+            config_json: config_json.to_owned(),
+            genotypes: genotypes.iter().map(|genes| Genes { values: genes.clone() }).collect(),
+            trials: Some(trials(batch.trial_set)),
+            trial_count: n_trials as u32,
+            priority: None,
+        };
+        fitness.extend(connection.fitness(request).await?);
+    }
+    Ok(fitness)
+}
+
+fn trials(trial_set: TrialSet) -> EvolutionTrials {
+    let trials = match trial_set {
+        TrialSet::Generation(generation) => Some(Trials::Generation(generation)),
+        TrialSet::HeldOut { generation, block } => {
+            Some(Trials::Comparison(ComparisonTrials { generation, block: block.into() }))
+        }
+        TrialSet::Judgement(generation) => Some(Trials::Judgement(generation)),
+        // No evolution runs on these.
+        TrialSet::Evaluation => None,
+    };
+    EvolutionTrials { trials }
+}
+
+/// Simulates on some threads.
+fn here(
+    simulation: &Simulation,
+    batch: &Batch,
+    n_threads: usize,
+) -> Result<Vec<Vec<f64>>, EvaluateError> {
+    let items = items(batch);
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::new());
+    thread::scope(|scope| {
+        for _ in 0..n_threads.min(items.len()) {
+            scope.spawn(|| {
+                while let Some((genotype, trials)) = items.get(next.fetch_add(1, Ordering::Relaxed))
+                {
+                    let genes = &batch.genotypes[*genotype];
+                    let fitness = simulation.evaluate(genes, batch.trial_set, trials.clone());
+                    let result = (*genotype, trials.start, fitness);
+                    done.lock().unwrap_or_else(PoisonError::into_inner).push(result);
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|&(genotype, first, _)| (genotype, first));
+    let mut fitness = vec![Vec::new(); batch.genotypes.len()];
+    for (genotype, _, values) in done {
+        fitness[genotype].extend(values?);
+    }
+    Ok(fitness)
+}
+
+/// Genotypes and trials, in portions.
+fn items(batch: &Batch) -> Vec<(usize, Range<u32>)> {
+    let mut items = Vec::new();
+    for (genotype, fitness) in batch.trial_fitness.iter().enumerate() {
+        let n_trials = fitness.len() as u32;
+        for first in (0..n_trials).step_by(TRIALS_PER_ITEM as usize) {
+            items.push((genotype, first..n_trials.min(first + TRIALS_PER_ITEM)));
+        }
+    }
+    items
+}

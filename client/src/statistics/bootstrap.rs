@@ -1,0 +1,51 @@
+//! Bootstrap intervals: how far a statistic varies if the runs are drawn again from those
+//! that there are (percentile method; Efron & Tibshirani 1993, section 13.3).
+
+use rand::RngExt as _;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng as _};
+use serde::Serialize;
+
+use super::quantile;
+
+/// Number of times that the runs are drawn again.
+const N_RESAMPLES: usize = 10_000;
+/// The same runs give the same interval.
+const SEED: u64 = 0;
+
+/// A statistic and its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    pub value: f64,
+    /// Lower and upper end. Both are the value if there is one run: of the spread of runs
+    /// it says nothing.
+    pub ci95: [f64; 2],
+}
+
+/// A statistic of a sample. `statistic` may reorder what it is given.
+pub fn interval(values: &[f64], statistic: impl Fn(&mut [f64]) -> f64) -> Interval {
+    interval_of_two(values, &[], |values, _| statistic(values))
+}
+
+/// A statistic of two samples, each drawn again by itself.
+pub fn interval_of_two(
+    first: &[f64],
+    second: &[f64],
+    statistic: impl Fn(&mut [f64], &mut [f64]) -> f64,
+) -> Interval {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let (mut a, mut b) = (first.to_vec(), second.to_vec());
+    let value = statistic(&mut a, &mut b);
+    let mut draw = |from: &[f64], to: &mut Vec<f64>| {
+        to.clear();
+        to.extend(from.iter().map(|_| from[rng.random_range(0..from.len() as u32) as usize]));
+    };
+    let mut resampled: Vec<f64> = (0..N_RESAMPLES)
+        .map(|_| {
+            draw(first, &mut a);
+            draw(second, &mut b);
+            statistic(&mut a, &mut b)
+        })
+        .collect();
+    resampled.sort_by(f64::total_cmp);
+    Interval { value, ci95: [0.025, 0.975].map(|p| quantile(&resampled, p)) }
+}

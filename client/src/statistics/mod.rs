@@ -1,0 +1,40 @@
+//! Statistics that compare runs: robust summaries of few runs, their bootstrap intervals,
+//! and whether one algorithm is better than another (Agarwal et al. 2021, "Deep
+//! reinforcement learning at the edge of the statistical precipice").
+
+mod bootstrap;
+mod ranks;
+
+pub use bootstrap::{Interval, interval, interval_of_two};
+pub use ranks::{mann_whitney, probability_of_improvement};
+
+/// The median; the mean of the two middle values of an even number. NaN without values.
+pub fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    quantile(values, 0.5)
+}
+
+/// The interquartile mean: the mean without the smallest and the largest quarter of the
+/// values, each rounded down to whole values. NaN without values.
+pub fn interquartile_mean(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let cut = values.len() / 4;
+    let kept = &values[cut..values.len() - cut];
+    kept.iter().sum::<f64>() / kept.len() as f64
+}
+
+/// A quantile of sorted values, by linear interpolation between them, p in [0, 1]. NaN
+/// without values.
+fn quantile(sorted: &[f64], p: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let place = p * last as f64;
+    let low = (place as usize).min(last);
+    let high = (low + 1).min(last);
+    // Infinities stand for what never happened: their difference is no number.
+    let rise = if sorted[low] == sorted[high] { 0.0 } else { sorted[high] - sorted[low] };
+    let share = place - low as f64;
+    if share == 0.0 { sorted[low] } else { sorted[low] + share * rise }
+}
+
+#[cfg(test)]
+mod tests;

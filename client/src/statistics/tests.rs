@@ -1,0 +1,86 @@
+//! Against rliable and scipy: `client/tests/fixtures/make.py` wrote what they compute.
+
+use serde::Deserialize;
+
+use super::*;
+
+#[derive(Debug, Deserialize)]
+struct Fixture {
+    summaries: Vec<Summary>,
+    pairs: Vec<Pair>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Summary {
+    values: Vec<f64>,
+    median: f64,
+    iqm: f64,
+    /// Of the median.
+    median_ci95: [f64; 2],
+    iqm_ci95: [f64; 2],
+}
+
+#[derive(Debug, Deserialize)]
+struct Pair {
+    a: Vec<f64>,
+    b: Vec<f64>,
+    probability: f64,
+    probability_ci95: [f64; 2],
+    p: f64,
+}
+
+fn fixture() -> Fixture {
+    serde_json::from_str(include_str!("../../tests/fixtures/statistics.json")).unwrap()
+}
+
+fn close(found: f64, expected: f64, tolerance: f64) -> bool {
+    (found - expected).abs() <= tolerance * expected.abs().max(1e-12)
+}
+
+/// Whether both ends agree, but for what two sets of random draws differ by: a part of the
+/// width. For a statistic of few possible values that is a step from one to the next.
+fn agree(found: Interval, expected: [f64; 2], part: f64) -> bool {
+    let width = (expected[1] - expected[0]).abs().max(1e-12);
+    found.ci95.iter().zip(expected).all(|(found, end)| (found - end).abs() <= part * width)
+}
+
+#[test]
+fn summaries_are_those_of_rliable() {
+    for of in fixture().summaries {
+        let iqm = interval(&of.values, interquartile_mean);
+        let middle = interval(&of.values, median);
+        assert!(close(iqm.value, of.iqm, 1e-12), "{of:?} {iqm:?}");
+        assert!(close(middle.value, of.median, 1e-12), "{of:?} {middle:?}");
+        assert!(agree(iqm, of.iqm_ci95, 0.06), "{of:?} {iqm:?}");
+        assert!(agree(middle, of.median_ci95, 0.12), "{of:?} {middle:?}");
+    }
+}
+
+#[test]
+fn comparisons_are_those_of_rliable_and_scipy() {
+    for pair in fixture().pairs {
+        let found = interval_of_two(&pair.a, &pair.b, |a, b| probability_of_improvement(a, b));
+        assert!(close(found.value, pair.probability, 1e-12), "{pair:?} {found:?}");
+        assert!(agree(found, pair.probability_ci95, 0.12), "{pair:?} {found:?}");
+        let p = mann_whitney(&pair.a, &pair.b).unwrap();
+        assert!(close(p, pair.p, 1e-9), "{pair:?} {p}");
+        assert_eq!(mann_whitney(&pair.b, &pair.a), Some(p));
+    }
+}
+
+#[test]
+fn what_never_happened_has_no_interval_of_numbers() {
+    let never = f64::INFINITY;
+    let found = interval(&[3.0, 5.0, never], median);
+    assert_eq!((found.value, found.ci95), (5.0, [3.0, never]));
+    assert_eq!(median(&mut [3.0, never]), never);
+    assert_eq!(median(&mut [never, never]), never);
+}
+
+#[test]
+fn one_run_says_nothing_of_the_spread_and_none_say_nothing() {
+    assert_eq!(interval(&[2.0], median), Interval { value: 2.0, ci95: [2.0, 2.0] });
+    assert!(interval(&[], median).value.is_nan());
+    assert_eq!(mann_whitney(&[], &[1.0]), None);
+    assert_eq!(mann_whitney(&[1.0], &[1.0]), Some(1.0));
+}

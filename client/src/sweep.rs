@@ -1,0 +1,200 @@
+//! Sweeps: the runs of one experiment file with several seeds and values.
+
+use std::{collections::BTreeSet, str::FromStr};
+
+use clap::Args;
+use coordinator::group::Membership;
+use experiment_file::{ConfigError, ExperimentConfig};
+use sha2::{Digest as _, Sha256};
+use swarm_proto::v1::SubmitExperimentRequest;
+
+use crate::{
+    args::{ExperimentArgs, Label},
+    change::Change,
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides, random_request_id},
+    json,
+};
+
+/// Most runs of one sweep: as many as a coordinator has unfinished.
+const RUNS_MAX: usize = coordinator::limits::UNFINISHED_MAX;
+
+/// What makes one experiment file several runs.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SweepArgs {
+    /// Run the experiment once with each of these seeds, as a group of runs. `0..4` are
+    /// five: both ends belong to it.
+    #[arg(long, value_name = "FIRST..LAST|S,...", conflicts_with = "seed")]
+    pub seeds: Option<Seeds>,
+    /// Change a value of the experiment file. With several values, run the experiment with
+    /// each of them, as a group of runs; several options give all combinations.
+    #[arg(long, value_name = "PATH=VALUE,...")]
+    pub set: Vec<String>,
+    /// Name of the group [default: the name of the experiment, if there are several runs]
+    #[arg(long, value_name = "NAME")]
+    pub group: Option<String>,
+}
+
+/// A set of seeds, in ascending order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds(Vec<u64>);
+
+impl FromStr for Seeds {
+    type Err = String;
+
+    /// Reads `3`, `0..4`, `1,5,8..9`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut seeds = BTreeSet::new();
+        for part in text.split(',') {
+            let number = |text: &str| -> Result<u64, String> {
+                text.trim()
+                    .parse()
+                    .map_err(|_| format!("`{part}` is neither a seed nor FIRST..LAST"))
+            };
+            let (first, last) = match part.split_once("..") {
+                Some((first, last)) => (number(first)?, number(last)?),
+                None => (number(part)?, number(part)?),
+            };
+            if last < first {
+                return Err(format!("`{part}` ends before it begins"));
+            }
+            if last - first >= RUNS_MAX as u64 {
+                return Err(format!("`{part}` has more than {RUNS_MAX} seeds"));
+            }
+            seeds.extend(first..=last);
+        }
+        Ok(Self(seeds.into_iter().collect()))
+    }
+}
+
+/// One run of a sweep, checked.
+#[derive(Debug)]
+pub struct SweepRun {
+    pub file: ExperimentFile,
+    pub request: SubmitExperimentRequest,
+}
+
+impl SweepRun {
+    /// The group that it belongs to, if any.
+    pub fn group(&self) -> Option<&str> {
+        Some(&*self.request.group).filter(|group| !group.is_empty())
+    }
+}
+
+/// All runs that the arguments ask for, or every mistake in them. One run alone belongs to
+/// a group only if the arguments name the group or a set of seeds.
+pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
+    let invalid = |error: ConfigError| Error::invalid(&args.config, &error);
+    let file = ExperimentFile::read(&args.config).map_err(invalid)?;
+    let overrides = args.overrides();
+    let seeds: Vec<Option<u64>> = match &args.sweep.seeds {
+        Some(Seeds(seeds)) => seeds.iter().copied().map(Some).collect(),
+        None => vec![overrides.seed],
+    };
+    let variants = variants(&args.sweep.set, RUNS_MAX / seeds.len())?;
+    let is_group = args.sweep.group.is_some() || args.sweep.seeds.is_some() || variants.len() > 1;
+    let (mut runs, mut problems) = (Vec::new(), Vec::new());
+    for variant in &variants {
+        let checked = file.changed(&variant.changes).and_then(|file| {
+            let config = file.check(&overrides)?.config;
+            Ok((file, config))
+        });
+        match checked {
+            Err(error) => problems.extend(error.problems),
+            Ok((file, config)) => {
+                for &seed in &seeds {
+                    let overrides = Overrides { seed, ..overrides };
+                    let mut request = file.request(&overrides, random_request_id("submit"));
+                    let labels = args.labels.iter().cloned();
+                    request.labels = labels.map(|Label { key, value }| (key, value)).collect();
+                    if is_group {
+                        let config = overrides.apply(config.clone()).map_err(invalid)?;
+                        join(&mut request, &config, args.sweep.group.as_deref(), &variant.name)?;
+                    }
+                    runs.push(SweepRun { file: file.clone(), request });
+                }
+            }
+        }
+    }
+    if !problems.is_empty() {
+        let mut seen = BTreeSet::new();
+        // What is wrong with several variants is said once.
+        problems.retain(|problem| seen.insert(problem.to_string()));
+        return Err(invalid(ConfigError { problems }));
+    }
+    Ok(runs)
+}
+
+/// Makes a request one for a run of a group: the same run of the same group again is the
+/// run that exists.
+fn join(
+    request: &mut SubmitExperimentRequest,
+    config: &ExperimentConfig,
+    group: Option<&str>,
+    variant: &str,
+) -> Result<(), Error> {
+    let group = group.unwrap_or(&config.name);
+    Membership::new(group, variant)
+        .map_err(|problem| Error::Input(format!("{problem}; name it with --group")))?;
+    let (simulation, config) = (sim_core::FINGERPRINT, config.to_canonical_json());
+    let identity = json::line(&[group, simulation, &config]);
+    let digest: [u8; 16] = Sha256::digest(identity)[..16].try_into().expect("it has 32");
+    request.request_id = format!("group-{:032x}", u128::from_be_bytes(digest));
+    (request.group, request.variant) = (group.to_owned(), variant.to_owned());
+    Ok(())
+}
+
+/// A combination of values.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Variant {
+    /// The changes that not all variants have; empty if there is one variant.
+    name: String,
+    changes: Vec<Change>,
+}
+
+/// All combinations of the values of `--set`, or what is wrong with each.
+fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
+    let (mut axes, mut problems) = (Vec::new(), Vec::new());
+    for text in set {
+        match Change::parse_variants(text) {
+            Ok(axis) => axes.push(axis),
+            Err(problem) => problems.push(format!("--set {problem}")),
+        }
+    }
+    for (i, axis) in axes.iter().enumerate() {
+        let path = &axis[0].path;
+        if axes[..i].iter().any(|other| other[0].path == *path) {
+            problems.push(format!("--set {path} is given twice"));
+        }
+        if path == "seed" {
+            problems.push("--set seed: give --seeds instead".to_owned());
+        }
+    }
+    if !problems.is_empty() {
+        return Err(Error::Input(problems.join("\n")));
+    }
+    let mut variants = vec![Variant::default()];
+    for axis in &axes {
+        let with = |variant: &Variant, change: &Change| {
+            let mut variant = variant.clone();
+            if axis.len() > 1 {
+                let separator = if variant.name.is_empty() { "" } else { "; " };
+                variant.name += &format!("{separator}{change}");
+            }
+            variant.changes.push(change.clone());
+            variant
+        };
+        if variants.len() * axis.len() > n_max {
+            let message = format!("these are more than {RUNS_MAX} runs, the most of a group");
+            return Err(Error::Input(message));
+        }
+        variants = variants
+            .iter()
+            .flat_map(|variant| axis.iter().map(move |change| with(variant, change)))
+            .collect();
+    }
+    Ok(variants)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! Names of commands that people try, and the commands that do what they want.
+
+use clap::{
+    CommandFactory as _, Error,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
+
+use crate::args::Args;
+
+/// Other words, and what to suggest for them.
+const SYNONYMS: [(&[&str], &str); 10] = [
+    (&["stop", "kill", "abort", "end"], "`cancel` ends an experiment"),
+    (&["remove", "rm", "purge"], "`delete` deletes an experiment that has ended"),
+    (&["start", "launch", "evolve", "train"], "`run` evolves here, `submit` on a fleet"),
+    (&["status", "ps", "show", "info"], "`list` has all experiments, `explain` one"),
+    (&["tail", "follow", "attach"], "`watch` follows an experiment, `logs --follow` all"),
+    (&["best", "result", "results", "genotype"], "`champion` prints the best individual"),
+    (
+        &["check", "lint"],
+        "`validate` checks experiment files, `verify` a bundle, `doctor` a database",
+    ),
+    (&["nodes", "cluster", "hosts"], "`workers` lists the workers"),
+    (&["play", "trace", "view"], "`simulate` repeats trials, with `--trace` step by step"),
+    (&["graph", "chart", "figure", "draw"], "`plot` draws the fitness of runs"),
+];
+/// Least similarity of a command that may have been mistyped, of 1.
+const SIMILARITY_MIN: f64 = 0.85;
+
+/// An error of the command line; for an unknown command with commands that were
+/// probably meant, instead of those that merely have the same letters.
+pub fn with_suggestions(mut error: Error) -> Error {
+    if error.kind() != ErrorKind::InvalidSubcommand {
+        return error;
+    }
+    let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand).cloned()
+    else {
+        return error;
+    };
+    error.remove(ContextKind::SuggestedSubcommand);
+    error.remove(ContextKind::Suggested);
+    if let Some((_, tip)) = SYNONYMS.iter().find(|(names, _)| names.contains(&&*name)) {
+        let tips = ContextValue::StyledStrs(vec![(*tip).into()]);
+        error.insert(ContextKind::Suggested, tips);
+        return error;
+    }
+    let definition = Args::command();
+    let commands = definition.get_subcommands().filter(|command| !command.is_hide_set());
+    let names = commands.map(clap::Command::get_name);
+    let similar = names.filter(|known| strsim::jaro_winkler(&name, known) > SIMILARITY_MIN);
+    let similar: Vec<String> = similar.map(str::to_owned).collect();
+    if !similar.is_empty() {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(similar));
+    }
+    error
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+
+    fn answer(command: &str) -> String {
+        with_suggestions(Args::try_parse_from(["swarmctl", command]).unwrap_err()).to_string()
+    }
+
+    #[test]
+    fn other_words_lead_to_the_command_that_is_meant() {
+        for (word, command) in [("stop", "`cancel`"), ("status", "`list`"), ("best", "`champion`")]
+        {
+            let answer = answer(word);
+            assert!(answer.contains(command), "{answer}");
+        }
+    }
+
+    #[test]
+    fn no_word_is_a_command() {
+        let definition = Args::command();
+        for word in SYNONYMS.iter().flat_map(|(words, _)| *words) {
+            assert!(definition.find_subcommand(word).is_none(), "{word}");
+        }
+    }
+
+    #[test]
+    fn mistyped_commands_are_recognised() {
+        for (typed, command) in
+            [("sbumit", "submit"), ("valdate", "validate"), ("expalin", "explain")]
+        {
+            assert!(answer(typed).contains(&format!("'{command}'")), "{}", answer(typed));
+        }
+        assert!(!answer("xyzzy").contains("tip"));
+    }
+}
