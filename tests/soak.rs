@@ -179,6 +179,8 @@ impl Soak {
                 if fault == Fault::WorkerKilled {
                     place.worker.process.kill();
                 } else {
+                    // A worker that has not said a word may not listen for signals yet.
+                    place.worker.process.wait_for("sign of life", |_| true);
                     place.worker.process.signal("TERM");
                     assert_eq!(place.worker.process.wait().code(), Some(0));
                 }

@@ -9,10 +9,11 @@ use std::{
     time::{Duration, Instant},
 };
 
+use evolution::Evolution;
 use experiment_file::ExperimentConfig;
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, workspace_file};
-use numeric::random::{Purpose, Stream};
 use serde_json::json;
+use sim_core::Simulation;
 
 const N_ROUNDS: usize = 5;
 /// The first generation of a round sets up, the others are timed.
@@ -32,9 +33,10 @@ fn main() {
             let file = file.edit(|file| {
                 file["seed"] = json!(seed);
                 file["algorithm"]["generations"] = json!(N_TIMED_GENERATIONS + 1);
-                // Re-evaluations of champions are not what is measured.
+                // Re-evaluations and judgements of champions are not what is measured.
                 file["algorithm"]["champion_every"] = json!(1000);
                 file["algorithm"]["champion_trials"] = json!(1);
+                file["algorithm"]["judgement_trials"] = json!(1);
             });
             let id = coordinator.submit(&file.path());
             coordinator.watch(id).finish();
@@ -63,15 +65,17 @@ fn fleet_seconds(coordinator: &CoordinatorProcess, id: u64) -> f64 {
     Duration::from_millis(elapsed_ms).as_secs_f64() / N_TIMED_GENERATIONS as f64
 }
 
-/// Seconds that one thread takes for as many genotypes as a generation has.
+/// Seconds that one thread takes for the genotypes of a generation of the same evolution.
 fn alone_seconds(config: &ExperimentConfig, seed: u64) -> f64 {
-    let experiment = sim_core::Simulation::compile(config).expect("a shipped file is right");
-    let mut genes = Stream::new(seed, 0, 0, Purpose::Evolution, 0);
+    let config = ExperimentConfig { seed, ..config.clone() };
+    let simulation = Simulation::compile(&config).expect("a shipped file is right");
+    let segments = simulation.population_segments();
+    let evolution = Evolution::new(&config, segments, sim_core::FINGERPRINT);
+    let generation = evolution.ask();
     let start = Instant::now();
-    for _ in 0..config.algorithm.population_size {
-        let genotype: Vec<f64> = (0..experiment.genotype_len()).map(|_| genes.uniform()).collect();
+    for genotype in generation.genotypes.iter() {
         let trials = 0..config.algorithm.num_evaluations;
-        experiment.evaluate(&genotype, seed, trials).expect("genotype and trials are right");
+        simulation.evaluate(genotype, 0, trials).expect("genotype and trials are right");
     }
     start.elapsed().as_secs_f64()
 }

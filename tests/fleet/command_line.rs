@@ -11,13 +11,16 @@ use serde_json::{Value, json};
 fn quickstart_gets_better_and_gives_the_same_digest_twice() {
     let directory = tempfile::tempdir().unwrap();
     let path = workspace_file("configs/quickstart.json");
-    let run = || {
-        // In the same data directory: a finished experiment is not continued.
-        let args =
-            ["run", path.to_str().unwrap(), "--data-dir", directory.path().to_str().unwrap()];
-        swarmctl(args).expect_success().json_lines()
+    let run = |more: &[&str]| {
+        let data_dir = directory.path().to_str().unwrap();
+        let args = [&["run", path.to_str().unwrap(), "--data-dir", data_dir], more].concat();
+        swarmctl(args).expect_success()
     };
-    let (first, second) = (run(), run());
+    let first = run(&[]).json_lines();
+    let again = run(&[]);
+    assert_eq!(again.json_lines(), first, "it is shown again");
+    assert!(again.stderr.contains("-> the same once more: --new"), "{}", again.stderr);
+    let second = run(&["--new"]).json_lines();
     let last = first.last().unwrap();
     assert_eq!(last["state"], "completed");
     let best = |line: &Value| line["best"].as_f64().unwrap();

@@ -7,6 +7,7 @@
 use std::{
     collections::BTreeSet,
     env, fs,
+    io::{BufRead as _, BufReader},
     process::{Child, Command, Stdio},
     sync::OnceLock,
     thread,
@@ -27,7 +28,7 @@ const N_QUESTIONS_MAX: usize = 600;
 const PERIOD: Duration = Duration::from_millis(100);
 
 fn experiment() -> Experiment {
-    Experiment::tiny(2).edit(|value| value["algorithm"]["judgement_trials"] = 8.into())
+    Experiment::tiny(2)
 }
 
 fn submit(coordinator: &CoordinatorProcess) -> u64 {
@@ -351,4 +352,28 @@ async fn an_experiment_that_is_queued_beside_another_is_alone_once_that_is_pause
     busy.hang_up().await;
     let _worker = WorkerProcess::start(&coordinator, "worker");
     assert_undisturbed(&coordinator, id);
+}
+
+#[test]
+fn what_an_experiment_waits_for_is_said_at_once_to_those_who_watch_and_of_the_fleet() {
+    let coordinator = CoordinatorProcess::start();
+    let id = submit(&coordinator);
+    let mut watch = Command::new(binary("swarmctl"));
+    watch.args(["--coordinator", &coordinator.url(), "watch", &id.to_string()]);
+    let mut watch = watch.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut remarks = BufReader::new(watch.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert_eq!(remarks.next().unwrap(), "waiting: no worker is connected");
+    let advice = remarks.next().unwrap();
+    assert!(advice.contains("start some: worker --coordinator"), "{advice}");
+
+    let fleet = coordinator.swarmctl(&["explain"]).expect_success().json();
+    assert_eq!(fleet["workers"], 0);
+    assert_eq!(fleet["experiments"][0]["findings"][0]["kind"], "no_workers");
+
+    coordinator.swarmctl(&["pause", &id.to_string(), "--reason", "lunch"]).expect_success();
+    assert_eq!(remarks.next().unwrap(), "waiting: it is paused: paused by a client: lunch");
+    coordinator.swarmctl(&["resume", &id.to_string()]).expect_success();
+    let _worker = WorkerProcess::start(&coordinator, "ada");
+    drop(remarks.by_ref().last());
+    assert!(watch.wait().unwrap().success());
 }

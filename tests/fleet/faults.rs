@@ -23,8 +23,12 @@ use harness::{CoordinatorProcess, Experiment, LogLine, Watch, undisturbed};
 /// Generations of the experiments here.
 const GENERATIONS: u64 = 6;
 
-/// An item takes tens of milliseconds: time to hit it.
+/// A generation takes tens of milliseconds: time to hit it.
 static SMALL: Subject = Subject::new(|| Experiment::small(GENERATIONS));
+/// Two workers of one slot each are given its items in several portions.
+static MANY: Subject = Subject::new(|| {
+    Experiment::small(GENERATIONS).edit(|e| e["algorithm"]["population_size"] = 60.into())
+});
 /// For faults that need no time to hit.
 static TINY: Subject = Subject::new(|| Experiment::tiny(GENERATIONS));
 

@@ -4,12 +4,18 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod budgets;
+mod bundles;
 mod command_line;
 mod determinism;
 mod evaluation;
 mod explain;
 mod faults;
+mod forks;
+mod groups;
 mod health;
+mod individuals;
+mod life;
+mod lineage;
 mod metrics;
 mod monitoring;
 mod protocol;
@@ -18,5 +24,6 @@ mod read_out;
 mod reproduction;
 mod security;
 mod simulate;
+mod slurm;
 mod steering;
 mod strangers;

@@ -5,11 +5,12 @@ use std::{
     collections::BTreeMap,
     env, fs,
     path::{Path, PathBuf},
+    process::Command,
 };
 
 use evolution::Digest;
 use experiment_file::ExperimentConfig;
-use harness::{swarmctl, workspace_file};
+use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
 
 /// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, 1 without
@@ -45,23 +46,6 @@ impl Run {
         champions.iter().map(|path| Self::read(path)).collect()
     }
 
-    /// Those that this version of the simulation computed. What an earlier one computed
-    /// can be repeated with that one only.
-    fn repeatable() -> Vec<Self> {
-        let mut runs = Self::all();
-        runs.retain(Self::is_repeatable);
-        runs
-    }
-
-    fn is_repeatable(&self) -> bool {
-        let simulation = self.champion["simulation"].as_str().unwrap();
-        let is_ours = simulation == sim_core::FINGERPRINT;
-        if !is_ours {
-            println!("SKIPPED: results/*/{} is of {simulation}", self.stem);
-        }
-        is_ours
-    }
-
     fn seed(&self) -> String {
         self.champion["seed"].to_string()
     }
@@ -86,16 +70,15 @@ fn results(path: &str) -> PathBuf {
 }
 
 #[test]
-fn runs_are_complete_and_of_the_shipped_experiments() {
+fn runs_are_complete_and_of_the_shipped_experiments_and_this_simulation() {
     let runs = Run::all();
     assert!(!runs.is_empty());
     for run in &runs {
         let config = run.config();
         assert_eq!(run.stem, format!("{}-{}", config.name, config.seed));
-        if run.is_repeatable() {
-            let digest = Digest::of_config(&config, sim_core::FINGERPRINT);
-            assert_eq!(run.champion["config_digest"], digest.to_string());
-        }
+        assert_eq!(run.champion["simulation"], sim_core::FINGERPRINT, "{}", run.stem);
+        let digest = Digest::of_config(&config, sim_core::FINGERPRINT);
+        assert_eq!(run.champion["config_digest"], digest.to_string(), "{}", run.stem);
         assert_eq!(run.history.len() as u64, config.algorithm.generations, "{}", run.stem);
         for (i, generation) in run.history.iter().enumerate() {
             assert_eq!(generation["generation"], i.to_string(), "{}", run.stem);
@@ -105,9 +88,9 @@ fn runs_are_complete_and_of_the_shipped_experiments() {
 }
 
 #[test]
-fn runs_that_are_repeated_begin_with_the_same_bits() {
+fn runs_begin_again_with_the_same_bits() {
     let n_generations = n_generations();
-    for run in Run::repeatable() {
+    for run in Run::all() {
         let data_dir = tempfile::tempdir().unwrap();
         let generations = n_generations.to_string();
         let lines = swarmctl([
@@ -136,7 +119,7 @@ fn runs_that_are_repeated_begin_with_the_same_bits() {
 
 #[test]
 fn champions_have_the_fitness_for_which_they_were_chosen() {
-    for run in Run::repeatable() {
+    for run in Run::all() {
         // Means of a distribution were in no generation; evaluations are about those.
         let trials = run.champion["trial_fitness"].as_array().unwrap();
         if trials.is_empty() {
@@ -167,7 +150,7 @@ fn champions_have_the_fitness_for_which_they_were_chosen() {
 
 /// Trials do not depend on how many there are, so a few of them are enough.
 #[test]
-fn evaluations_that_are_repeated_have_the_same_bits() {
+fn evaluations_have_the_same_bits_again() {
     let evaluations = fs::read_dir(results("evaluations")).unwrap();
     let mut evaluations: Vec<PathBuf> = evaluations.map(|entry| entry.unwrap().path()).collect();
     evaluations.sort();
@@ -178,15 +161,11 @@ fn evaluations_that_are_repeated_have_the_same_bits() {
             serde_json::from_str(&fs::read_to_string(evaluation.join("summary.json")).unwrap())
                 .unwrap();
         let run = Run::read(&results(&format!("champions/{stem}.json")));
-        if !run.is_repeatable() {
-            continue;
-        }
         let again = tempfile::tempdir().unwrap();
         let mut args: Vec<String> =
             ["evaluate", "--local", "--trials", "2", "--genotype"].map(str::to_owned).into();
         args.push(results(&format!("champions/{stem}.json")).to_str().unwrap().to_owned());
         args.extend(["--config".to_owned(), run.config_path()]);
-        args.extend(["--base".to_owned(), format!("seed={}", run.seed())]);
         args.extend(["--steps".to_owned(), summary["steps"].to_string()]);
         args.extend(["--to".to_owned(), again.path().to_str().unwrap().to_owned()]);
         for (index, condition) in summary["conditions"].as_array().unwrap().iter().enumerate() {
@@ -208,4 +187,51 @@ fn evaluations_that_are_repeated_have_the_same_bits() {
         };
         assert_eq!(rows(again.path()), rows(&evaluation), "{stem}");
     }
+}
+
+/// Numbers of `docs/reproduction.md`, one of each table.
+#[test]
+fn the_script_of_the_report_prints_its_numbers() {
+    let mut command = Command::new(results("report.py"));
+    command.arg(results("format-2"));
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped_for_want_of("python3", "apt-get install python3");
+        return;
+    }
+    let report = Outcome::of(&mut command).expect_success().stdout;
+    for row in [
+        "| leader_selection_snes-0 | 1000 | 1.737 |",
+        "| nominal | 1.47 | 1.23 |",
+        "| inhibit=msg | 0.012 [0.001] |",
+        "| accuracy | topology_switch:every=200 | 0.45 |",
+    ] {
+        assert!(report.contains(row), "{row}: {report}");
+    }
+    Outcome::of(&mut Command::new(results("report.py"))).expect_success();
+}
+
+#[test]
+fn a_run_that_is_added_twice_is_computed_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |path: &str| dir.path().join(path);
+    fs::create_dir(path("results")).unwrap();
+    fs::create_dir(path("configs")).unwrap();
+    fs::copy(results("add-run"), path("results/add-run")).unwrap();
+    fs::copy(workspace_file("configs/quickstart.json"), path("configs/quickstart.json")).unwrap();
+    let binaries = binary("swarmctl").parent().unwrap().to_str().unwrap().to_owned();
+    binary("coordinator");
+    let add = || {
+        let mut command = Command::new(path("results/add-run"));
+        command.args(["quickstart", "7"]).arg(path("data"));
+        command.args(["--generations", "2", "--workers", "1"]);
+        command.env("PATH", format!("{binaries}:{}", env::var("PATH").unwrap()));
+        Outcome::of(&mut command).expect_success();
+        let read = |name| fs::read_to_string(path(name)).unwrap();
+        [read("results/histories/quickstart-7.csv"), read("results/champions/quickstart-7.json")]
+    };
+    let added = add();
+    assert_eq!(added[0].lines().count(), 3);
+    let champion_of_run = path("data/quickstart-7/quickstart-1.champion.json");
+    assert_eq!(added[1], fs::read_to_string(champion_of_run).unwrap());
+    assert_eq!(add(), added);
 }

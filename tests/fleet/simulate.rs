@@ -119,7 +119,6 @@ fn genotypes_and_traces_that_will_not_do_are_one_line_each() {
         (["--genotype", config.to_str().unwrap()], "no genotype in"),
         (["--genotype", "missing.json"], "missing.json"),
         (["--trace", &inside_a_file], "cannot write"),
-        (["--steps", "200000"], "algorithm.evaluation_steps"),
     ] {
         let outcome = simulate(&config, &args);
         assert_eq!(outcome.code, Some(2), "{outcome:#?}");

@@ -56,12 +56,20 @@ async fn a_pause_outlives_the_coordinator_and_changes_no_bit() {
 }
 
 #[tokio::test]
-async fn a_paused_experiment_can_be_reprioritised_and_cancelled() {
+async fn a_paused_experiment_can_be_given_another_reason_and_priority_and_be_cancelled() {
     let coordinator = CoordinatorProcess::start();
     let experiment_id = coordinator.submit(&Experiment::small(GENERATIONS).path());
     let mut client = experiments(&coordinator).await;
-    let pause = PauseExperimentRequest { experiment_id, reason: String::new() };
-    client.pause_experiment(pause).await.unwrap();
+    for (reason, expected) in [
+        ("", "paused by a client"),
+        ("lunch", "paused by a client: lunch"),
+        ("", "paused by a client: lunch"),
+        ("dinner", "paused by a client: dinner"),
+    ] {
+        let pause = PauseExperimentRequest { experiment_id, reason: reason.to_owned() };
+        let paused = client.pause_experiment(pause).await.unwrap().into_inner();
+        assert_eq!(paused.experiment.unwrap().reason, expected);
+    }
 
     let set = SetPriorityRequest { experiment_id, priority: 300 };
     let changed = client.set_priority(set).await.unwrap().into_inner().experiment.unwrap();

@@ -34,6 +34,7 @@ impl Experiment {
         algorithm["evaluation_steps"] = json!(600);
         algorithm["num_evaluations"] = json!(3);
         algorithm["champion_trials"] = json!(8);
+        algorithm["judgement_trials"] = json!(8);
         Self::of(value)
     }
 

@@ -24,5 +24,5 @@ pub use mount::SmallDisk;
 pub use process::{LogLine, LoggingProcess, Outcome, swarmctl, swarmctl_process};
 pub use prometheus::{Prometheus, promtool_check_config, promtool_check_metrics};
 pub use proxy::{Direction, Proxy, Traffic};
-pub use python::{PythonClient, RunningPythonClient};
+pub use python::{PythonClient, RunningPythonClient, python_with};
 pub use skip::{skipped, skipped_for_want_of};

@@ -22,6 +22,23 @@ pub struct PythonClient {
     generated: TempDir,
 }
 
+/// A Python that has a module; none, and a line that says that the test is skipped, without.
+pub fn python_with(module: &str) -> Option<PathBuf> {
+    let interpreter = env::var_os("SWARM_TEST_PYTHON")
+        .map_or_else(|| workspace_file(VIRTUAL_ENVIRONMENT), PathBuf::from);
+    let import = format!("import {module}");
+    let found = Command::new(&interpreter).args(["-c", &import]).output();
+    if !found.is_ok_and(|output| output.status.success()) {
+        skipped_for_want_of(
+            &format!("Python with {module} at {}", interpreter.display()),
+            "python3 -m venv target/python && \
+             target/python/bin/pip install -r .ci/requirements.txt",
+        );
+        return None;
+    }
+    Some(interpreter)
+}
+
 impl PythonClient {
     /// None, and a line that says that the test is skipped, without a Python.
     pub fn find() -> Option<Self> {

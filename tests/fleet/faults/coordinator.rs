@@ -4,13 +4,13 @@ use std::{thread, time::Duration};
 
 use harness::{CoordinatorProcess, LogLine, WorkerProcess};
 
-use super::{GENERATIONS, SMALL, n_lost, resumed_at, wait_for_assignment};
+use super::{GENERATIONS, MANY, SMALL, n_lost, resumed_at, wait_for_assignment};
 
 #[test]
 fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     let mut coordinator = CoordinatorProcess::start();
     let _workers = WorkerProcess::start_many(&coordinator, 2);
-    let id = SMALL.submit(&coordinator);
+    let id = MANY.submit(&coordinator);
     let watch = coordinator.watch(id);
 
     // More assignments than the first ones: results have come in, others are
@@ -28,9 +28,10 @@ fn a_coordinator_killed_within_a_generation_evaluates_it_again() {
     assert!(!coordinator.process.lines().iter().any(is_evaluated), "the kill came within it");
 
     coordinator.restart();
-    assert_eq!(resumed_at(&coordinator), 3);
+    // Or at the one before, whose commit may have been under way.
+    assert!((2..=3).contains(&resumed_at(&coordinator)));
     // The workers and the watching client have come back by themselves.
-    SMALL.assert_undisturbed(watch);
+    MANY.assert_undisturbed(watch);
 }
 
 #[test]

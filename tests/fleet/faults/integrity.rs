@@ -68,10 +68,10 @@ fn an_experiment_whose_checkpoint_was_edited_does_not_come_to_another_digest() {
     coordinator.wait_for_generation(1);
     edit_and_restart(&mut coordinator, |database| {
         // A bit of a number: still a valid evolution.
-        let read = "SELECT state FROM checkpoints";
+        let read = "SELECT state FROM keyframes";
         let mut state: Vec<u8> = database.query_row(read, [], |row| row.get(0)).unwrap();
         state[40] ^= 1;
-        let n_changed = database.execute("UPDATE checkpoints SET state = ?1", [state]).unwrap();
+        let n_changed = database.execute("UPDATE keyframes SET state = ?1", [state]).unwrap();
         assert_eq!(n_changed, 1);
     });
     let reason = wait_for_pause(&coordinator);

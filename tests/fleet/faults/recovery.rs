@@ -92,7 +92,7 @@ fn a_copy_of_a_database_in_use_without_its_log_is_not_taken_for_the_whole() {
 }
 
 /// A database with a completed and a running experiment of which a page is overwritten, or a
-/// quarter is cut off: each experiment that is not lost comes to the digest
+/// tenth is cut off: each experiment that is not lost comes to the digest
 /// of an undisturbed run.
 fn is_recovered(damage: impl FnOnce(&mut Vec<u8>)) {
     let mut coordinator = CoordinatorProcess::start();
@@ -169,5 +169,5 @@ fn root_page(database: &[u8], table: &str) -> usize {
 
 #[test]
 fn a_database_that_was_cut_off_is_recovered() {
-    is_recovered(|bytes| bytes.truncate(bytes.len() * 3 / 4));
+    is_recovered(|bytes| bytes.truncate(bytes.len() * 9 / 10));
 }

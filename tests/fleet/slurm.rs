@@ -1,0 +1,124 @@
+//! Workers as jobs of a real Slurm: a controller and a node on this machine.
+
+use std::{
+    fs,
+    net::TcpListener,
+    path::Path,
+    process::{Child, Command, Stdio},
+};
+
+use harness::{CoordinatorProcess, Experiment, binary, skipped, undisturbed};
+use serde_json::Value;
+
+/// Processes that end with the test.
+struct Running(Vec<Child>);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        for child in &mut self.0 {
+            // A failed test must not leave processes behind.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn output(program: &str, args: &[&str]) -> String {
+    let output = Command::new(program).args(args).output().unwrap();
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+}
+
+fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+/// The settings of a controller and a node of two processors without accounts, cgroups or
+/// authentication.
+fn settings(directory: &Path) -> String {
+    let (host, user) = (output("hostname", &["-s"]), output("id", &["-un"]));
+    let (controller, node, directory) = (free_port(), free_port(), directory.display());
+    format!(
+        "ClusterName=test
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={controller}
+SlurmdPort={node}
+SlurmUser={user}
+SlurmdUser={user}
+AuthType=auth/none
+CredType=cred/none
+StateSaveLocation={directory}/state
+SlurmdSpoolDir={directory}/spool
+SlurmctldPidFile={directory}/slurmctld.pid
+SlurmdPidFile={directory}/slurmd.pid
+SlurmctldLogFile={directory}/slurmctld.log
+SlurmdLogFile={directory}/slurmd.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+SchedulerParameters=sched_interval=1,batch_sched_delay=0
+MpiDefault=none
+ReturnToService=2
+NodeName={host} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
+PartitionName=short Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+"
+    )
+}
+
+#[test]
+fn workers_are_jobs_of_slurm_as_long_as_there_is_something_to_compute() {
+    let has = |program: &str| Command::new(program).arg("-V").output().is_ok();
+    if !["slurmctld", "slurmd", "sbatch", "squeue", "scancel"].into_iter().all(has) {
+        return skipped("there is no Slurm (Debian: slurmctld, slurmd, slurm-client)");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    for part in ["state", "spool"] {
+        fs::create_dir(directory.path().join(part)).unwrap();
+    }
+    let conf = directory.path().join("slurm.conf");
+    fs::write(&conf, settings(directory.path())).unwrap();
+    let start = |program: &Path, args: &[&str]| {
+        let mut command = Command::new(program);
+        command.args(args).env("SLURM_CONF", &conf).current_dir(directory.path());
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let _slurm =
+        Running(["slurmctld", "slurmd"].map(|daemon| start(daemon.as_ref(), &["-D"])).into());
+
+    let coordinator = CoordinatorProcess::start();
+    // More than one worker is wanted for.
+    let population = |file: &mut Value| file["algorithm"]["population_size"] = 24.into();
+    let experiment = Experiment::tiny(3).edit(population);
+    let id = coordinator.submit(&experiment.path());
+    let (url, worker) = (coordinator.url(), binary("worker"));
+    let args = ["--coordinator", &url, "fleet", "slurm", "--max", "2", "--interval", "1s"];
+    let more = ["--idle-timeout", "4s", "--worker", worker.to_str().unwrap()];
+    let sbatch = ["--", "--partition=short"];
+    let swarmctl = |sbatch: &[&str]| {
+        let mut command = Command::new(binary("swarmctl"));
+        command.args([&args[..], &more, sbatch].concat()).env("SLURM_CONF", &conf);
+        command.current_dir(directory.path());
+        command
+    };
+    // The controller answers as soon as it is up, and refuses what does not exist.
+    let refused = loop {
+        let refused = swarmctl(&["--", "--partition=none"]).output().unwrap();
+        let reason = String::from_utf8(refused.stderr).unwrap();
+        if !reason.contains("Unable to contact slurm controller") {
+            break (refused.status.code(), reason);
+        }
+    };
+    assert_eq!(refused.0, Some(2));
+    assert!(refused.1.contains("invalid partition"), "{}", refused.1);
+
+    let quiet = Stdio::null;
+    let fleet = swarmctl(&sbatch).stdout(quiet()).stderr(quiet()).spawn().unwrap();
+    let _fleet = Running(vec![fleet]);
+    let finished = coordinator.watch(id).finish();
+    assert_eq!(finished.digests(), undisturbed(&experiment));
+    let left = |line: &Value| line["message"] == "worker left";
+    let (n_seen, first) = coordinator.process.find(0, "the end of a worker", left);
+    let (_, second) = coordinator.process.find(n_seen, "the end of the other", left);
+    assert_ne!(first["name"], second["name"]);
+    assert_eq!(second["workers"], 0);
+}
