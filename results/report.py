@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Prints the numbers of docs/reproduction.md, as tables.
+
+    results/report.py [DIRECTORY]           runs and evaluations in it; results/ by default
+    results/report.py --traces [DIRECTORY]  what champions send, from a trace of five trials;
+                                            needs swarmctl in the PATH
+
+Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of samples.
+"""
+
+import csv
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from pathlib import Path
+
+RESULTS = Path(__file__).resolve().parent
+LAST = 50
+MEANS = (0.1, 0.3, 0.5, 0.7, 1.0)
+BESTS = (0.5, 1.0)
+STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 700, 1000)
+
+
+def table(head, rows):
+    print("| " + " | ".join(map(str, head)) + " |")
+    print("|" + "---|" * len(head))
+    for row in rows:
+        print("| " + " | ".join(str(cell) for cell in row) + " |")
+    print()
+
+
+def number(value, digits=3):
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def read_csv(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def runs(folder):
+    print("## Runs\n")
+    rows = []
+    for path in sorted((folder / "histories").glob("*.csv")):
+        history = read_csv(path)
+        last = history[-LAST:]
+        champion = json.loads((folder / "champions" / f"{path.stem}.json").read_text())
+        judged, selected = champion.get("judged"), champion.get("held_out")
+        worth = ""
+        if judged:
+            worth = f"{judged['mean']:.3f} ({judged['ci95'][0]:.3f} to {judged['ci95'][1]:.3f})"
+        elif selected:
+            worth = f"{selected['mean']:.3f} ± {selected['ci95']:.3f}, selected"
+        first = lambda key, least: next(
+            (row["generation"] for row in history if float(row[key] or "-inf") > least), ""
+        )
+        rows.append([
+            path.stem,
+            len(history),
+            number(statistics.fmean(float(row["mean"]) for row in last)),
+            number(statistics.fmean(float(row["best"]) for row in last)),
+            number(max(float(row["best"]) for row in history)),
+            worth,
+            number(sum(int(row["duration_ms"]) for row in history) / 3.6e6, 2),
+            *(first("mean", least) for least in MEANS),
+            *(first("best", least) for least in BESTS),
+            history[-1]["digest"][:12],
+        ])
+    table(
+        ["run", "generations", f"mean, last {LAST}", f"best, last {LAST}", "best of all", "champion",
+         "wall, h", *(f"mean > {least} from" for least in MEANS), *(f"best > {least} from" for least in BESTS),
+         "last digest"],
+        rows,
+    )
+
+
+def evaluation(folder):
+    print(f"## Evaluation of {folder.name}\n")
+    trials = defaultdict(lambda: defaultdict(list))
+    for row in read_csv(folder / "trials.csv"):
+        if row["time_mean"]:
+            trials[row["condition"]][row["metric"]].append((float(row["time_mean"]), row["end"]))
+    metrics = sorted({metric for of in trials.values() for metric in of})
+    print("Mean over trials of the mean over time; in brackets the median.\n")
+    cell = lambda values: values and f"{statistics.fmean(values):.3f} [{statistics.median(values):.3f}]"
+    table(
+        ["condition", *metrics],
+        [[name, *(cell([mean for mean, _ in of[metric]]) for metric in metrics)] for name, of in trials.items()],
+    )
+    if "true_positive_rate" in metrics:
+        errors(folder, trials)
+    steps = read_csv(folder / "steps.csv")
+    medians = defaultdict(dict)
+    for row in steps:
+        medians[row["metric"], row["condition"]][int(row["step"])] = row["median"]
+    end = max(int(row["step"]) for row in steps)
+    print("Median over trials at a step (at the latest recorded one before it).\n")
+    shown = sorted({step for step in STEPS if step < end} | {end})
+    rows = []
+    for (metric, condition), of in sorted(medians.items()):
+        at = lambda step: of[max(known for known in of if known <= step)]
+        rows.append([metric, condition, *(at(step) for step in shown)])
+    table(["measure", "condition", *shown], rows)
+
+
+def errors(folder, trials):
+    """Wrong LEDs per step. A trial has one border, so that its size follows from the rates:
+    accuracy * n = TPR * border + TNR * (n - border)."""
+    name = json.loads((folder / "summary.json").read_text())["name"]
+    config = json.loads((RESULTS.parent / "configs" / f"{name}.json").read_text())
+    evolved = config["algorithm"]["evolvable_object"]
+    rows = []
+    for condition, of in trials.items():
+        if condition != "nominal" and not condition.startswith("robots="):
+            continue
+        n = config["world"]["objects"][evolved]["num_instances"]
+        n = int(condition.removeprefix("robots=")) if condition != "nominal" else n
+        rates = zip(*([mean for mean, _ in of[key]] for key in ("accuracy", "true_positive_rate", "true_negative_rate")))
+        if len({len(of[key]) for key in ("accuracy", "true_positive_rate", "true_negative_rate")}) != 1:
+            print(f"{condition}: a trial has no border, or nothing but a border\n")
+            continue
+        border = lambda accuracy, tpr, tnr: n * (accuracy - tnr) / (tpr - tnr)
+        rates = list(rates)
+        misses = statistics.fmean(border(*rate) * (1 - rate[1]) for rate in rates)
+        alarms = statistics.fmean((n - border(*rate)) * (1 - rate[2]) for rate in rates)
+        rows.append([condition, number(misses, 2), number(alarms, 2)])
+    table(["condition", "false negatives per step", "false positives per step"], rows)
+
+
+def traces(folder):
+    print("## What champions send\n")
+    for path in sorted((folder / "champions").glob("*.json")):
+        champion = json.loads(path.read_text())
+        config = RESULTS.parent / "configs" / f"{champion['name']}.json"
+        with tempfile.TemporaryDirectory() as scratch:
+            trace = Path(scratch) / "trace.csv"
+            command = ["swarmctl", "simulate", config, "--genotype", path, "--trace", trace,
+                       "--generation", "1000000", "--trials", "5"]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            rows = [row for row in read_csv(trace) if int(row["step"]) >= 10]
+        modes = Counter(row["mode"] for row in rows)
+        frames = sum(modes.values())
+        print(f"{path.stem}: {frames} frames after the tenth step")
+        for mode, n in sorted(modes.items()):
+            lit = sum(row["mode"] == mode and row.get("led", "0") not in ("", "0") for row in rows)
+            print(f"  {mode}: {100 * n / frames:.2f} %, of these with the LED on {100 * lit / n:.2f} %")
+        message = lambda row: ", ".join(value for key, value in row.items() if key.startswith("message_"))
+        sent = Counter(message(row) for row in rows if row["mode"] == "send")
+        for symbol, n in sent.most_common(4):
+            print(f"  sends ({symbol}): {100 * n / sum(sent.values()):.2f} %")
+        print()
+
+
+def main():
+    arguments = [argument for argument in sys.argv[1:] if argument != "--traces"]
+    folder = Path(arguments[0]) if arguments else RESULTS
+    if "--traces" in sys.argv:
+        traces(folder)
+        return
+    runs(folder)
+    for path in sorted((folder / "evaluations").glob("*")):
+        evaluation(path)
+
+
+if __name__ == "__main__":
+    main()
