@@ -82,8 +82,10 @@ export function chart(label) {
     frame = { inner, x0, x1 };
     const parts = [];
     const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
-    const digits = Math.max(0, Math.min(4, 2 - Math.floor(Math.log10(y1 - y0))));
-    for (const tick of ticks(y0, y1, 5)) {
+    const heights = ticks(y0, y1, 5);
+    // As many as tell one from the next.
+    const digits = Math.max(0, Math.ceil(-Math.log10(heights[1] - heights[0] || 1) - 1e-9));
+    for (const tick of heights) {
       parts.push(shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }));
       parts.push(text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" }));
     }

@@ -2,8 +2,13 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
+import { whatItDoes } from "swarm/doing.js";
+import { dynamicsPanel } from "swarm/dynamics.js";
 import { heatMap } from "swarm/heat-map.js";
 import { askJson, bar, complain, listen, main, order, remaining, span, stateMark } from "swarm/page.js";
+
+/** Time between two looks at what does not come with every generation, ms. */
+const LOOK_EVERY = 2000;
 
 const id = location.pathname.split("/").pop();
 bar(`Experiment ${id}`, "");
@@ -20,6 +25,7 @@ const fitness = chart("fitness by generation");
 const spread = chart("standard deviation of fitness by generation");
 const map = heatMap(id);
 const championBox = element("section", { className: "panel" });
+const dynamics = dynamicsPanel(id);
 const doing = element("section", { className: "panel" });
 const eventList = element("ol", { className: "events" });
 const file = element("pre", { className: "file" });
@@ -31,6 +37,7 @@ main.replaceChildren(
     element("section", { className: "panel" }, element("h2", {}, "Diversity"),
       element("p", { className: "muted small" }, "standard deviation of fitness among the individuals"), spread),
     element("section", { className: "panel" }, element("h2", {}, "Events"), eventList)),
+  dynamics,
   element("details", { className: "panel" }, element("summary", {}, "Experiment file"), file));
 
 function draw() {
@@ -56,6 +63,7 @@ function draw() {
   fitness.dataset.generations = generations.length;
   spread.show({ xLabel: "generation", yLabel: "standard deviation", lines: [{ name: "standard deviation", color: "var(--line)", points: points(4) }] });
   map.update(it.generations_done);
+  dynamics.update(it.generations_done);
 }
 
 function drawActions(hasCoordinator) {
@@ -115,25 +123,7 @@ function drawChampion() {
 
 async function drawDoing(hasCoordinator) {
   doing.hidden = !hasCoordinator || experiment.state !== "running";
-  if (doing.hidden) return;
-  const it = await askJson(`/api/experiments/${id}/explain`);
-  const parts = [element("h2", {}, "Now")];
-  for (const trouble of it.troubles) parts.push(element("p", { className: "bad" }, trouble));
-  if (it.workers_available === 0) {
-    parts.push(element("p", { className: "bad" }, it.workers ? "No connected worker is given work." : "No worker is connected: start one with `worker`."));
-  }
-  if (it.round) {
-    const { generation, kind, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;
-    parts.push(element("p", {}, `${kind} ${kind === "generation" ? generation : `after generation ${generation}`}: ${episodes - left} of ${episodes} episodes, since ${span(running)}`),
-      element("progress", { max: episodes, value: episodes - left }),
-      element("p", { className: "muted" }, `${queued} items wait; ${held.length} workers hold others`));
-    const rows = held.sort((a, b) => b[2] - a[2]).slice(0, 6).map(([worker, items, ms]) =>
-      element("tr", {}, element("td", {}, worker), element("td", {}, `${items} items`), element("td", {}, `for ${span(ms)}`)));
-    if (rows.length) parts.push(element("table", {}, ...rows));
-  }
-  for (const [worker, why] of it.withheld.slice(0, 5)) parts.push(element("p", { className: "bad small" }, `${worker}: ${why}`));
-  if (it.rivals.length) parts.push(element("p", { className: "muted" }, `shares the fleet with ${it.rivals.map((rival) => `experiment ${rival}`).join(", ")}`));
-  doing.replaceChildren(...parts);
+  if (!doing.hidden) doing.replaceChildren(element("h2", {}, "Now"), ...whatItDoes(await askJson(`/api/experiments/${id}/explain`)));
 }
 
 async function drawEvents() {
@@ -156,20 +146,31 @@ async function load() {
   await Promise.all([drawEvents(), drawDoing(hasCoordinator)]);
 }
 
+let next = null;
+
+/** Looks again and again, as long as something happens. */
+async function follow() {
+  clearTimeout(next);
+  try {
+    await load();
+    document.getElementById("problem")?.remove();
+  } catch (error) {
+    complain(error);
+  }
+  clearTimeout(next);
+  if (["running", "paused"].includes(experiment?.state)) next = setTimeout(follow, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
+}
+
 try {
   hasCoordinator = (await askJson("/api/session")).has_coordinator;
-  await load();
-  let isLoading = false;
-  listen(`/api/experiments/${id}/live?from=0`, async (news) => {
+  await follow();
+  listen(`/api/experiments/${id}/live?from=0`, (news) => {
     // After a new connection the server may say again what is known.
     for (const row of news.generations) if (row[0] === generations.length + (generations[0]?.[0] ?? row[0])) generations.push(row);
     const before = experiment;
     experiment = news.experiment;
     draw();
-    if (isLoading || (before.last_sequence === experiment.last_sequence && before.state === experiment.state)) return;
-    isLoading = true;
-    await load().catch(complain);
-    isLoading = false;
+    if (before.state !== experiment.state) follow();
   });
 } catch (error) {
   complain(error);

@@ -1,16 +1,22 @@
 // Who computes.
 
 import { decimals, element } from "swarm/dom.js";
-import { askJson, bar, complain, main, span } from "swarm/page.js";
+import { whatItDoes } from "swarm/doing.js";
+import { fleetTimeline } from "swarm/fleet-timeline.js";
+import { askJson, bar, complain, counted, main, span } from "swarm/page.js";
 
 /** Between two looks, ms. */
 const LOOK_EVERY = 2000;
+/** Experiments that are explained at most. */
+const EXPLAINED_MAX = 6;
 
 bar("Fleet", "/fleet");
 const summary = element("p", { className: "muted" });
 const rows = element("tbody");
 const heading = ["Worker", "Slots", "Items", "Results/s", "Idle", "Last heard", "Connected", "Version", ""];
-main.replaceChildren(element("h1", {}, "Fleet"), summary,
+const timeline = fleetTimeline();
+const work = element("div", { className: "columns" });
+main.replaceChildren(element("h1", {}, "Fleet"), summary, timeline, work,
   element("div", { className: "panel scroll" }, element("table", { className: "list" },
     element("thead", {}, element("tr", {}, ...heading.map((name) => element("th", {}, name)))), rows)));
 
@@ -25,15 +31,28 @@ function row(it) {
     cell("Version", it.version), cell("", element("span", { className: "bad" }, it.trouble)));
 }
 
+/** What each experiment does that is not at its end, and why it waits. */
+async function explain(experiments) {
+  const running = experiments.filter((it) => it.state === "running");
+  const parts = await Promise.all(running.slice(0, EXPLAINED_MAX).map(async (it) =>
+    element("section", { className: "panel" },
+      element("h2", {}, element("a", { href: `/experiment/${it.id}` }, `${it.id} ${it.name}`)),
+      ...whatItDoes(await askJson(`/api/experiments/${it.id}/explain`)))));
+  if (running.length > parts.length) parts.push(element("p", { className: "muted" }, `${running.length - parts.length} more experiments run`));
+  work.replaceChildren(...parts);
+}
+
 async function look() {
   try {
     const { workers } = await askJson("/api/workers");
     const slots = workers.reduce((sum, it) => sum + it.slots, 0);
     const rate = workers.reduce((sum, it) => sum + it.results_per_second, 0);
     summary.textContent = workers.length
-      ? `${workers.length} workers with ${slots} slots, ${decimals(rate, 1)} results per second`
+      ? `${counted(workers.length, "worker")} with ${counted(slots, "slot")}, ${decimals(rate, 1)} results per second`
       : "No worker is connected: start one with `worker`.";
     rows.replaceChildren(...workers.slice(0, 1000).map(row));
+    timeline.show(await askJson("/api/timeline"), workers);
+    await explain((await askJson("/api/experiments")).experiments);
     document.getElementById("problem")?.remove();
   } catch (error) {
     complain(error);

@@ -74,6 +74,11 @@ export function complain(error) {
   if (!box.isConnected) main.prepend(box);
 }
 
+/** "1 item", "2 items" */
+export function counted(n, what) {
+  return `${n} ${what}${n === 1 ? "" : "s"}`;
+}
+
 /** "3 s", "12 min", "4.2 h" */
 export function span(ms) {
   const units = [[86_400_000, "d"], [3_600_000, "h"], [60_000, "min"], [1000, "s"]];

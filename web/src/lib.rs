@@ -18,4 +18,4 @@ mod what_if;
 pub use replay::{Episode, Replay, ReplayError};
 pub use replay_file::replay_file;
 pub use server::Site;
-pub use source::{Action, Archive, Control};
+pub use source::{Action, Archive, Assignment, Control, Fate};

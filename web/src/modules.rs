@@ -21,9 +21,12 @@ macro_rules! modules {
 modules!(
     "camera.js",
     "dom.js",
+    "doing.js",
     "drawing.js",
+    "dynamics.js",
     "charts.js",
     "episode.js",
+    "fleet-timeline.js",
     "heat-map.js",
     "page.js",
     "page-compare.js",

@@ -1,9 +1,12 @@
 //! What pages are made of: the same queries, in the same messages, as clients have.
 
+use std::{ops::Range, time::Duration};
+
+use serde::Serialize;
 use swarm_proto::v1::{
     Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
-    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
-    SubmitExperimentRequest, Worker,
+    ListDynamicsResponse, ListEventsRequest, ListEventsResponse, ListGenerationsRequest,
+    ListGenerationsResponse, SubmitExperimentRequest, Worker,
 };
 use tokio::sync::watch;
 use tonic::{Status, async_trait};
@@ -31,6 +34,9 @@ pub trait Archive: Send + Sync + 'static {
     /// of that one.
     async fn fitness(&self, id: u64, from: u64, n: u32) -> Result<(u64, Vec<Vec<f32>>), Status>;
 
+    /// How a page of generations from `from` on moved the distribution: work for a processor.
+    async fn dynamics(&self, id: u64, from: u64) -> Result<ListDynamicsResponse, Status>;
+
     /// The genotype at an address that names a single one.
     async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status>;
 
@@ -43,6 +49,9 @@ pub trait Archive: Send + Sync + 'static {
 pub trait Control: Send + Sync + 'static {
     /// The connected workers.
     async fn workers(&self) -> Result<Vec<Worker>, Status>;
+
+    /// Who computed what lately, in no order.
+    async fn timeline(&self) -> Result<Vec<Assignment>, Status>;
 
     /// What an experiment does, or waits for.
     async fn explain(&self, id: u64) -> Result<ExplainExperimentResponse, Status>;
@@ -65,4 +74,45 @@ pub enum Action {
     Cancel,
     /// Its weight in the sharing of the fleet, 1 to 1000.
     Priority(u32),
+}
+
+/// Something that a worker was given to compute.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignment {
+    /// The worker's connection.
+    pub worker_id: u64,
+    /// What the worker calls itself.
+    pub worker_name: String,
+    /// None: it is of an evaluation.
+    pub experiment: Option<u64>,
+    /// What it is a part of, for people.
+    pub batch: String,
+    /// Its individual, within that.
+    pub individual: u32,
+    /// The trials of the individual.
+    pub trials: Range<u32>,
+    /// Time since the worker was sent it.
+    pub assigned_for: Duration,
+    /// Time since its end; zero if it has not ended.
+    pub ended_for: Duration,
+    /// For how long it was computed; zero unless there is a result.
+    pub busy: Duration,
+    /// What has become of it.
+    pub fate: Fate,
+}
+
+/// What has become of an assignment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fate {
+    /// There is no answer yet.
+    Unanswered,
+    /// There is a result.
+    Computed,
+    /// It was not needed any more, or another worker was to compute it.
+    TakenBack,
+    /// The worker reported a failure.
+    Failed,
+    /// The worker went away.
+    Lost,
 }

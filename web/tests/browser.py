@@ -8,15 +8,18 @@ that were tested are also pictured there.
 """
 
 import csv
+import http.client
 import json
 import os
 import pathlib
+import re
 import shutil
 import socket
 import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.request
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else "target/debug").resolve()
 CONFIG = pathlib.Path(__file__).parents[2] / "configs/quickstart.json"
@@ -68,8 +71,8 @@ class Fleet:
                 return
         raise AssertionError("the coordinator does not start")
 
-    def start_worker(self):
-        return self.start("worker", "--coordinator", self.url, "--name", "w", "--slots", "1")
+    def start_worker(self, name="w"):
+        return self.start("worker", "--coordinator", self.url, "--name", name, "--slots", "1")
 
     def start(self, program, *args):
         process = subprocess.Popen(
@@ -127,7 +130,7 @@ class BrowserTest(unittest.TestCase):
             message = json.loads(entry["message"])["message"]
             if message["method"] == "Network.requestWillBeSent":
                 url = message["params"]["request"]["url"]
-                is_ours = url.startswith(("http://127.0.0.1:", "file://", "data:", "blob:", "chrome:"))
+                is_ours = url.startswith(("http://127.0.0.1:", "https://127.0.0.1:", "file://", "data:", "blob:", "chrome:"))
                 self.assertTrue(is_ours, f"a request to another host: {url}")
 
     def prefer(self, scheme):
@@ -203,6 +206,48 @@ class Pages(BrowserTest):
         # It plays by itself.
         self.wait_for_text("#step", "step 99 of 100")
 
+    def test_the_best_of_each_generation_are_on_top_if_wished(self):
+        self.open("/experiment/1")
+        canvas = self.find(".heat-map canvas")
+        self.wait(lambda: canvas.size["height"] > 100, "the map is empty")
+        self.script("document.querySelector('.heat-map').scrollIntoView()")
+
+        def fitness_down_the_first_column():
+            """What is read out cell by cell."""
+            found = []
+            n_individuals = 32
+            for place in range(n_individuals):
+                y = (place + 0.5) * canvas.size["height"] / n_individuals
+                self.script(f"""
+                    const canvas = document.querySelector('.heat-map canvas');
+                    const {{ left, top }} = canvas.getBoundingClientRect();
+                    canvas.dispatchEvent(new PointerEvent('pointermove', {{ clientX: left + 5, clientY: top + {y} }}));
+                """)
+                text = self.script("return document.querySelector('.heat-map .readout').textContent")
+                found.append(tuple(map(float, re.match(r"generation 0, individual (\d+): (.*)", text).groups())))
+            return found
+
+        as_numbered = fitness_down_the_first_column()
+        self.assertEqual([individual for individual, _ in as_numbered], list(range(32)))
+        self.find("#sort-individuals").click()
+        best_first = fitness_down_the_first_column()
+        self.assertEqual([fitness for _, fitness in best_first], sorted((it[1] for it in as_numbered), reverse=True))
+        self.assertEqual(set(best_first), set(as_numbered))
+
+    def test_the_distribution_is_seen_when_somebody_asks(self):
+        csv_text = self.fleet.swarmctl("history", "1", "--dynamics")
+        last = json.loads(csv_text)[-1]
+        self.open("/experiment/1")
+        panel = self.find("details.dynamics")
+        self.script("document.querySelector('.dynamics summary').scrollIntoView()")
+        panel.find_element(By.TAG_NAME, "summary").click()
+        self.wait(lambda: panel.get_attribute("data-generations") == "12", "generations are missing")
+        answer = self.script("return fetch('/api/experiments/1/dynamics?from=11').then((it) => it.json())")
+        [[generation, step, deviations, _]] = answer["generations"]
+        self.assertEqual((generation, step), (11, last["mean_step"]))
+        self.assertEqual(deviations[2], last["deviation_median"])
+        self.picture("dynamics")
+
     def test_positions_are_those_of_the_trace(self):
         trace = pathlib.Path(self.fleet.directory.name) / "trace.csv"
         args = ["simulate", "1@5/3", "--trials", "1", "--trace", str(trace)]
@@ -249,7 +294,7 @@ class Pages(BrowserTest):
     def test_the_fleet_is_seen(self):
         self.open("/fleet")
         self.wait_for_text("tbody", "w")
-        self.wait_for_text("main", "1 workers with 1 slots")
+        self.wait_for_text("main", "1 worker with 1 slot")
         self.picture("fleet")
 
     def test_a_narrow_screen_has_room_and_both_themes_differ(self):
@@ -288,6 +333,47 @@ class Live(BrowserTest):
         self.wait_for_text("#connection", "live")
         self.wait(lambda: n_generations() == 40, "generations are missing")
         self.wait_for_text(".state", "completed")
+
+    def test_the_timeline_shows_who_computes_and_what_was_lost(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        workers = [fleet.start_worker(name) for name in ["left", "right"]]
+        fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
+        self.browser.get(fleet.pages + "/fleet")
+        computed = """return fetch('/api/timeline').then((it) => it.json()).then(({ workers, assignments }) =>
+            Object.groupBy(assignments.filter((it) => it[8] === 'computed'), (it) => workers[it[0]][1]))"""
+        self.wait(lambda: set(self.script(computed)) == {"left", "right"}, "not both compute")
+        self.wait_for_text("main", "1 quickstart")
+        self.find(".fleet-timeline[data-assignments]")
+        self.picture("timeline")
+        workers[1].kill()
+        self.wait_for_text(".broken", "right: lost with its worker, experiment 1, generation")
+        self.picture("timeline-lost")
+        self.narrow()
+        widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
+        self.assertLessEqual(widths[0], widths[1])
+        self.picture("narrow-timeline")
+
+    def test_pages_are_encrypted_where_the_coordinator_is(self):
+        """The certificate is made up, so the browser is told to take it."""
+        self.browser.execute_cdp_cmd("Security.setIgnoreCertificateErrors", {"ignore": True})
+        with tempfile.TemporaryDirectory() as directory:
+            certificate, key = (str(pathlib.Path(directory) / name) for name in ("cert.pem", "key.pem"))
+            command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
+            subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2"]
+            subprocess.run([*command, *subject, "-keyout", key, "-out", certificate], check=True, capture_output=True)
+            tokens = {"SWARM_CLIENT_TOKEN": CLIENT_TOKEN, "SWARM_WORKER_TOKEN": WORKER_TOKEN}
+            fleet = Fleet("--tls-cert", certificate, "--tls-key", key, environment=tokens)
+            self.addCleanup(fleet.stop)
+            address = fleet.pages.replace("http:", "https:")
+            self.browser.get(address + "/fleet")
+            self.find("#token").send_keys(CLIENT_TOKEN, Keys.ENTER)
+            self.wait_for_text("h1", "Experiments")
+            self.wait_for_text("#connection", "live")
+            [cookie] = self.browser.get_cookies()
+            self.assertTrue(cookie["secure"] and cookie["httpOnly"], cookie)
+            with self.assertRaises((OSError, http.client.HTTPException), msg="it answers without TLS"):
+                urllib.request.urlopen(fleet.pages, timeout=DEADLINE)
 
     def test_an_experiment_is_paused_and_resumed(self):
         fleet = Fleet()

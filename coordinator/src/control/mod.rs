@@ -27,7 +27,7 @@ use tokio::sync::{Semaphore, oneshot};
 
 use crate::{
     driver::{DriverEvent, EventSender},
-    engine::WorkerStatus,
+    engine::{TimelineEntry, WorkerStatus},
     ids::ExperimentId,
     limits::{EVALUATIONS_MAX, REQUESTS_LEN_MAX, UNFINISHED_MAX},
     memory::Shortage,
@@ -139,6 +139,11 @@ impl Control {
     /// The connected workers, in the order in which they joined.
     pub async fn workers(&self) -> Result<Vec<WorkerStatus>, ControlError> {
         self.ask(DriverEvent::WorkersRequested).await
+    }
+
+    /// Who computed what lately.
+    pub async fn timeline(&self) -> Result<Vec<TimelineEntry>, ControlError> {
+        self.ask(DriverEvent::TimelineRequested).await
     }
 
     /// Asks the driver something.

@@ -7,7 +7,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    engine::{Assignment, Introduction, ItemResult, JobActivity, WorkerStatus},
+    engine::{Assignment, Introduction, ItemResult, JobActivity, TimelineEntry, WorkerStatus},
     ids::{AssignmentId, ExperimentId, JobId, WorkerId},
     memory::Shortage,
     runs::{Evaluation, Request, Runnable},
@@ -52,6 +52,8 @@ pub enum DriverEvent {
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// Somebody wants to see who computed what lately.
+    TimelineRequested(oneshot::Sender<Vec<TimelineEntry>>),
     /// A client lets a worker out of quarantine.
     WorkerReadmitted {
         /// What it calls itself.

@@ -188,6 +188,9 @@ impl Driver {
             DriverEvent::WorkersRequested(reply) => {
                 drop(reply.send(self.engine.worker_status(now)));
             }
+            DriverEvent::TimelineRequested(reply) => {
+                drop(reply.send(self.engine.timeline(now)));
+            }
             DriverEvent::WorkerReadmitted { name, reply } => {
                 if self.engine.on_readmitted(now, &name) {
                     info!(name, "worker is readmitted");

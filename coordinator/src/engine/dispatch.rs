@@ -23,6 +23,7 @@ use super::{
     Assignment, Command, Engine,
     item::Item,
     job::{JobWork, remaining},
+    timeline::Fate,
     worker::{AssignedItem, FULL_LOAD, Worker},
 };
 
@@ -182,7 +183,7 @@ impl Engine {
                 Some((holder, assignment_id))
             });
         let Some((holder, assignment_id)) = candidate else { return false };
-        let assignment = self.recall(holder, assignment_id);
+        let assignment = self.recall(now, holder, assignment_id);
         self.requeue(assignment.job, &assignment.item);
         true
     }
@@ -289,12 +290,19 @@ impl Engine {
     }
 
     /// Takes an assignment back: its worker is told to drop it.
-    pub(super) fn recall(&mut self, worker: WorkerId, assignment_id: AssignmentId) -> AssignedItem {
-        let assignment = self.take_assignment(worker, assignment_id);
+    pub(super) fn recall(
+        &mut self,
+        now: Instant,
+        id: WorkerId,
+        assignment_id: AssignmentId,
+    ) -> AssignedItem {
+        let assignment = self.take_assignment(id, assignment_id);
         self.counters.n_items_recalled += 1;
         self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
-        self.outgoing.recalled.entry(worker).or_default().push(assignment_id);
-        let worker = self.workers.get_mut(&worker).expect("it had the assignment");
+        self.outgoing.recalled.entry(id).or_default().push(assignment_id);
+        let worker = self.workers.get_mut(&id).expect("it had the assignment");
+        let ended = assignment.clone();
+        self.timeline.add(now, (id, worker), ended, Fate::TakenBack, Duration::ZERO);
         worker.remember_recalled(assignment_id, assignment.clone());
         assignment
     }

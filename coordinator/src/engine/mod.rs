@@ -54,6 +54,7 @@ mod questions;
 mod results;
 mod stalls;
 mod stats;
+mod timeline;
 mod unaudited;
 mod verdicts;
 mod worker;
@@ -68,7 +69,7 @@ use std::{
 use sim_core::TrialSet;
 
 use crate::{
-    ids::{JobId, WorkerId},
+    ids::{AssignmentId, JobId, WorkerId},
     priority::Priority,
 };
 
@@ -89,7 +90,9 @@ use quarantine::Quarantine;
 use questions::Questions;
 use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
-use worker::Worker;
+use timeline::Timeline;
+pub use timeline::{Fate, TimelineEntry};
+use worker::{AssignedItem, Worker};
 
 /// How an engine decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,6 +139,7 @@ pub struct Engine {
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
     counters: Counters,
+    timeline: Timeline,
 }
 
 impl Engine {
@@ -160,6 +164,7 @@ impl Engine {
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
             counters: Counters::default(),
+            timeline: Timeline::default(),
         }
     }
 
@@ -251,7 +256,7 @@ impl Engine {
     /// A job waits until it is resumed. Its assignments are taken back; results are
     /// kept.
     pub fn on_job_paused(&mut self, now: Instant, id: JobId) {
-        self.pause(id);
+        self.pause(now, id);
         self.assign(now);
     }
 
@@ -273,7 +278,7 @@ impl Engine {
 
     /// A job is over, for whatever reason.
     pub fn on_job_ended(&mut self, now: Instant, id: JobId) {
-        self.forget_job(id);
+        self.forget_job(now, id);
         self.assign(now);
     }
 
@@ -389,6 +394,9 @@ impl Engine {
         let n_items = worker.in_flight.len();
         let n_computing = n_items - worker.n_waiting();
         let is_evidence = is_evidence && !worker.is_draining;
+        for item in worker.in_flight.values().chain(worker.written_off.values()) {
+            self.timeline.add(now, (id, &worker), item.clone(), Fate::Lost, Duration::ZERO);
+        }
         let n_suspects = if is_evidence { n_computing } else { 0 };
         let process = worker.introduction.process;
         let is_alone = n_computing + worker.written_off.len() == 1;
@@ -411,21 +419,21 @@ impl Engine {
         n_items
     }
 
-    fn forget_job(&mut self, id: JobId) {
+    fn forget_job(&mut self, now: Instant, id: JobId) {
         self.withdraw_questions(id, |_| true);
-        self.withdraw(id);
+        self.withdraw(now, id);
         self.jobs.remove(&id);
     }
 
-    fn pause(&mut self, id: JobId) {
+    fn pause(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         if !mem::replace(&mut work.is_paused, true) {
-            self.withdraw(id);
+            self.withdraw(now, id);
         }
     }
 
     /// Takes a job away from all workers; its items wait again.
-    fn withdraw(&mut self, id: JobId) {
+    fn withdraw(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         self.ready_queue.remove(&(work.virtual_time, id));
         let mut audits = Vec::new();
@@ -433,9 +441,14 @@ impl Engine {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
             if worker.known_jobs.remove(&id).is_some() {
                 self.load_index.remove(worker_id, worker);
-                let ours = worker.in_flight.extract_if(.., |_, a| a.job == id);
-                audits.extend(ours.filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
-                worker.written_off.retain(|_, assignment| assignment.job != id);
+                let is_ours = |_: &AssignmentId, it: &mut AssignedItem| it.job == id;
+                let ours: Vec<_> = worker.in_flight.extract_if(.., is_ours).collect();
+                let written_off = worker.written_off.extract_if(.., is_ours).collect::<Vec<_>>();
+                for (_, item) in ours.iter().chain(&written_off).cloned() {
+                    let who = (worker_id, &*worker);
+                    self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
+                }
+                audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
                 // Nothing is left that it could answer.
                 worker.is_stalled &= !worker.written_off.is_empty();
                 self.load_index.add(worker_id, worker);

@@ -16,6 +16,7 @@ use super::{
     known_results::{Disagreement, REFEREE},
     losses::AfterLoss,
     questions::{Doubt, Party},
+    timeline::Fate,
     verdicts::{place, wrong},
     worker::{AssignedItem, Worker},
 };
@@ -135,6 +136,8 @@ impl Engine {
         worker.is_stalled = false;
         worker.is_on_probation &= !is_ok;
         self.load_index.add(id, worker);
+        let fate = if is_ok { Fate::Computed } else { Fate::Failed };
+        self.timeline.add(now, (id, worker), assignment.clone(), fate, busy);
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
         if is_ok {
             work.learn(&assignment.item, busy, pace);
@@ -156,7 +159,7 @@ impl Engine {
             return;
         }
         // What was to be audited may have been discarded meanwhile.
-        let n_new = self.take_values(job, id, item, values, assignment.is_audit);
+        let n_new = self.take_values(now, job, id, item, values, assignment.is_audit);
         if assignment.is_audit && n_new == 0 {
             let auditor = self.party(id).name;
             let batch = self.batch_mut(job);
@@ -179,6 +182,7 @@ impl Engine {
     /// `may_be_queued`: whether the item may be waiting for another worker.
     pub(super) fn take_values(
         &mut self,
+        now: Instant,
         job: JobId,
         id: WorkerId,
         item: &Item,
@@ -197,7 +201,7 @@ impl Engine {
             batch.unqueue(item.individual);
         }
         for (holder, assignment_id) in batch.redundant(item.individual) {
-            self.recall(holder, assignment_id);
+            self.recall(now, holder, assignment_id);
         }
         self.jobs.get_mut(&job).expect("just seen").n_episodes += n_new as u64;
         self.counters.n_episodes += n_new as u64;
@@ -221,7 +225,7 @@ impl Engine {
         if let Err(disagreement) = self.batch_mut(job).known.compare(item, values) {
             self.on_disagreement(now, job, id, item, disagreement);
         } else if !assignment.is_audit {
-            self.take_values(job, id, item, values, true);
+            self.take_values(now, job, id, item, values, true);
             self.update_readiness(job);
             self.finish_if_evaluated(now, job);
         }
@@ -257,7 +261,7 @@ impl Engine {
         let (job, item) = (assignment.job, assignment.item.clone());
         let reporter = self.party(id);
         if let Some(confirmed) = self.confirms(job, &item, &reporter.name, &message) {
-            return self.fail(job, &item, &confirmed);
+            return self.fail(now, job, &item, &confirmed);
         }
         // A worker whose word is in doubt already says nothing new.
         let is_doubted = self.workers[&id].question.is_some();
@@ -441,7 +445,7 @@ impl Engine {
     }
 
     /// An item fails wherever it is computed.
-    pub(super) fn fail(&mut self, id: JobId, item: &Item, failure: &str) {
+    pub(super) fn fail(&mut self, now: Instant, id: JobId, item: &Item, failure: &str) {
         let batch = self.batch_mut(id);
         let reason = format!(
             "individual {} of {}, trials {}..{}, fails wherever it is computed: {failure}",
@@ -450,7 +454,7 @@ impl Engine {
             item.trials.start,
             item.trials.end,
         );
-        self.forget_job(id);
+        self.forget_job(now, id);
         self.commands.push_back(Command::FailJob { job: id, reason });
     }
 }

@@ -81,7 +81,7 @@ impl Engine {
                 self.update_worker(id, |worker| worker.written_off.insert(assignment_id, copy));
                 assignment
             } else {
-                self.recall(id, assignment_id)
+                self.recall(now, id, assignment_id)
             };
             self.retry(now, assignment, NoResult::TakenBack);
         }

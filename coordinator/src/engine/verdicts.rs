@@ -1,6 +1,11 @@
 //! Asking the referee, and what follows from its answers.
 
-use std::{collections::BTreeSet, sync::Arc, time::Instant};
+use std::{
+    collections::BTreeSet,
+    mem,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use crate::{
     ids::{JobId, QuestionId, WorkerId},
@@ -14,6 +19,7 @@ use super::{
     known_results::{REFEREE, same_bits},
     questions::{Doubt, Party, Question},
     results::NoResult,
+    timeline::Fate,
     worker::Worker,
 };
 
@@ -128,7 +134,7 @@ impl Engine {
             }
         }
         if self.batch_of(question) {
-            self.fail(question.job, &question.item, failure);
+            self.fail(now, question.job, &question.item, failure);
         }
     }
 
@@ -167,7 +173,7 @@ impl Engine {
                 self.put_in_quarantine(now, &party, &reason);
             }
             if values.len() == self.batch_mut(job).n_values(item.trials.len()) {
-                self.take_values(job, REFEREE, item, values, true);
+                self.take_values(now, job, REFEREE, item, values, true);
             }
             self.update_readiness(job);
             self.finish_if_evaluated(now, job);
@@ -236,14 +242,18 @@ impl Engine {
     /// Takes everything back from a worker in quarantine.
     fn isolate(&mut self, now: Instant, id: WorkerId, reason: &str) {
         let in_flight: Vec<_> = self.workers[&id].in_flight.keys().copied().collect();
-        self.update_worker(id, |worker| {
+        let written_off = self.update_worker(id, |worker| {
             worker.quarantined = Some(reason.to_owned());
             worker.question = None;
-            worker.written_off.clear();
             worker.is_stalled = false;
+            mem::take(&mut worker.written_off)
         });
+        for item in written_off.into_values() {
+            let who = (id, &self.workers[&id]);
+            self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
+        }
         for assignment_id in in_flight.into_iter().rev() {
-            let assignment = self.recall(id, assignment_id);
+            let assignment = self.recall(now, id, assignment_id);
             self.retry(now, assignment, NoResult::TakenBack);
         }
         let worker: &mut Worker = self.workers.get_mut(&id).expect("just seen");

@@ -2,6 +2,7 @@
 
 use std::{
     collections::{BTreeMap, VecDeque},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -23,6 +24,8 @@ pub const FULL_LOAD: u64 = 1 << 20;
 pub struct Worker {
     /// Who it is.
     pub introduction: Introduction,
+    /// What it calls itself, for those who remember it after it is gone.
+    pub shared_name: Arc<str>,
     /// When it last gave a sign of life.
     pub last_heard: Instant,
     /// Whether it wants no more items.
@@ -85,6 +88,7 @@ impl Worker {
     pub fn new(introduction: Introduction, now: Instant) -> Self {
         Self {
             time: WorkerTime::new(now, introduction.n_slots),
+            shared_name: introduction.name.as_str().into(),
             introduction,
             last_heard: now,
             is_draining: false,

@@ -4,10 +4,11 @@ use std::{path::Path, time::Duration};
 
 use swarm_proto::v1::{
     Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
-    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
-    SubmitExperimentRequest, Worker, experiment_service_server::ExperimentService as _,
+    ListDynamicsResponse, ListEventsRequest, ListEventsResponse, ListGenerationsRequest,
+    ListGenerationsResponse, SubmitExperimentRequest, Worker,
+    experiment_service_server::ExperimentService as _,
 };
-use swarm_web::{Action, Archive, Control as WebControl};
+use swarm_web::{Action, Archive, Assignment, Control as WebControl};
 use tokio::{
     sync::{Semaphore, watch},
     task, time,
@@ -17,9 +18,10 @@ use tonic::{Request, Status, async_trait};
 use crate::{
     clock,
     control::ControlError,
+    engine::{Fate, TimelineEntry},
     ids::ExperimentId,
     limits::RECONSTRUCTIONS_OF_PAGES_MAX,
-    queries::{self, QueryError, StoredIndividuals},
+    queries::{self, QueryError, StoredDynamics, StoredIndividuals},
     shared_store::SharedStore,
     store::{Store, StoreError},
 };
@@ -93,6 +95,16 @@ impl Archive for PagesArchive {
         Ok(self.store.read(read).await?)
     }
 
+    async fn dynamics(&self, id: u64, from: u64) -> Result<ListDynamicsResponse, Status> {
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let read = move |store: &Store| StoredDynamics::read(store, ExperimentId(id), from);
+        let stored = self.store.read(read).await?;
+        let found = task::spawn_blocking(move || stored.replay())
+            .await
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        Ok(convert::dynamics(found))
+    }
+
     async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status> {
         let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
         let address = convert::address(address)?;
@@ -118,6 +130,11 @@ impl WebControl for Experiments {
         Ok(workers.into_iter().map(|worker| convert::worker(worker, now_ms)).collect())
     }
 
+    async fn timeline(&self) -> Result<Vec<Assignment>, Status> {
+        let entries = self.control.timeline().await?;
+        Ok(entries.into_iter().map(assignment).collect())
+    }
+
     async fn explain(&self, id: u64) -> Result<ExplainExperimentResponse, Status> {
         Ok(explain::explanation(self.control.explain(ExperimentId(id)).await?))
     }
@@ -138,5 +155,27 @@ impl WebControl for Experiments {
     async fn submit(&self, request: SubmitExperimentRequest) -> Result<Experiment, Status> {
         let response = self.submit_experiment(Request::new(request)).await?.into_inner();
         response.experiment.ok_or_else(|| Status::internal("there is no experiment"))
+    }
+}
+
+/// An assignment for pages.
+fn assignment(it: TimelineEntry) -> Assignment {
+    Assignment {
+        worker_id: it.worker.0,
+        batch: it.batch(),
+        worker_name: it.name.to_string(),
+        experiment: it.job.experiment().map(|id| id.0),
+        individual: it.individual,
+        trials: it.trials,
+        assigned_for: it.assigned_for,
+        ended_for: it.ended_for,
+        busy: it.busy,
+        fate: match it.fate {
+            Fate::Unanswered => swarm_web::Fate::Unanswered,
+            Fate::Computed => swarm_web::Fate::Computed,
+            Fate::TakenBack => swarm_web::Fate::TakenBack,
+            Fate::Failed => swarm_web::Fate::Failed,
+            Fate::Lost => swarm_web::Fate::Lost,
+        },
     }
 }

@@ -1,9 +1,14 @@
 //! What pages get, as JSON.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
+use serde_json::{Value, json};
 use swarm_proto::v1::{
     CompletedGeneration, Event, Experiment, ExperimentState, Worker, event::Kind,
 };
+
+use crate::source::Assignment;
 
 /// An experiment in a list.
 #[derive(Debug, Serialize)]
@@ -150,4 +155,30 @@ impl From<Worker> for WorkerAnswer {
             trouble,
         }
     }
+}
+
+/// Assignments as rows, which name their workers and batches by place: worker, batch,
+/// individual, first trial, trial after the last, time since it was given, time since its end
+/// (or 0) and time of computing in µs, fate.
+pub fn timeline(assignments: Vec<Assignment>) -> Value {
+    let mut workers: BTreeMap<(u64, String), usize> = BTreeMap::new();
+    let mut batches: BTreeMap<(String, Option<u64>), usize> = BTreeMap::new();
+    let mut rows = Vec::with_capacity(assignments.len());
+    for it in assignments {
+        let n = workers.len();
+        let worker = *workers.entry((it.worker_id, it.worker_name)).or_insert(n);
+        let n = batches.len();
+        let batch = *batches.entry((it.batch, it.experiment)).or_insert(n);
+        let [given, ended, busy] =
+            [it.assigned_for, it.ended_for, it.busy].map(|it| it.as_micros() as u64);
+        let (first, end) = (it.trials.start, it.trials.end);
+        rows.push(json!([worker, batch, it.individual, first, end, given, ended, busy, it.fate]));
+    }
+    json!({ "workers": by_place(workers), "batches": by_place(batches), "assignments": rows })
+}
+
+fn by_place<T: Ord>(places: BTreeMap<T, usize>) -> Vec<T> {
+    let mut all: Vec<(usize, T)> = places.into_iter().map(|(it, place)| (place, it)).collect();
+    all.sort_by_key(|(place, _)| *place);
+    all.into_iter().map(|(_, it)| it).collect()
 }

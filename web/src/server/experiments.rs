@@ -83,6 +83,21 @@ pub async fn generations(
     Ok(Json(json!({ "generations": rows, "next": page.next_generation })))
 }
 
+/// How a page of generations moved the distribution, and where the next one begins. A row is a
+/// generation, the length of the step of the mean, least, quartiles and largest of the genes'
+/// standard deviations (or none), and the rank correlation of trials.
+pub async fn dynamics(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+    Query(From { from }): Query<From>,
+) -> Result<Json<Value>, Problem> {
+    let page = shared.archive.dynamics(id, from).await?;
+    let rows = page.generations.iter();
+    let rows =
+        rows.map(|it| json!([it.generation, it.mean_step, it.deviations, it.rank_correlation]));
+    Ok(Json(json!({ "generations": rows.collect::<Vec<_>>(), "next": page.next_generation })))
+}
+
 /// The latest events that are no generations.
 pub async fn events(
     State(shared): State<Shared>,

@@ -1,6 +1,6 @@
 //! What the coordinator does at this moment, and having it do something.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use axum::{
     Json,
@@ -11,22 +11,59 @@ use axum::{
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
-use swarm_proto::v1::{ForkPoint, Round, SubmitExperimentRequest};
+use swarm_proto::v1::{ExplainExperimentResponse, ForkPoint, Round, SubmitExperimentRequest};
 use tokio::{sync::Mutex, time::Instant};
 
 use super::{
     Shared,
-    answers::{ExperimentAnswer, WorkerAnswer},
+    answers::{self, ExperimentAnswer, WorkerAnswer},
     problem::Problem,
 };
 use crate::source::{Action, Control};
 
-/// For how long an answer about workers serves all pages.
+/// For how long an answer serves all pages.
 const FRESH: Duration = Duration::from_secs(1);
 
-/// The latest answer about workers.
+/// Experiments whose latest explanation is kept for other pages.
+const EXPLANATIONS_MAX: usize = 256;
+
+/// The latest answer to a question that many pages ask.
 #[derive(Debug, Default)]
-pub struct Workers(Mutex<Option<(Instant, Bytes)>>);
+pub struct LatestAnswer(Mutex<Option<(Instant, Bytes)>>);
+
+impl LatestAnswer {
+    /// That answer, or a new one if it is old: the coordinator is asked once a second, whoever
+    /// looks.
+    async fn get(
+        &self,
+        ask: impl Future<Output = Result<Value, Problem>>,
+    ) -> Result<Response, Problem> {
+        let mut latest = self.0.lock().await;
+        let answer = match &*latest {
+            Some((at, answer)) if at.elapsed() < FRESH => answer.clone(),
+            _ => {
+                let answer = Bytes::from(ask.await?.to_string());
+                *latest = Some((Instant::now(), answer.clone()));
+                answer
+            }
+        };
+        Ok(([(CONTENT_TYPE, "application/json")], answer).into_response())
+    }
+}
+
+/// The latest answer about each of some experiments.
+#[derive(Debug, Default)]
+pub struct Explanations(Mutex<BTreeMap<u64, Arc<LatestAnswer>>>);
+
+impl Explanations {
+    async fn of(&self, id: u64) -> Arc<LatestAnswer> {
+        let mut known = self.0.lock().await;
+        if known.len() >= EXPLANATIONS_MAX {
+            known.clear();
+        }
+        Arc::clone(known.entry(id).or_default())
+    }
+}
 
 /// What can be done here.
 pub async fn session(State(shared): State<Shared>) -> Json<Value> {
@@ -37,36 +74,40 @@ fn control(shared: &Shared) -> Result<&dyn Control, Problem> {
     shared.control.as_deref().ok_or_else(Problem::no_coordinator)
 }
 
-/// The connected workers. The coordinator is asked once a second, whoever looks.
+/// The connected workers.
 pub async fn workers(State(shared): State<Shared>) -> Result<Response, Problem> {
     let control = control(&shared)?;
-    let mut latest = shared.workers.0.lock().await;
-    let answer = match &*latest {
-        Some((at, answer)) if at.elapsed() < FRESH => answer.clone(),
-        _ => {
-            let workers = control.workers().await?.into_iter().map(WorkerAnswer::from);
-            let answer = json!({ "workers": workers.collect::<Vec<_>>() }).to_string();
-            let answer = Bytes::from(answer);
-            *latest = Some((Instant::now(), answer.clone()));
-            answer
-        }
+    let ask = async {
+        let workers = control.workers().await?.into_iter().map(WorkerAnswer::from);
+        Ok(json!({ "workers": workers.collect::<Vec<_>>() }))
     };
-    Ok(([(CONTENT_TYPE, "application/json")], answer).into_response())
+    shared.workers.get(ask).await
+}
+
+/// Who computed what lately.
+pub async fn timeline(State(shared): State<Shared>) -> Result<Response, Problem> {
+    let control = control(&shared)?;
+    shared.timeline.get(async { Ok(answers::timeline(control.timeline().await?)) }).await
 }
 
 /// What an experiment does, or waits for.
 pub async fn explain(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
-) -> Result<Json<Value>, Problem> {
-    let it = control(&shared)?.explain(id).await?;
+) -> Result<Response, Problem> {
+    let control = control(&shared)?;
+    let latest = shared.explanations.of(id).await;
+    latest.get(async { Ok(explanation(control.explain(id).await?)) }).await
+}
+
+fn explanation(it: ExplainExperimentResponse) -> Value {
     let troubles = [it.store_trouble, it.incompatible, it.shortage].into_iter();
     let troubles: Vec<String> = troubles.filter(|text| !text.is_empty()).collect();
     let held = |round: &Round| -> Vec<Value> {
         let held = round.held.iter();
         held.map(|it| json!([it.worker_name, it.items, it.held_ms, it.silent_ms])).collect()
     };
-    Ok(Json(json!({
+    json!({
         "round": it.round.map(|round| json!({
             "generation": round.generation,
             "kind": match (round.held_out, round.judgement) {
@@ -87,7 +128,7 @@ pub async fn explain(
             .collect::<Vec<_>>(),
         // Why nothing goes on, if that is so.
         "troubles": troubles,
-    })))
+    })
 }
 
 /// What an action needs to know.

@@ -26,7 +26,12 @@ use tokio_util::sync::CancellationToken;
 
 use crate::source::{Archive, Control};
 
-use self::{access::Access, fleet::Workers, listener::Connections, live::Latest};
+use self::{
+    access::Access,
+    fleet::{Explanations, LatestAnswer},
+    listener::Connections,
+    live::Latest,
+};
 
 /// Bytes of a request's body: a token, or what to change.
 const BODY_LEN_MAX: usize = 16 << 10;
@@ -51,7 +56,9 @@ pub struct Site {
 struct Shared {
     archive: Arc<dyn Archive>,
     control: Option<Arc<dyn Control>>,
-    workers: Arc<Workers>,
+    workers: Arc<LatestAnswer>,
+    timeline: Arc<LatestAnswer>,
+    explanations: Arc<Explanations>,
     latest: Arc<Latest>,
     replays: Arc<Semaphore>,
     shutdown: CancellationToken,
@@ -73,6 +80,8 @@ impl Site {
             archive,
             control,
             workers: Arc::default(),
+            timeline: Arc::default(),
+            explanations: Arc::default(),
             latest: Arc::default(),
             replays: Arc::new(Semaphore::new(REPLAYS_MAX)),
             shutdown,
@@ -80,12 +89,14 @@ impl Site {
         let api = Router::new()
             .route("/session", get(fleet::session))
             .route("/workers", get(fleet::workers))
+            .route("/timeline", get(fleet::timeline))
             .route("/live", get(live::news))
             .route("/experiments", get(experiments::all))
             .route("/experiments/{id}", get(experiments::one))
             .route("/experiments/{id}/generations", get(experiments::generations))
             .route("/experiments/{id}/events", get(experiments::events))
             .route("/experiments/{id}/fitness", get(experiments::fitness))
+            .route("/experiments/{id}/dynamics", get(experiments::dynamics))
             .route("/experiments/{id}/live", get(live::generations))
             .route("/experiments/{id}/explain", get(fleet::explain))
             .route("/experiments/{id}/{action}", post(fleet::steer))

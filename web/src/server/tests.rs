@@ -5,8 +5,8 @@ use axum::{
     http::{Request, Response, StatusCode},
 };
 use swarm_proto::v1::{
-    Experiment, GetChampionResponse, GetExperimentResponse, ListEventsRequest, ListEventsResponse,
-    ListGenerationsRequest, ListGenerationsResponse,
+    Experiment, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
+    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
 };
 use tokio::sync::watch;
 use tonic::{Status, async_trait};
@@ -42,6 +42,10 @@ impl Archive for OneExperiment {
 
     async fn fitness(&self, _: u64, from: u64, _: u32) -> Result<(u64, Vec<Vec<f32>>), Status> {
         Ok((from, vec![vec![0.5, 1.0], vec![2.0]]))
+    }
+
+    async fn dynamics(&self, _: u64, _: u64) -> Result<ListDynamicsResponse, Status> {
+        Ok(ListDynamicsResponse::default())
     }
 
     async fn individual(&self, _: &str) -> Result<GetChampionResponse, Status> {

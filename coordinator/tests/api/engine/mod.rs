@@ -3,6 +3,7 @@
 
 mod by_hand;
 mod evaluations;
+mod timeline;
 mod trouble;
 
 use std::time::Duration;

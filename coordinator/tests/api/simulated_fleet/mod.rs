@@ -16,7 +16,7 @@ use std::{
 use coordinator::{
     engine::{
         Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
-        JobActivity, WorkerStatus,
+        JobActivity, TimelineEntry, WorkerStatus,
     },
     ids::{AssignmentId, JobId, QuestionId, WorkerId},
     priority::Priority,
@@ -220,6 +220,12 @@ impl SimulatedFleet {
         self.workers.keys().copied().collect()
     }
 
+    /// Who computed what lately.
+    pub fn timeline(&self) -> Vec<TimelineEntry> {
+        self.engine.timeline(self.instant())
+    }
+
+    /// What the engine says about the workers.
     pub fn status(&self) -> Vec<WorkerStatus> {
         self.engine.worker_status(self.instant())
     }

@@ -1,0 +1,161 @@
+//! Who computed what lately: assignments that have ended, as many as there is room for, and
+//! those that have not.
+
+use std::{
+    collections::VecDeque,
+    ops::Range,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use sim_core::TrialSet;
+
+use crate::ids::{JobId, WorkerId};
+
+use super::{
+    Engine,
+    batch::name_of,
+    worker::{AssignedItem, Worker},
+};
+
+/// Assignments that are remembered after their end.
+const ENDED_MAX: usize = 2048;
+/// Those without a result that are remembered beside them: they are rare, and what people
+/// look for.
+const BROKEN_MAX: usize = 256;
+/// Unanswered assignments in one answer, the oldest first.
+const UNANSWERED_MAX: usize = 2048;
+
+/// What has become of an assignment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// The worker has it, and has not answered.
+    Unanswered,
+    /// The worker has returned its values.
+    Computed,
+    /// Its result was not needed any more, or another worker was to compute it.
+    TakenBack,
+    /// The worker reported that it cannot be computed.
+    Failed,
+    /// The worker left, was lost, or fell silent.
+    Lost,
+}
+
+/// An assignment as people see it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimelineEntry {
+    /// The connection of the worker that had it.
+    pub worker: WorkerId,
+    /// What the worker calls itself.
+    pub name: Arc<str>,
+    /// The job that it is of.
+    pub job: JobId,
+    /// The trial set of the batch that it is of.
+    pub trial_set: TrialSet,
+    /// Index of the individual among the batch's genotypes.
+    pub individual: u32,
+    /// The trials.
+    pub trials: Range<u32>,
+    /// Time since the worker was sent it.
+    pub assigned_for: Duration,
+    /// Time since its end; zero if it has not ended.
+    pub ended_for: Duration,
+    /// For how long the worker computed it; zero unless there is a result.
+    pub busy: Duration,
+    /// What has become of it.
+    pub fate: Fate,
+}
+
+/// An assignment that has ended.
+#[derive(Debug)]
+struct Ended {
+    worker: WorkerId,
+    name: Arc<str>,
+    item: AssignedItem,
+    at: Instant,
+    busy: Duration,
+    fate: Fate,
+}
+
+/// The assignments that ended last.
+#[derive(Debug, Default)]
+pub struct Timeline {
+    ended: VecDeque<Ended>,
+    broken: VecDeque<Ended>,
+}
+
+impl Timeline {
+    /// Remembers an assignment that has ended. `busy`: how long it was computed.
+    pub fn add(
+        &mut self,
+        now: Instant,
+        (id, worker): (WorkerId, &Worker),
+        item: AssignedItem,
+        fate: Fate,
+        busy: Duration,
+    ) {
+        let name = Arc::clone(&worker.shared_name);
+        let (list, n_max) = match fate {
+            Fate::Failed | Fate::Lost => (&mut self.broken, BROKEN_MAX),
+            _ => (&mut self.ended, ENDED_MAX),
+        };
+        if list.len() == n_max {
+            list.pop_front();
+        }
+        list.push_back(Ended { worker: id, name, item, at: now, busy, fate });
+    }
+}
+
+impl TimelineEntry {
+    /// What it is a part of, in messages.
+    pub fn batch(&self) -> String {
+        format!("{}, {}", self.job, name_of(self.trial_set))
+    }
+}
+
+impl Engine {
+    /// The assignments of lately. Those that gave no result are remembered for longest.
+    pub fn timeline(&self, now: Instant) -> Vec<TimelineEntry> {
+        let Timeline { ended, broken } = &self.timeline;
+        let of_ended = |it: &Ended| {
+            let ended_for = now.saturating_duration_since(it.at);
+            entry(now, (it.worker, &it.name), &it.item, ended_for, it.busy, it.fate)
+        };
+        let mut unanswered: Vec<(WorkerId, &Worker, &AssignedItem)> = self
+            .workers
+            .iter()
+            .flat_map(|(&id, worker)| {
+                let held = worker.in_flight.values().chain(worker.written_off.values());
+                held.map(move |item| (id, worker, item))
+            })
+            .collect();
+        unanswered.sort_by_key(|&(.., item)| item.assigned);
+        let unanswered = unanswered.into_iter().take(UNANSWERED_MAX).map(|(id, worker, item)| {
+            let who = (id, &worker.shared_name);
+            entry(now, who, item, Duration::ZERO, Duration::ZERO, Fate::Unanswered)
+        });
+        broken.iter().chain(ended).map(of_ended).chain(unanswered).collect()
+    }
+}
+
+fn entry(
+    now: Instant,
+    (worker, name): (WorkerId, &Arc<str>),
+    item: &AssignedItem,
+    ended_for: Duration,
+    busy: Duration,
+    fate: Fate,
+) -> TimelineEntry {
+    TimelineEntry {
+        worker,
+        name: Arc::clone(name),
+        job: item.job,
+        trial_set: item.trial_set,
+        individual: item.item.individual,
+        trials: item.item.trials.clone(),
+        assigned_for: now.saturating_duration_since(item.assigned),
+        ended_for,
+        busy,
+        fate,
+    }
+}

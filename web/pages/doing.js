@@ -1,0 +1,25 @@
+// What an experiment does at this moment, or what it waits for.
+
+import { element } from "swarm/dom.js";
+import { counted, span } from "swarm/page.js";
+
+/** Paragraphs that say what the server answers. */
+export function whatItDoes(it) {
+  const parts = [];
+  for (const trouble of it.troubles) parts.push(element("p", { className: "bad" }, trouble));
+  if (it.workers_available === 0) {
+    parts.push(element("p", { className: "bad" }, it.workers ? "No connected worker is given work." : "No worker is connected: start one with `worker`."));
+  }
+  if (it.round) {
+    const { generation, kind, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;
+    parts.push(element("p", {}, `${kind} ${kind === "generation" ? generation : `after generation ${generation}`}: ${episodes - left} of ${episodes} episodes, since ${span(running)}`),
+      element("progress", { max: episodes, value: episodes - left }),
+      element("p", { className: "muted" }, `${counted(queued, "item")} without a worker; ${counted(held.length, "worker")} with others`));
+    const rows = held.sort((a, b) => b[2] - a[2]).slice(0, 6).map(([worker, items, ms]) =>
+      element("tr", {}, element("td", {}, worker), element("td", {}, counted(items, "item")), element("td", {}, `for ${span(ms)}`)));
+    if (rows.length) parts.push(element("table", {}, ...rows));
+  }
+  for (const [worker, why] of it.withheld.slice(0, 5)) parts.push(element("p", { className: "bad small" }, `${worker}: ${why}`));
+  if (it.rivals.length) parts.push(element("p", { className: "muted" }, `shares the fleet with ${it.rivals.map((rival) => `experiment ${rival}`).join(", ")}`));
+  return parts;
+}
