@@ -1,0 +1,31 @@
+//! Errors of Rust as exceptions; their classes are in `swarmevo/errors.py`.
+
+use experiment_file::ConfigError;
+use pyo3::{exceptions::PyValueError, prelude::*};
+use sim_core::EvaluateError;
+
+/// The exception `name` of `swarmevo.errors` with these arguments; if it cannot be made, why.
+fn exception<'py>(py: Python<'py>, name: &str, args: impl IntoPyObject<'py>) -> PyErr {
+    let made = || {
+        let class = py.import("swarmevo.errors")?.getattr(name)?;
+        class.call1((args,))
+    };
+    made().map_or_else(|error| error, PyErr::from_value)
+}
+
+/// An experiment with problems: `ExperimentError`.
+pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
+    let problems = error.problems.iter();
+    let problems = problems.map(|it| (it.path.as_str(), it.line, it.message.as_str()));
+    exception(py, "ExperimentError", problems.collect::<Vec<_>>())
+}
+
+/// What the caller asked for cannot be simulated.
+pub fn evaluate_error(error: &EvaluateError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// A panic: `InternalError`.
+pub fn panic_error(py: Python<'_>, message: &str) -> PyErr {
+    exception(py, "InternalError", message)
+}

@@ -1,0 +1,287 @@
+//! The algorithms, as ask and tell.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use evolution::{ALGORITHMS, Champion, ChampionSource, Generation, Setup};
+use experiment_file::{
+    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, ExperimentConfig, Parameter,
+    ParameterValue,
+};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use pyo3::{
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+    types::PyDict,
+};
+use sim_core::{FINGERPRINT, Simulation, TrialSet};
+
+use crate::running::guarded;
+
+/// An evolution between two generations.
+#[pyclass(frozen, module = "swarmevo._core")]
+pub struct Evolution(Mutex<State>);
+
+#[derive(Clone)]
+struct State {
+    evolution: evolution::Evolution,
+    /// What `ask` has drawn since the last `tell`.
+    asked: Option<Generation>,
+}
+
+#[pymethods]
+impl Evolution {
+    /// Of one population, for any function of genes in [0, 1].
+    #[new]
+    fn new(
+        algorithm: &str,
+        n_genes: usize,
+        population_size: u32,
+        seed: u64,
+        params: &Bound<'_, PyDict>,
+    ) -> PyResult<Self> {
+        let params = read_params(algorithm, params)?;
+        let setup = Setup { population_size, seed, params, ..Setup::new(algorithm, n_genes) };
+        let evolution = setup.start().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self::of(evolution))
+    }
+
+    /// From what `to_json` has given.
+    #[staticmethod]
+    fn from_json(text: &str) -> PyResult<Self> {
+        let evolution = serde_json::from_str(text).map_err(|error| {
+            PyValueError::new_err(format!("not the state of an evolution: {error}"))
+        })?;
+        Ok(Self::of(evolution))
+    }
+
+    /// The state.
+    fn to_json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.state().evolution)
+            .map_err(|error| PyRuntimeError::new_err(error.to_string()))
+    }
+
+    /// The next generation, `[P, d]`.
+    fn ask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let genotypes = guarded(py, || {
+            let mut state = self.state();
+            let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
+            let genotypes = asked.genotypes.to_vec();
+            state.asked = Some(asked);
+            genotypes
+        })?;
+        Ok(PyArray2::from_vec2(py, &genotypes)?)
+    }
+
+    /// Learns from the fitness of the generation that was asked for, `[P, T]`. Returns the
+    /// index of the generation, best, mean, min and the number of those that are not finite.
+    fn tell(
+        &self,
+        py: Python<'_>,
+        fitness: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<(u64, f64, f64, f64, usize)> {
+        let fitness = rows(&fitness);
+        let summary = guarded(py, || {
+            let mut state = self.state();
+            let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
+            if asked.genotypes.len() != fitness.len() || fitness.iter().any(Vec::is_empty) {
+                let expected = asked.genotypes.len();
+                state.asked = Some(asked);
+                return Err(format!(
+                    "the generation has {expected} genotypes; their fitness has to be an array of \
+                     {expected} numbers, or of {expected} rows with a number for each trial"
+                ));
+            }
+            let kept = asked.clone();
+            let told = state.evolution.tell(asked, &fitness);
+            told.map_err(|error| {
+                state.asked = Some(kept);
+                error.to_string()
+            })
+        })?;
+        let summary = summary.map_err(PyValueError::new_err)?;
+        let of = &summary.statistics;
+        Ok((summary.generation, of.best, of.mean, of.min, summary.n_non_finite))
+    }
+
+    #[getter]
+    fn n_generations(&self) -> u64 {
+        self.state().evolution.n_generations()
+    }
+
+    /// The link of the digest chain of generations.
+    #[getter]
+    fn digest(&self) -> String {
+        self.state().evolution.digest().to_string()
+    }
+
+    /// The link of the digest chain of re-evaluations.
+    #[getter]
+    fn champion_digest(&self) -> String {
+        self.state().evolution.champion_digest().to_string()
+    }
+
+    /// The champion so far.
+    #[getter]
+    fn champion<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let champion = self.state().evolution.champion().cloned();
+        champion.map(|champion| champion_dict(py, &champion)).transpose()
+    }
+
+    /// The mean of the distribution, if there is one.
+    #[getter]
+    fn mean<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.state().evolution.mean().map(|mean| PyArray1::from_vec(py, mean))
+    }
+
+    /// Another one in the same state.
+    fn copy(&self) -> Self {
+        Self(Mutex::new(self.state().clone()))
+    }
+
+    /// The comparison of candidates for the champion.
+    fn reevaluation(&self) -> Option<Reevaluation> {
+        self.state().evolution.reevaluation().map(|it| Reevaluation(Mutex::new(it)))
+    }
+
+    /// Makes the winner of a comparison that is over the champion.
+    fn set_champion(&self, reevaluation: &Reevaluation) {
+        self.state().evolution.set_champion(&reevaluation.lock());
+    }
+
+    /// Judges the champion: its genotypes and trials.
+    fn judgement<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
+        let judgement = self.state().evolution.judgement();
+        judgement.map(|it| asked_trials(py, &it.genotypes(), it.trial_set())).transpose()
+    }
+
+    /// The judged champion, and the last link of the digest chain of re-evaluations.
+    fn judge<'py>(
+        &self,
+        py: Python<'py>,
+        fitness: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyDict>, String)> {
+        let judgement = self.state().evolution.judgement();
+        let judgement =
+            judgement.ok_or_else(|| PyValueError::new_err("there is no champion yet"))?;
+        let fitness = rows(&fitness);
+        let (champion, digest) = guarded(py, || judgement.decide(&fitness))?;
+        Ok((champion_dict(py, &champion)?, digest.to_string()))
+    }
+}
+
+impl Evolution {
+    fn of(evolution: evolution::Evolution) -> Self {
+        Self(Mutex::new(State { evolution, asked: None }))
+    }
+
+    /// As the coordinator's of the same file.
+    pub fn of_experiment(config: &ExperimentConfig, simulation: &Simulation) -> Self {
+        let segments = simulation.population_segments();
+        Self::of(evolution::Evolution::new(config, segments, FINGERPRINT))
+    }
+
+    /// A panic leaves a state that can be read.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Candidates for the champion, compared block by block on held-out trials.
+#[pyclass(frozen, module = "swarmevo._core")]
+pub struct Reevaluation(Mutex<evolution::Reevaluation>);
+
+#[pymethods]
+impl Reevaluation {
+    /// The genotypes and trials of the next block; none if the comparison is over.
+    fn ask<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
+        let this = self.lock();
+        (!this.is_over()).then(|| asked_trials(py, &this.genotypes(), this.trial_set())).transpose()
+    }
+
+    /// Takes the fitness of a block in.
+    fn tell(&self, py: Python<'_>, fitness: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
+        let fitness = rows(&fitness);
+        guarded(py, || self.lock().learn(&fitness))
+    }
+}
+
+impl Reevaluation {
+    fn lock(&self) -> MutexGuard<'_, evolution::Reevaluation> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Genotypes `[P, d]`; kind, generation and block of the trials that they are to meet.
+type AskedTrials<'py> = (Bound<'py, PyArray2<f64>>, (&'static str, u64, u8));
+
+fn asked_trials<'py>(
+    py: Python<'py>,
+    genotypes: &[Vec<f64>],
+    trial_set: TrialSet,
+) -> PyResult<AskedTrials<'py>> {
+    let trials = match trial_set {
+        TrialSet::Generation(generation) => ("generation", generation, 0),
+        TrialSet::HeldOut { generation, block } => ("held_out", generation, block),
+        TrialSet::Judgement(generation) => ("judgement", generation, 0),
+        TrialSet::Evaluation => ("evaluation", 0, 0),
+    };
+    Ok((PyArray2::from_vec2(py, genotypes)?, trials))
+}
+
+fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Bound<'py, PyDict>> {
+    let Champion { generation, source, genotype, trial_fitness, held_out, judged } = champion;
+    let dict = PyDict::new(py);
+    dict.set_item("generation", generation)?;
+    let individual = match source {
+        ChampionSource::Individual(index) => Some(index),
+        ChampionSource::Mean => None,
+    };
+    dict.set_item("individual", individual)?;
+    dict.set_item("genotype", PyArray1::from_slice(py, genotype))?;
+    dict.set_item("trial_fitness", PyArray1::from_slice(py, trial_fitness))?;
+    dict.set_item("selection", held_out.map(|it| (it.mean, it.n_trials)))?;
+    dict.set_item("judged", judged.map(|it| (it.mean, it.low, it.high, it.n_trials)))?;
+    Ok(dict)
+}
+
+fn rows(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+    array.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
+}
+
+/// Parameters from Python. A number is of the kind that the parameter has, if it fits;
+/// otherwise `Setup` says what would.
+fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<AlgorithmParams> {
+    let mut params = AlgorithmParams::default();
+    let described = AlgorithmDescription::find(ALGORITHMS, algorithm);
+    let parameters = described.map_or(&[][..], |described| described.parameters);
+    for (key, value) in given {
+        let key: String = key.extract()?;
+        let is_whole = parameters.iter().any(|it| {
+            it.key == key && matches!(it.domain, Domain::Whole(..) | Domain::BelowPopulationSize)
+        });
+        let value = if is_whole && let Ok(whole) = value.extract::<u32>() {
+            ParameterValue::Whole(whole)
+        } else if let Ok(number) = value.extract::<f64>() {
+            ParameterValue::Number(number)
+        } else {
+            ParameterValue::Name(value.extract()?)
+        };
+        params.set(&key, value);
+    }
+    Ok(params)
+}
+
+/// The algorithms: name, title, and of each parameter key, what it may be, default and
+/// meaning.
+#[pyfunction]
+pub fn algorithms() -> Vec<(&'static str, &'static str, Vec<[String; 4]>)> {
+    let parameter = |it: &Parameter| {
+        let default = match it.default {
+            DefaultValue::Formula(formula) => formula.to_owned(),
+            value => value.value().map_or_else(String::new, |value| value.to_string()),
+        };
+        [it.key.to_owned(), it.domain.to_string(), default, it.meaning.to_owned()]
+    };
+    let described = ALGORITHMS.iter();
+    described.map(|it| (it.name, it.title, it.parameters.iter().map(parameter).collect())).collect()
+}

@@ -1,0 +1,183 @@
+//! An experiment, compiled: what `swarmevo.Experiment` is made of.
+
+use evolution::ALGORITHMS;
+use experiment_file::ExperimentConfig;
+use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+use sim_core::Simulation;
+use swarm_web::{Episode, Replay, replay_file};
+
+use crate::{
+    errors::{config_error, evaluate_error},
+    evolution::Evolution,
+    running::{compute, guarded},
+    trace::Recording,
+    trials::Trials,
+};
+
+/// An experiment file that has been read and compiled.
+#[pyclass(frozen, module = "swarmevo._core")]
+pub struct Experiment {
+    config: ExperimentConfig,
+    pub(crate) simulation: Simulation,
+    warnings: Vec<String>,
+}
+
+#[pymethods]
+impl Experiment {
+    #[new]
+    fn new(py: Python<'_>, text: &str, default_name: &str, seed: Option<u64>) -> PyResult<Self> {
+        let read = guarded(py, || {
+            let (mut config, warnings) =
+                ExperimentConfig::from_json(text, default_name, ALGORITHMS)?;
+            config.seed = seed.unwrap_or(config.seed);
+            Ok((Simulation::compile(&config)?, config, warnings))
+        })?;
+        let (simulation, config, warnings) = read.map_err(|error| config_error(py, &error))?;
+        let warnings = warnings.iter().map(ToString::to_string).collect();
+        Ok(Self { config, simulation, warnings })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.config.name
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    #[getter]
+    fn n_genes(&self) -> usize {
+        self.simulation.genotype_len()
+    }
+
+    #[getter]
+    fn n_steps(&self) -> u32 {
+        self.simulation.n_steps()
+    }
+
+    #[getter]
+    fn measure_names(&self) -> Vec<&'static str> {
+        self.simulation.measure_names().to_vec()
+    }
+
+    /// The file with all defaults, as JSON.
+    fn to_json(&self) -> String {
+        self.config.to_canonical_json()
+    }
+
+    /// Fitness of P genotypes in T trials, flat: `[P * T]`.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        genotypes: PyReadonlyArray2<'py, f64>,
+        trials: Trials,
+        n_threads: usize,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.of_all(py, &genotypes, &trials, n_threads, |genotype, trials, keep_going| {
+            let (set, range) = trials;
+            self.simulation.evaluate_while(genotype, set, range, keep_going)
+        })
+    }
+
+    /// As `evaluate`, and all measures of all steps: `[P * T * (1 + S * K)]`.
+    fn measure<'py>(
+        &self,
+        py: Python<'py>,
+        genotypes: PyReadonlyArray2<'py, f64>,
+        trials: Trials,
+        n_threads: usize,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        self.of_all(py, &genotypes, &trials, n_threads, |genotype, trials, keep_going| {
+            let (set, range) = trials;
+            self.simulation.measure_while(genotype, set, range, keep_going)
+        })
+    }
+
+    /// Everything that there is to see of a genotype in T trials: arrays by name.
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        genotype: PyReadonlyArray1<'py, f64>,
+        trials: Trials,
+        n_threads: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let genotype = genotype.to_vec()?;
+        let (set, range) = (trials.set()?, trials.range());
+        let recordings = compute(py, range.len(), n_threads, |index, _| {
+            let mut recording = Recording::default();
+            let trial = range.start + index as u32;
+            let mut observe = |step| recording.add(&step, &self.simulation);
+            let summary = self.simulation.simulate(&genotype, set, trial, &mut observe)?;
+            recording.end(&summary);
+            Ok(Some(recording))
+        })?;
+        Recording::to_arrays(py, recordings, self.simulation.n_steps() as usize)
+    }
+
+    /// The network of a genotype, as JSON.
+    fn network_json(&self, genotype: PyReadonlyArray1<'_, f64>) -> PyResult<String> {
+        let network = self.simulation.network_json(&genotype.to_vec()?);
+        network.map(|network| network.to_string()).map_err(|error| evaluate_error(&error))
+    }
+
+    /// An episode with the player, as an HTML file.
+    fn replay_html(
+        &self,
+        py: Python<'_>,
+        genotype: PyReadonlyArray1<'_, f64>,
+        trials: Trials,
+        name: &str,
+    ) -> PyResult<String> {
+        let (genotype, trial_set, trial) =
+            (genotype.to_vec()?, trials.set()?, trials.range().start);
+        let html = guarded(py, || {
+            let (config, simulation) = (&self.config, &self.simulation);
+            let genotype = &genotype;
+            let episode = Episode { config, simulation, genotype, name, trial_set, trial };
+            Replay::simulate(&episode).map(|replay| replay_file(&replay))
+        })?;
+        html.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The experiment's evolution before its first generation.
+    fn evolution(&self) -> Evolution {
+        Evolution::of_experiment(&self.config, &self.simulation)
+    }
+}
+
+impl Experiment {
+    /// Computes P genotypes, in so many items that all threads have something to do.
+    fn of_all<'py>(
+        &self,
+        py: Python<'py>,
+        genotypes: &PyReadonlyArray2<'py, f64>,
+        trials: &Trials,
+        n_threads: usize,
+        work: impl Fn(
+            &[f64],
+            (sim_core::TrialSet, std::ops::Range<u32>),
+            &dyn Fn() -> bool,
+        ) -> Result<Option<Vec<f64>>, sim_core::EvaluateError>
+        + Sync,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (n_genotypes, n_genes) = genotypes.as_array().dim();
+        // A copy: nobody writes to it while the lock is not held.
+        let genes = genotypes.to_vec()?;
+        let (set, range) = (trials.set()?, trials.range());
+        // Trials of a genotype are fastest side by side; they are parted only where there are
+        // fewer genotypes than threads.
+        let n_parts = n_threads.div_ceil(n_genotypes.max(1)).clamp(1, range.len().max(1));
+        let part_len = range.len().div_ceil(n_parts).max(1);
+        let n_parts = range.len().div_ceil(part_len).max(1);
+        let results = compute(py, n_genotypes * n_parts, n_threads, |item, keep_going| {
+            let genotype = &genes[item / n_parts * n_genes..][..n_genes];
+            let first = range.start + (item % n_parts * part_len) as u32;
+            let part = first..range.end.min(first.saturating_add(part_len as u32));
+            work(genotype, (set, part), keep_going)
+        })?;
+        Ok(results.concat().into_pyarray(py))
+    }
+}

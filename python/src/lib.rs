@@ -1,0 +1,29 @@
+//! The extension behind the Python package `swarmevo`: the simulator and the algorithms.
+//! `swarmevo/*.py` is what people see of it.
+
+mod errors;
+mod evolution;
+mod experiment;
+mod running;
+mod trace;
+mod trials;
+
+use pyo3::prelude::*;
+
+/// The private half of the package.
+#[pymodule(gil_used = true)]
+mod _core {
+    #[pymodule_export]
+    use crate::{
+        evolution::{Evolution, Reevaluation, algorithms},
+        experiment::Experiment,
+    };
+
+    /// Names the function that the simulator computes: equal names, equal bits.
+    #[pymodule_export]
+    const FINGERPRINT: &str = sim_core::FINGERPRINT;
+
+    /// An experiment file to begin with.
+    #[pymodule_export]
+    const QUICKSTART: &str = include_str!("../../configs/quickstart.json");
+}

@@ -1,0 +1,116 @@
+//! Long computations without the interpreter's lock: on threads, stopped by Ctrl-C, and a
+//! panic is an exception.
+
+use std::{
+    any::Any,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
+    thread,
+    time::Duration,
+};
+
+use pyo3::prelude::*;
+use sim_core::EvaluateError;
+
+use crate::errors::{evaluate_error, panic_error};
+
+/// How often the interpreter is asked whether a signal has come.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Whether to go on; a computation asks now and then.
+pub type KeepGoing<'a> = &'a dyn Fn() -> bool;
+
+/// Why there is no result.
+enum Failure {
+    Evaluate(EvaluateError),
+    Panic(String),
+    Signal(PyErr),
+}
+
+/// Computes `work` of 0..`n_items` on `n_threads` threads and returns the results in order.
+/// `work` returns none only if it was told not to go on.
+pub fn compute<T: Send>(
+    py: Python<'_>,
+    n_items: usize,
+    n_threads: usize,
+    work: impl Fn(usize, KeepGoing<'_>) -> Result<Option<T>, EvaluateError> + Sync,
+) -> PyResult<Vec<T>> {
+    let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let keep_going = || !stopped.load(Ordering::Relaxed);
+    // A thread: what is left of the items, until there are none.
+    let work_off = || {
+        let mut done = Vec::new();
+        while keep_going() {
+            let item = next.fetch_add(1, Ordering::Relaxed);
+            if item >= n_items {
+                break;
+            }
+            match work(item, &keep_going) {
+                Ok(Some(result)) => done.push((item, result)),
+                Ok(None) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(done)
+    };
+    let computed = py.detach(|| {
+        thread::scope(|scope| {
+            let (outbox, inbox) = mpsc::channel();
+            for _ in 0..n_threads.min(n_items) {
+                let outbox = outbox.clone();
+                let work_off = &work_off;
+                scope.spawn(move || {
+                    let outcome = catch_unwind(AssertUnwindSafe(work_off));
+                    // The receiver reads until all senders are gone.
+                    let _ = outbox.send(outcome);
+                });
+            }
+            drop(outbox);
+            let (mut results, mut failure) = (Vec::with_capacity(n_items), None);
+            loop {
+                let failed = match inbox.recv_timeout(SIGNAL_INTERVAL) {
+                    Ok(Ok(Ok(done))) => {
+                        results.extend(done);
+                        continue;
+                    }
+                    Ok(Ok(Err(error))) => Failure::Evaluate(error),
+                    Ok(Err(panic)) => Failure::Panic(panic_message(&*panic)),
+                    Err(RecvTimeoutError::Timeout) => {
+                        match Python::attach(|py| py.check_signals()) {
+                            Ok(()) => continue,
+                            Err(error) => Failure::Signal(error),
+                        }
+                    }
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                stopped.store(true, Ordering::Relaxed);
+                failure.get_or_insert(failed);
+            }
+            failure.map_or(Ok(results), Err)
+        })
+    });
+    match computed {
+        Ok(mut results) => {
+            results.sort_unstable_by_key(|&(item, _)| item);
+            Ok(results.into_iter().map(|(_, result)| result).collect())
+        }
+        Err(Failure::Evaluate(error)) => Err(evaluate_error(&error)),
+        Err(Failure::Panic(message)) => Err(panic_error(py, &message)),
+        Err(Failure::Signal(error)) => Err(error),
+    }
+}
+
+/// Computes something short, without the interpreter's lock.
+pub fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panic_message(&*panic)))
+        .map_err(|message| panic_error(py, &message))
+}
+
+fn panic_message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("no message").to_owned()
+}

@@ -1,0 +1,37 @@
+"""Simulates and evolves robot swarms: here, and on a fleet.
+
+>>> import swarmevo
+>>> experiment = swarmevo.Experiment.quickstart()
+>>> run = swarmevo.evolve(experiment, generations=2, progress=False)
+>>> run.champion.genotype.shape
+(424,)
+"""
+
+from ._core import FINGERPRINT
+from .errors import ExperimentError, FleetError, InternalError, Problem, SwarmError
+from .evolution import (
+    CMAES,
+    GA,
+    SNES,
+    XNES,
+    Champion,
+    Evolution,
+    Generation,
+    OpenAIES,
+    SepCMAES,
+    algorithms,
+)
+from .experiment import Experiment, Measured
+from .local import LocalRun, evolve
+from .mirroring import mirror
+from .network import Network
+from .replay import Replay
+from .trace import Trace
+from .trials import TrialSet
+
+__all__ = [
+    "CMAES", "Champion", "Evolution", "Experiment", "ExperimentError", "FINGERPRINT",
+    "FleetError", "GA", "Generation", "InternalError", "LocalRun", "Measured", "Network",
+    "OpenAIES", "Problem", "Replay", "SNES", "SepCMAES", "SwarmError", "Trace", "TrialSet",
+    "XNES", "algorithms", "evolve", "mirror",
+]

@@ -1,0 +1,55 @@
+"""What goes wrong."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Sequence
+
+
+class Problem(NamedTuple):
+    """One mistake in an experiment file."""
+
+    path: str
+    """Where, such as ``algorithm.population_size``; empty for the whole file."""
+    line: int | None
+    """Line in the file, from 1, if the text has such a place."""
+    message: str
+    """What is wrong, and what would be right."""
+
+    def __str__(self) -> str:
+        line = "" if self.line is None else f"line {self.line}: "
+        return line + (f"{self.path}: " if self.path else "") + self.message
+
+
+class SwarmError(Exception):
+    """The base of all errors of this package."""
+
+
+class ExperimentError(SwarmError, ValueError):
+    """An experiment file with mistakes: all of them."""
+
+    def __init__(self, problems: Sequence[tuple[str, int | None, str]]) -> None:
+        self.problems: list[Problem] = [Problem(*problem) for problem in problems]
+        """In the order of the file; never empty."""
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.problems))
+
+
+class InternalError(SwarmError, RuntimeError):
+    """The simulator has panicked: a bug of it, or a state of an evolution that was edited."""
+
+
+class FleetError(SwarmError):
+    """The coordinator has refused a request, or cannot be reached.
+
+    ``code`` is the name of the gRPC status, such as ``"NOT_FOUND"``; ``docs/clients.md``
+    says what each means.
+    """
+
+    def __init__(self, code: str, message: str) -> None:
+        self.code = code
+        super().__init__(code, message)
+
+    def __str__(self) -> str:
+        return str(self.args[1])

@@ -1,0 +1,121 @@
+"""Whole runs, here: what a coordinator does, to the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .evolution import Champion, Evolution, Generation
+from .experiment import Experiment
+from .plotting import plot_history
+from .trials import TrialSet
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+Evaluate = Callable[[NDArray[np.float64], TrialSet, int], NDArray[np.float64]]
+"""Fitness ``[P, T]`` of genotypes ``[P, d]`` in T trials of a set."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalRun:
+    """A run that has ended."""
+
+    experiment: Experiment
+    generations: list[Generation]
+    """All of them, in order."""
+    champion: Champion
+    """Judged on trials that selected nothing."""
+    digest: str
+    """Covers every bit of the run: the one that ``swarmctl run`` prints."""
+    evolution: Evolution
+    """After the last generation, to go on from."""
+
+    def history(self) -> pandas.DataFrame:
+        """A row per generation."""
+        import pandas
+
+        rows = [vars(generation) for generation in self.generations]
+        return pandas.DataFrame(rows).rename(columns={"index": "generation"})
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Best and mean fitness of every generation."""
+        indices = [generation.index for generation in self.generations]
+        best = [generation.best for generation in self.generations]
+        mean = [generation.mean for generation in self.generations]
+        return plot_history(ax, self.experiment.name, indices, best, mean)
+
+    def __repr__(self) -> str:
+        return (
+            f"<LocalRun of {self.experiment.name!r}: {len(self.generations)} generations, "
+            f"champion {self.champion.fitness:.6f}>"
+        )
+
+
+def evolve(
+    experiment: Experiment,
+    generations: int | None = None,
+    *,
+    threads: int | None = None,
+    progress: bool = True,
+    evaluate: Evaluate | None = None,
+) -> LocalRun:
+    """Runs an experiment here, as ``swarmctl run`` does: the same generations, champion and
+    digest.
+
+    ``generations``: instead of the file's. ``threads``: as many as there are processors if
+    absent. ``progress``: whether tqdm, if it is installed, shows how far it is.
+    ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`.
+    """
+    settings = experiment.to_dict()["algorithm"]
+    n_generations: int = settings["generations"] if generations is None else generations
+    if n_generations < 1:
+        raise ValueError(f"generations are 1 or more, not {n_generations}")
+
+    def here(
+        genotypes: NDArray[np.float64], trial_set: TrialSet, n_trials: int
+    ) -> NDArray[np.float64]:
+        return experiment.evaluate(genotypes, trial_set, trials=n_trials, threads=threads)
+
+    compute = here if evaluate is None else evaluate
+
+    def compare(evolution: Evolution) -> None:
+        candidates = evolution._core.reevaluation()
+        assert candidates is not None, "a generation has been told"
+        while (asked := candidates.ask()) is not None:
+            genotypes, trials = asked
+            candidates.tell(compute(genotypes, TrialSet(*trials), settings["champion_trials"]))
+        evolution._core.set_champion(candidates)
+
+    evolution = experiment.evolution()
+    done: list[Generation] = []
+    for index in _shown(range(n_generations), experiment.name, progress):
+        fitness = compute(evolution.ask(), TrialSet.of(index), experiment.n_trials)
+        done.append(evolution.tell(fitness))
+        if evolution.n_generations % settings["champion_every"] == 0:
+            compare(evolution)
+    # A comparison that is only the end's is not what a longer run goes on from.
+    ended = evolution.copy()
+    if evolution.n_generations % settings["champion_every"] != 0:
+        compare(ended)
+    asked = ended._core.judgement()
+    assert asked is not None, "a generation has been told"
+    genotypes, trials = asked
+    fitness = compute(genotypes, TrialSet(*trials), settings["judgement_trials"])
+    champion, digest = ended._core.judge(fitness)
+    return LocalRun(experiment, done, Champion(**champion), digest, evolution)
+
+
+def _shown(indices: range, name: str, progress: bool) -> Iterable[int]:
+    if not progress:
+        return indices
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return indices
+    shown: Iterable[int] = tqdm(indices, desc=name, unit="generation")
+    return shown

@@ -1,0 +1,79 @@
+"""Networks: what a genotype encodes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import networkx
+
+
+class Network:
+    """A network's neurons, inputs and synapses, as matrices and as a graph.
+
+    Neurons are numbered in the order of the ensembles of the experiment file, inputs in that
+    of its stimuli.
+    """
+
+    def __init__(self, description: dict[str, Any]) -> None:
+        self.description: dict[str, Any] = description
+        """All of it, as ``swarmctl champion --output json`` has it."""
+        neurons = description["neurons"]
+        self.inputs: list[str] = [
+            f"{it['name']}_{i}" for it in description["stimuli"] for i in range(it["n"])
+        ]
+        """Names of the I inputs: ``STIMULUS_0`` and so on."""
+        self.ensembles: list[str] = [neuron["ensemble"] for neuron in neurons]
+        """The ensemble of each of the N neurons."""
+        seen: dict[str, int] = {}
+        self.neurons: list[str] = []
+        """Names of the N neurons: ``ENSEMBLE_0`` and so on."""
+        for ensemble in self.ensembles:
+            self.neurons.append(f"{ensemble}_{seen.setdefault(ensemble, 0)}")
+            seen[ensemble] += 1
+        names = [key for key in (neurons[0] if neurons else {}) if _is_number(neurons[0][key])]
+        self.parameters: dict[str, NDArray[np.float64]] = {
+            name: np.array([neuron[name] for neuron in neurons]) for name in names
+        }
+        """By name, such as ``tau``, ``bias`` and ``gain`` of ``ctrnn``: ``[N]``."""
+        self.input_weights: NDArray[np.float64] = np.zeros((len(neurons), len(self.inputs)))
+        """``[N, I]``: weight of each synapse from an input, 0 where there is none."""
+        self.weights: NDArray[np.float64] = np.zeros((len(neurons), len(neurons)))
+        """``[N, N]``: ``weights[post, pre]``, 0 where there is no synapse."""
+        for synapse in description["synapses"]:
+            pre = synapse["pre"]
+            if "input" in pre:
+                self.input_weights[synapse["post"], pre["input"]] += synapse["weight"]
+            else:
+                self.weights[synapse["post"], pre["neuron"]] += synapse["weight"]
+
+    def to_networkx(self) -> networkx.MultiDiGraph:
+        """A graph with a node per input and neuron, under their names, and an edge per
+        synapse with ``weight``, ``group`` (its name in the file) and ``trainable``."""
+        import networkx
+
+        graph: networkx.MultiDiGraph = networkx.MultiDiGraph()
+        for name in self.inputs:
+            graph.add_node(name, kind="input")
+        for i, name in enumerate(self.neurons):
+            graph.add_node(name, kind="neuron", **self.description["neurons"][i])
+        for synapse in self.description["synapses"]:
+            pre = synapse["pre"]
+            source = self.inputs[pre["input"]] if "input" in pre else self.neurons[pre["neuron"]]
+            rest = {key: synapse[key] for key in synapse if key not in ("pre", "post")}
+            graph.add_edge(source, self.neurons[synapse["post"]], **rest)
+        return graph
+
+    def __repr__(self) -> str:
+        n_synapses = len(self.description["synapses"])
+        return (
+            f"<Network: {len(self.inputs)} inputs, {len(self.neurons)} neurons, "
+            f"{n_synapses} synapses>"
+        )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -1,0 +1,67 @@
+"""Which trials an experiment is simulated in.
+
+A *trial set* is a family of worlds and noise; its trials are numbered from 0. Evolution is
+selected by one set per generation. Champions are compared, and in the end judged, on others.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Union
+
+
+class TrialSet(NamedTuple):
+    """Worlds and noise. A generation's number means the set of that generation.
+
+    >>> TrialSet.of(3) == TrialSet.generation_of(3)
+    True
+    >>> TrialSet.judgement(59)
+    TrialSet(kind='judgement', generation=59, block=0)
+    """
+
+    kind: str
+    """``generation``, ``held_out``, ``judgement`` or ``evaluation``."""
+    generation: int = 0
+    """The generation that the set belongs to, from 0."""
+    block: int = 0
+    """Which of a generation's held-out blocks, 0 to 255."""
+
+    @classmethod
+    def generation_of(cls, generation: int) -> TrialSet:
+        """The trials that generation ``generation`` is selected by."""
+        return cls("generation", generation)
+
+    @classmethod
+    def held_out(cls, generation: int, block: int = 0) -> TrialSet:
+        """Trials that candidates for the champion are compared by after a generation."""
+        return cls("held_out", generation, block)
+
+    @classmethod
+    def judgement(cls, generation: int) -> TrialSet:
+        """Trials that say what the champion is worth after the last generation."""
+        return cls("judgement", generation)
+
+    @classmethod
+    def evaluation(cls) -> TrialSet:
+        """Trials of no evolution, the ones of ``swarmctl evaluate``."""
+        return cls("evaluation")
+
+    @classmethod
+    def of(cls, trials: AnyTrialSet) -> TrialSet:
+        """``trials`` itself, or the set of the generation of that number."""
+        return trials if isinstance(trials, TrialSet) else cls("generation", int(trials))
+
+
+AnyTrialSet = Union[int, TrialSet]
+"""A trial set, or the number of a generation."""
+
+
+def address(
+    trial_set: AnyTrialSet, trials: int | range | None, default: int
+) -> tuple[str, int, int, int, int]:
+    """What the extension takes: set and range of trials."""
+    if trials is None:
+        trials = default
+    chosen = range(trials) if isinstance(trials, int) else trials
+    if chosen.step != 1 or len(chosen) == 0 or chosen.start < 0:
+        raise ValueError(f"trials are a number above 0 or a range such as range(5, 10), not {trials}")
+    return (*TrialSet.of(trial_set), chosen.start, chosen.stop)
