@@ -46,6 +46,9 @@ pub const GENES_PER_GENERATION: u64 = 50_000_000;
 /// the genes.
 pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 
+/// Euler steps of spiking networks, ms: the shortest time constants of their synapses and
+/// decoders are 5 ms.
+pub const SPIKING_DT: RangeInclusive<f64> = 0.001..=2.0;
 /// Network substeps per environment step.
 pub const TIME_SCALE: u32 = 1_000;
 /// Values of all stimuli together.

@@ -17,6 +17,27 @@ pub enum GenotypeQuery {
     /// `neurons:PARAMETER:...`: the name of a parameter that evolves in some
     /// [`NeuronModel`](crate::NeuronModel).
     Neurons(&'static str, EnsembleSelector),
+    /// `decoders:weights:...`
+    Decoders(OutputSelector),
+}
+
+/// The last part of `decoders:weights:...`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum OutputSelector {
+    /// Every output whose decoding has weights.
+    All,
+    /// One output.
+    Named(String),
+}
+
+impl OutputSelector {
+    /// As it stands in a query.
+    pub fn as_str(&self) -> &str {
+        match self {
+            Self::All => "all",
+            Self::Named(name) => name,
+        }
+    }
 }
 
 /// The last part of `synapses:weights:...`. Kinds refer to the *presynaptic*
@@ -75,6 +96,7 @@ impl fmt::Display for GenotypeQuery {
             Self::Neurons(parameter, selector) => {
                 write!(f, "neurons:{parameter}:{}", selector.as_str())
             }
+            Self::Decoders(selector) => write!(f, "decoders:weights:{}", selector.as_str()),
         }
     }
 }
@@ -87,20 +109,10 @@ pub enum ParseQueryError {
     Unsupported(String),
     /// It has another form.
     #[error(
-        "expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with {}",
-        parameter_names()
+        "expected `synapses:weights:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, \
+         with a parameter of the neuron model"
     )]
     Malformed,
-}
-
-/// Such as "`a`, `b` or `c`".
-fn parameter_names() -> String {
-    let quoted: Vec<String> =
-        evolvable_parameters().iter().map(|p| format!("`{}`", p.name)).collect();
-    match quoted.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => quoted.concat(),
-    }
 }
 
 impl FromStr for GenotypeQuery {
@@ -123,9 +135,15 @@ impl FromStr for GenotypeQuery {
                     name => SynapseSelector::Named(name.to_owned()),
                 }));
             }
+            ("decoders" | "decoding", "weights") => {
+                return Ok(Self::Decoders(match selector {
+                    "all" => OutputSelector::All,
+                    name => OutputSelector::Named(name.to_owned()),
+                }));
+            }
             ("synapses", "delays")
             | ("neurons", "decoding")
-            | ("encoders" | "encoding" | "decoders" | "decoding", "weights") => {
+            | ("encoders" | "encoding", "weights") => {
                 return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
             }
             ("neurons", name) => {
@@ -163,7 +181,7 @@ impl JsonSchema for GenotypeQuery {
         json_schema!({
             "description": "Names a part of the network's parameters (Table 4.1).",
             "type": "string",
-            "pattern": format!("^(synapses:weights|neurons:({names})):.+$"),
+            "pattern": format!("^(synapses:weights|deco(ders|ding):weights|neurons:({names})):.+$"),
         })
     }
 }

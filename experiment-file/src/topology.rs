@@ -6,8 +6,10 @@ use serde_json::json;
 
 use super::{NamedMap, NeuronModel, SensorQuery, limits, neuron, schema};
 
-/// Of [`TopologyConfig::dt`].
+/// Of [`TopologyConfig::dt`], s.
 pub(super) const DEFAULT_DT: f64 = 0.1;
+/// Of [`TopologyConfig::dt`] of spiking neurons, ms.
+pub(super) const DEFAULT_SPIKING_DT: f64 = 1.0;
 /// Of [`TopologyConfig::time_scale`].
 pub(super) const DEFAULT_TIME_SCALE: u32 = 20;
 /// Of [`TopologyConfig::seed`].
@@ -24,8 +26,9 @@ pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
     transform = schema::ignored("synapse_params")
 )]
 pub struct TopologyConfig {
-    /// Euler step of the network, seconds; default 0.1.
-    #[schemars(extend("default" = DEFAULT_DT, "exclusiveMinimum" = 0))]
+    /// Euler step of the network: of rate neurons in seconds, default 0.1; of spiking ones
+    /// in ms, default 1, at most 2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub dt: f64,
     /// Network substeps per environment step; default 20.
     #[schemars(range(min = 1, max = limits::TIME_SCALE), extend("default" = DEFAULT_TIME_SCALE))]
@@ -36,16 +39,16 @@ pub struct TopologyConfig {
     /// How the neurons work; default `rate_model`.
     #[serde(skip_serializing_if = "NeuronModel::is_default")]
     pub neuron_model: NeuronModel,
-    /// Whether the gain multiplies the bias, u = F(g (v + beta)) (Eq. 2.2), or not,
-    /// u = F(g v + beta); default true.
+    /// Of rate neurons: whether the gain multiplies the bias, u = F(g (v + beta))
+    /// (Eq. 2.2), or not, u = F(g v + beta); default true.
     #[serde(skip_serializing_if = "Clone::clone")]
     #[schemars(extend("default" = true))]
     pub bias_in_gain: bool,
-    /// What neurons show until their first substep; default `activation`.
+    /// What rate neurons show until their first substep; default `activation`.
     #[serde(skip_serializing_if = "InitialRates::is_default")]
     pub initial_rates: InitialRates,
-    /// Time constant of all neurons that an output reads, whatever the genotype says,
-    /// seconds; default null: that of the genotype.
+    /// Time constant of all rate neurons that an output reads, whatever the genotype
+    /// says, seconds; default null: that of the genotype.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "schema::positive_or_null")]
     pub motor_tau: Option<f64>,
@@ -192,8 +195,9 @@ pub struct SynapseGroupConfig {
     pub p: f64,
 }
 
-/// How the activities of an output's ensemble become an action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+/// How what an output's ensemble does becomes an action: the first three for rate neurons,
+/// from activities u; the others for spiking ones, from the spikes of the environment step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "scheme", content = "params")]
 #[schemars(deny_unknown_fields, transform = schema::decodings)]
 pub enum DecodingConfig {
@@ -206,4 +210,50 @@ pub enum DecodingConfig {
     },
     /// One category, drawn from softmax(u).
     SoftmaxDecoding {},
+    /// The index of the neuron that spiked first: the lowest of those that did at once, 0
+    /// if none has.
+    FirstToSpike {},
+    /// Sum over neurons of weight * spikes * 0.25^rank; the rank is how many neurons of
+    /// the ensemble spiked before it for the first time.
+    RankOrderDecoding {
+        /// Values that it yields, each with weights of its own; default 1.
+        #[schemars(range(min = 1, max = limits::MESSAGE_LENGTH), extend("default" = 1))]
+        num_outputs: u32,
+    },
+    /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises
+    /// within 5 ms of one and decays with 30 ms.
+    LinearPopulationDecoding {
+        /// Values that it yields, each with weights of its own; default 1.
+        #[schemars(range(min = 1, max = limits::MESSAGE_LENGTH), extend("default" = 1))]
+        num_outputs: u32,
+        /// What it yields where W a = 0; default 0.5.
+        #[schemars(range(min = -1, max = 1), extend("default" = 0.5))]
+        rest_value: f64,
+    },
+}
+
+impl DecodingConfig {
+    /// Whether it decodes spikes, not activities.
+    pub fn is_of_spikes(self) -> bool {
+        use DecodingConfig::{FirstToSpike, LinearPopulationDecoding, RankOrderDecoding};
+        matches!(self, FirstToSpike {} | RankOrderDecoding { .. } | LinearPopulationDecoding { .. })
+    }
+
+    /// Values that it yields for an ensemble of `n` neurons, unless it yields a category.
+    pub fn n_values(self, n: u32) -> u32 {
+        match self {
+            Self::RankOrderDecoding { num_outputs }
+            | Self::LinearPopulationDecoding { num_outputs, .. } => num_outputs,
+            _ => n,
+        }
+    }
+
+    /// Its weights for an ensemble of `n` neurons, value by value.
+    pub fn n_weights(self, n: u32) -> u32 {
+        match self {
+            Self::RankOrderDecoding { num_outputs }
+            | Self::LinearPopulationDecoding { num_outputs, .. } => num_outputs * n,
+            _ => 0,
+        }
+    }
 }

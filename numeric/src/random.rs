@@ -55,7 +55,8 @@ pub enum Purpose {
     LightMovement = 8,
     /// Which synapses exist; seed = `topology.seed`, stream = index of the group.
     Connections = 9,
-    /// Weights outside the genotype; as [`Connections`](Self::Connections).
+    /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
+    /// decoders; stream = 2^32 + output.
     FixedWeights = 10,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,

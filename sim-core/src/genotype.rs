@@ -8,7 +8,8 @@ use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use experiment_file::{
-    EnsembleSelector, ExperimentConfig, GeneScale, GenotypeQuery, SynapseSelector, TopologyConfig,
+    EnsembleSelector, ExperimentConfig, GeneScale, GenotypeQuery, OutputSelector, SynapseSelector,
+    TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -47,6 +48,13 @@ enum Parameter {
         /// Number of the neuron.
         neuron: usize,
     },
+    /// A weight of the decoding of an output.
+    Decoder {
+        /// Number of the output.
+        output: usize,
+        /// Number of the weight.
+        weight: usize,
+    },
 }
 
 impl Codec {
@@ -61,7 +69,7 @@ impl Codec {
             let bounds = population.min_vals.iter().zip(&population.max_vals);
             for (query, (&low, &high)) in population.objects.iter().zip(bounds) {
                 let span = high - low;
-                let (parameters, scale) = select(query, network);
+                let (parameters, scale) = select(query, &config.topology, network);
                 for parameter in parameters {
                     *coverage.of(parameter) = true;
                     genes.push(Gene { parameter, low, span, scale });
@@ -75,7 +83,7 @@ impl Codec {
             segments.push(first..genes.len());
         }
         let defaults = defaults(&config.topology, network, &coverage, problems);
-        let uncovered = coverage.describe(network);
+        let uncovered = coverage.describe(&config.topology, network);
         let motor = network.ensembles.values().filter(|ensemble| ensemble.motor);
         let motor: Vec<usize> = motor.flat_map(|ensemble| ensemble.neurons.clone()).collect();
         let fixed_tau = network.motor_tau.map(|tau| (motor, tau));
@@ -107,6 +115,7 @@ impl Codec {
                 Parameter::Neuron { parameter, neuron } => {
                     phenotype.neurons[parameter][neuron] = value;
                 }
+                Parameter::Decoder { output, weight } => phenotype.decoders[output][weight] = value,
             }
         }
         if let Some((neurons, tau)) = &self.fixed_tau {
@@ -117,7 +126,11 @@ impl Codec {
 }
 
 /// The parameters that a query covers, in genotype order, and the scale of its genes.
-fn select(query: &GenotypeQuery, network: &Network) -> (Vec<Parameter>, GeneScale) {
+fn select(
+    query: &GenotypeQuery,
+    config: &TopologyConfig,
+    network: &Network,
+) -> (Vec<Parameter>, GeneScale) {
     match query {
         GenotypeQuery::Weights(selector) => (select_weights(selector, network), GeneScale::Linear),
         GenotypeQuery::Neurons(name, selector) => {
@@ -134,6 +147,17 @@ fn select(query: &GenotypeQuery, network: &Network) -> (Vec<Parameter>, GeneScal
             };
             let parameters = neurons.map(|neuron| Parameter::Neuron { parameter, neuron });
             (parameters.collect(), scale)
+        }
+        GenotypeQuery::Decoders(selector) => {
+            let outputs = config.outputs.keys().zip(&network.outputs).enumerate();
+            let selected = outputs.filter(|(_, (name, _))| match selector {
+                OutputSelector::All => true,
+                OutputSelector::Named(selected) => selected == *name,
+            });
+            let parameters = selected.flat_map(|(output, (_, compiled))| {
+                (0..compiled.n_weights).map(move |weight| Parameter::Decoder { output, weight })
+            });
+            (parameters.collect(), GeneScale::Linear)
         }
     }
 }
@@ -168,7 +192,11 @@ fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Paramete
     selected.map(Parameter::Weight).collect()
 }
 
-/// Values of what the genotype does not cover.
+/// The first stream of fixed weights of decoders, after those of groups of synapses.
+const DECODERS: u64 = 1 << 32;
+
+/// Values of what the genotype does not cover. Weights of a decoder are all drawn, so that
+/// none depends on what else is covered.
 fn defaults(
     config: &TopologyConfig,
     network: &Network,
@@ -190,7 +218,8 @@ fn defaults(
             let is_used = !covered[ensemble.neurons.clone()].iter().all(|&covered| covered);
             // Euler steps beyond twice the time constant diverge.
             if parameter.is_time_constant && network.dt > 2.0 * value && is_used {
-                let message = format!("{value} s is less than half of topology.dt: unstable");
+                let value = parameter.with_unit(value);
+                let message = format!("{value} is less than half of topology.dt: unstable");
                 let path = format!("topology.ensembles.{name}.params.{}", parameter.name);
                 problems.add(path, message);
             }
@@ -198,7 +227,13 @@ fn defaults(
         }
         neurons.insert(parameter.name, values);
     }
-    Phenotype { weights, neurons }
+    let decoders = network.outputs.iter().enumerate().map(|(index, output)| {
+        let number = DECODERS + index as u64;
+        let mut stream = Stream::new(config.seed, 0, 0, Purpose::FixedWeights, number);
+        (0..output.n_weights).map(|_| -1.0 + 2.0 * stream.uniform()).collect()
+    });
+    let decoders = decoders.collect();
+    Phenotype { weights, neurons, decoders }
 }
 
 /// Which values the genotype covers.
@@ -207,6 +242,8 @@ struct ParameterCoverage {
     weights: Vec<bool>,
     /// By index of the parameter and number of the neuron.
     neurons: Vec<Vec<bool>>,
+    /// By number of the output and of the weight.
+    decoders: Vec<Vec<bool>>,
 }
 
 impl ParameterCoverage {
@@ -215,6 +252,7 @@ impl ParameterCoverage {
         Self {
             weights: vec![false; network.synapses.len()],
             neurons: vec![vec![false; network.n_neurons()]; n_parameters],
+            decoders: network.outputs.iter().map(|output| vec![false; output.n_weights]).collect(),
         }
     }
 
@@ -223,16 +261,23 @@ impl ParameterCoverage {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
             Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],
+            Parameter::Decoder { output, weight } => &mut self.decoders[output][weight],
         }
     }
 
     /// What is not covered, except what the experiment declares untrainable.
-    fn describe(&self, network: &Network) -> Vec<String> {
+    fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {
             let n = group.synapses.clone().filter(|&synapse| !self.weights[synapse]).count();
             if n > 0 {
                 lines.push(format!("synapses:weights:{name}: {n} weights stay random"));
+            }
+        }
+        for (name, covered) in config.outputs.keys().zip(&self.decoders) {
+            let n = covered.iter().filter(|covered| !**covered).count();
+            if n > 0 {
+                lines.push(format!("decoders:weights:{name}: {n} weights stay random"));
             }
         }
         let parameters = network.model.spec().parameters.iter().zip(&self.neurons);
@@ -290,6 +335,7 @@ mod tests {
             let value = match gene.parameter {
                 Parameter::Weight(synapse) => phenotype.weights[synapse],
                 Parameter::Neuron { parameter, neuron } => phenotype.neurons[parameter][neuron],
+                Parameter::Decoder { output, weight } => phenotype.decoders[output][weight],
             };
             let value = match gene.scale {
                 GeneScale::Linear => value,

@@ -22,6 +22,11 @@ impl Lanes {
         Self { row_len, values: vec![0.0; n_rows * row_len] }
     }
 
+    /// Number of rows; 0 without lanes.
+    pub fn n_rows(&self) -> usize {
+        self.values.len().checked_div(self.row_len).unwrap_or(0)
+    }
+
     /// One row, with its padding.
     pub fn row(&self, row: usize) -> &[f32] {
         &self.values[row * self.row_len..][..self.row_len]

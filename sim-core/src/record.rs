@@ -52,6 +52,10 @@ pub struct RobotRecord {
     /// Activity of every neuron of its network after the step, in the order of
     /// [`Simulation::network_json`](crate::Simulation::network_json); empty without a network.
     pub activity: Vec<f64>,
+    /// Voltage of every spiking neuron after the step, mV, in the same order; empty
+    /// without spiking neurons. Their activity is the share of substeps with a spike.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub voltages: Vec<f64>,
     /// The frame that it took from the air.
     pub received: Option<ReceivedFrame>,
     /// The message of that frame; zeros without one.

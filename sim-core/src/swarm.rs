@@ -88,6 +88,7 @@ impl Swarm {
             heading: self.headings[robot],
             stimuli: Vec::new(),
             activity: Vec::new(),
+            voltages: Vec::new(),
             received: self.received[robot].as_ref().map(|received| ReceivedFrame {
                 emitter: received.emitter,
                 originator: received.origin.originator,

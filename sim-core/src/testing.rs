@@ -1,11 +1,26 @@
 //! The shipped experiments, for tests to vary.
 
-use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig};
+use experiment_file::{
+    ExperimentConfig, GenotypeQuery, NeuronModel, ObjectConfig, RobotConfig, SynapseSelector,
+};
 use numeric::random::{Purpose, Stream};
 
 /// Leader selection.
 pub(crate) fn experiment_a() -> ExperimentConfig {
     read(include_str!("../../configs/leader_selection_snes.json"))
+}
+
+/// Leader selection with spiking neurons of a model; weights evolve.
+pub(crate) fn experiment_a_spiking(model: NeuronModel) -> ExperimentConfig {
+    let mut config = read(include_str!("../../configs/spiking/leader_selection_lif.json"));
+    config.topology.neuron_model = model;
+    for ensemble in config.topology.ensembles.values_mut() {
+        ensemble.params = model.default_params();
+    }
+    let population = &mut config.algorithm.populations[0];
+    population.objects = vec![GenotypeQuery::Weights(SynapseSelector::All)];
+    (population.min_vals, population.max_vals) = (vec![-100.0], vec![250.0]);
+    config
 }
 
 /// Borderline identification.

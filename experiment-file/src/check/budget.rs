@@ -24,6 +24,8 @@ struct NetworkSize {
     n_states: u64,
     /// Parameters of all neurons that can evolve.
     n_neuron_genes: u64,
+    /// Weights of all decodings.
+    n_decoder_weights: u64,
     /// Operations of all neurons in a substep.
     n_neuron_operations: u64,
     /// If every possible one exists.
@@ -46,6 +48,14 @@ impl NetworkSize {
             n_neurons,
             n_states: n_neurons * model.states_per_neuron,
             n_neuron_genes: n_neurons * model.evolvable().count() as u64,
+            n_decoder_weights: topology
+                .outputs
+                .iter()
+                .filter_map(|(name, output)| {
+                    let n = topology.ensembles.get(&output.ensemble)?.n;
+                    Some(u64::from(topology.decoding.get(name)?.n_weights(n)))
+                })
+                .sum(),
             n_neuron_operations: n_neurons * model.operations_per_neuron,
             n_synapses: groups
                 .map(|group| size_of_all(&group.pre) * size_of_all(&group.post))
@@ -89,7 +99,7 @@ fn generation(
     let parts = [&algorithm.key("num_evaluations")];
     limit(n_trials, limits::TRIALS_PER_GENERATION, what, &size_path, &parts, report);
 
-    let n_genes = network.n_synapses + network.n_neuron_genes;
+    let n_genes = network.n_synapses + network.n_neuron_genes + network.n_decoder_weights;
     let what = "possible genes per generation";
     let parts = [&topology];
     limit(size * n_genes, limits::GENES_PER_GENERATION, what, &size_path, &parts, report);

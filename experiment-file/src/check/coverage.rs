@@ -3,7 +3,10 @@
 use std::fmt;
 
 use crate::report::{Path, Report, suggestion};
-use crate::{EnsembleSelector, GenotypeQuery, SynapseGroupConfig, SynapseSelector, TopologyConfig};
+use crate::{
+    EnsembleSelector, GenotypeQuery, OutputSelector, SynapseGroupConfig, SynapseSelector,
+    TopologyConfig,
+};
 
 /// The evolvable parts of a network and who claimed them.
 pub(super) struct ParameterCoverage<'a> {
@@ -24,6 +27,8 @@ enum PartKind<'a> {
     Weights { group: &'a str, pre: &'a str, source: Source },
     /// A parameter of an ensemble's neurons.
     Neurons { parameter: &'static str, ensemble: &'a str },
+    /// The weights of an output's decoding.
+    Decoder { output: &'a str },
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -54,7 +59,10 @@ impl<'a> ParameterCoverage<'a> {
             let parameters = topology.neuron_model.spec().evolvable();
             parameters.map(move |p| PartKind::Neurons { parameter: p.name, ensemble })
         });
-        let parts = weights.chain(neurons).map(|kind| Part { kind, owner: None }).collect();
+        let weighted = topology.decoding.iter().filter(|(_, decoding)| decoding.n_weights(1) > 0);
+        let decoders = weighted.map(|(output, _)| PartKind::Decoder { output });
+        let parts =
+            weights.chain(neurons).chain(decoders).map(|kind| Part { kind, owner: None }).collect();
         Self { topology, parts }
     }
 
@@ -67,15 +75,16 @@ impl<'a> ParameterCoverage<'a> {
         report: &Report<'_>,
     ) {
         let part = |key| Path::from(["topology", key]);
-        let [stimuli, ensembles, synapses] =
-            ["stimuli", "ensembles", "synapses"].map(|map| part(map).keys());
+        let [stimuli, ensembles, synapses, outputs] =
+            ["stimuli", "ensembles", "synapses", "outputs"].map(|map| part(map).keys());
         if self.n_meanings(query) != 1 {
-            let others = [&stimuli, &ensembles, &synapses];
+            let others = [&stimuli, &ensembles, &synapses, &outputs];
             return report.conflict(path, &others, || self.explain(query));
         }
         let others = match query {
             GenotypeQuery::Neurons(..) => vec![ensembles, part("neuron_model"), part("neurons")],
             GenotypeQuery::Weights(_) => vec![stimuli, part("synapses"), part("outputs")],
+            GenotypeQuery::Decoders(_) => vec![outputs, part("decoding")],
         };
         let others: Vec<&Path> = others.iter().collect();
         let (mut matches, mut taken) = (false, None);
@@ -106,6 +115,9 @@ impl<'a> ParameterCoverage<'a> {
                 let is_source = ensembles.contains_key(name) || stimuli.contains_key(name);
                 usize::from(is_source) + usize::from(synapses.contains_key(name))
             }
+            GenotypeQuery::Decoders(OutputSelector::Named(name)) => {
+                usize::from(self.topology.outputs.contains_key(name))
+            }
             _ => 1,
         }
     }
@@ -120,6 +132,9 @@ impl<'a> ParameterCoverage<'a> {
             GenotypeQuery::Weights(selector) => {
                 let known = ensembles.keys().chain(stimuli.keys()).chain(synapses.keys());
                 (selector.as_str(), "ensemble, stimulus or synapse group", known.collect())
+            }
+            GenotypeQuery::Decoders(selector) => {
+                (selector.as_str(), "output", self.topology.outputs.keys().collect())
             }
         };
         if self.n_meanings(query) > 1 {
@@ -149,6 +164,10 @@ impl PartKind<'_> {
                         EnsembleSelector::Named(name) => name == ensemble,
                     }
             }
+            (Self::Decoder { output }, GenotypeQuery::Decoders(selector)) => match selector {
+                OutputSelector::All => true,
+                OutputSelector::Named(name) => name == output,
+            },
             _ => false,
         }
     }
@@ -163,6 +182,7 @@ impl fmt::Display for PartKind<'_> {
             Self::Neurons { parameter, ensemble } => {
                 write!(f, "the {parameter} of ensemble `{ensemble}`")
             }
+            Self::Decoder { output } => write!(f, "the weights of the decoding of `{output}`"),
         }
     }
 }

@@ -158,7 +158,16 @@ fn decoding(topology: &TopologyConfig, report: &Report<'_>) {
             continue;
         };
         let ensemble_path = Path::from(["topology", "ensembles", &output.ensemble]);
-        let others = [&outputs_path.key(name), &ensemble_path];
+        let [model, neurons] = ["neuron_model", "neurons"].map(|key| Path::from(["topology", key]));
+        let others = [&outputs_path.key(name), &ensemble_path, &model, &neurons];
+        if decoding.is_of_spikes() != topology.neuron_model.is_spiking() {
+            report.conflict(&path.key(name), &others, || {
+                let model = topology.neuron_model.name();
+                let what = if decoding.is_of_spikes() { "spikes" } else { "activities" };
+                format!("decodes {what}, which `{model}` neurons do not have")
+            });
+            continue;
+        }
         if let Err(message) = accepts(output.actuator, decoding, ensemble.n) {
             report.conflict(&path.key(name), &others, message);
         }
@@ -169,14 +178,34 @@ fn decoding(topology: &TopologyConfig, report: &Report<'_>) {
 /// length of a message is the transmitter's.)
 fn accepts(actuator: ActuatorQuery, decoding: DecodingConfig, n: u32) -> Result<(), String> {
     use ActuatorQuery::{Led, Message, Mode, Wheels};
-    use DecodingConfig::{IdentityDecoding, SoftmaxDecoding, ThresholdDecoding};
+    use DecodingConfig::{
+        FirstToSpike, IdentityDecoding, LinearPopulationDecoding, RankOrderDecoding,
+        SoftmaxDecoding, ThresholdDecoding,
+    };
+    if let RankOrderDecoding { num_outputs } | LinearPopulationDecoding { num_outputs, .. } =
+        decoding
+    {
+        return match (actuator, num_outputs) {
+            (Message, _) | (Wheels, 1 | 2) | (Led | Mode, 1) => Ok(()),
+            (Wheels, _) => {
+                Err(format!("the actuator needs 1 or 2 outputs, these are {num_outputs}"))
+            }
+            (Led | Mode, _) => Err(format!("the actuator needs 1 output, these are {num_outputs}")),
+        };
+    }
     let (sizes, expected) = match (actuator, decoding) {
         (Message, IdentityDecoding {} | ThresholdDecoding { .. }) => return Ok(()),
         (Wheels, IdentityDecoding {} | ThresholdDecoding { .. }) => (1..=2, "1 or 2 neurons"),
         (Led | Mode, ThresholdDecoding { .. }) => (1..=1, "1 neuron"),
-        (Led, SoftmaxDecoding {}) => (2..=u32::MAX, "one neuron per colour, 2 or more"),
+        (Mode, FirstToSpike {}) => (2..=2, "2 neurons, relay and send"),
+        (Led, SoftmaxDecoding {} | FirstToSpike {}) => {
+            (2..=u32::MAX, "one neuron per colour, 2 or more")
+        }
         (Led, _) => return Err("an LED needs `ThresholdDecoding` or `SoftmaxDecoding`".to_owned()),
         (Mode, _) => return Err("a mode needs `ThresholdDecoding`".to_owned()),
+        (Wheels | Message, FirstToSpike {}) => {
+            return Err("the actuator takes numbers, `FirstToSpike` yields a category".to_owned());
+        }
         (Wheels | Message, _) => return Err("the actuator needs `IdentityDecoding`".to_owned()),
     };
     if sizes.contains(&n) {

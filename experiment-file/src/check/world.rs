@@ -95,15 +95,27 @@ fn network_ports(
             });
         } else if config.actuator == ActuatorQuery::Message
             && let Some(ensemble) = topology.ensembles.get(&config.ensemble)
+            && let Some(decoding) = topology.decoding.get(output)
             && let Some(transmitter) = &robot.actuators.wireless_transmitter
-            && ensemble.n != transmitter.msg_length
+            && decoding.n_values(ensemble.n) != transmitter.msg_length
         {
             let ensemble_path = Path::from(["topology", "ensembles", &config.ensemble, "n"]);
+            let decoding_path = Path::from(["topology", "decoding", output]);
             let transmitter_path = actuators_path.key("wireless_transmitter");
-            let (n, msg_length) = (ensemble.n, transmitter.msg_length);
-            report.conflict(&ensemble_path, &[&controller_path, &transmitter_path, &path], || {
-                format!("is {n}, but messages of robot `{name}` have `msg_length` {msg_length}")
-            });
+            let (n, msg_length) = (decoding.n_values(ensemble.n), transmitter.msg_length);
+            let others = [&controller_path, &transmitter_path, &path, &decoding_path];
+            if decoding.n_weights(ensemble.n) > 0 {
+                report.conflict(&decoding_path, &others, || {
+                    format!(
+                        "has {n} outputs, but messages of robot `{name}` have `msg_length` \
+                         {msg_length}"
+                    )
+                });
+            } else {
+                report.conflict(&ensemble_path, &others, || {
+                    format!("is {n}, but messages of robot `{name}` have `msg_length` {msg_length}")
+                });
+            }
         }
     }
 }

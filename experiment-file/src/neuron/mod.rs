@@ -6,6 +6,11 @@
 //! model: a file beside `rate`, a variant of [`NeuronModel`] here, and in `sim-core`
 //! the model's dynamics.
 
+mod adex;
+mod exp_lif;
+mod izhikevich;
+mod lif;
+mod morris_lecar;
 mod rate;
 
 use std::borrow::Cow;
@@ -24,16 +29,31 @@ pub enum NeuronModel {
     /// Continuous-time recurrent neural network of rate neurons (CTRNN).
     #[default]
     Rate,
+    /// Leaky integrate and fire.
+    Lif,
+    /// Exponential integrate and fire (Fourcaud-Trocme et al. 2003).
+    ExpLif,
+    /// Adaptive exponential integrate and fire (Brette and Gerstner 2005).
+    AdEx,
+    /// Izhikevich 2003.
+    Izhikevich,
+    /// Morris and Lecar 1981.
+    MorrisLecar,
 }
 
-/// Models of the original simulator that this one does not know.
-pub(super) const UNSUPPORTED: [&str; 5] = ["adex", "izhikevich", "lif", "exp_lif", "morris_lecar"];
+/// Voltages of spiking neurons, mV.
+const VOLTAGE: RangeInclusive<f64> = -200.0..=200.0;
+/// Time constants of spiking neurons, ms.
+const TIME: RangeInclusive<f64> = 0.01..=10_000.0;
 
 /// What an experiment file can say of the neurons of a model, and what they cost.
 #[derive(Debug)]
 pub struct NeuronModelSpec {
     /// Its names in files; the canonical form uses the first.
     pub names: &'static [&'static str],
+    /// Whether its neurons emit spikes. Then times are ms and voltages mV; otherwise times
+    /// are seconds and neurons have activities.
+    pub is_spiking: bool,
     /// The parameters of a neuron, in the order of the canonical form.
     pub parameters: &'static [NeuronParameter],
     /// The activation function of an ensemble that names none; none for a model
@@ -64,6 +84,8 @@ pub struct NeuronParameter {
     pub gene: Option<GeneScale>,
     /// Whether an Euler step longer than twice its value makes the network diverge.
     pub is_time_constant: bool,
+    /// Whether its values are whole numbers.
+    pub is_whole: bool,
 }
 
 /// From a number between a query's `min_vals` and `max_vals` to a value.
@@ -80,13 +102,24 @@ pub enum GeneScale {
 
 impl NeuronModel {
     /// Every model.
-    pub const ALL: [Self; 1] = [Self::Rate];
+    pub const ALL: [Self; 6] =
+        [Self::Rate, Self::Lif, Self::ExpLif, Self::AdEx, Self::Izhikevich, Self::MorrisLecar];
 
     /// What files say of it, and what it costs.
     pub fn spec(self) -> &'static NeuronModelSpec {
         match self {
             Self::Rate => &rate::SPEC,
+            Self::Lif => &lif::SPEC,
+            Self::ExpLif => &exp_lif::SPEC,
+            Self::AdEx => &adex::SPEC,
+            Self::Izhikevich => &izhikevich::SPEC,
+            Self::MorrisLecar => &morris_lecar::SPEC,
         }
+    }
+
+    /// Whether its neurons emit spikes.
+    pub fn is_spiking(self) -> bool {
+        self.spec().is_spiking
     }
 
     /// The name in the canonical form.
@@ -192,17 +225,45 @@ pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
         }
         json_schema!({"type": "object", "properties": properties, "additionalProperties": false})
     };
-    match NeuronModel::ALL.as_slice() {
-        [only] => of_model(*only),
-        several => {
-            json_schema!({"anyOf": several.iter().copied().map(of_model).collect::<Vec<_>>()})
-        }
-    }
+    json_schema!({"anyOf": NeuronModel::ALL.map(of_model)})
 }
 
 impl NeuronParameter {
+    /// A parameter that evolves on the scale of its values, for the table of a model.
+    const fn linear(
+        name: &'static str,
+        unit: &'static str,
+        default: f64,
+        range: RangeInclusive<f64>,
+        description: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            aliases: &[],
+            description,
+            unit,
+            default,
+            range,
+            gene: Some(GeneScale::Linear),
+            is_time_constant: false,
+            is_whole: false,
+        }
+    }
+
+    /// A time constant that evolves, ms.
+    const fn time_constant(name: &'static str, default: f64, description: &'static str) -> Self {
+        let linear = Self::linear(name, "ms", default, TIME, description);
+        Self { is_time_constant: true, ..linear }
+    }
+
+    /// The substeps after a spike in which a neuron takes no current.
+    const fn refractory_substeps(default: f64, description: &'static str) -> Self {
+        let linear = Self::linear("time_refrac", "", default, 0.0..=1_000.0, description);
+        Self { gene: None, is_whole: true, ..linear }
+    }
+
     /// A value with its unit.
-    pub(super) fn with_unit(&self, value: impl fmt::Display) -> String {
+    pub fn with_unit(&self, value: impl fmt::Display) -> String {
         if self.unit.is_empty() { value.to_string() } else { format!("{value} {}", self.unit) }
     }
 
@@ -210,7 +271,7 @@ impl NeuronParameter {
         let (min, max) = (self.range.start(), self.range.end());
         json!({
             "description": self.description,
-            "type": "number",
+            "type": if self.is_whole { "integer" } else { "number" },
             "minimum": min,
             "maximum": max,
             "default": self.default,

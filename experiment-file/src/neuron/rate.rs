@@ -7,6 +7,7 @@ use crate::limits::{POSITIVE, QUANTITY};
 
 pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
     names: &["rate_model", "ctrnn"],
+    is_spiking: false,
     parameters: &[
         NeuronParameter {
             name: "tau",
@@ -18,6 +19,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             range: POSITIVE,
             gene: Some(GeneScale::PowerOfTen { factor: 2.0 }),
             is_time_constant: true,
+            is_whole: false,
         },
         NeuronParameter {
             name: "gain",
@@ -29,6 +31,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             range: QUANTITY,
             gene: Some(GeneScale::Linear),
             is_time_constant: false,
+            is_whole: false,
         },
         NeuronParameter {
             name: "bias",
@@ -39,6 +42,7 @@ pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
             range: QUANTITY,
             gene: Some(GeneScale::Linear),
             is_time_constant: false,
+            is_whole: false,
         },
     ],
     activation: Some(Activation::Sigmoid),

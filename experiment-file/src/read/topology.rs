@@ -4,10 +4,12 @@ use super::node::{Node, Object};
 use crate::report::suggestion;
 use crate::semantics::Semantics;
 use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
-use crate::topology::{DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_TIME_SCALE};
+use crate::topology::{
+    DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_SPIKING_DT, DEFAULT_TIME_SCALE,
+};
 use crate::{
-    Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, NamedMap, NeuronModel, OutputConfig,
-    SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits, neuron,
+    Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, InitialRates, NamedMap, NeuronModel,
+    OutputConfig, SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits,
 };
 
 pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
@@ -16,16 +18,22 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     if let Some(node) = o.optional("encoding") {
         node.map(0, |name, node| encoding(name, node, &stimuli));
     }
+    let is_spiking = model.is_some_and(NeuronModel::is_spiking);
+    let dt = if is_spiking {
+        o.or("dt", DEFAULT_SPIKING_DT, |node| node.number(limits::SPIKING_DT))
+    } else {
+        o.or("dt", DEFAULT_DT, Node::positive)
+    };
+    let (bias_in_gain, initial_rates, motor_tau) =
+        if is_spiking { of_spiking_neurons(o) } else { of_rate_neurons(o, semantics) };
     TopologyConfig {
-        dt: o.or("dt", DEFAULT_DT, Node::positive),
+        dt,
         time_scale: o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE)),
         seed: o.or("seed", DEFAULT_CONNECTION_SEED, |node| node.u64(0..=u64::MAX)),
         neuron_model: model.unwrap_or_default(),
-        bias_in_gain: o.or("bias_in_gain", semantics.bias_in_gain(), Node::bool),
-        initial_rates: o.or("initial_rates", semantics.initial_rates(), |node| {
-            node.variant(&[]).unwrap_or_default()
-        }),
-        motor_tau: o.or("motor_tau", semantics.motor_tau(), |node| node.or_null(Node::positive)),
+        bias_in_gain,
+        initial_rates,
+        motor_tau,
         stimuli,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
         outputs: o.required("outputs").map(1, |_, node| node.object(output)),
@@ -34,11 +42,30 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     }
 }
 
+/// `bias_in_gain`, `initial_rates` and `motor_tau`.
+fn of_rate_neurons(o: &mut Object<'_>, semantics: Semantics) -> (bool, InitialRates, Option<f64>) {
+    let initial_rates = |node: Node<'_>| node.variant(&[]).unwrap_or_default();
+    (
+        o.or("bias_in_gain", semantics.bias_in_gain(), Node::bool),
+        o.or("initial_rates", semantics.initial_rates(), initial_rates),
+        o.or("motor_tau", semantics.motor_tau(), |node| node.or_null(Node::positive)),
+    )
+}
+
+/// The same keys where nothing has a rate.
+fn of_spiking_neurons(o: &mut Object<'_>) -> (bool, InitialRates, Option<f64>) {
+    for key in ["bias_in_gain", "initial_rates", "motor_tau"] {
+        if let Some(node) = o.optional(key) {
+            node.problem("a key of rate neurons; these spike");
+        }
+    }
+    (true, InitialRates::default(), None)
+}
+
 /// The model, which a file may name in two places; none if it is unreadable.
 fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
-    let named = |node: Node<'_>| {
-        node.one_of(&NeuronModel::names(), &neuron::UNSUPPORTED).and_then(NeuronModel::named)
-    };
+    let named =
+        |node: Node<'_>| node.one_of(&NeuronModel::names(), &[]).and_then(NeuronModel::named);
     let outer = o.optional("neuron_model").map(named);
     let inner = o.optional("neurons").map(|node| node.object(|o| named(o.required("model"))));
     if let (Some(Some(outer)), Some(Some(inner))) = (outer, inner)
@@ -91,7 +118,14 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     let outer = activation(o);
     let (params, inner) = o.inner("params", |o| {
         let parameters = spec.parameters.iter().map(|parameter| {
-            let read = |node: Node<'_>| node.number(parameter.range.clone());
+            let (min, max) = (*parameter.range.start(), *parameter.range.end());
+            let read = |node: Node<'_>| {
+                if parameter.is_whole {
+                    f64::from(node.u32(min as u32..=max as u32))
+                } else {
+                    node.number(min..=max)
+                }
+            };
             (parameter.name.to_owned(), o.or(parameter.name, parameter.default, read))
         });
         (parameters.collect(), activation(o))
@@ -129,13 +163,20 @@ fn synapse_group(o: &mut Object<'_>) -> SynapseGroupConfig {
 }
 
 fn decoding(o: &mut Object<'_>) -> DecodingConfig {
-    const KNOWN: [&str; 3] = ["IdentityDecoding", "ThresholdDecoding", "SoftmaxDecoding"];
-    const UNSUPPORTED: [&str; 4] =
-        ["ArgmaxDecoding", "FirstToSpike", "LinearPopulationDecoding", "RankOrderDecoding"];
-    let Some(scheme) = o.required("scheme").one_of(&KNOWN, &UNSUPPORTED) else {
+    const KNOWN: [&str; 6] = [
+        "IdentityDecoding",
+        "ThresholdDecoding",
+        "SoftmaxDecoding",
+        "FirstToSpike",
+        "RankOrderDecoding",
+        "LinearPopulationDecoding",
+    ];
+    let Some(scheme) = o.required("scheme").one_of(&KNOWN, &["ArgmaxDecoding"]) else {
         o.accept_rest();
         return DecodingConfig::IdentityDecoding {};
     };
+    let num_outputs =
+        |o: &mut Object<'_>| o.or("num_outputs", 1, |node| node.u32(1..=limits::MESSAGE_LENGTH));
     o.inner("params", |o| {
         // Says what the scheme says, too; nothing depends on it.
         o.or("is_cat", false, Node::bool);
@@ -144,6 +185,17 @@ fn decoding(o: &mut Object<'_>) -> DecodingConfig {
                 stochastic: o.or("stochastic", false, Node::bool),
             },
             "SoftmaxDecoding" => DecodingConfig::SoftmaxDecoding {},
+            "FirstToSpike" => {
+                o.ignored("num_outputs", "there are as many as neurons");
+                DecodingConfig::FirstToSpike {}
+            }
+            "RankOrderDecoding" => {
+                DecodingConfig::RankOrderDecoding { num_outputs: num_outputs(o) }
+            }
+            "LinearPopulationDecoding" => DecodingConfig::LinearPopulationDecoding {
+                num_outputs: num_outputs(o),
+                rest_value: o.or("rest_value", 0.5, |node| node.number(-1.0..=1.0)),
+            },
             _ => DecodingConfig::IdentityDecoding {},
         }
     })

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::generator::{Dice, damage, experiment};
 use super::{accept, read};
-use sim_core::Simulation;
+use sim_core::{Simulation, StepRecord};
 
 /// Damaged variants of each file that is right.
 const N_VARIANTS: u64 = 20;
@@ -81,4 +81,32 @@ fn accepted_files_can_be_simulated() {
         }
     }
     assert!(n_simulated >= 1_000, "{n_simulated} of {n}");
+}
+
+/// Whatever the parameters and genes within their ranges.
+#[test]
+fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
+    let (mut n_simulated, mut n_voltages) = (0, 0);
+    for index in 0..n_files() / 2 {
+        let mut dice = Dice::new(index);
+        let mut file = experiment(&mut dice);
+        file["algorithm"]["evaluation_steps"] = json!(101);
+        let (config, _) = read(&file.to_string()).unwrap();
+        let Ok(experiment) = Simulation::compile(&config) else { continue };
+        if !config.topology.neuron_model.is_spiking() {
+            continue;
+        }
+        n_simulated += 1;
+        let genotype: Vec<f64> =
+            (0..experiment.genotype_len()).map(|_| f64::from(u8::from(dice.chance(0.5)))).collect();
+        let observe = &mut |step: StepRecord| {
+            for robot in &step.robots {
+                assert!(robot.voltages.iter().all(|v| v.is_finite()), "{file}");
+                assert!(robot.wheels.iter().chain(&robot.message).all(|x| x.is_finite()), "{file}");
+                n_voltages += robot.voltages.len();
+            }
+        };
+        experiment.simulate(&genotype, 0, 0, observe).unwrap();
+    }
+    assert!(n_voltages > 100 * n_simulated && n_simulated > 0, "{n_voltages} of {n_simulated}");
 }

@@ -108,20 +108,25 @@ const MISTAKES: &[(&str, &str, &str)] = &[
      "line 11: topology.ensembles.H: a stimulus has the same name\n\
       line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIGHT`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `H`"),
     // What the original knows and this does not.
-    (r#""neuron_model": "rate_model""#, r#""neuron_model": "lif""#,
-     "line 9: topology.neuron_model: not supported: `lif`; known: `rate_model`, `ctrnn`"),
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
      "line 9: topology.synapse_model: not supported: `dynamic_synapse`; known: `static_synapse`"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,
      "line 8: topology.encoding.MSG.scheme: not supported: `PoissonRateCoding`; known: `IdentityEncoding`"),
-    (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "FirstToSpike", "params": {"num_outputs": 3}}"#,
-     "line 30: topology.decoding.mode.scheme: not supported: `FirstToSpike`; known: `IdentityDecoding`, `ThresholdDecoding`, `SoftmaxDecoding`"),
+    (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "ArgmaxDecoding", "params": {"num_outputs": 3}}"#,
+     "line 30: topology.decoding.mode.scheme: not supported: `ArgmaxDecoding`; known: `IdentityDecoding`, `ThresholdDecoding`, `SoftmaxDecoding`, `FirstToSpike`, `RankOrderDecoding`, `LinearPopulationDecoding`"),
     (r#""sensors": {"wireless_receiver": {}, "#, r#""sensors": {"wireless_receiver": {}, "nest_sensor": {}, "#,
      "line 55: world.objects.bots.sensors.nest_sensor: not supported"),
     (r#""sensor": "light_sensor""#, r#""sensor": "wireless_receiver:n_hops""#,
      "line 6: topology.stimuli.LIGHT.sensor: not supported: `wireless_receiver:n_hops`; known: `wireless_receiver:msg`, `wireless_receiver:signal`, `wireless_receiver:receiving_direction`, `wireless_receiver:sending_direction`, `wireless_receiver:state`, `light_sensor`, `distance_sensor`, `ground_sensor`"),
+    (r#""neurons:tau:H""#, r#""encoders:weights:all""#,
+     "line 45: algorithm.populations.neurons.objects[1]: not supported: `encoders:weights`"),
+    // Spiking neurons.
+    (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "FirstToSpike"}"#,
+     "line 30: topology.decoding.mode: decodes spikes, which `rate_model` neurons do not have"),
     (r#""neurons:tau:H""#, r#""decoders:weights:all""#,
-     "line 45: algorithm.populations.neurons.objects[1]: not supported: `decoders:weights`"),
+     "line 45: algorithm.populations.neurons.objects[1]: covers nothing that can evolve"),
+    (r#""neurons:tau:H""#, r#""decoding:weights:modes""#,
+     "line 45: algorithm.populations.neurons.objects[1]: no output is named `modes`; did you mean `mode`?"),
     (r#""controller": null"#, r#""controller": "light_prey_controller""#,
      "line 63: world.objects.lamp.controller: not supported: `light_prey_controller`; known: `static`, `light_orbit_controller`, `light_rnd_pos_controller`"),
     (r#""type": "light_source""#, r#""type": "nest""#,
@@ -171,7 +176,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neurons:tau:H""#, r#""neurons:tau:HH""#,
      "line 45: algorithm.populations.neurons.objects[1]: no ensemble is named `HH`; did you mean `H`?"),
     (r#""neurons:tau:H""#, r#""neurons:tau""#,
-     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME` or `neurons:PARAMETER:NAME` with `tau`, `gain` or `bias`"),
+     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, with a parameter of the neuron model"),
     (r#""neurons:tau:H""#, r#""neurons:bias:H""#,
      "line 45: algorithm.populations.neurons.objects[1]: covers the bias of ensemble `H` a second time, after `neurons:bias:all` of population `neurons`"),
     (r#""neurons:tau:H""#, r#""synapses:weights:in""#,
@@ -306,12 +311,53 @@ fn costs_are_limited_in_sum() {
     }
 }
 
+/// The shipped leader selection with LIF neurons, one passage replaced.
+#[test]
+fn mistakes_of_spiking_networks_have_answers() {
+    let (_, base) =
+        super::shipped::spiking().into_iter().find(|it| it.0.contains("r_selection_lif")).unwrap();
+    for (from, to, expected) in SPIKING_MISTAKES {
+        assert_eq!(base.matches(from).count(), 1, "{from:?} must occur once");
+        assert_eq!(refuse(&base.replace(from, to)), *expected, "{from} -> {to}");
+    }
+}
+
+#[rustfmt::skip]
+const SPIKING_MISTAKES: &[(&str, &str, &str)] = &[
+    (r#""dt": 1,"#, r#""dt": 2.5,"#,
+     "line 5: topology.dt: must be between 0.001 and 2, is 2.5"),
+    (r#""dt": 1,"#, r#""dt": 1, "motor_tau": 0.5,"#,
+     "line 5: topology.motor_tau: a key of rate neurons; these spike"),
+    (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "activation": "tanh"}"#,
+     "line 21: topology.ensembles.H1.activation: unknown key; known: `n`, `params`"),
+    (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "params": {"time_refrac": 2.5}}"#,
+     "line 21: topology.ensembles.H1.params.time_refrac: expected a whole number, found 2.5"),
+    (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "params": {"tau": -20}}"#,
+     "line 21: topology.ensembles.H1.params.tau: must be between 0.01 and 10000, is -20"),
+    (r#""min_vals": [-60, -150, -150, -65, 5, -2]"#, r#""min_vals": [-60, -150, -150, -65, 0.4, -2]"#,
+     "line 67: algorithm.populations.p1.min_vals[4]: tau = 0.4 ms is below dt / 2: the network would be unstable"),
+    (r#"{"scheme": "FirstToSpike"}"#, r#"{"scheme": "ThresholdDecoding"}"#,
+     "line 52: topology.decoding.outC: decodes activities, which `lif` neurons do not have"),
+    (r#"{"scheme": "FirstToSpike"}"#, r#"{"scheme": "RankOrderDecoding", "params": {"num_outputs": 2}}"#,
+     "line 52: topology.decoding.outC: the actuator needs 1 output, these are 2"),
+    (r#""outA": {"scheme": "LinearPopulationDecoding", "params": {"num_outputs": 2}}"#,
+     r#""outA": {"scheme": "LinearPopulationDecoding"}"#,
+     "line 50: topology.decoding.outA: has 1 outputs, but messages of robot `robotA` have `msg_length` 2"),
+    (r#""outA": {"scheme": "LinearPopulationDecoding", "params": {"num_outputs": 2}}"#,
+     r#""outA": {"scheme": "FirstToSpike"}"#,
+     "line 50: topology.decoding.outA: the actuator takes numbers, `FirstToSpike` yields a category"),
+    (r#""neurons:v_rest:all""#, r#""neurons:V_rest:all""#,
+     "line 65: algorithm.populations.p1.objects[3]: covers nothing that can evolve"),
+    (r#""decoders:weights:all""#, r#""decoders:weights:outC""#,
+     "line 65: algorithm.populations.p1.objects[5]: covers nothing that can evolve"),
+];
+
 /// No problem hides another, and none is reported that merely follows from
 /// another.
 #[test]
 fn everything_wrong_is_reported_at_once() {
     let text = edited_often(&[
-        (r#""neuron_model": "rate_model""#, r#""neuron_model": "lif", "dt": 0"#),
+        (r#""neuron_model": "rate_model""#, r#""neuron_model": "hodgkin_huxley", "dt": 0"#),
         (r#""LIGHT": {"n": 6"#, r#""LIGHT": {"n": "six""#),
         (r#""H": {"n": 4}"#, r#""H": {"n": 4, "tau": 1}"#),
         (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": ["MSG", "DARK"]"#),
@@ -332,7 +378,7 @@ fn everything_wrong_is_reported_at_once() {
 #[rustfmt::skip]
 const EVERYTHING: &[&str] = &[
     "line 6: topology.stimuli.LIGHT.n: expected a whole number, found a string",
-    "line 9: topology.neuron_model: not supported: `lif`; known: `rate_model`, `ctrnn`",
+    "line 9: topology.neuron_model: unknown name `hodgkin_huxley`; known: `rate_model`, `ctrnn`, `lif`, `exp_lif`, `adex`, `izhikevich`, `morris_lecar`",
     "line 9: topology.dt: must be positive and at most 1000000000, is 0",
     "line 11: topology.ensembles.H.tau: unknown key; known: `n`, `activation`, `params`",
     "line 19: topology.outputs.led: missing key `ensemble`",

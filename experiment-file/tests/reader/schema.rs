@@ -44,7 +44,7 @@ fn unknown_keys_missing_keys_and_wrong_types_do_not_fit_the_schema() {
         (r#""H": {"n": 4}"#, r#""H": {"n": 4, "tau": 1}"#),
         (r#""p": 0.5"#, r#""p": 1.5"#),
         (r#""pre": ["MSG", "LIGHT"]"#, r#""pre": 3"#),
-        (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "FirstToSpike"}"#),
+        (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "FirstSpike"}"#),
         (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "ThresholdDecoding", "p": 1}"#),
         (r#""wheel_actuator": {}}"#, r#""wheel_actuator": {"speed": 1}}"#),
         (r#""wheel_actuator": {}}"#, r#""wheel_actuator": null}"#),

@@ -6,13 +6,22 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::accept;
-use experiment_file::FitnessFunction;
+use experiment_file::{FitnessFunction, NeuronModel};
 
 /// Every shipped file: its stem and its text.
 pub(super) fn shipped() -> Vec<(String, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    files_of("../configs")
+}
+
+/// The shipped experiments of spiking swarms.
+pub(super) fn spiking() -> Vec<(String, String)> {
+    files_of("../configs/spiking")
+}
+
+fn files_of(folder: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut paths: Vec<PathBuf> = entries.collect();
+    let mut paths: Vec<PathBuf> = entries.filter(|path| path.is_file()).collect();
     paths.sort();
     let text = |path: &PathBuf| fs::read_to_string(path).unwrap();
     let stem = |path: &PathBuf| path.file_stem().unwrap().to_str().unwrap().to_owned();
@@ -21,9 +30,33 @@ pub(super) fn shipped() -> Vec<(String, String)> {
 
 #[test]
 fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
-    for (stem, text) in shipped() {
+    for (stem, text) in shipped().into_iter().chain(spiking()) {
         assert_eq!(accept(&text).name, stem);
     }
+}
+
+/// Three tasks, each with two neuron models, and with the budget of the rate neurons'.
+#[test]
+fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
+    let rate = shipped();
+    let spiking = spiking();
+    for task in ["leader_selection", "borderline", "light_follower"] {
+        let find = |files: &[(String, String)], name: &str| {
+            let (_, text) = files.iter().find(|(stem, _)| stem == name).expect(name);
+            accept(text)
+        };
+        let expected = find(&rate, &format!("{task}_snes"));
+        for (name, model) in [("lif", NeuronModel::Lif), ("adex", NeuronModel::AdEx)] {
+            let config = find(&spiking, &format!("{task}_{name}"));
+            assert_eq!(config.topology.neuron_model, model);
+            assert_eq!(config.world, expected.world);
+            let [ours, theirs] = [&config.algorithm, &expected.algorithm].map(|it| {
+                (it.fitness_function, it.generations, it.population_size, it.evaluation_steps)
+            });
+            assert_eq!(ours, theirs);
+        }
+    }
+    assert_eq!(spiking.len(), 6);
 }
 
 #[test]
@@ -55,7 +88,7 @@ fn every_task_is_shipped_for_the_ga_and_for_snes() {
 /// A reader of the file sees the constants, whatever the defaults are.
 #[test]
 fn shipped_files_state_every_constant_of_sensors_and_actuators() {
-    for (stem, text) in shipped() {
+    for (stem, text) in shipped().into_iter().chain(spiking()) {
         let file: Value = serde_json::from_str(&text).unwrap();
         let canonical: Value = serde_json::from_str(&accept(&text).to_canonical_json()).unwrap();
         for (name, object) in canonical["world"]["objects"].as_object().unwrap() {

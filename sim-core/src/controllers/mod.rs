@@ -25,6 +25,11 @@ pub(crate) trait Controller {
     fn activity(&self) -> Option<&Lanes> {
         None
     }
+
+    /// Voltages of its neurons, mV, `[neuron][lane]`, if they spike.
+    fn voltages(&self) -> Option<Lanes> {
+        None
+    }
 }
 
 /// The actions of one robot in one step.

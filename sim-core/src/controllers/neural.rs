@@ -13,15 +13,18 @@ use numeric::random::Stream;
 pub(crate) struct NeuralController<'a> {
     state: NetworkState,
     outputs: &'a [Output],
+    /// Weights of the decoder of each output.
+    decoders: Vec<Vec<f64>>,
     /// Scratch of decoders.
-    weights: Vec<f64>,
+    scratch: Vec<f64>,
 }
 
 impl<'a> NeuralController<'a> {
     /// At rest in every lane.
     pub fn new(isa: Isa, network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
         let state = NetworkState::new(isa, network, phenotype, n_lanes);
-        Self { state, outputs: &network.outputs, weights: Vec::new() }
+        let decoders = phenotype.decoders.clone();
+        Self { state, outputs: &network.outputs, decoders, scratch: Vec::new() }
     }
 }
 
@@ -31,12 +34,16 @@ impl Controller for NeuralController<'_> {
     }
 
     fn act(&mut self, lane: usize, stream: &mut Stream, action: &mut Action<'_>) {
-        for output in self.outputs {
-            output.decode(self.state.activity(), lane, stream, &mut self.weights, action);
+        for (output, weights) in self.outputs.iter().zip(&self.decoders) {
+            output.decode(&self.state, weights, lane, stream, &mut self.scratch, action);
         }
     }
 
     fn activity(&self) -> Option<&Lanes> {
         Some(self.state.activity())
+    }
+
+    fn voltages(&self) -> Option<Lanes> {
+        self.state.voltages()
     }
 }

@@ -8,6 +8,7 @@ use super::Ensemble;
 use crate::communication::Mode;
 use crate::controllers::Action;
 use crate::lanes::Lanes;
+use crate::network::dynamics::{NetworkState, SpikeWindow};
 use crate::problems::Problems;
 use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig};
 use numeric::random::{Stream, sample};
@@ -21,10 +22,12 @@ pub(crate) struct Output {
     pub neurons: Range<usize>,
     /// How.
     pub decoder: Decoder,
+    /// Number of weights of the decoder.
+    pub n_weights: usize,
 }
 
-/// How activities become an action.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How activities or spikes become an action.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Decoder {
     /// The activity itself.
     Identity,
@@ -34,6 +37,15 @@ pub(crate) enum Decoder {
     Bernoulli,
     /// The index of a neuron, with probabilities softmax(activities).
     Softmax,
+    /// The index of the neuron that spiked first.
+    FirstToSpike,
+    /// Sums of weight * spikes * 0.25^rank.
+    RankOrder,
+    /// sigmoid(3 W a) + rest_value - 0.5
+    LinearPopulation {
+        /// The value where W a = 0.
+        rest_value: f64,
+    },
 }
 
 /// Outputs in the order of the configuration.
@@ -49,25 +61,119 @@ pub(super) fn compile(
             problems.add(path, format!("no ensemble is named {:?}", output.ensemble));
             continue;
         };
-        let decoder = match config.decoding.get(name) {
+        let decoding = config.decoding.get(name);
+        let decoder = match decoding {
             Some(DecodingConfig::IdentityDecoding {}) => Decoder::Identity,
             Some(DecodingConfig::ThresholdDecoding { stochastic: false }) => Decoder::Threshold,
             Some(DecodingConfig::ThresholdDecoding { stochastic: true }) => Decoder::Bernoulli,
             Some(DecodingConfig::SoftmaxDecoding {}) => Decoder::Softmax,
+            Some(DecodingConfig::FirstToSpike {}) => Decoder::FirstToSpike,
+            Some(DecodingConfig::RankOrderDecoding { .. }) => Decoder::RankOrder,
+            Some(&DecodingConfig::LinearPopulationDecoding { rest_value, .. }) => {
+                Decoder::LinearPopulation { rest_value }
+            }
             None => {
                 problems.add(format!("topology.decoding.{name}"), "missing");
                 continue;
             }
         };
         let neurons = ensemble.neurons.clone();
-        outputs.push(Output { actuator: output.actuator, neurons, decoder });
+        let n_weights =
+            decoding.map_or(0, |decoding| decoding.n_weights(neurons.len() as u32) as usize);
+        outputs.push(Output { actuator: output.actuator, neurons, decoder, n_weights });
     }
     outputs
 }
 
 impl Output {
-    /// Decodes the activities of one lane. `weights` is scratch.
+    /// Decodes what the neurons of one lane show. `weights`: those of the decoder, value
+    /// by value.
     pub fn decode(
+        &self,
+        state: &NetworkState,
+        weights: &[f64],
+        lane: usize,
+        stream: &mut Stream,
+        scratch: &mut Vec<f64>,
+        action: &mut Action<'_>,
+    ) {
+        match state.window() {
+            Some(window) => {
+                self.decode_spikes(window, weights, lane, scratch);
+                self.apply(scratch, action);
+            }
+            None => self.decode_activities(state.activity(), lane, stream, scratch, action),
+        }
+    }
+
+    /// The values that the spikes of one lane stand for.
+    fn decode_spikes(
+        &self,
+        window: &SpikeWindow,
+        weights: &[f64],
+        lane: usize,
+        values: &mut Vec<f64>,
+    ) {
+        let first = |neuron: usize| window.first.get(neuron, lane);
+        values.clear();
+        match self.decoder {
+            Decoder::RankOrder => {
+                for weights in weights.chunks_exact(self.neurons.len().max(1)) {
+                    let terms = self.neurons.clone().zip(weights).map(|(neuron, weight)| {
+                        let earlier =
+                            self.neurons.clone().filter(|&other| first(other) < first(neuron));
+                        let share = libm::exp2(-2.0 * earlier.count() as f64);
+                        f64::from(window.counts.get(neuron, lane)) * weight * share
+                    });
+                    values.push(terms.sum());
+                }
+            }
+            Decoder::LinearPopulation { rest_value } => {
+                for weights in weights.chunks_exact(self.neurons.len().max(1)) {
+                    let terms = self.neurons.clone().zip(weights);
+                    let sum: f64 = terms
+                        .map(|(neuron, weight)| {
+                            f64::from(window.filtered.get(neuron, lane)) * weight
+                        })
+                        .sum();
+                    values.push(1.0 / (1.0 + libm::exp(-3.0 * sum)) + rest_value - 0.5);
+                }
+            }
+            // The reader sees to it that decoders of activities have rate neurons.
+            _ => {
+                let earliest = self.neurons.clone().min_by(|&a, &b| first(a).total_cmp(&first(b)));
+                values.push(earliest.map_or(0.0, |neuron| (neuron - self.neurons.start) as f64));
+            }
+        }
+    }
+
+    /// Numbers become an action.
+    fn apply(&self, values: &[f64], action: &mut Action<'_>) {
+        let value = values.first().copied().unwrap_or_default();
+        let category = if self.decoder == Decoder::FirstToSpike {
+            value as u32
+        } else {
+            u32::from(value >= 0.5)
+        };
+        match self.actuator {
+            ActuatorQuery::Message => {
+                for (component, &value) in action.message.iter_mut().zip(values) {
+                    *component = value;
+                }
+            }
+            ActuatorQuery::Wheels => {
+                let left = values.get(1).copied().unwrap_or(-value);
+                *action.wheels = [value.clamp(-1.0, 1.0), left.clamp(-1.0, 1.0)];
+            }
+            ActuatorQuery::Led => *action.led = category,
+            ActuatorQuery::Mode => {
+                *action.mode = if category > 0 { Mode::Send } else { Mode::Relay };
+            }
+        }
+    }
+
+    /// `weights` is scratch.
+    fn decode_activities(
         &self,
         activities: &Lanes,
         lane: usize,
@@ -125,9 +231,9 @@ impl Decoder {
     /// The value that one activity stands for; a category is not one's own.
     fn value(self, activity: f64, stream: &mut Stream) -> f64 {
         match self {
-            Self::Identity | Self::Softmax => activity,
             Self::Threshold => f64::from(activity >= 0.5),
             Self::Bernoulli => f64::from(stream.bernoulli(activity)),
+            _ => activity,
         }
     }
 }
@@ -151,8 +257,8 @@ mod tests {
         let (mut wheels, mut led, mut mode, mut message) = ([0.0; 2], 0, Mode::Send, [0.0; 2]);
         let mut action =
             Action { wheels: &mut wheels, led: &mut led, mode: &mut mode, message: &mut message };
-        let output = Output { actuator, neurons: 0..activities.len(), decoder };
-        output.decode(&lanes, 0, stream, &mut Vec::new(), &mut action);
+        let output = Output { actuator, neurons: 0..activities.len(), decoder, n_weights: 0 };
+        output.decode_activities(&lanes, 0, stream, &mut Vec::new(), &mut action);
         (wheels, led, mode, message)
     }
 

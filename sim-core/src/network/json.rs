@@ -47,12 +47,16 @@ impl Network {
                 })
             })
         });
-        let outputs = self.outputs.iter().map(|output| {
-            json!({
+        let outputs = self.outputs.iter().zip(&phenotype.decoders).map(|(output, weights)| {
+            let mut json = json!({
                 "actuator": output.actuator,
                 "first_neuron": output.neurons.start,
                 "n": output.neurons.len(),
-            })
+            });
+            if !weights.is_empty() {
+                json["weights"] = weights.chunks_exact(output.neurons.len()).collect();
+            }
+            json
         });
         json!({
             "dt": self.dt,

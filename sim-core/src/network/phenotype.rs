@@ -2,7 +2,8 @@
 
 use indexmap::IndexMap;
 
-/// One value per synapse, and one per neuron and parameter of the neuron model.
+/// One value per synapse, one per neuron and parameter of the neuron model, and one per
+/// neuron and value of the decodings that have weights.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Phenotype {
     /// Weights, by number of the synapse.
@@ -10,4 +11,6 @@ pub(crate) struct Phenotype {
     /// By name of the parameter, in the order of the neuron model's parameters: its
     /// values, by number of the neuron.
     pub neurons: IndexMap<&'static str, Vec<f64>>,
+    /// By number of the output: the weights of its decoding, value by value.
+    pub decoders: Vec<Vec<f64>>,
 }

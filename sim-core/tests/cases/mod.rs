@@ -6,3 +6,4 @@ mod leaders;
 mod movers;
 mod semantics;
 mod sensors;
+mod spiking;

@@ -64,6 +64,7 @@ fn decode_output(decoding: DecodingConfig, u: &[f64], stream: &mut Stream) -> Ve
             let weights: Vec<f64> = u.iter().map(|u| (u - largest).exp()).collect();
             vec![draw(&weights, stream.uniform()) as f64]
         }
+        _ => panic!("rate neurons have no spikes to decode"),
     }
 }
 

@@ -18,6 +18,7 @@ mod lights;
 mod network;
 mod perturbations;
 mod sensors;
+mod spiking;
 mod torus;
 mod witness;
 mod world;

@@ -9,6 +9,8 @@ use experiment_file::{
 };
 use numeric::random::{Purpose, Stream};
 
+use super::spiking;
+
 /// What a gene encodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gene {
@@ -16,6 +18,8 @@ pub enum Gene {
     Weight(usize),
     /// Parameter of the neuron of this number.
     Neuron(&'static str, usize),
+    /// Of an output: weight of its decoding.
+    Decoder(usize, usize),
 }
 
 /// A gene with its bounds.
@@ -137,6 +141,10 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
                     };
                     neurons.map(|neuron| Gene::Neuron(parameter, neuron)).collect()
                 }
+                GenotypeQuery::Decoders(selector) => spiking::decoders(topology, selector)
+                    .into_iter()
+                    .flat_map(|(output, n)| (0..n).map(move |w| Gene::Decoder(output, w)))
+                    .collect(),
             };
             genes.extend(covered.into_iter().map(|gene| BoundedGene { gene, min, max }));
         }
@@ -155,6 +163,52 @@ fn n_neurons(topology: &TopologyConfig) -> usize {
 
 fn n_inputs(topology: &TopologyConfig) -> usize {
     topology.stimuli.values().map(|stimulus| stimulus.n as usize).sum()
+}
+
+/// What a genotype encodes.
+pub struct Decoded {
+    /// N x N, row = postsynaptic neuron.
+    pub w_neurons: Vec<Vec<f64>>,
+    /// N x I, row = postsynaptic neuron.
+    pub w_inputs: Vec<Vec<f64>>,
+    /// Parameters of neurons: name, neuron, number within the bounds.
+    pub neurons: Vec<(&'static str, usize, f64)>,
+    /// Weights of decodings: output, number, value.
+    pub decoders: Vec<(usize, usize, f64)>,
+}
+
+/// Decodes a genotype: x * (max - min) + min. Weights that no query covers are drawn from
+/// U(-1, 1).
+pub fn decode_genes(config: &ExperimentConfig, genotype: &[f64]) -> Decoded {
+    let topology = &config.topology;
+    let synapses = synapses(topology);
+    let genes = bounded_genes(config, &synapses);
+    assert_eq!(genotype.len(), genes.len(), "length of the genotype");
+    let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
+    let (mut neurons, mut decoders) = (Vec::new(), Vec::new());
+    for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
+        let value = x * (max - min) + min;
+        match *gene {
+            Gene::Weight(synapse) => weights[synapse] = Some(value),
+            Gene::Neuron(name, neuron) => neurons.push((name, neuron, value)),
+            Gene::Decoder(output, weight) => decoders.push((output, weight, value)),
+        }
+    }
+    let n = n_neurons(topology);
+    let mut w_neurons = vec![vec![0.0; n]; n];
+    let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
+    let mut fixed_weights: Vec<Stream> = (0..topology.synapses.len() as u64)
+        .map(|group| Stream::new(topology.seed, 0, 0, Purpose::FixedWeights, group))
+        .collect();
+    for (synapse, weight) in synapses.iter().zip(weights) {
+        let weight =
+            weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform());
+        match synapse.pre {
+            Pre::Input(input) => w_inputs[synapse.post][input] = weight,
+            Pre::Neuron(neuron) => w_neurons[synapse.post][neuron] = weight,
+        }
+    }
+    Decoded { w_neurons, w_inputs, neurons, decoders }
 }
 
 /// The phenotype: N neurons, I inputs.
@@ -178,9 +232,7 @@ impl Network {
     /// no query covers keeps its default; such weights are drawn from U(-1, 1).
     pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
         let topology = &config.topology;
-        let synapses = synapses(topology);
-        let genes = bounded_genes(config, &synapses);
-        assert_eq!(genotype.len(), genes.len(), "length of the genotype");
+        let Decoded { w_neurons, w_inputs, neurons, .. } = decode_genes(config, genotype);
 
         let mut tau = Vec::new();
         let mut gain = Vec::new();
@@ -194,15 +246,12 @@ impl Network {
                 activation.push(ensemble.activation.expect("rate neurons have one"));
             }
         }
-        let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
-        for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
-            let value = x * (max - min) + min;
-            match *gene {
-                Gene::Weight(synapse) => weights[synapse] = Some(value),
-                Gene::Neuron("bias", neuron) => bias[neuron] = value,
-                Gene::Neuron("gain", neuron) => gain[neuron] = value,
-                Gene::Neuron("tau", neuron) => tau[neuron] = 2.0 * 10f64.powf(value),
-                Gene::Neuron(other, _) => panic!("{other} is no parameter of a CTRNN"),
+        for (name, neuron, value) in neurons {
+            match name {
+                "bias" => bias[neuron] = value,
+                "gain" => gain[neuron] = value,
+                "tau" => tau[neuron] = 2.0 * 10f64.powf(value),
+                other => panic!("{other} is no parameter of a CTRNN"),
             }
         }
 
@@ -213,20 +262,6 @@ impl Network {
             }
         }
 
-        let n = n_neurons(topology);
-        let mut w_neurons = vec![vec![0.0; n]; n];
-        let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
-        let mut fixed_weights: Vec<Stream> = (0..topology.synapses.len() as u64)
-            .map(|group| Stream::new(topology.seed, 0, 0, Purpose::FixedWeights, group))
-            .collect();
-        for (synapse, weight) in synapses.iter().zip(weights) {
-            let weight =
-                weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform());
-            match synapse.pre {
-                Pre::Input(input) => w_inputs[synapse.post][input] = weight,
-                Pre::Neuron(neuron) => w_neurons[synapse.post][neuron] = weight,
-            }
-        }
         let &TopologyConfig { dt, time_scale, bias_in_gain, initial_rates, .. } = topology;
         Self {
             dt,

@@ -14,6 +14,7 @@ use super::lights::Light;
 use super::network::Network;
 use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
 use super::sensors::{self, Readings};
+use super::spiking::{SpikingNetwork, SpikingState};
 use super::torus::{Torus, Vector};
 use super::witness::Witness;
 
@@ -23,8 +24,10 @@ pub struct Robot<'a> {
     object_idx: usize,
     pub position: Vector,
     pub heading: f64,
-    /// State of the network.
+    /// State of the network, of rate neurons.
     pub v: Vec<f64>,
+    /// State of the network, of spiking neurons.
+    spiking: SpikingState,
     /// Mode in force: send (or relay).
     pub send: bool,
     pub led: u32,
@@ -74,11 +77,33 @@ pub struct Area<'a> {
     pub params: &'a GroundAreaParams,
 }
 
+/// The network that all robots have.
+enum Controller {
+    Rate(Network),
+    Spiking(SpikingNetwork),
+}
+
+impl Controller {
+    fn n_rate_neurons(&self) -> usize {
+        match self {
+            Self::Rate(network) => network.n_neurons(),
+            Self::Spiking(_) => 0,
+        }
+    }
+
+    fn rest(&self) -> SpikingState {
+        match self {
+            Self::Rate(_) => SpikingState::default(),
+            Self::Spiking(network) => network.rest(),
+        }
+    }
+}
+
 /// One trial of one genotype, step by step.
 pub struct Simulation<'a> {
     config: &'a ExperimentConfig,
     torus: Torus,
-    network: Network,
+    network: Controller,
     pub robots: Vec<Robot<'a>>,
     lights: Vec<Light<'a>>,
     areas: Vec<Area<'a>>,
@@ -101,7 +126,11 @@ impl<'a> Simulation<'a> {
         let mut simulation = Self {
             config,
             torus: Torus { width: world.width, height: world.height },
-            network: Network::decode(config, genotype),
+            network: if config.topology.neuron_model.is_spiking() {
+                Controller::Spiking(SpikingNetwork::decode(config, genotype))
+            } else {
+                Controller::Rate(Network::decode(config, genotype))
+            },
             robots: Vec::new(),
             lights: Vec::new(),
             areas: Vec::new(),
@@ -178,7 +207,8 @@ impl<'a> Simulation<'a> {
                 object_idx,
                 position: positions[i],
                 heading: headings[i],
-                v: vec![0.0; self.network.n_neurons()],
+                v: vec![0.0; self.network.n_rate_neurons()],
+                spiking: self.network.rest(),
                 send: true,
                 led: 0,
                 wheels: [0.0, 0.0],
@@ -312,9 +342,16 @@ impl<'a> Simulation<'a> {
     fn control(&mut self, i: usize, phi: &[f64]) -> Actions {
         let robot = &mut self.robots[i];
         let msg_length = robot.msg_length();
-        let u = self.network.step(&mut robot.v, phi, self.k == 0);
-        let mut actions =
-            actuators::decode(&self.config.topology, &u, msg_length, &mut robot.decoding);
+        let topology = &self.config.topology;
+        let mut actions = match &self.network {
+            Controller::Rate(network) => {
+                let u = network.step(&mut robot.v, phi, self.k == 0);
+                actuators::decode(topology, &u, msg_length, &mut robot.decoding)
+            }
+            Controller::Spiking(network) => {
+                network.step(topology, &mut robot.spiking, phi, msg_length)
+            }
+        };
         if let Some(transmitter) = &robot.config.actuators.wireless_transmitter
             && self.k < transmitter.sending_steps
         {

@@ -50,7 +50,8 @@ fn population(dice: &mut Dice, algorithm: &str, queries: &[&(String, [f64; 2])])
     }
     let [mut low, mut high] =
         [0, 1].map(|i| queries.iter().map(|(_, bounds)| json!(bounds[i])).collect::<Value>());
-    if queries.len() == 1 || dice.chance(0.2) {
+    let is_symmetric = queries.iter().all(|(_, [low, _])| *low <= -0.5);
+    if is_symmetric && (queries.len() == 1 || dice.chance(0.2)) {
         [low, high] = [json!(-0.5), json!(0.5)];
     }
     insert(&mut population, "objects", json!(names));

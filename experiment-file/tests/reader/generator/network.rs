@@ -1,5 +1,6 @@
 //! Topologies, and queries of the genotype.
 
+use experiment_file::NeuronModel;
 use serde_json::{Value, json};
 
 use super::world::Robot;
@@ -8,6 +9,9 @@ use super::{Dice, insert, object};
 /// A generated topology, and what queries have to know of it.
 pub(super) struct Network {
     pub(super) topology: Value,
+    model: NeuronModel,
+    /// Outputs whose decoding has weights.
+    weighted: Vec<String>,
     ensembles: Vec<String>,
     motor: Vec<String>,
     /// Name, starts, of every group that evolves.
@@ -18,8 +22,14 @@ pub(super) struct Network {
 
 impl Network {
     pub(super) fn new(dice: &mut Dice, robot: &Robot) -> Self {
+        let spiking = NeuronModel::ALL.into_iter().filter(|model| model.is_spiking());
+        let spiking: Vec<NeuronModel> = spiking.collect();
+        let model =
+            if dice.chance(0.4) { spiking[dice.below(spiking.len())] } else { NeuronModel::Rate };
         let mut network = Self {
             topology: json!({}),
+            model,
+            weighted: Vec::new(),
             ensembles: Vec::new(),
             motor: Vec::new(),
             groups: Vec::new(),
@@ -41,25 +51,37 @@ impl Network {
         let outputs = network.outputs(dice, robot, &mut ensembles);
         let synapses = network.synapses(dice, &stimuli);
         let (seed, time_scale) = (dice.below(1 << 20), dice.die(30));
-        let bias_in_gain = json!(dice.chance(0.5));
-        let initial_rates = json!(dice.pick(&["activation", "zero"]));
-        let motor_tau = if dice.chance(0.3) { json!(null) } else { json!(0.7) };
-        let dt = dice.number(0.01, 0.3);
-        network.topology = object(
-            dice,
-            [
-                ("dt", dt),
-                ("time_scale", json!(time_scale)),
-                ("bias_in_gain", bias_in_gain),
-                ("initial_rates", initial_rates),
-                ("motor_tau", motor_tau),
-                ("seed", json!(seed)),
-                ("encoding", encoding),
-                ("neuron_model", json!("rate_model")),
-                ("neurons", json!({"model": "ctrnn"})),
-                ("synapse_model", json!("static_synapse")),
-            ],
-        );
+        let common = [
+            ("time_scale", json!(time_scale)),
+            ("seed", json!(seed)),
+            ("encoding", encoding),
+            ("synapse_model", json!("static_synapse")),
+        ];
+        network.topology = object(dice, common);
+        let of_model = if model.is_spiking() {
+            insert(&mut network.topology, "neuron_model", json!(model));
+            let dt = dice.number(0.1, 2.0);
+            object(dice, [("dt", dt), ("neurons", json!({"model": model}))])
+        } else {
+            let bias_in_gain = json!(dice.chance(0.5));
+            let initial_rates = json!(dice.pick(&["activation", "zero"]));
+            let motor_tau = if dice.chance(0.3) { json!(null) } else { json!(0.7) };
+            let dt = dice.number(0.01, 0.3);
+            object(
+                dice,
+                [
+                    ("dt", dt),
+                    ("bias_in_gain", bias_in_gain),
+                    ("initial_rates", initial_rates),
+                    ("motor_tau", motor_tau),
+                    ("neuron_model", json!("rate_model")),
+                    ("neurons", json!({"model": "ctrnn"})),
+                ],
+            )
+        };
+        for (key, value) in of_model.as_object().unwrap() {
+            insert(&mut network.topology, key, value.clone());
+        }
         let [outputs, decoding] = outputs;
         for (key, value) in [
             ("stimuli", stimuli),
@@ -74,17 +96,39 @@ impl Network {
     }
 
     fn ensemble(&mut self, dice: &mut Dice, ensembles: &mut Value, name: &str, n: usize) {
-        let activation = json!(dice.pick(&["sigmoid", "tanh"]));
-        let [tau, gain, bias] =
-            [dice.number(0.3, 9.0), dice.number(-2.0, 5.0), dice.number(-2.0, 2.0)];
-        let inner = object(
-            dice,
-            [("tau", tau), ("gain", gain), ("bias", bias), ("activation", activation.clone())],
-        );
-        let mut ensemble = object(dice, [("activation", activation), ("params", inner)]);
+        let mut ensemble = if self.model.is_spiking() {
+            json!({"params": self.spiking_params(dice)})
+        } else {
+            let activation = json!(dice.pick(&["sigmoid", "tanh"]));
+            let [tau, gain, bias] =
+                [dice.number(0.3, 9.0), dice.number(-2.0, 5.0), dice.number(-2.0, 2.0)];
+            let inner = object(
+                dice,
+                [("tau", tau), ("gain", gain), ("bias", bias), ("activation", activation.clone())],
+            );
+            object(dice, [("activation", activation), ("params", inner)])
+        };
         insert(&mut ensemble, "n", json!(n));
         insert(ensembles, name, ensemble);
         self.ensembles.push(name.to_owned());
+    }
+
+    /// Some of the model's parameters, within their ranges; time constants above dt / 2.
+    fn spiking_params(&self, dice: &mut Dice) -> Value {
+        let mut params = json!({});
+        for parameter in self.model.spec().parameters {
+            let (low, high) = (*parameter.range.start(), *parameter.range.end());
+            let low = if parameter.is_time_constant { 1.0 } else { low };
+            if dice.chance(0.5) {
+                let value = if parameter.is_whole {
+                    json!(dice.below(high as usize + 1))
+                } else {
+                    dice.number(low, high)
+                };
+                insert(&mut params, parameter.name, value);
+            }
+        }
+        params
     }
 
     /// `outputs` and `decoding`.
@@ -96,6 +140,7 @@ impl Network {
         }
         for (i, actuator) in actuators.into_iter().enumerate() {
             let (n, scheme) = match actuator {
+                _ if self.model.is_spiking() => self.spiking_decoding(dice, actuator),
                 "wheel_actuator" => (dice.die(2), "IdentityDecoding"),
                 "wireless_transmitter" => {
                     (robot.msg_length, dice.pick(&["IdentityDecoding", "ThresholdDecoding"]))
@@ -112,14 +157,43 @@ impl Network {
             insert(&mut output, "actuator", json!(actuator));
             insert(&mut outputs, &format!("out{i}"), output);
             let mut params = object(dice, [("is_cat", json!(scheme != "IdentityDecoding"))]);
-            if scheme == "ThresholdDecoding" {
-                insert(&mut params, "stochastic", json!(dice.chance(0.5)));
+            match scheme {
+                "ThresholdDecoding" => {
+                    insert(&mut params, "stochastic", json!(dice.chance(0.5)));
+                }
+                "RankOrderDecoding" | "LinearPopulationDecoding" => {
+                    let n = match actuator {
+                        "wireless_transmitter" => robot.msg_length,
+                        "wheel_actuator" => dice.die(2),
+                        _ => 1,
+                    };
+                    insert(&mut params, "num_outputs", json!(n));
+                    if scheme == "LinearPopulationDecoding" && dice.chance(0.5) {
+                        insert(&mut params, "rest_value", dice.number(-1.0, 1.0));
+                    }
+                    self.weighted.push(format!("out{i}"));
+                }
+                _ => {}
             }
-            let mut entry = object(dice, [("params", params)]);
+            let mut entry = if self.model.is_spiking() {
+                json!({"params": params})
+            } else {
+                object(dice, [("params", params)])
+            };
             insert(&mut entry, "scheme", json!(scheme));
             insert(&mut decoding, &format!("out{i}"), entry);
         }
         [outputs, decoding]
+    }
+
+    /// Neurons and the decoding of their spikes.
+    fn spiking_decoding(&self, dice: &mut Dice, actuator: &str) -> (usize, &'static str) {
+        let categorical = actuator == "led_actuator" || actuator == "wireless_transmitter:state";
+        match dice.below(3) {
+            0 if categorical => (2, "FirstToSpike"),
+            1 => (dice.die(4), "RankOrderDecoding"),
+            _ => (dice.die(4), "LinearPopulationDecoding"),
+        }
     }
 
     /// Groups over disjoint pairs.
@@ -185,9 +259,18 @@ impl Network {
             weights.into_iter().map(|name| (format!("synapses:weights:{name}"), [-3.0, 3.0]));
         let mut queries: Vec<_> = weights.collect();
         let gain = dice.pick(&["gain", "gains"]);
-        for (parameter, bounds) in
-            [("bias", [-1.5, 1.5]), ("tau", [-1.0, 0.75]), (gain, [0.05, 5.0])]
-        {
+        let rate = [("bias", [-1.5, 1.5]), ("tau", [-1.0, 0.75]), (gain, [0.05, 5.0])];
+        let of_model = if self.model.is_spiking() {
+            let evolvable = self.model.spec().evolvable().map(|parameter| {
+                let (low, high) = (*parameter.range.start(), *parameter.range.end());
+                let low = if parameter.is_time_constant { 1.0 } else { low };
+                (parameter.name, [low, high])
+            });
+            evolvable.collect()
+        } else {
+            rate.to_vec()
+        };
+        for (parameter, bounds) in of_model {
             let selectors = match dice.below(3) {
                 0 => vec!["all".to_owned()],
                 1 => dice.some(&self.ensembles),
@@ -196,8 +279,23 @@ impl Network {
             let named = selectors.into_iter().map(|s| (format!("neurons:{parameter}:{s}"), bounds));
             queries.extend(named);
         }
+        if !self.weighted.is_empty() {
+            let outputs = match dice.below(3) {
+                0 => vec!["all".to_owned()],
+                1 => dice.some(&self.weighted),
+                _ => Vec::new(),
+            };
+            let part = dice.pick(&["decoders", "decoding"]);
+            queries.extend(
+                outputs.into_iter().map(|name| (format!("{part}:weights:{name}"), [-2.0, 2.0])),
+            );
+        }
         if queries.is_empty() {
-            queries.push(("neurons:bias:all".to_owned(), [-1.0, 1.0]));
+            let parameter = self.model.spec().evolvable().nth(1).unwrap();
+            let bounds = [*parameter.range.start(), *parameter.range.end()];
+            let bounds = if parameter.is_time_constant { [1.0, bounds[1]] } else { bounds };
+            let bounds = if parameter.name == "gain" { [-1.0, 1.0] } else { bounds };
+            queries.push((format!("neurons:{}:all", parameter.name), bounds));
         }
         queries
     }

@@ -19,7 +19,6 @@
 //! the same bits. Two neurons share a division; which ones is a matter of the network's
 //! structure alone.
 
-mod aligned;
 mod chunk;
 mod kernel;
 mod remainder;

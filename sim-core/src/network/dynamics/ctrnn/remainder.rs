@@ -7,7 +7,7 @@ use std::mem;
 
 use pulp::{Simd, WithSimd};
 
-use super::aligned::Aligned;
+use super::super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;

@@ -1,0 +1,33 @@
+//! Exponential integrate and fire (Fourcaud-Trocme et al. 2003), as the original has it:
+//! tau dv/dt = v_rest - v + 0.3 exp(v - thresh) + 0.6 I, a spike at 30 mV.
+
+use super::{NeuronModelSpec, NeuronParameter, VOLTAGE};
+
+pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
+    names: &["exp_lif"],
+    is_spiking: true,
+    parameters: &[
+        NeuronParameter::time_constant("tau", 20.0, "Membrane time constant, ms; default 20."),
+        NeuronParameter::linear(
+            "v_rest",
+            "mV",
+            -65.0,
+            VOLTAGE,
+            "Resting voltage, to which spikes reset, mV; default -65.",
+        ),
+        NeuronParameter::linear(
+            "thresh",
+            "mV",
+            -40.0,
+            VOLTAGE,
+            "Where the upswing of a spike begins, mV; default -40.",
+        ),
+        NeuronParameter::refractory_substeps(
+            10.0,
+            "Substeps after a spike without current; default 10.",
+        ),
+    ],
+    activation: None,
+    states_per_neuron: 8,
+    operations_per_neuron: 20,
+};

@@ -1,0 +1,294 @@
+//! The network in some vectors of lanes: substep by substep, synapses and neurons.
+
+use pulp::{Simd, WithSimd};
+
+use super::super::SpikeWindow;
+use super::super::aligned::Aligned;
+use super::kernel::Kernel;
+use super::model::Model;
+use crate::lanes::Lanes;
+use numeric::Isa;
+
+/// Vectors per row of a chunk, at most.
+pub(super) const MAX_WIDTH: usize = 2;
+
+/// The state of a network in some neighbouring vectors of lanes.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    first_lane: usize,
+    /// Vectors per row.
+    width: usize,
+    /// Lanes per row.
+    n_lanes: usize,
+    /// `[neuron][variable][lane]`
+    state: Aligned,
+    /// 1 where a neuron spiked in the last substep, else 0: `[neuron][lane]`.
+    spikes: Aligned,
+    /// The neurons that spiked in any lane in the last substep, ascending.
+    active: Vec<usize>,
+    /// What stimuli add to the current, `[neuron][lane]`.
+    drive: Aligned,
+    /// `[neuron][lane]`
+    current: Aligned,
+    /// Spikes in the environment step, `[neuron][lane]`.
+    counts: Aligned,
+    /// Of motor neurons: the substep of the first spike, x and a of the filter,
+    /// `[motor neuron][variable][lane]`.
+    motor: Aligned,
+}
+
+impl Chunk {
+    /// At rest.
+    pub fn new<M: Model<C, Z>, const C: usize, const Z: usize>(
+        kernel: &Kernel<M, C, Z>,
+        first_lane: usize,
+        width: usize,
+        isa: Isa,
+    ) -> Self {
+        let n_lanes = width * isa.vector_len();
+        let rows = |n: usize| Aligned::new(n * n_lanes);
+        let n_neurons = kernel.n_neurons();
+        let mut chunk = Self {
+            first_lane,
+            width,
+            n_lanes,
+            state: rows(n_neurons * Z),
+            spikes: rows(n_neurons),
+            active: Vec::with_capacity(n_neurons),
+            drive: rows(n_neurons),
+            current: rows(n_neurons),
+            counts: rows(n_neurons),
+            motor: rows(kernel.motor.len() * 3),
+        };
+        let starts = kernel.starts.iter().flatten();
+        for (row, &start) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(starts) {
+            row.fill(start);
+        }
+        for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
+            rows[..n_lanes].fill(kernel.n_substeps as f32);
+        }
+        chunk
+    }
+
+    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    pub fn advance<M: Model<C, Z>, const C: usize, const Z: usize>(
+        &mut self,
+        kernel: &Kernel<M, C, Z>,
+        stimuli: &Lanes,
+        isa: Isa,
+    ) {
+        match self.width {
+            1 => isa.run(Work::<M, C, Z, 1> { kernel, chunk: self, stimuli }),
+            2 => isa.run(Work::<M, C, Z, 2> { kernel, chunk: self, stimuli }),
+            width => unreachable!("{width} vectors are more than MAX_WIDTH"),
+        }
+    }
+
+    /// Writes the share of substeps in which each neuron spiked, `[neuron][lane]`.
+    pub fn write_activity<M, const C: usize, const Z: usize>(
+        &self,
+        kernel: &Kernel<M, C, Z>,
+        activity: &mut Lanes,
+    ) {
+        let n_substeps = kernel.n_substeps as f32;
+        for (neuron, counts) in self.counts.values().chunks_exact(self.n_lanes).enumerate() {
+            let row = &mut activity.row_mut(neuron)[self.first_lane..][..self.n_lanes];
+            for (share, count) in row.iter_mut().zip(counts) {
+                *share = count / n_substeps;
+            }
+        }
+    }
+
+    /// Writes what decoders read of motor neurons.
+    pub fn write_window<M, const C: usize, const Z: usize>(
+        &self,
+        kernel: &Kernel<M, C, Z>,
+        window: &mut SpikeWindow,
+    ) {
+        let n_lanes = self.n_lanes;
+        let motor = self.motor.values().chunks_exact(3 * n_lanes);
+        for (&neuron, rows) in kernel.motor.iter().zip(motor) {
+            let counts = &self.counts.values()[neuron * n_lanes..][..n_lanes];
+            for (lanes, values) in [
+                (&mut window.counts, counts),
+                (&mut window.first, &rows[..n_lanes]),
+                (&mut window.filtered, &rows[2 * n_lanes..]),
+            ] {
+                lanes.row_mut(neuron)[self.first_lane..][..n_lanes].copy_from_slice(values);
+            }
+        }
+    }
+
+    /// Writes the voltage of each neuron, mV, `[neuron][lane]`.
+    pub fn write_voltages<const Z: usize>(&self, voltages: &mut Lanes) {
+        let neurons = self.state.values().chunks_exact(Z * self.n_lanes);
+        for (neuron, state) in neurons.enumerate() {
+            let row = &mut voltages.row_mut(neuron)[self.first_lane..][..self.n_lanes];
+            row.copy_from_slice(&state[..self.n_lanes]);
+        }
+    }
+}
+
+/// An environment step of a chunk of W vectors per row.
+struct Work<'a, M, const C: usize, const Z: usize, const W: usize> {
+    kernel: &'a Kernel<M, C, Z>,
+    chunk: &'a mut Chunk,
+    stimuli: &'a Lanes,
+}
+
+impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
+    for Work<'_, M, C, Z, W>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { kernel, chunk, stimuli } = self;
+        perceive::<S, M, C, Z, W>(simd, kernel, chunk, stimuli);
+        for substep in 0..kernel.n_substeps {
+            propagate::<S, M, C, Z, W>(simd, kernel, chunk);
+            integrate::<S, M, C, Z, W>(simd, kernel, chunk);
+            listen::<S, M, C, Z, W>(simd, kernel, chunk, substep);
+        }
+    }
+}
+
+// All that touches vectors is inlined into `with_simd`, which is compiled for the
+// vectors' instruction set; closures would not be, hence the plain loops.
+
+/// What the stimuli of this environment step add to currents; nothing has spiked in it.
+#[inline(always)]
+fn perceive<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+    simd: S,
+    kernel: &Kernel<M, C, Z>,
+    chunk: &mut Chunk,
+    stimuli: &Lanes,
+) {
+    let n_lanes = W * S::F32_LANES;
+    let drives = rows_mut::<S, W>(chunk.drive.values_mut());
+    for (neuron, drive) in drives.iter_mut().enumerate() {
+        let mut sum = [simd.splat_f32s(0.0); W];
+        for &(input, weight) in kernel.afferent.of(neuron) {
+            let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
+            accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
+        }
+        *drive = sum;
+    }
+    chunk.counts.values_mut().fill(0.0);
+    for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
+        rows[..n_lanes].fill(kernel.n_substeps as f32);
+    }
+}
+
+/// The current of every neuron, from the spikes of the substep before.
+#[inline(always)]
+fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+    simd: S,
+    kernel: &Kernel<M, C, Z>,
+    chunk: &mut Chunk,
+) {
+    chunk.current.values_mut().copy_from_slice(chunk.drive.values());
+    let currents = rows_mut::<S, W>(chunk.current.values_mut());
+    let spikes = rows::<S, W>(chunk.spikes.values());
+    for &pre in &chunk.active {
+        for &(post, weight) in kernel.outgoing.of(pre) {
+            accumulate(simd, &mut currents[post], weight, &spikes[pre]);
+        }
+    }
+}
+
+/// One Euler step of every neuron.
+#[inline(always)]
+fn integrate<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, const W: usize>(
+    simd: S,
+    kernel: &Kernel<M, C, Z>,
+    chunk: &mut Chunk,
+) {
+    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+    let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
+    let currents = rows::<S, W>(chunk.current.values());
+    let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
+    let counts = rows_mut::<S, W>(chunk.counts.values_mut());
+    chunk.active.clear();
+    for (neuron, constants) in kernel.constants.iter().enumerate() {
+        let mut splat = [zero; C];
+        for (splat, &constant) in splat.iter_mut().zip(constants) {
+            *splat = simd.splat_f32s(constant);
+        }
+        let mut is_active = false;
+        for vector in 0..W {
+            let mut state = [zero; Z];
+            for (value, row) in state.iter_mut().zip(&states[neuron]) {
+                *value = row[vector];
+            }
+            let (state, spiked) = M::update(simd, splat, state, currents[neuron][vector]);
+            for (row, value) in states[neuron].iter_mut().zip(state) {
+                row[vector] = value;
+            }
+            let spike = simd.select_f32s(spiked, one, zero);
+            spikes[neuron][vector] = spike;
+            counts[neuron][vector] = simd.add_f32s(counts[neuron][vector], spike);
+            is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
+        }
+        if is_active {
+            chunk.active.push(neuron);
+        }
+    }
+}
+
+/// What decoders keep of the motor neurons' spikes.
+#[inline(always)]
+fn listen<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+    simd: S,
+    kernel: &Kernel<M, C, Z>,
+    chunk: &mut Chunk,
+    substep: u32,
+) {
+    let one = simd.splat_f32s(1.0);
+    let [retention, rise, decay] =
+        [kernel.filter.retention, kernel.filter.rise, kernel.filter.decay]
+            .map(|constant| simd.splat_f32s(constant));
+    let now = simd.splat_f32s(substep as f32);
+    let spikes = rows::<S, W>(chunk.spikes.values());
+    let motor = rows_mut::<S, W>(chunk.motor.values_mut()).as_chunks_mut::<3>().0;
+    for (&neuron, [first, x, a]) in kernel.motor.iter().zip(motor) {
+        for vector in 0..W {
+            let spiked = simd.equal_f32s(spikes[neuron][vector], one);
+            let earliest = simd.min_f32s(first[vector], now);
+            first[vector] = simd.select_f32s(spiked, earliest, first[vector]);
+            let decayed = simd.mul_f32s(x[vector], retention);
+            x[vector] = simd.select_f32s(spiked, one, decayed);
+            let growth = simd.mul_f32s(rise, x[vector]);
+            let room = simd.sub_f32s(one, a[vector]);
+            let loss = simd.mul_f32s(decay, a[vector]);
+            let change = simd.sub_f32s(simd.mul_f32s(growth, room), loss);
+            a[vector] = simd.add_f32s(a[vector], change);
+        }
+    }
+}
+
+/// Adds weight * values.
+#[inline(always)]
+fn accumulate<S: Simd, const W: usize>(
+    simd: S,
+    sum: &mut [S::f32s; W],
+    weight: f32,
+    values: &[S::f32s; W],
+) {
+    let weight = simd.splat_f32s(weight);
+    for (sum, value) in sum.iter_mut().zip(values) {
+        *sum = simd.mul_add_f32s(weight, *value, *sum);
+    }
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+fn rows<S: Simd, const W: usize>(values: &[f32]) -> &[[S::f32s; W]] {
+    S::as_simd_f32s(values).0.as_chunks().0
+}
+
+/// Values as rows of W vectors.
+#[inline(always)]
+fn rows_mut<S: Simd, const W: usize>(values: &mut [f32]) -> &mut [[S::f32s; W]] {
+    S::as_mut_simd_f32s(values).0.as_chunks_mut().0
+}

@@ -1,0 +1,100 @@
+//! Functions of the neuron models, from IEEE arithmetic with fused multiply-adds alone.
+//!
+//! Errors: exp 3e-6 of its value for |x| <= 43, beyond which it stays as 2^63 or 2^-63;
+//! cosh likewise; tanh 3e-7.
+
+use std::f32::consts::LOG2_E;
+
+use pulp::Simd;
+
+use crate::exp2::{Exp2, exp2, exp2_parts};
+
+/// e^x
+#[inline(always)]
+pub(super) fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    exp2(simd, simd.mul_f32s(x, simd.splat_f32s(LOG2_E)))
+}
+
+/// (e^2x - 1) / (e^2x + 1); near 0 nothing cancels.
+#[inline(always)]
+pub(super) fn tanh<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    let y = simd.mul_f32s(x, simd.splat_f32s(2.0 * LOG2_E));
+    let Exp2 { s, q, f } = exp2_parts(simd, y);
+    let above = simd.sub_f32s(s, simd.splat_f32s(1.0));
+    let above = simd.mul_add_f32s(s, simd.mul_f32s(q, f), above);
+    simd.div_f32s(above, simd.add_f32s(above, simd.splat_f32s(2.0)))
+}
+
+/// (e^x + e^-x) / 2
+#[inline(always)]
+pub(super) fn cosh<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    let sum = simd.add_f32s(exp(simd, x), exp(simd, simd.neg_f32s(x)));
+    simd.mul_f32s(simd.splat_f32s(0.5), sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::WithSimd;
+
+    use super::*;
+    use numeric::Isa;
+
+    /// exp, tanh and cosh of whole vectors of x.
+    struct Functions<'a>(&'a [f32]);
+
+    impl WithSimd for Functions<'_> {
+        type Output = Vec<[f32; 3]>;
+
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            let lanes = self.0.chunks_exact(S::F32_LANES).flat_map(|x| {
+                let x = S::as_simd_f32s(x).0[0];
+                let all = [exp(simd, x), tanh(simd, x), cosh(simd, x)];
+                let all: &[f32] = pulp::bytemuck::cast_slice(&all);
+                let lane = |i: usize| [0, 1, 2].map(|function| all[function * S::F32_LANES + i]);
+                (0..S::F32_LANES).map(lane).collect::<Vec<_>>()
+            });
+            lanes.collect()
+        }
+    }
+
+    /// Every 997th float of both signs, up to 43.
+    fn sample() -> Vec<f32> {
+        let magnitudes = (0..=43.0_f32.to_bits()).step_by(997).map(f32::from_bits);
+        let mut sample: Vec<f32> = magnitudes.flat_map(|x| [x, -x]).collect();
+        sample.resize(sample.len().next_multiple_of(64), 0.0);
+        sample
+    }
+
+    #[test]
+    fn functions_are_accurate() {
+        let sample = sample();
+        for (&x, computed) in sample.iter().zip(Isa::best().run(Functions(&sample))) {
+            let exact = f64::from(x);
+            let [exp, tanh, cosh] = computed.map(f64::from);
+            assert!((exp / libm::exp(exact) - 1.0).abs() < 3e-6, "exp {x}");
+            assert!((tanh - libm::tanh(exact)).abs() < 3e-7, "tanh {x}");
+            assert!((cosh / libm::cosh(exact) - 1.0).abs() < 3e-6, "cosh {x}");
+        }
+    }
+
+    #[test]
+    fn whatever_the_argument_there_is_a_number() {
+        let large = [f32::MAX; 64];
+        let small = [f32::MIN; 64];
+        for x in [large, small] {
+            assert!(Isa::best().run(Functions(&x)).as_flattened().iter().all(|y| y.is_finite()));
+        }
+    }
+
+    #[test]
+    fn instruction_sets_agree_in_every_bit() {
+        let sample = sample();
+        let bits = |isa: Isa| -> Vec<[u32; 3]> {
+            let computed = isa.run(Functions(&sample));
+            computed.into_iter().map(|values| values.map(f32::to_bits)).collect()
+        };
+        for isa in Isa::available() {
+            assert!(bits(isa) == bits(Isa::best()), "{isa} differs from {}", Isa::best());
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Networks of spiking neurons, by synchronous Euler steps (section 4.1 of the thesis):
+//! in every substep, each neuron takes the current I = W s of the spikes s of the substep
+//! before, and W_I phi of the stimuli, which are held for an environment step.
+//! `docs/neurons.md` has the models.
+//!
+//! It is computed in f32; constants are computed in f64 and rounded once. All lanes share
+//! the weights; no value of one lane ever meets another's. What a neuron does to others is
+//! added up source by source, and a neuron that spikes in no lane of a chunk costs
+//! nothing: what it would add is zero, which changes no sum.
+
+mod adex;
+mod chunk;
+mod exp_lif;
+mod functions;
+mod izhikevich;
+mod kernel;
+mod lif;
+mod model;
+mod morris_lecar;
+mod wiring;
+
+use super::{Dynamics, SpikeWindow};
+use crate::lanes::Lanes;
+use crate::network::{Network, Phenotype};
+use chunk::Chunk;
+use experiment_file::NeuronModel;
+use kernel::Kernel;
+use model::Model;
+use numeric::Isa;
+pub(super) use wiring::Wiring;
+
+/// A network of spiking neurons, by their model, at rest.
+pub(super) fn compile(
+    isa: Isa,
+    network: &Network,
+    wiring: &Wiring,
+    phenotype: &Phenotype,
+    n_lanes: usize,
+) -> Box<dyn Dynamics> {
+    macro_rules! spiking {
+        ($model:ty) => {
+            Box::new(Spiking::<$model, _, _>::new(isa, network, wiring, phenotype, n_lanes))
+        };
+    }
+    match network.model {
+        NeuronModel::Rate => unreachable!("the wiring is of spiking neurons"),
+        NeuronModel::Lif => spiking!(lif::Lif),
+        NeuronModel::ExpLif => spiking!(exp_lif::ExpLif),
+        NeuronModel::AdEx => spiking!(adex::AdEx),
+        NeuronModel::Izhikevich => spiking!(izhikevich::Izhikevich),
+        NeuronModel::MorrisLecar => spiking!(morris_lecar::MorrisLecar),
+    }
+}
+
+/// A network with its weights, and its state in every lane.
+#[derive(Debug)]
+struct Spiking<M, const C: usize, const Z: usize> {
+    isa: Isa,
+    kernel: Kernel<M, C, Z>,
+    chunks: Vec<Chunk>,
+}
+
+impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
+    fn new(
+        isa: Isa,
+        network: &Network,
+        wiring: &Wiring,
+        phenotype: &Phenotype,
+        n_lanes: usize,
+    ) -> Self {
+        let kernel = Kernel::compile(network, wiring, phenotype);
+        let vector_len = isa.vector_len();
+        let n_vectors = n_lanes.div_ceil(vector_len);
+        let chunks = (0..n_vectors).step_by(chunk::MAX_WIDTH).map(|first| {
+            let width = chunk::MAX_WIDTH.min(n_vectors - first);
+            Chunk::new(&kernel, first * vector_len, width, isa)
+        });
+        let chunks = chunks.collect();
+        Self { isa, kernel, chunks }
+    }
+}
+
+impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, Z> {
+    fn step(&mut self, stimuli: &Lanes) {
+        for chunk in &mut self.chunks {
+            chunk.advance(&self.kernel, stimuli, self.isa);
+        }
+    }
+
+    /// The share of the substeps in which it spiked.
+    fn write_activity(&self, activity: &mut Lanes) {
+        for chunk in &self.chunks {
+            chunk.write_activity(&self.kernel, activity);
+        }
+    }
+
+    fn write_window(&self, window: &mut SpikeWindow) {
+        for chunk in &self.chunks {
+            chunk.write_window(&self.kernel, window);
+        }
+    }
+
+    fn write_voltages(&self, voltages: &mut Lanes) -> bool {
+        for chunk in &self.chunks {
+            chunk.write_voltages::<Z>(voltages);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

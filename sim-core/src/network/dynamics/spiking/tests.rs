@@ -1,0 +1,134 @@
+//! Spiking networks against themselves, on other processors and in other lanes.
+
+use crate::lanes::Lanes;
+use crate::network::dynamics::NetworkState;
+use crate::network::{Network, Phenotype};
+use crate::problems::Problems;
+use crate::testing::{experiment_a_spiking, genotype};
+use experiment_file::{ExperimentConfig, NeuronModel};
+use numeric::Isa;
+
+const MODELS: [NeuronModel; 5] = [
+    NeuronModel::Lif,
+    NeuronModel::ExpLif,
+    NeuronModel::AdEx,
+    NeuronModel::Izhikevich,
+    NeuronModel::MorrisLecar,
+];
+
+/// The network of a configuration, and the phenotype of one of its genotypes.
+fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
+    let mut problems = Problems::default();
+    let network = Network::compile(&config.topology, &mut problems);
+    let codec = crate::genotype::Codec::compile(config, &network, &mut problems);
+    problems.check().unwrap();
+    let phenotype = codec.decode(&genotype(codec.genotype_len(), 5));
+    (network, phenotype)
+}
+
+/// Networks of each model, substep by substep or in steps of several.
+fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
+    let networks = MODELS.into_iter().map(|model| {
+        let mut config = experiment_a_spiking(model);
+        config.topology.time_scale = time_scale;
+        compiled(&config)
+    });
+    networks.collect()
+}
+
+fn stimulus(step: usize, lane: usize, input: usize) -> f64 {
+    0.5 + 0.5 * libm::sin((lane + 3 * input + step / 20) as f64)
+}
+
+/// Stimuli of one step in some lanes.
+fn stimuli(step: usize, lanes: std::ops::Range<usize>) -> Lanes {
+    let mut stimuli = Lanes::new(5, lanes.len());
+    for (index, lane) in lanes.enumerate() {
+        for input in 0..5 {
+            stimuli.set(input, index, stimulus(step, lane, input) as f32);
+        }
+    }
+    stimuli
+}
+
+/// Activities and voltages of one lane after some steps with the given lanes.
+fn bits(
+    (network, phenotype): &(Network, Phenotype),
+    isa: Isa,
+    lanes: std::ops::Range<usize>,
+    lane: usize,
+) -> Vec<u32> {
+    let mut state = NetworkState::new(isa, network, phenotype, lanes.len());
+    let mut bits = Vec::new();
+    for step in 0..3 {
+        state.step(&stimuli(step, lanes.clone()));
+        let index = lane - lanes.start;
+        let voltages = state.voltages().unwrap();
+        let window = state.window().unwrap();
+        for lanes in [state.activity(), &voltages, &window.counts, &window.first, &window.filtered]
+        {
+            bits.extend(lanes.column(index).map(f32::to_bits));
+        }
+    }
+    bits
+}
+
+#[test]
+fn instruction_sets_agree_in_every_bit() {
+    for network in networks(20) {
+        for n_lanes in [1, 15, 50] {
+            let expected = bits(&network, Isa::best(), 0..n_lanes, n_lanes / 2);
+            for isa in Isa::available() {
+                assert_eq!(bits(&network, isa, 0..n_lanes, n_lanes / 2), expected, "{isa}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lane_does_not_depend_on_its_place_or_its_neighbours() {
+    for network in networks(20) {
+        let alone = bits(&network, Isa::best(), 70..71, 70);
+        for lanes in [69..71, 60..80, 0..71, 37..170] {
+            assert_eq!(bits(&network, Isa::best(), lanes.clone(), 70), alone, "{lanes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_window_has_counts_and_first_spikes_of_motor_neurons() {
+    let mut config = experiment_a_spiking(NeuronModel::Lif);
+    config.topology.time_scale = 40;
+    let network = compiled(&config);
+    config.topology.time_scale = 1;
+    let single = compiled(&config);
+    let mut window = NetworkState::new(Isa::best(), &network.0, &network.1, 3);
+    let mut substeps = NetworkState::new(Isa::best(), &single.0, &single.1, 3);
+    let held = stimuli(4, 0..3);
+    window.step(&held);
+    let mut n_first = 0;
+    let mut counts = vec![[0.0; 3]; network.0.n_neurons()];
+    let mut first = vec![[40.0; 3]; network.0.n_neurons()];
+    let motor: Vec<usize> = network.0.outputs.iter().flat_map(|it| it.neurons.clone()).collect();
+    for substep in 0..40 {
+        substeps.step(&held);
+        for &neuron in &motor {
+            for lane in 0..3 {
+                if substeps.activity().get(neuron, lane) > 0.0 {
+                    counts[neuron][lane] += 1.0;
+                    first[neuron][lane] = f32::min(first[neuron][lane], substep as f32);
+                    n_first += 1;
+                }
+            }
+        }
+    }
+    assert!(n_first > 3, "{n_first}");
+    let (window, last) = (window.window().unwrap(), substeps.window().unwrap());
+    for &neuron in &motor {
+        for lane in 0..3 {
+            assert_eq!(window.counts.get(neuron, lane), counts[neuron][lane]);
+            assert_eq!(window.first.get(neuron, lane), first[neuron][lane]);
+            assert_eq!(window.filtered.get(neuron, lane), last.filtered.get(neuron, lane));
+        }
+    }
+}

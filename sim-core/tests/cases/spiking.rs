@@ -1,0 +1,62 @@
+//! Networks of spiking neurons.
+
+use experiment_file::{
+    ActuatorQuery, DecodingConfig, ExperimentConfig, FitnessFunction, GenotypeQuery, NeuronModel,
+    OutputSelector, SynapseSelector,
+};
+
+use crate::configs::{experiment_a, experiment_c};
+use crate::{assert_agreement, random_genotype, spread};
+
+/// An experiment with neurons of a model; weights evolve, of synapses and of decoders.
+fn spiking(mut config: ExperimentConfig, model: NeuronModel) -> ExperimentConfig {
+    let topology = &mut config.topology;
+    (topology.neuron_model, topology.dt) = (model, 1.0);
+    for ensemble in topology.ensembles.values_mut() {
+        ensemble.activation = None;
+        ensemble.params = model.default_params();
+    }
+    for (name, output) in &topology.outputs {
+        topology.ensembles[&output.ensemble].n = 3;
+        let num_outputs = if output.actuator == ActuatorQuery::Message { 2 } else { 1 };
+        topology.decoding[name] = match output.actuator {
+            ActuatorQuery::Wheels => DecodingConfig::RankOrderDecoding { num_outputs },
+            ActuatorQuery::Mode => {
+                topology.ensembles[&output.ensemble].n = 2;
+                DecodingConfig::FirstToSpike {}
+            }
+            _ => DecodingConfig::LinearPopulationDecoding { num_outputs, rest_value: 0.5 },
+        };
+    }
+    let population = &mut config.algorithm.populations[0];
+    population.objects = vec![
+        GenotypeQuery::Weights(SynapseSelector::All),
+        GenotypeQuery::Decoders(OutputSelector::All),
+    ];
+    population.min_vals = vec![-100.0, -1.0];
+    population.max_vals = vec![250.0, 1.0];
+    config
+}
+
+/// Episodes are short: where one of two numbers crosses a threshold a substep earlier, in
+/// f32 or in f64, trajectories part.
+#[test]
+fn swarms_of_every_model_agree() {
+    for model in NeuronModel::ALL.into_iter().filter(|model| model.is_spiking()) {
+        let mut fitness = Vec::new();
+        for (base, task) in [
+            (experiment_a(), FitnessFunction::IdentifyBorderline),
+            (experiment_c(), FitnessFunction::OrientationConsensus),
+        ] {
+            let mut config = spiking(base, model);
+            config.algorithm.fitness_function = task;
+            config.algorithm.evaluation_steps = 12;
+            for seed in 0..4 {
+                let genotype = random_genotype(&config, seed);
+                let episodes = assert_agreement(&config, &genotype, 0, 0..1);
+                fitness.extend(episodes.iter().map(|episode| episode.fitness));
+            }
+        }
+        assert!(spread(fitness.iter().copied()) > 0.01, "{model:?}: {fitness:?}");
+    }
+}
