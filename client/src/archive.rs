@@ -115,17 +115,21 @@ impl Archive {
         }
     }
 
-    /// An address whose experiment has its number.
-    pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
-        let id = match (&address.experiment, self) {
+    /// The number of the one experiment of a number or a name.
+    pub async fn experiment_id(&self, subject: &Subject) -> Result<u64, Error> {
+        Ok(match (subject, self) {
             (Subject::Experiment(id), _) => *id,
             (subject, Self::Coordinator(connection)) => connection.one(subject).await?.id,
             (Subject::Group(name), Self::Directory { path, offline }) => {
                 let all = offline.experiments().map_err(|status| refused(&status, path))?;
                 one(name, named(name, &all)?)?.id
             }
-        };
-        Ok(address.of(id))
+        })
+    }
+
+    /// An address whose experiment has its number.
+    pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
+        Ok(address.of(self.experiment_id(&address.experiment).await?))
     }
 
     /// The one at an address, and its experiment.

@@ -90,14 +90,6 @@ Exit codes:
   12   the bundle is not what it says (verify)
   130  interrupted";
 
-/// The experiment that a command is about.
-#[derive(Debug, ClapArgs)]
-pub struct ExperimentId {
-    /// Number of the experiment.
-    #[arg(value_parser = whole(1..=u64::MAX))]
-    pub id: u64,
-}
-
 /// The experiment, or the group of them, that a command is about.
 #[derive(Debug, ClapArgs)]
 pub struct Target {

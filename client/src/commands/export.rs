@@ -13,8 +13,8 @@ use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
 use crate::{
-    archive::Archive, args::ExperimentId, connection::present, error::Error, json,
-    progress::Progress, settings::Settings, tensorboard::EventFile, text,
+    archive::Archive, args::Target, connection::present, error::Error, json, progress::Progress,
+    settings::Settings, tensorboard::EventFile, text,
 };
 
 /// Write an ended experiment to a file that others can verify and import.
@@ -29,7 +29,7 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct ExportArgs {
     #[command(flatten)]
-    experiment: ExperimentId,
+    target: Target,
     /// The bundle; a file that exists is replaced.
     #[arg(long, value_name = "FILE", required_unless_present = "tensorboard")]
     to: Option<PathBuf>,
@@ -44,7 +44,7 @@ pub struct ExportArgs {
 
 const HELP: &str = "\
 Examples:
-  swarmctl export 3 --to leader.zip
+  swarmctl export leader --to leader.zip
   swarmctl export 1 --to quickstart.zip --data-dir swarm-data
   swarmctl export 3 --tensorboard runs && tensorboard --logdir runs";
 
@@ -64,7 +64,7 @@ pub async fn export(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let archive = Archive::open(settings, args.data_dir.as_deref())?;
-    let id = args.experiment.id;
+    let id = archive.experiment_id(&args.target.subject).await?;
     let (path, bytes, next) = match (&args.to, &args.tensorboard) {
         (Some(path), _) => {
             let next = format!("check it with: swarmctl verify {}", path.display());

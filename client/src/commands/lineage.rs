@@ -10,7 +10,8 @@ use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
 use crate::{
-    archive::Archive, args::whole, error::Error, json, progress::Progress, settings::Settings,
+    address::NamedAddress, archive::Archive, args::whole, error::Error, json, progress::Progress,
+    settings::Settings,
 };
 
 /// Print whom an individual of a genetic algorithm descends from, and which genes it has from
@@ -23,9 +24,9 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct LineageArgs {
-    /// Whom: ID@G/I, individual I of generation G.
+    /// Whom: ID@G/I, individual I of generation G of the experiment of that number or name.
     #[arg(value_name = "ID@G/I")]
-    address: Address,
+    address: NamedAddress,
     /// Number of generations to go back.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u32>(1..=1000))]
     depth: u32,
@@ -81,11 +82,12 @@ pub async fn lineage(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let archive = Archive::open(settings, args.data_dir.as_deref())?;
-    let GetLineageResponse { populations } = archive.lineage(args.address, args.depth).await?;
+    let address = archive.resolve(&args.address).await?;
+    let GetLineageResponse { populations } = archive.lineage(address, args.depth).await?;
     progress.print(&match (args.dot, progress.is_json()) {
         (true, _) => draw::graph(&populations),
-        (_, true) => json::document(&LineageDocument::new(args.address, &populations)),
-        _ => draw::trees(&populations, args.address.experiment.0),
+        (_, true) => json::document(&LineageDocument::new(address, &populations)),
+        _ => draw::trees(&populations, address.experiment.0),
     })
 }
 

@@ -173,6 +173,15 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
     sections.join("\n\n")
 }
 
+fn page(command: &clap::Command) -> String {
+    // What all commands have in common is on the first page.
+    let mut command = command.clone().mut_args(|arg| {
+        let is_common = arg.is_global_set();
+        arg.hide(is_common)
+    });
+    command.render_long_help().to_string()
+}
+
 #[test]
 fn the_manual() {
     let mut swarmctl = Args::command().term_width(80);
@@ -181,13 +190,10 @@ fn the_manual() {
     let names: Vec<String> = shown.map(|command| command.get_name().to_owned()).collect();
     let mut pages = vec![swarmctl.render_long_help().to_string()];
     for name in names.iter().filter(|name| *name != "help") {
-        let command = swarmctl.find_subcommand_mut(name).unwrap();
-        // What all commands have in common is on the first page.
-        let command = command.clone().mut_args(|arg| {
-            let is_common = arg.is_global_set();
-            arg.hide(is_common)
-        });
-        pages.push(command.clone().render_long_help().to_string());
+        let command = swarmctl.find_subcommand(name).unwrap();
+        pages.push(page(command));
+        let nested = command.get_subcommands().filter(|command| command.get_name() != "help");
+        pages.extend(nested.map(page));
     }
     let rule = format!("\n\n{}\n\n", "=".repeat(80));
     let pages: Vec<&str> = pages.iter().map(|page| page.trim_end()).collect();
@@ -215,7 +221,7 @@ async fn answers_for_people() {
         "prune 3",
         "history 3 --dynamics",
         "lineage 3@2/5",
-        "lineage 3@2/5 --dot",
+        "lineage leader@2/5 --dot",
         "wait 3 --for ended",
         "wait 3",
         "explain 3",

@@ -91,6 +91,22 @@ async fn people_read_tables() {
 }
 
 #[tokio::test]
+async fn tables_fit_the_terminal() {
+    let (_dir, runs) = files();
+    for width in [40, 80, 200] {
+        let captured = Captured::default();
+        let args = CompareArgs { runs: runs.clone(), last: 2, target: Some(6.0), to: None };
+        let mut progress = captured.progress_on(OutputFormat::Table, width);
+        compare(Settings::default(), &args, &mut progress).await.unwrap();
+        let lines = captured.lines();
+        for line in lines.iter().flat_map(|text| text.lines()) {
+            assert!(console::measure_text_width(line) <= width, "{width}: {line}");
+        }
+        insta::assert_snapshot!(format!("tables_at_{width}_columns"), lines.join("\n"));
+    }
+}
+
+#[tokio::test]
 async fn all_files_that_are_wrong_are_named_at_once() {
     let (dir, mut paths) = files();
     let write = |name: &str, text: &str| {
