@@ -1,14 +1,15 @@
 //! Errors of Rust as exceptions; their classes are in `swarmevo/errors.py`.
 
 use experiment_file::ConfigError;
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::{call::PyCallArgs, exceptions::PyValueError, prelude::*};
 use sim_core::EvaluateError;
+use tonic::Status;
 
 /// The exception `name` of `swarmevo.errors` with these arguments; if it cannot be made, why.
-fn exception<'py>(py: Python<'py>, name: &str, args: impl IntoPyObject<'py>) -> PyErr {
+fn exception<'py>(py: Python<'py>, name: &str, args: impl PyCallArgs<'py>) -> PyErr {
     let made = || {
         let class = py.import("swarmevo.errors")?.getattr(name)?;
-        class.call1((args,))
+        class.call1(args)
     };
     made().map_or_else(|error| error, PyErr::from_value)
 }
@@ -17,7 +18,19 @@ fn exception<'py>(py: Python<'py>, name: &str, args: impl IntoPyObject<'py>) -> 
 pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
     let problems = error.problems.iter();
     let problems = problems.map(|it| (it.path.as_str(), it.line, it.message.as_str()));
-    exception(py, "ExperimentError", problems.collect::<Vec<_>>())
+    exception(py, "ExperimentError", (problems.collect::<Vec<_>>(),))
+}
+
+/// A request that is refused: `FleetError`, with the name of the status.
+pub fn refused(py: Python<'_>, status: &Status) -> PyErr {
+    let mut code = String::new();
+    for (i, letter) in format!("{:?}", status.code()).chars().enumerate() {
+        if i > 0 && letter.is_uppercase() {
+            code.push('_');
+        }
+        code.push(letter.to_ascii_uppercase());
+    }
+    exception(py, "FleetError", (code, status.message()))
 }
 
 /// What the caller asked for cannot be simulated.
@@ -27,5 +40,5 @@ pub fn evaluate_error(error: &EvaluateError) -> PyErr {
 
 /// A panic: `InternalError`.
 pub fn panic_error(py: Python<'_>, message: &str) -> PyErr {
-    exception(py, "InternalError", message)
+    exception(py, "InternalError", (message,))
 }

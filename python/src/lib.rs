@@ -1,6 +1,7 @@
 //! The extension behind the Python package `swarmevo`: the simulator and the algorithms.
 //! `swarmevo/*.py` is what people see of it.
 
+mod database;
 mod errors;
 mod evolution;
 mod experiment;
@@ -15,6 +16,7 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::{
+        database::Database,
         evolution::{Evolution, Reevaluation, algorithms},
         experiment::Experiment,
     };
@@ -26,4 +28,8 @@ mod _core {
     /// An experiment file to begin with.
     #[pymodule_export]
     const QUICKSTART: &str = include_str!("../../configs/quickstart.json");
+
+    /// The gRPC protocol, as a set of file descriptors.
+    #[pymodule_export]
+    const PROTOCOL: &[u8] = include_bytes!("../../proto/swarm.v1.binpb");
 }

@@ -22,16 +22,20 @@ from .evolution import (
     algorithms,
 )
 from .experiment import Experiment, Measured
+from .files import Archive, open
+from .fleet import Client, FleetRun, connect
 from .local import LocalRun, evolve
 from .mirroring import mirror
 from .network import Network
+from .records import Individuals, RecordedRun
 from .replay import Replay
 from .trace import Trace
 from .trials import TrialSet
 
 __all__ = [
-    "CMAES", "Champion", "Evolution", "Experiment", "ExperimentError", "FINGERPRINT",
-    "FleetError", "GA", "Generation", "InternalError", "LocalRun", "Measured", "Network",
-    "OpenAIES", "Problem", "Replay", "SNES", "SepCMAES", "SwarmError", "Trace", "TrialSet",
-    "XNES", "algorithms", "evolve", "mirror",
+    "Archive", "CMAES", "Champion", "Client", "Evolution", "Experiment", "ExperimentError",
+    "FINGERPRINT", "FleetError", "FleetRun", "GA", "Generation", "Individuals", "InternalError",
+    "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES",
+    "SepCMAES", "SwarmError", "Trace", "TrialSet", "XNES", "algorithms", "connect", "evolve",
+    "mirror", "open",
 ]

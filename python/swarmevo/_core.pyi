@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 FINGERPRINT: str
 QUICKSTART: str
+PROTOCOL: bytes
 
 _Floats = NDArray[np.float64]
 _Trials = tuple[str, int, int, int, int]
@@ -57,3 +58,7 @@ class Reevaluation:
     def tell(self, fitness: _Floats) -> None: ...
 
 def algorithms() -> list[tuple[str, str, list[list[str]]]]: ...
+
+class Database:
+    def __init__(self, directory: str) -> None: ...
+    def call(self, name: str, request: bytes) -> bytes: ...

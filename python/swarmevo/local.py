@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable, Iterable
+from typing import TYPE_CHECKING, Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .evolution import Champion, Evolution, Generation
 from .experiment import Experiment
 from .plotting import plot_history
+from .progress import shown
 from .trials import TrialSet
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def evolve(
 
     evolution = experiment.evolution()
     done: list[Generation] = []
-    for index in _shown(range(n_generations), experiment.name, progress):
+    for index in shown(range(n_generations), experiment.name, progress, n_generations):
         fitness = compute(evolution.ask(), TrialSet.of(index), experiment.n_trials)
         done.append(evolution.tell(fitness))
         if evolution.n_generations % settings["champion_every"] == 0:
@@ -109,13 +110,3 @@ def evolve(
     champion, digest = ended._core.judge(fitness)
     return LocalRun(experiment, done, Champion(**champion), digest, evolution)
 
-
-def _shown(indices: range, name: str, progress: bool) -> Iterable[int]:
-    if not progress:
-        return indices
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return indices
-    shown: Iterable[int] = tqdm(indices, desc=name, unit="generation")
-    return shown

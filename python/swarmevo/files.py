@@ -1,0 +1,52 @@
+"""The database of a data directory, read without a coordinator."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from . import _core, protocol
+from .records import RecordedRun, Records
+
+
+def open(directory: str | os.PathLike[str] = "swarm-data") -> Archive:
+    """Opens the data directory of ``swarmctl run`` or of a coordinator. It is only read; a
+    coordinator may use it meanwhile."""
+    return Archive(directory)
+
+
+class Archive(Records):
+    """A data directory; use :func:`open`."""
+
+    def __init__(self, directory: str | os.PathLike[str]) -> None:
+        self.directory = Path(directory)
+        """The data directory."""
+        self._database = _core.Database(os.fspath(directory))
+
+    def to_parquet(self, directory: str | os.PathLike[str]) -> list[Path]:
+        """Writes ``experiments.parquet``, and of each experiment ``history-ID.parquet`` and
+        ``fitness-ID.parquet``: the tables of :meth:`~Records.experiments`,
+        :meth:`~RecordedRun.history` and :meth:`~RecordedRun.fitness_log`. Returns the files."""
+        directory = Path(directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        files = [directory / "experiments.parquet"]
+        self.experiments().to_parquet(files[0], index=False)
+        for run in self.runs():
+            if run.message.generations_done == 0:
+                continue
+            for name, table in (("history", run.history()), ("fitness", run.fitness_log())):
+                files.append(directory / f"{name}-{run.id}.parquet")
+                table.to_parquet(files[-1], index=False)
+        return files
+
+    def _run(self, experiment_id: int) -> RecordedRun:
+        return RecordedRun(self, experiment_id)
+
+    def _call(self, name: str, **request: Any) -> Any:
+        _, request_class, response_class = protocol.method("ExperimentService", name)
+        answer = self._database.call(name, request_class(**request).SerializeToString())
+        return response_class.FromString(answer)
+
+    def __repr__(self) -> str:
+        return f"<Archive in {self.directory}>"

@@ -1,0 +1,353 @@
+"""A coordinator and its fleet."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import protocol
+from .errors import ExperimentError, FleetError
+from .experiment import Experiment
+from .progress import shown
+from .records import RecordedRun, Records, config_json, problems_of
+from .settings import Settings
+from .trials import AnyTrialSet, TrialSet
+
+if TYPE_CHECKING:
+    import pandas
+
+Floats = NDArray[np.float64]
+
+REQUEST_LEN_MAX = 7 << 20
+"""Bytes of genes in one request; a coordinator takes 8 MiB."""
+VALUES_MAX = 1 << 21
+"""Genotypes times trials in one request."""
+DEADLINE_S = 30.0
+PAUSE_S = 1.0
+TRANSIENT = ("UNAVAILABLE", "DEADLINE_EXCEEDED", "ABORTED")
+"""Errors after which the same request may succeed; every request can be repeated."""
+ENDS = ("completed", "failed", "cancelled")
+
+
+def connect(
+    coordinator: str | None = None,
+    *,
+    token_file: str | None = None,
+    tls_ca: str | None = None,
+    tls_cert: str | None = None,
+    tls_key: str | None = None,
+    tls_domain: str | None = None,
+    plaintext: bool = False,
+    patience: float = 60.0,
+) -> Client:
+    """A client of a coordinator. What is not given is found as ``swarmctl`` finds it: in the
+    environment (``SWARM_COORDINATOR``, ``SWARM_CLIENT_TOKEN``, ``SWARM_TLS_CA``, ...), else in
+    the settings file, else it is ``http://127.0.0.1:7700`` without a token.
+
+    ``patience``: for how many seconds requests are repeated while the coordinator is away.
+    """
+    given = Settings(coordinator, token_file, tls_ca, tls_cert, tls_key, tls_domain, plaintext)
+    return Client(Settings.find(given), patience)
+
+
+class Client(Records):
+    """A connection to a coordinator; use :func:`connect`. Threads may share it."""
+
+    def __init__(self, settings: Settings, patience: float = 60.0) -> None:
+        import grpc
+
+        self.address: str = settings.address
+        """The coordinator's address."""
+        self.patience = patience
+        url = urlsplit(self.address)
+        if url.scheme not in ("http", "https") or not url.hostname:
+            raise ValueError(
+                f"the coordinator's address is http:// or https:// with host and port, not "
+                f"{self.address!r}"
+            )
+        target = url.netloc if url.port else f"{url.netloc}:{443 if url.scheme == 'https' else 80}"
+        token = settings.token()
+        is_here = url.hostname in ("127.0.0.1", "::1", "localhost")
+        if token and url.scheme != "https" and not is_here and not settings.plaintext:
+            raise ValueError(
+                f"the token would be sent to {url.hostname} unencrypted; use https:// and tls_ca, "
+                f"or plaintext=True if every member of that network is trusted"
+            )
+        self._metadata = [("authorization", f"Bearer {token}")] if token else []
+        options: list[tuple[str, Any]] = [
+            # Only pings tell a patient coordinator from a dead one.
+            ("grpc.keepalive_time_ms", 20_000),
+            ("grpc.max_reconnect_backoff_ms", 2000),
+            ("grpc.max_receive_message_length", 64 << 20),
+            ("grpc.max_send_message_length", -1),
+        ]
+        if url.scheme == "https":
+            if settings.tls_domain:
+                options.append(("grpc.ssl_target_name_override", settings.tls_domain))
+
+            def read(path: str | None) -> bytes | None:
+                return None if path is None else Path(path).read_bytes()
+
+            tls = grpc.ssl_channel_credentials(
+                read(settings.tls_ca), read(settings.tls_key), read(settings.tls_cert)
+            )
+            self._channel = grpc.secure_channel(target, tls, options)
+        else:
+            self._channel = grpc.insecure_channel(target, options)
+
+    def close(self) -> None:
+        """Closes the connection."""
+        self._channel.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def submit(
+        self,
+        experiment: Experiment | Mapping[str, Any] | str,
+        *,
+        name: str = "",
+        seed: int | None = None,
+        generations: int | None = None,
+        priority: int | None = None,
+        labels: Mapping[str, str] | None = None,
+        request_id: str | None = None,
+    ) -> FleetRun:
+        """Has the fleet run an experiment: an :class:`Experiment`, a file's text, or what it
+        says. The same ``request_id`` leads to the same experiment. Raises
+        :class:`ExperimentError` with all that is wrong with the file."""
+        request: dict[str, Any] = {
+            "request_id": request_id or str(uuid.uuid4()),
+            "config_json": config_json(
+                experiment if isinstance(experiment, (Experiment, str)) else dict(experiment)
+            ),
+            "default_name": name or "experiment",
+            "labels": dict(labels or {}),
+        }
+        optional = {"seed": seed, "generations": generations, "priority": priority}
+        request |= {key: value for key, value in optional.items() if value is not None}
+        try:
+            submitted = self._call("SubmitExperiment", **request)
+        except FleetError as error:
+            if error.code == "INVALID_ARGUMENT":
+                raise ExperimentError(problems_of(str(error))) from None
+            raise
+        return self._run(submitted.experiment.id)
+
+    def run(self, experiment: int | str) -> FleetRun:
+        """See :meth:`Records.run`."""
+        run = super().run(experiment)
+        assert isinstance(run, FleetRun)
+        return run
+
+    def workers(self) -> pandas.DataFrame:
+        """A row per connected worker."""
+        import pandas
+
+        found = self._request("FleetService", "ListWorkers").workers
+        names = ("id", "name", "slots", "items_in_flight", "results_per_second", "idle_share",
+                 "draining", "distrusted")
+        return pandas.DataFrame([[getattr(it, key) for key in names] for it in found], columns=names)
+
+    def evaluate(
+        self,
+        experiment: Experiment,
+        genotypes: ArrayLike,
+        generation: AnyTrialSet = 0,
+        *,
+        trials: int | None = None,
+        priority: int | None = None,
+    ) -> Floats:
+        """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``), computed by the
+        fleet: the bits of :meth:`Experiment.evaluate`, audited and repeated as a generation of
+        an experiment is. It waits for workers if there are none.
+
+        ``generation``: whose trials, or a trial set, but for those of evaluations. ``trials``:
+        their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.
+        """
+        genes, is_one = experiment._genotypes(genotypes)
+        n_trials = experiment.n_trials if trials is None else trials
+        request: dict[str, Any] = {
+            "config_json": experiment.to_json(),
+            "trials": _evolution_trials(TrialSet.of(generation)),
+            "trial_count": n_trials,
+        }
+        if priority is not None:
+            request["priority"] = priority
+        message = protocol.message("Genes")
+        per_call = REQUEST_LEN_MAX // (8 * experiment.n_genes + 16)
+        per_call = max(1, min(per_call, VALUES_MAX // max(1, n_trials)))
+        parts = [genes[first : first + per_call] for first in range(0, len(genes), per_call)]
+        if not parts:
+            return np.empty((0, n_trials))
+        asked = [
+            request | {"genotypes": [message(values=row.tolist()) for row in part]}
+            for part in parts
+        ]
+        answers = self._all_at_once("EvaluationService", "EvaluateFitness", asked)
+        fitness = np.array([it.values for answer in answers for it in answer.fitness])
+        return fitness[0] if is_one else fitness
+
+    def _run(self, experiment_id: int) -> FleetRun:
+        return FleetRun(self, experiment_id)
+
+    def _call(self, name: str, **request: Any) -> Any:
+        return self._request("ExperimentService", name, **request)
+
+    def _request(self, service: str, name: str, **request: Any) -> Any:
+        """One answer to one request, repeated while the coordinator is away."""
+        path, request_class, response_class = protocol.method(service, name)
+        call = self._channel.unary_unary(
+            path, request_class.SerializeToString, response_class.FromString
+        )
+        message = request_class(**request)
+        return self._patiently(
+            lambda: call(message, metadata=self._metadata, timeout=DEADLINE_S)
+        )
+
+    def _all_at_once(self, service: str, name: str, requests: list[dict[str, Any]]) -> list[Any]:
+        """Answers to requests that may take any time, sent together."""
+        path, request_class, response_class = protocol.method(service, name)
+        call = self._channel.unary_unary(
+            path, request_class.SerializeToString, response_class.FromString
+        )
+        messages = [request_class(**request) for request in requests]
+        waiting = [call.future(it, metadata=self._metadata) for it in messages]
+        try:
+            answers = []
+            for i, message in enumerate(messages):
+
+                def answer(i: int = i, message: Any = message) -> Any:
+                    try:
+                        return waiting[i].result()
+                    except BaseException:
+                        waiting[i].cancel()
+                        waiting[i] = call.future(message, metadata=self._metadata)
+                        raise
+
+                answers.append(self._patiently(answer))
+            return answers
+        finally:
+            # Whoever stops waiting, stops the work.
+            for future in waiting:
+                future.cancel()
+
+    def _patiently(self, attempt: Callable[[], Any]) -> Any:
+        give_up_at = time.monotonic() + self.patience
+        while True:
+            try:
+                with _errors(self.address):
+                    return attempt()
+            except FleetError as error:
+                if error.code not in TRANSIENT or time.monotonic() >= give_up_at:
+                    raise
+                time.sleep(PAUSE_S)
+
+    def __repr__(self) -> str:
+        return f"<Client of {self.address}>"
+
+
+class FleetRun(RecordedRun):
+    """An experiment that a coordinator runs, or has run."""
+
+    _records: Client
+
+    def watch(self) -> Iterator[Any]:
+        """The messages ``GenerationSummary`` of all generations, each once, those that are done
+        first, until the experiment has ended; through restarts of the coordinator."""
+        path, request_class, response_class = protocol.method("ExperimentService", "WatchExperiment")
+        client = self._records
+        call = client._channel.unary_stream(
+            path, request_class.SerializeToString, response_class.FromString
+        )
+        request = request_class(experiment_id=self.id, from_sequence=1)
+        is_over = False
+        while not is_over:
+            events = call(request, metadata=client._metadata)
+            try:
+                with _errors(client.address):
+                    for response in events:
+                        event = response.event
+                        request.from_sequence = event.sequence + 1
+                        kind = event.WhichOneof("kind")
+                        if kind == "generation_completed":
+                            yield event.generation_completed
+                        elif kind == "state_changed":
+                            is_over = protocol.states().get(event.state_changed.state) in ENDS
+            except FleetError as error:
+                if error.code not in (*TRANSIENT, "RESOURCE_EXHAUSTED"):
+                    raise
+            finally:
+                events.cancel()
+            if not is_over:
+                time.sleep(PAUSE_S)
+                # Raises if the coordinator does not come back.
+                self.refresh()
+
+    def wait(self, *, progress: bool = True) -> FleetRun:
+        """Waits for its end. ``progress``: whether tqdm, if it is installed, shows how far it
+        is. Raises :class:`FleetError` if it fails or is cancelled."""
+        for _ in shown(self.watch(), self.name, progress, total=self.message.generations):
+            pass
+        state = self.state
+        if state != "completed":
+            raise FleetError(state.upper(), f"experiment {self.id} {state}: {self.message.reason}")
+        return self
+
+    def pause(self, reason: str = "") -> None:
+        """Takes it from the workers until it is resumed."""
+        self._records._call("PauseExperiment", experiment_id=self.id, reason=reason)
+
+    def resume(self) -> None:
+        """Lets it go on, when it is paused or was cancelled."""
+        self._records._call("ResumeExperiment", experiment_id=self.id)
+
+    def cancel(self) -> None:
+        """Ends it."""
+        self._records._call("CancelExperiment", experiment_id=self.id)
+
+    def extend(self, generations: int) -> None:
+        """Has a completed experiment go on, to so many generations in all."""
+        self._records._call("ExtendExperiment", experiment_id=self.id, generations=generations)
+
+    def set_priority(self, priority: int) -> None:
+        """Its share of the fleet beside other experiments, 1 to 1000."""
+        self._records._call("SetPriority", experiment_id=self.id, priority=priority)
+
+
+@contextmanager
+def _errors(address: str) -> Iterator[None]:
+    """Errors of gRPC as :class:`FleetError`."""
+    import grpc
+
+    try:
+        yield
+    except grpc.RpcError as error:
+        code = error.code()
+        name = "UNKNOWN" if code is None else code.name
+        text = error.details() or name
+        raise FleetError(name, text if name != "UNAVAILABLE" else f"{address}: {text}") from None
+
+
+def _evolution_trials(trial_set: TrialSet) -> Any:
+    message = protocol.message("EvolutionTrials")
+    if trial_set.kind == "generation":
+        return message(generation=trial_set.generation)
+    if trial_set.kind == "judgement":
+        return message(judgement=trial_set.generation)
+    if trial_set.kind == "held_out":
+        comparison = protocol.message("ComparisonTrials")
+        return message(
+            comparison=comparison(generation=trial_set.generation, block=trial_set.block)
+        )
+    raise ValueError(f"the fleet computes trials of an evolution, not {trial_set}")

@@ -1,0 +1,21 @@
+"""How far something is."""
+
+from __future__ import annotations
+
+from typing import Iterable, Iterator, TypeVar
+
+Item = TypeVar("Item")
+
+
+def shown(
+    items: Iterable[Item], name: str, progress: bool, total: int | None = None
+) -> Iterator[Item]:
+    """``items``; tqdm, if it is installed and wanted, shows how many of them are done."""
+    if progress:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            pass
+        else:
+            items = tqdm(items, desc=name, unit="generation", total=total)
+    yield from items

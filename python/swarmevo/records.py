@@ -1,0 +1,255 @@
+"""Experiments that a coordinator has, or its database: histories, champions, individuals."""
+
+from __future__ import annotations
+
+import json
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import protocol
+from .evolution import Champion
+from .experiment import Experiment
+from .plotting import plot_history
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Individuals:
+    """A generation, as evolution was told of it."""
+
+    genotypes: Floats
+    """``[P, d]``"""
+    fitness: Floats
+    """``[P, T]``: of each in each trial."""
+
+
+class Records(ABC):
+    """Where experiments are read."""
+
+    @abstractmethod
+    def _call(self, name: str, **request: Any) -> Any:
+        """A call of ``ExperimentService``."""
+
+    def experiments(self) -> pandas.DataFrame:
+        """A row per experiment: number, name, state, generations, fitness of the champion."""
+        import pandas
+
+        return pandas.DataFrame([run.summary() for run in self.runs()])
+
+    def runs(self) -> list[RecordedRun]:
+        """All experiments, the newest last."""
+        found = self._call("ListExperiments").experiments
+        return [self._run(it.id) for it in sorted(found, key=lambda it: it.id)]
+
+    def run(self, experiment: int | str) -> RecordedRun:
+        """The experiment of a number, or the one of a name. KeyError if there is none, or
+        several of that name."""
+        if isinstance(experiment, int):
+            run = self._run(experiment)
+            run.refresh()
+            return run
+        found = [it.id for it in self._call("ListExperiments").experiments if it.name == experiment]
+        if len(found) != 1:
+            which = "no experiment is" if not found else f"experiments {found} are"
+            raise KeyError(f"{which} named {experiment!r}; name one by its number")
+        return self._run(found[0])
+
+    def individual(self, address: str) -> Champion:
+        """Whoever is at an address, bit for bit: ``3`` is the champion of experiment 3,
+        ``3@5/7`` individual 7 of its generation 5, ``3@5/mean`` the mean of the distribution
+        after that."""
+        found = self._call("GetIndividuals", address=address).individuals
+        if len(found) != 1:
+            raise ValueError(f"`{address}` is a generation; name one of it, such as {address}/0")
+        return champion_of(found[0])
+
+    @abstractmethod
+    def _run(self, experiment_id: int) -> RecordedRun: ...
+
+
+class RecordedRun:
+    """An experiment that a coordinator has, or its database."""
+
+    def __init__(self, records: Records, experiment_id: int) -> None:
+        self._records = records
+        self.id: int = experiment_id
+        """Its number."""
+        self._latest: Any = None
+        self._experiment: Experiment | None = None
+
+    def refresh(self) -> None:
+        """Reads where it stands."""
+        self._latest = self._records._call("GetExperiment", experiment_id=self.id)
+
+    @property
+    def message(self) -> Any:
+        """The message ``Experiment`` of the protocol, as last read."""
+        if self._latest is None:
+            self.refresh()
+        return self._latest.experiment
+
+    @property
+    def name(self) -> str:
+        """The file's name, or the one under which it was submitted."""
+        name: str = self.message.name
+        return name
+
+    @property
+    def state(self) -> str:
+        """``running``, ``completed``, ``failed``, ``cancelled`` or ``paused``, now."""
+        self.refresh()
+        return protocol.states()[self.message.state]
+
+    @property
+    def digest(self) -> str:
+        """Covers every bit of it so far; asks for the latest."""
+        self.refresh()
+        digest: str = self.message.digest
+        return digest
+
+    @property
+    def experiment(self) -> Experiment:
+        """What is simulated, with its seed."""
+        if self._experiment is None:
+            message = self.message
+            self._experiment = Experiment(self._latest.config_json, message.name, message.seed)
+        return self._experiment
+
+    def summary(self) -> dict[str, Any]:
+        """Where it stands, in short."""
+        self.refresh()
+        it = self.message
+        return {
+            "id": it.id,
+            "name": it.name,
+            "group": it.group,
+            "state": protocol.states()[it.state],
+            "algorithm": it.algorithm,
+            "seed": it.seed,
+            "generations_done": it.generations_done,
+            "generations": it.generations,
+            "champion_fitness": it.champion_fitness if it.HasField("champion_fitness") else np.nan,
+            "digest": it.digest,
+        }
+
+    def generations(self) -> Iterator[Any]:
+        """The messages ``CompletedGeneration`` of all generations."""
+        next_generation: int | None = 0
+        while next_generation is not None:
+            page = self._records._call(
+                "ListGenerations", experiment_id=self.id, from_generation=next_generation
+            )
+            yield from page.generations
+            is_last = not page.HasField("next_generation")
+            next_generation = None if is_last else page.next_generation
+
+    def history(self) -> pandas.DataFrame:
+        """A row per generation: best, mean, min, standard deviation, digest, times."""
+        import pandas
+
+        names = ("generation", "best", "mean", "min", "standard_deviation", "digest",
+                 "duration_ms", "episodes", "workers", "idle_share")
+        rows = [
+            {name: getattr(it.summary, name) for name in names}
+            | {"completed_at_ms": it.completed_at_ms}
+            for it in self.generations()
+        ]
+        return pandas.DataFrame(rows, columns=[*names, "completed_at_ms"])
+
+    @property
+    def champion(self) -> Champion:
+        """The champion so far."""
+        return self._records.individual(str(self.id))
+
+    def individual(self, generation: int, index: int) -> Champion:
+        """An individual of any generation."""
+        return self._records.individual(f"{self.id}@{generation}/{index}")
+
+    def mean(self, generation: int) -> Floats:
+        """``[d]``: the mean of the distribution after a generation."""
+        return self._records.individual(f"{self.id}@{generation}/mean").genotype
+
+    def individuals(self, generation: int) -> Individuals:
+        """All individuals of a generation, with what evolution was told of them."""
+        genotypes: list[Any] = []
+        fitness: list[Any] = []
+        next_individual: int | None = 0
+        while next_individual is not None:
+            page = self._records._call(
+                "GetIndividuals", address=f"{self.id}@{generation}", from_individual=next_individual
+            )
+            genotypes.extend(it.genotype for it in page.individuals)
+            fitness.extend(it.trial_fitness for it in page.individuals)
+            is_last = not page.HasField("next_individual")
+            next_individual = None if is_last else page.next_individual
+        return Individuals(np.array(genotypes), np.array(fitness))
+
+    def fitness_log(self, generations: range | None = None) -> pandas.DataFrame:
+        """A row per generation, individual and trial: what evolution was told. All
+        generations that are done, unless some are named."""
+        import pandas
+
+        chosen = range(self.message.generations_done) if generations is None else generations
+        tables = []
+        for generation in chosen:
+            fitness = self.individuals(generation).fitness
+            individual, trial = np.indices(fitness.shape)
+            columns = {
+                "generation": np.full(fitness.size, generation),
+                "individual": individual.reshape(-1),
+                "trial": trial.reshape(-1),
+                "fitness": fitness.reshape(-1),
+            }
+            tables.append(pandas.DataFrame(columns))
+        return pandas.concat(tables, ignore_index=True)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Best and mean fitness of every generation."""
+        done = [it.summary for it in self.generations()]
+        generations = [it.generation for it in done]
+        best, mean = [it.best for it in done], [it.mean for it in done]
+        return plot_history(ax, self.name, generations, best, mean)
+
+    def __repr__(self) -> str:
+        it = self.message
+        return (
+            f"<{type(self).__name__} {it.id} ({it.name}): {protocol.states()[it.state]}, "
+            f"{it.generations_done} of {it.generations} generations>"
+        )
+
+
+def champion_of(message: Any) -> Champion:
+    """What a message says of a genotype."""
+    judged = message.judged if message.HasField("judged") else None
+    held_out = message.held_out if message.HasField("held_out") else None
+    return Champion(
+        genotype=np.array(message.genotype),
+        generation=message.generation,
+        individual=message.individual if message.HasField("individual") else None,
+        trial_fitness=np.array(message.trial_fitness),
+        selection=None if held_out is None else (held_out.mean, held_out.trials),
+        judged=None
+        if judged is None
+        else (judged.mean, judged.low, judged.high, judged.trials),
+    )
+
+
+def problems_of(text: str) -> list[tuple[str, int | None, str]]:
+    """The problems of an experiment file in a coordinator's words."""
+    return [("", None, line) for line in text.splitlines() if line]
+
+
+def config_json(config: Experiment | str | dict[str, Any]) -> str:
+    """An experiment file as text."""
+    if isinstance(config, Experiment):
+        return config.to_json()
+    return config if isinstance(config, str) else json.dumps(config)

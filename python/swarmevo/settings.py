@@ -1,0 +1,111 @@
+"""How to reach the coordinator: as ``swarmctl`` finds out.
+
+Arguments, else the environment, else the settings file, else the default address.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+DEFAULT_COORDINATOR = "http://127.0.0.1:7700"
+TOKEN_VARIABLE = "SWARM_CLIENT_TOKEN"
+FILE_VARIABLE = "SWARM_CONFIG"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Address of a coordinator and credentials, as far as they are set."""
+
+    coordinator: str | None = None
+    """``http://`` or ``https://``, host and port."""
+    token_file: str | None = None
+    """File with the token."""
+    tls_ca: str | None = None
+    """PEM file of the authorities that the coordinator's certificate is checked against."""
+    tls_cert: str | None = None
+    """PEM file of a certificate of one's own."""
+    tls_key: str | None = None
+    """PEM file of its key."""
+    tls_domain: str | None = None
+    """Name in the coordinator's certificate, if it is not the address's."""
+    plaintext: bool = False
+    """Send the token unencrypted to another machine."""
+
+    @classmethod
+    def find(cls, given: Settings) -> Settings:
+        """``given``, completed from the environment and from the settings file."""
+        environment = cls._of_environment()
+        named = given.coordinator
+        if named is not None and environment.coordinator not in (None, named):
+            # Credentials for one coordinator are not shown to another.
+            environment = cls()
+        settings = given._or(environment)
+        file = cls._of_file()
+        address = settings.coordinator
+        if address is not None and address != (file.coordinator or DEFAULT_COORDINATOR):
+            return settings
+        if TOKEN_VARIABLE in os.environ:
+            file = replace(file, token_file=None)
+        return settings._or(file)
+
+    @property
+    def address(self) -> str:
+        """The coordinator's address."""
+        return self.coordinator or DEFAULT_COORDINATOR
+
+    def token(self) -> str | None:
+        """The token, from its file or the environment."""
+        if self.token_file is None:
+            return os.environ.get(TOKEN_VARIABLE)
+        if TOKEN_VARIABLE in os.environ:
+            raise ValueError(
+                f"there are two tokens: in {self.token_file} and in {TOKEN_VARIABLE}; give one"
+            )
+        return Path(self.token_file).read_text(encoding="utf-8").strip()
+
+    def _or(self, others: Settings) -> Settings:
+        chosen = {it.name: getattr(self, it.name) or getattr(others, it.name) for it in fields(self)}
+        return Settings(**chosen)
+
+    @classmethod
+    def _of_environment(cls) -> Settings:
+        def variable(name: str) -> str | None:
+            return os.environ.get(f"SWARM_{name}") or None
+
+        return cls(
+            coordinator=variable("COORDINATOR"),
+            token_file=variable("CLIENT_TOKEN_FILE"),
+            tls_ca=variable("TLS_CA"),
+            tls_cert=variable("TLS_CERT"),
+            tls_key=variable("TLS_KEY"),
+            tls_domain=variable("TLS_DOMAIN"),
+            plaintext=(variable("PLAINTEXT") or "").lower() not in ("", "0", "f", "false", "n", "no", "off"),
+        )
+
+    @classmethod
+    def _of_file(cls) -> Settings:
+        named = os.environ.get(FILE_VARIABLE)
+        directory = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+        path = Path(named) if named else Path(directory) / "swarmevo" / "config.json"
+        if not named and not path.is_file():
+            return cls()
+        found = json.loads(path.read_text(encoding="utf-8-sig"))
+        names = {it.name.replace("_", "-"): it.name for it in fields(cls)}
+        unknown = [key for key in found if key not in names]
+        if unknown:
+            raise ValueError(f"{path}: unknown key `{unknown[0]}`; known: {', '.join(names)}")
+        settings = cls(**{names[key]: value for key, value in found.items()})
+
+        def beside(file: str | None) -> str | None:
+            return None if file is None else str(path.parent / file)
+
+        return replace(
+            settings,
+            token_file=beside(settings.token_file),
+            tls_ca=beside(settings.tls_ca),
+            tls_cert=beside(settings.tls_cert),
+            tls_key=beside(settings.tls_key),
+        )
