@@ -1,5 +1,7 @@
 //! An experiment, compiled: what `swarmevo.Experiment` is made of.
 
+use std::sync::Arc;
+
 use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
@@ -11,6 +13,7 @@ use crate::{
     errors::{config_error, evaluate_error},
     evolution::Evolution,
     running::{compute, guarded},
+    stepping::Episodes,
     trace::Recording,
     trials::Trials,
 };
@@ -19,7 +22,7 @@ use crate::{
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Experiment {
     config: ExperimentConfig,
-    pub(crate) simulation: Simulation,
+    simulation: Arc<Simulation>,
     warnings: Vec<String>,
 }
 
@@ -35,7 +38,7 @@ impl Experiment {
         })?;
         let (simulation, config, warnings) = read.map_err(|error| config_error(py, &error))?;
         let warnings = warnings.iter().map(ToString::to_string).collect();
-        Ok(Self { config, simulation, warnings })
+        Ok(Self { config, simulation: simulation.into(), warnings })
     }
 
     #[getter]
@@ -140,6 +143,11 @@ impl Experiment {
             Replay::simulate(&episode).map(|replay| replay_file(&replay))
         })?;
         html.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Trials side by side, step by step.
+    fn episodes(&self, py: Python<'_>, trials: Trials) -> PyResult<Episodes> {
+        Episodes::start(py, Arc::clone(&self.simulation), trials.set()?, trials.range())
     }
 
     /// The experiment's evolution before its first generation.

@@ -6,6 +6,7 @@ mod errors;
 mod evolution;
 mod experiment;
 mod running;
+mod stepping;
 mod trace;
 mod trials;
 
@@ -19,6 +20,7 @@ mod _core {
         database::Database,
         evolution::{Evolution, Reevaluation, algorithms},
         experiment::Experiment,
+        stepping::Episodes,
     };
 
     /// Names the function that the simulator computes: equal names, equal bits.

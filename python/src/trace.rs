@@ -24,13 +24,14 @@ pub struct Recording {
     targets: Vec<i8>,
     stimuli: Vec<f32>,
     activities: Vec<f32>,
+    voltages: Vec<f32>,
     step_fitness: Vec<f64>,
     measures: Vec<f64>,
     lights: Vec<f64>,
     areas: Vec<f64>,
     fitness: Vec<f64>,
-    /// Stimuli and neurons of the robot that has most of them.
-    widths: [usize; 2],
+    /// Stimuli, neurons and voltages of the robot that has most of them.
+    widths: [usize; 3],
 }
 
 impl Recording {
@@ -69,9 +70,11 @@ impl Recording {
         self.frame_messages.reserve_exact(n * message_len);
         let n_stimuli = step.robots.iter().map(|robot| robot.stimuli.len()).max().unwrap_or(0);
         let n_neurons = step.robots.iter().map(|robot| robot.activity.len()).max().unwrap_or(0);
-        self.widths = [n_stimuli, n_neurons];
+        let n_voltages = step.robots.iter().map(|robot| robot.voltages.len()).max().unwrap_or(0);
+        self.widths = [n_stimuli, n_neurons, n_voltages];
         self.stimuli.reserve_exact(n * n_stimuli);
         self.activities.reserve_exact(n * n_neurons);
+        self.voltages.reserve_exact(n * n_voltages);
         self.areas.extend(step.areas.iter().flat_map(|area| [area.x, area.y]));
     }
 
@@ -91,9 +94,10 @@ impl Recording {
         self.frame_messages.extend(&robot.received_message);
         self.targets.push(robot.target.map_or(-1, i8::from));
         // They are of 32 bits where they come from.
-        let [n_stimuli, n_neurons] = self.widths;
+        let [n_stimuli, n_neurons, n_voltages] = self.widths;
         pad(&mut self.stimuli, &robot.stimuli, n_stimuli);
         pad(&mut self.activities, &robot.activity, n_neurons);
+        pad(&mut self.voltages, &robot.voltages, n_voltages);
     }
 
     /// The episode is over.
@@ -123,6 +127,7 @@ impl Recording {
         arrays.of_robots("frame_messages", all.frame_messages)?;
         arrays.of_robots("stimuli", all.stimuli)?;
         arrays.of_robots("activities", all.activities)?;
+        arrays.of_robots("voltages", all.voltages)?;
         arrays.one_per_robot("headings", all.headings)?;
         arrays.one_per_robot("leds", all.leds)?;
         arrays.one_per_robot("sends", all.sends)?;
@@ -161,6 +166,7 @@ impl Recording {
         join(&mut self.targets, other.targets);
         join(&mut self.stimuli, other.stimuli);
         join(&mut self.activities, other.activities);
+        join(&mut self.voltages, other.voltages);
         join(&mut self.step_fitness, other.step_fitness);
         join(&mut self.measures, other.measures);
         join(&mut self.lights, other.lights);

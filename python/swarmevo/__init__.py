@@ -8,6 +8,8 @@
 """
 
 from ._core import FINGERPRINT
+from .environment import parallel_env
+from .episodes import Actions, Episodes
 from .errors import ExperimentError, FleetError, InternalError, Problem, SwarmError
 from .evolution import (
     CMAES,
@@ -33,9 +35,9 @@ from .trace import Trace
 from .trials import TrialSet
 
 __all__ = [
-    "Archive", "CMAES", "Champion", "Client", "Evolution", "Experiment", "ExperimentError",
+    "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "GA", "Generation", "Individuals", "InternalError",
     "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "XNES", "algorithms", "connect", "evolve",
-    "mirror", "open",
+    "mirror", "open", "parallel_env",
 ]

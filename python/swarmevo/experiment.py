@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .episodes import Episodes
 from .network import Network
 from .trace import Trace
 from .trials import AnyTrialSet, address
@@ -206,6 +207,13 @@ class Experiment:
         where = address(generation, trials, self.n_trials)
         arrays = self._core.simulate(genes, where, _threads(threads))
         return Trace(self, genes, where, arrays)
+
+    def episodes(
+        self, generation: AnyTrialSet = 0, *, trials: int | range | None = None
+    ) -> Episodes:
+        """T trials side by side, step by step, whose robots do what they are told."""
+        where = address(generation, trials, self.n_trials)
+        return Episodes(self, where, self._core.episodes(where))
 
     def network(self, genotype: ArrayLike) -> Network:
         """The network that a genotype ``[d]`` encodes."""

@@ -65,6 +65,8 @@ class Trace:
     """``[T, steps, R, I]``: what its controller got; NaN for inputs that it has not."""
     activities: Floats32
     """``[T, steps, R, N]``: activity of its neurons after the step; NaN without a network."""
+    voltages: Floats32
+    """``[T, steps, R, N]``: voltage of spiking neurons after the step, mV; N is 0 without."""
     lights: Floats
     """``[T, steps, L, 2]``: positions of lights during the step, cm."""
     areas: Floats

@@ -62,7 +62,7 @@
 //!
 //! [`Simulation::compile`] turns a configuration into a `network`, a codec of
 //! genotypes (`genotype`) and a `world` of `objects`. `episode` steps the trials of
-//! a genotype side by side and shows them to a recorder; `trial` has the phases of a
+//! a genotype side by side and shows them to a recorder; `stepping` has somebody else decide; `trial` has the phases of a
 //! step, and `swarm` the state of its robots. A phase is a module each: `senses` and
 //! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
 //! `fitness`. Below everything lie `numeric`'s random streams, `torus`, `neighbours`
@@ -98,6 +98,7 @@ mod sensors;
 mod simulation;
 mod specified;
 mod starts;
+mod stepping;
 mod swarm;
 #[cfg(test)]
 mod testing;
@@ -111,6 +112,7 @@ pub use output::Output;
 pub use record::{EpisodeSummary, Measures, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};
 pub use specified::{SpecifiedSimulation, panic_to_failure};
+pub use stepping::{Actions, Policy, StepError, Stepper};
 pub use torus::Vec2;
 
 /// Identifies the function that this crate computes. Raise the number after the

@@ -230,7 +230,7 @@ impl Simulation {
         Ok(self.codec.decode(genotype))
     }
 
-    fn check_trials(&self, trials: &Range<u32>) -> Result<(), EvaluateError> {
+    pub(crate) fn check_trials(&self, trials: &Range<u32>) -> Result<(), EvaluateError> {
         if trials.is_empty() || trials.end > limits::TRIALS {
             return Err(EvaluateError::Trials { trials: trials.clone() });
         }

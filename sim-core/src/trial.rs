@@ -1,7 +1,7 @@
 //! One trial of an experiment: the phases of its environment steps, except what
 //! controllers do.
 
-use std::mem;
+use std::{mem, ops::Range};
 
 use crate::communication::{Mode, Radio};
 use crate::controllers::Controller;
@@ -15,6 +15,7 @@ use crate::record::{Measures, StepRecord};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
+use crate::stepping::Actions;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
@@ -238,6 +239,16 @@ impl<'a> Trial<'a> {
         for (lane, robot) in (first_lane..).zip(robots) {
             let mut action = self.swarm.fresh_action(robot);
             controller.act(lane, &mut self.decoding[robot], &mut action);
+        }
+    }
+
+    /// Adds what robots were decided to do in this step.
+    pub fn add_actions(&self, robots: Range<usize>, actions: &mut Actions) {
+        for robot in robots {
+            actions.wheels.push(self.swarm.wheels[robot]);
+            actions.leds.push(self.swarm.leds[robot]);
+            actions.sends.push(self.swarm.modes[robot] == Mode::Send);
+            actions.messages.extend(&self.swarm.messages[self.swarm.message_range(robot)]);
         }
     }
 

@@ -1,0 +1,366 @@
+//! Episodes step by step, with robots whose actions somebody else decides.
+
+use std::ops::Range;
+
+use crate::communication::Mode;
+use crate::controllers::{Action, BraitenbergLightFollower, Controller, NeuralController};
+use crate::lanes::Lanes;
+use crate::simulation::{EvaluateError, Simulation};
+use crate::trial::Trial;
+use experiment_file::RobotController;
+use numeric::random::{Stream, TrialSet};
+
+/// Trials of an experiment side by side, whose robots with a network, the *agents*, do what
+/// they are told: stimuli out, actions in. Robots with another controller decide for themselves.
+///
+/// With the actions of [`decide`](Self::decide), fitness and everything else are those of
+/// [`Simulation::simulate`], bit for bit.
+pub struct Stepper<'a> {
+    simulation: &'a Simulation,
+    trials: Vec<Trial<'a>>,
+    groups: Vec<Group<'a>>,
+    n_agents: usize,
+    step: u32,
+}
+
+/// The robots of one object.
+struct Group<'a> {
+    index: usize,
+    robots: Range<usize>,
+    /// `[input][lane]`, one lane per trial and robot, trial by trial.
+    stimuli: Lanes,
+    n_inputs: usize,
+    decider: Decider<'a>,
+}
+
+enum Decider<'a> {
+    /// Whoever calls, for as many agents before this group in each trial.
+    Caller { first_agent: usize },
+    /// The robots themselves.
+    Own(Box<dyn Controller + 'a>),
+}
+
+/// What the agents of all trials do in one step: arrays `[trial][agent]`, and
+/// `[trial][agent][component]` of messages.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Actions {
+    /// Right and left wheel, in \[-1, 1\].
+    pub wheels: Vec<[f64; 2]>,
+    /// Colour of the LED, 0 off.
+    pub leds: Vec<u32>,
+    /// Whether it sends its own message; else it relays.
+    pub sends: Vec<bool>,
+    /// Message, before quantisation, in \[0, 1\].
+    pub messages: Vec<f64>,
+}
+
+/// The network of a genotype, in all trials of a [`Stepper`], with its state.
+pub struct Policy<'a> {
+    /// Per group, none where robots decide for themselves.
+    controllers: Vec<Option<NeuralController<'a>>>,
+}
+
+/// Why a step cannot be taken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// An array of actions has another length.
+    #[error("{expected} {what} are needed, there are {actual}")]
+    Length {
+        /// What the array has.
+        what: &'static str,
+        /// How many are needed.
+        expected: usize,
+        /// How many there are.
+        actual: usize,
+    },
+    /// An action is outside its range or not finite.
+    #[error("{what} number {index} is {value}, not within {range}")]
+    Range {
+        /// What it is.
+        what: &'static str,
+        /// Its place in the array.
+        index: usize,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        range: &'static str,
+    },
+    /// The episode is over.
+    #[error("the episode has ended after {0} steps; begin another one")]
+    Over(u32),
+    /// The world cannot hold its robots any more.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+}
+
+/// Gives agents the actions of the caller.
+struct Commanded<'a> {
+    actions: &'a Actions,
+    /// The agent of the first lane.
+    first_agent: usize,
+    first_lane: usize,
+    message_len: usize,
+}
+
+impl Controller for Commanded<'_> {
+    fn perceive(&mut self, _: &Lanes) {}
+
+    fn act(&mut self, lane: usize, _: &mut Stream, action: &mut Action<'_>) {
+        let agent = self.first_agent + lane - self.first_lane;
+        *action.wheels = self.actions.wheels[agent];
+        *action.led = self.actions.leds[agent];
+        *action.mode = if self.actions.sends[agent] { Mode::Send } else { Mode::Relay };
+        let message = &self.actions.messages[agent * self.message_len..][..self.message_len];
+        action.message.copy_from_slice(message);
+    }
+}
+
+impl<'a> Stepper<'a> {
+    /// The trials before their first step; agents have their first stimuli.
+    pub fn new(
+        simulation: &'a Simulation,
+        trial_set: TrialSet,
+        trials: Range<u32>,
+    ) -> Result<Self, EvaluateError> {
+        simulation.check_trials(&trials)?;
+        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
+        let trials = trials.collect::<Result<Vec<_>, _>>()?;
+        let mut n_agents = 0;
+        let groups = simulation.world.groups.iter().enumerate().map(|(index, group)| {
+            let n_lanes = trials.len() * group.robots.len();
+            let n_inputs = group.stimuli.last().map_or(0, |(_, inputs)| inputs.end);
+            let decider = match group.controller {
+                RobotController::NeuralController => {
+                    n_agents += group.robots.len();
+                    Decider::Caller { first_agent: n_agents - group.robots.len() }
+                }
+                RobotController::BraitenbergLightFollower => {
+                    Decider::Own(Box::new(BraitenbergLightFollower::new(n_inputs, n_lanes)))
+                }
+            };
+            let stimuli = Lanes::new(n_inputs, n_lanes);
+            Group { index, robots: group.robots.clone(), stimuli, n_inputs, decider }
+        });
+        let groups = groups.collect();
+        let mut this = Self { simulation, trials, groups, n_agents, step: 0 };
+        this.sense()?;
+        Ok(this)
+    }
+
+    /// The numbers of the agents among all robots.
+    pub fn agents(&self) -> Vec<usize> {
+        self.commanded().flat_map(|group| group.robots.clone()).collect()
+    }
+
+    /// Inputs of an agent: of the one that has most of them.
+    pub fn n_inputs(&self) -> usize {
+        self.commanded().map(|group| group.n_inputs).max().unwrap_or(0)
+    }
+
+    /// Components of a message; 0 without radio.
+    pub fn message_len(&self) -> usize {
+        self.simulation.world.message_len
+    }
+
+    /// Environment steps taken.
+    pub fn n_steps_done(&self) -> u32 {
+        self.step
+    }
+
+    /// What the agents get, `[trial][agent][input]`; NaN for inputs that an agent has not. After
+    /// the last step, that of the last step.
+    pub fn stimuli(&self) -> Vec<f32> {
+        let width = self.n_inputs();
+        let mut values = Vec::with_capacity(self.trials.len() * self.n_agents * width);
+        for trial in 0..self.trials.len() {
+            for group in self.commanded() {
+                let first = trial * group.robots.len();
+                for lane in first..first + group.robots.len() {
+                    values.extend((0..group.n_inputs).map(|input| group.stimuli.get(input, lane)));
+                    values.extend((group.n_inputs..width).map(|_| f32::NAN));
+                }
+            }
+        }
+        values
+    }
+
+    /// The network of a genotype, at rest, for as many trials.
+    pub fn policy(&self, genotype: &[f64]) -> Result<Policy<'a>, EvaluateError> {
+        let simulation = self.simulation;
+        let phenotype = simulation.phenotype(genotype)?;
+        let controllers = self.groups.iter().map(|group| {
+            let n_lanes = self.trials.len() * group.robots.len();
+            let network = &simulation.network;
+            matches!(group.decider, Decider::Caller { .. })
+                .then(|| NeuralController::new(simulation.isa, network, &phenotype, n_lanes))
+        });
+        Ok(Policy { controllers: controllers.collect() })
+    }
+
+    /// What the network has agents do in this step. It draws its random decisions from the
+    /// trials' streams, as in [`Simulation::simulate`]: to be asked once per step.
+    pub fn decide(&mut self, policy: &mut Policy<'_>) -> Actions {
+        for (group, controller) in self.groups.iter().zip(&mut policy.controllers) {
+            let Some(controller) = controller else { continue };
+            controller.perceive(&group.stimuli);
+            for (index, trial) in self.trials.iter_mut().enumerate() {
+                trial.decide(group.index, index * group.robots.len(), controller);
+            }
+        }
+        let mut actions = Actions::default();
+        for trial in &self.trials {
+            for group in self.commanded() {
+                trial.add_actions(group.robots.clone(), &mut actions);
+            }
+        }
+        actions
+    }
+
+    /// One environment step. Returns its fitness in each trial, none where it does not count.
+    pub fn step(&mut self, actions: &Actions) -> Result<Vec<Option<f64>>, StepError> {
+        if self.step >= self.simulation.n_steps {
+            return Err(StepError::Over(self.step));
+        }
+        self.check(actions)?;
+        let (n_agents, message_len) = (self.n_agents, self.message_len());
+        for group in &mut self.groups {
+            let n_robots = group.robots.len();
+            if let Decider::Own(controller) = &mut group.decider {
+                controller.perceive(&group.stimuli);
+            }
+            for (index, trial) in self.trials.iter_mut().enumerate() {
+                let first_lane = index * n_robots;
+                match &mut group.decider {
+                    Decider::Caller { first_agent } => {
+                        let first_agent = index * n_agents + *first_agent;
+                        let mut commanded =
+                            Commanded { actions, first_agent, first_lane, message_len };
+                        trial.decide(group.index, first_lane, &mut commanded);
+                    }
+                    Decider::Own(controller) => {
+                        trial.decide(group.index, first_lane, &mut **controller);
+                    }
+                }
+            }
+        }
+        let step = self.step;
+        let fitness = self.trials.iter_mut().map(|trial| {
+            let fitness = trial.act(step);
+            trial.move_lights(step);
+            fitness
+        });
+        let fitness = fitness.collect();
+        self.step += 1;
+        if self.step < self.simulation.n_steps {
+            self.sense()?;
+        }
+        Ok(fitness)
+    }
+
+    /// Fitness of each trial so far: the mean over the steps that count.
+    pub fn fitness(&self) -> Vec<f64> {
+        self.trials.iter().map(Trial::fitness).collect()
+    }
+
+    /// The groups of agents.
+    fn commanded(&self) -> impl Iterator<Item = &Group<'a>> {
+        self.groups.iter().filter(|group| matches!(group.decider, Decider::Caller { .. }))
+    }
+
+    fn sense(&mut self) -> Result<(), EvaluateError> {
+        for (index, trial) in self.trials.iter_mut().enumerate() {
+            trial.sense(self.step)?;
+            for group in &mut self.groups {
+                trial.stimulate(group.index, index * group.robots.len(), &mut group.stimuli);
+            }
+        }
+        Ok(())
+    }
+
+    fn check(&self, actions: &Actions) -> Result<(), StepError> {
+        let Actions { wheels, leds, sends, messages } = actions;
+        let n = self.trials.len() * self.n_agents;
+        let lengths = [
+            ("wheels", n, wheels.len()),
+            ("LEDs", n, leds.len()),
+            ("modes", n, sends.len()),
+            ("components of messages", n * self.message_len(), messages.len()),
+        ];
+        for (what, expected, actual) in lengths {
+            if expected != actual {
+                return Err(StepError::Length { what, expected, actual });
+            }
+        }
+        let wheels = wheels.iter().flatten().enumerate();
+        let wheel = wheels.map(|(index, value)| ("wheel", index, *value, "[-1, 1]"));
+        let message = messages.iter().enumerate();
+        let message = message.map(|(index, value)| ("message component", index, *value, "[0, 1]"));
+        for (what, index, value, range) in wheel.chain(message) {
+            let least = if what == "wheel" { -1.0 } else { 0.0 };
+            if !(least..=1.0).contains(&value) {
+                return Err(StepError::Range { what, index, value, range });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{experiment_a, genotype};
+
+    #[test]
+    fn stepping_with_the_network_of_a_genotype_gives_the_bits_of_its_simulation() {
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let genotype = genotype(simulation.genotype_len(), 3);
+        let trial_set = TrialSet::Generation(4);
+        let mut stepper = Stepper::new(&simulation, trial_set, 2..5).unwrap();
+        let mut policy = stepper.policy(&genotype).unwrap();
+        let (mut fitness, mut stimuli) = (Vec::new(), Vec::new());
+        for _ in 0..simulation.n_steps() {
+            stimuli.push(stepper.stimuli());
+            let actions = stepper.decide(&mut policy);
+            fitness.push(stepper.step(&actions).unwrap());
+        }
+        assert_eq!(stepper.fitness(), simulation.evaluate(&genotype, trial_set, 2..5).unwrap());
+        let width = stepper.n_inputs();
+        let n_values = stepper.agents().len() * width;
+        simulation
+            .simulate(&genotype, trial_set, 3, &mut |record| {
+                let step = record.step as usize;
+                assert_eq!(record.fitness, fitness[step][1], "step {step}");
+                let expected = record.robots.iter().flat_map(|robot| &robot.stimuli);
+                let actual = &stimuli[step][n_values..2 * n_values];
+                assert!(
+                    expected.eq(actual
+                        .iter()
+                        .map(|&value| f64::from(value))
+                        .collect::<Vec<_>>()
+                        .iter())
+                );
+            })
+            .unwrap();
+        let actions = stepper.decide(&mut policy);
+        assert_eq!(stepper.step(&actions), Err(StepError::Over(simulation.n_steps())));
+    }
+
+    #[test]
+    fn actions_that_do_not_fit_are_refused_and_no_step_is_taken() {
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..1).unwrap();
+        let mut policy = stepper.policy(&genotype(simulation.genotype_len(), 1)).unwrap();
+        let actions = stepper.decide(&mut policy);
+        let mut short = actions.clone();
+        short.leds.pop();
+        assert!(matches!(stepper.step(&short), Err(StepError::Length { what: "LEDs", .. })));
+        for value in [f64::NAN, -0.1, 1.1] {
+            let mut wrong = actions.clone();
+            wrong.messages[1] = value;
+            let refused = stepper.step(&wrong).unwrap_err();
+            assert!(matches!(refused, StepError::Range { index: 1, .. }), "{refused}");
+        }
+        assert_eq!(stepper.n_steps_done(), 0);
+        assert!(stepper.step(&actions).is_ok());
+    }
+}
