@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 """Prints the numbers of docs/reproduction.md, as tables.
 
-    results/report.py [DIRECTORY]           runs and evaluations in it; results/ by default
-    results/report.py --traces [DIRECTORY]  what champions send, from a trace of five trials;
-                                            needs swarmctl in the PATH
+    results/report.py [DIRECTORY]    runs and evaluations in it; results/ by default
 
 Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of samples.
 """
@@ -11,10 +9,8 @@ Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of s
 import csv
 import json
 import statistics
-import subprocess
 import sys
-import tempfile
-from collections import Counter, defaultdict
+from collections import defaultdict
 from pathlib import Path
 
 RESULTS = Path(__file__).resolve().parent
@@ -130,36 +126,8 @@ def errors(folder, trials):
     table(["condition", "false negatives per step", "false positives per step"], rows)
 
 
-def traces(folder):
-    print("## What champions send\n")
-    for path in sorted((folder / "champions").glob("*.json")):
-        champion = json.loads(path.read_text())
-        config = RESULTS.parent / "configs" / f"{champion['name']}.json"
-        with tempfile.TemporaryDirectory() as scratch:
-            trace = Path(scratch) / "trace.csv"
-            command = ["swarmctl", "simulate", config, "--genotype", path, "--trace", trace,
-                       "--generation", "1000000", "--trials", "5"]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            rows = [row for row in read_csv(trace) if int(row["step"]) >= 10]
-        modes = Counter(row["mode"] for row in rows)
-        frames = sum(modes.values())
-        print(f"{path.stem}: {frames} frames after the tenth step")
-        for mode, n in sorted(modes.items()):
-            lit = sum(row["mode"] == mode and row.get("led", "0") not in ("", "0") for row in rows)
-            print(f"  {mode}: {100 * n / frames:.2f} %, of these with the LED on {100 * lit / n:.2f} %")
-        message = lambda row: ", ".join(value for key, value in row.items() if key.startswith("message_"))
-        sent = Counter(message(row) for row in rows if row["mode"] == "send")
-        for symbol, n in sent.most_common(4):
-            print(f"  sends ({symbol}): {100 * n / sum(sent.values()):.2f} %")
-        print()
-
-
 def main():
-    arguments = [argument for argument in sys.argv[1:] if argument != "--traces"]
-    folder = Path(arguments[0]) if arguments else RESULTS
-    if "--traces" in sys.argv:
-        traces(folder)
-        return
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else RESULTS
     runs(folder)
     for path in sorted((folder / "evaluations").glob("*")):
         evaluation(path)

@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Prints what champions send and how they react to what they hear and see, as tables.
+
+    results/mechanisms.py [DIRECTORY]    champions in it; results/ by default
+
+Every champion is simulated in 20 trials that had no part in its evolution; steps 0 to 9, in which
+robots are made to send, do not count. A robot acts on the stimuli of the same row of the trace.
+Needs swarmctl in the PATH, Python 3.9 and nothing else.
+"""
+
+import csv
+import json
+import math
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from pathlib import Path
+
+from report import RESULTS, table
+
+TRIALS = 20
+WINDOW = 10  # steps in which a robot counts from how many sectors it heard frames
+
+
+def percent(values):
+    """Share of true values with its standard error over trials: rows of a trial are no sample."""
+    shares = [100 * statistics.fmean(of) for of in by_trial(values).values()]
+    error = statistics.stdev(shares) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
+    return f"{100 * statistics.fmean(value for _, value in values):.1f} ± {error:.1f} %"
+
+
+def by_trial(values):
+    of = defaultdict(list)
+    for trial, value in values:
+        of[trial].append(value)
+    return of
+
+
+def quartiles(values):
+    if len(values) < 20:
+        return "–"
+    first, median, third = statistics.quantiles(values, n=4)
+    return f"{median:+.2f} ({first:+.2f} to {third:+.2f})"
+
+
+def is_lit(row):
+    return row["led"] not in ("", "0")
+
+
+def message(row):
+    return tuple(value for key, value in row.items() if key.startswith("message_"))
+
+
+def conditional(title, condition, event, rows):
+    """How often `event` is true, by `condition`; rows whose condition is None do not count."""
+    groups = defaultdict(list)
+    for row in rows:
+        groups[condition(row)].append((row["trial"], event(row)))
+    groups.pop(None, None)
+    total = sum(map(len, groups.values()))
+    table([title, "share of rows", "share with the LED on"],
+          [[key, f"{100 * len(values) / total:.1f} %", percent(values)] for key, values in sorted(groups.items())])
+
+
+def senders(rows):
+    modes = Counter(row["mode"] for row in rows)
+    print(", ".join(f"{100 * n / len(rows):.2f} % {mode}" for mode, n in modes.most_common()) + "\n")
+    sent = [row for row in rows if row["mode"] == "send"]
+    symbols = Counter(map(message, sent))
+    frequent = [symbol for symbol, _ in symbols.most_common(4)]
+    table(["symbol sent", "share"], [[f"({', '.join(symbol)})", f"{100 * symbols[symbol] / len(sent):.2f} %"] for symbol in frequent])
+    return frequent
+
+
+def leds(rows, frequent):
+    conditional("mode", lambda row: row["mode"], is_lit, rows)
+    name = lambda row: f"({', '.join(message(row))})" if message(row) in frequent else "others"
+    conditional("symbol sent", lambda row: name(row) if row["mode"] == "send" else None, is_lit, rows)
+
+
+def neighbours(rows):
+    """Fig. 6.19: the LED by the number of sectors from which frames came within the window."""
+    heard = defaultdict(list)
+    sectors = {}
+    for row in rows:
+        of = heard[row["trial"], row["robot"]]
+        of.append(row["frame_sector"])
+        sectors[id(row)] = len({sector for sector in of[-WINDOW:] if sector}) if len(of) >= WINDOW else None
+    conditional(f"sectors heard within {WINDOW} steps", lambda row: sectors[id(row)], is_lit, rows)
+    wrong = [(row["trial"], is_lit(row) != (row["led_target"] == "1")) for row in rows if row["led_target"]]
+    print(f"wrong LEDs: {percent(wrong)}\n")
+    near = defaultdict(list)
+    steps = defaultdict(list)
+    for row in rows:
+        steps[row["trial"], row["step"]].append(row)
+    for swarm in steps.values():
+        for row in swarm:
+            x, y = float(row["x_cm"]), float(row["y_cm"])
+            within = sum(math.hypot(float(other["x_cm"]) - x, float(other["y_cm"]) - y) < 100 for other in swarm) - 1
+            near[min(within, 8)].append((row["trial"], is_lit(row) != (row["led_target"] == "1")))
+    table(["robots within 100 cm", "share of rows", "wrong"],
+          [[f"{n}{' or more' if n == 8 else ''}", f"{100 * len(of) / len(rows):.1f} %", percent(of)] for n, of in sorted(near.items())])
+
+
+def angle(row, stimulus):
+    """Direction of a sector that is given as (x, y) in [0, 1], in degrees; None without a frame."""
+    if row["frame_sector"] == "":
+        return None
+    x, y = (float(row[f"stimulus_{stimulus}_{i}"]) for i in (0, 1))
+    return round(math.degrees(math.atan2(y, x))) % 360
+
+
+def alignment(rows, stimuli):
+    """Fig. 6.27 and 6.28: wheels and symbols by the directions of receiving and sending."""
+    receiving, sending = stimuli["receiving_direction"], stimuli["sending_direction"]
+    turns, symbols = defaultdict(list), defaultdict(Counter)
+    for row in rows:
+        rx, tx = angle(row, receiving), angle(row, sending)
+        if rx is None:
+            continue
+        turns[rx, tx].append(float(row["wheel_right"]))
+        symbols["aligned" if abs(rx - tx) == 180 else "not aligned"][message(row)] += 1
+    sectors = sorted({rx for rx, _ in turns} | {tx for _, tx in turns})
+    print("wheel, median (quartiles); rows: direction of receiving, columns: of sending, degrees\n")
+    table(["", *sectors], [[rx, *(quartiles(turns[rx, tx]) for tx in sectors)] for rx in sectors])
+    frequent = [symbol for symbol, _ in sum(symbols.values(), Counter()).most_common(4)]
+    table(["sender and receiver", *(f"({', '.join(s)})" for s in frequent)],
+          [[name, *(f"{100 * of[s] / sum(of.values()):.1f} %" for s in frequent)] for name, of in sorted(symbols.items())])
+
+
+def following(rows, stimuli):
+    """Fig. 6.37: the difference of the wheels, left minus right, by where light and frames are."""
+    light = sorted(key for key in rows[0] if key.startswith(f"stimulus_{stimuli['light_sensor']}_"))
+    by_light, by_frame, blind, speed = defaultdict(list), defaultdict(list), [], []
+    for row in rows:
+        turn = float(row["wheel_left"]) - float(row["wheel_right"])
+        seen = [float(row[key]) for key in light]
+        if max(seen) > 0:
+            by_light[seen.index(max(seen))].append(turn)
+        elif (direction := angle(row, stimuli["receiving_direction"])) is not None:
+            by_frame[direction].append(turn)
+        else:
+            blind.append(turn)
+            speed.append((float(row["wheel_left"]) + float(row["wheel_right"])) / 2)
+    print("left wheel minus right wheel, median (quartiles); positive turns right\n")
+    table(["strongest light in sector of", "rows", "difference"],
+          [[f"{360 * sector // len(light)}°", len(of), quartiles(of)] for sector, of in sorted(by_light.items())])
+    table(["no light; frame from", "rows", "difference"], [[f"{at}°", len(of), quartiles(of)] for at, of in sorted(by_frame.items())])
+    print(f"neither: {len(blind)} rows, difference {quartiles(blind)}, mean of both wheels {quartiles(speed)}\n")
+
+
+def simulated(path, config):
+    with tempfile.TemporaryDirectory() as scratch:
+        trace = Path(scratch) / "trace.csv"
+        command = ["swarmctl", "simulate", config, "--genotype", path, "--trace", trace,
+                   "--trace-columns", "targets", "--generation", "1000000", "--trials", str(TRIALS)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        with open(trace, newline="") as file:
+            return [row for row in csv.DictReader(file) if int(row["step"]) >= 10]
+
+
+def main():
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else RESULTS
+    for path in sorted((folder / "champions").glob("*.json")):
+        name = json.loads(path.read_text())["name"]
+        config = RESULTS.parent / "configs" / f"{name}.json"
+        stimuli = {of["sensor"].rpartition(":")[2]: key for key, of in json.loads(config.read_text())["topology"]["stimuli"].items()}
+        rows = simulated(path, config)
+        print(f"## {path.stem}\n")
+        frequent = senders(rows)
+        if name.startswith("leader_selection"):
+            leds(rows, frequent)
+        elif name.startswith("borderline"):
+            neighbours(rows)
+        elif name.startswith("orientation_consensus"):
+            alignment(rows, stimuli)
+        elif name.startswith("light_follower"):
+            following(rows, stimuli)
+
+
+if __name__ == "__main__":
+    main()
