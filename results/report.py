@@ -88,6 +88,8 @@ def evaluation(folder):
     )
     if "true_positive_rate" in metrics:
         errors(folder, trials)
+    if "near_light_photosensitive" in metrics:
+        lost_lights(folder)
     steps = read_csv(folder / "steps.csv")
     medians = defaultdict(dict)
     for row in steps:
@@ -124,6 +126,21 @@ def errors(folder, trials):
         alarms = statistics.fmean((n - border(*rate)) * (1 - rate[2]) for rate in rates)
         rows.append([condition, number(misses, 2), number(alarms, 2)])
     table(["condition", "false negatives per step", "false positives per step"], rows)
+
+
+def lost_lights(folder):
+    """Trials in which those that see the light are near it for less than half of the time."""
+    near = defaultdict(dict)
+    for row in read_csv(folder / "trials.csv"):
+        if row["metric"].startswith("near_light_"):
+            near[row["condition"], row["trial"]][row["metric"]] = float(row["time_mean"])
+    rows = defaultdict(lambda: ([], []))
+    for (condition, _), trial in near.items():
+        lost = trial["near_light_photosensitive"] < 0.5
+        rows[condition][lost].append(trial["near_light_others"])
+    mean = lambda values: f"{statistics.fmean(values):.3f}" if values else ""
+    table(["condition", "trials that lose the light", "others near it in these", "in the rest"],
+          [[name, f"{len(lost)} of {len(lost) + len(kept)}", mean(lost), mean(kept)] for name, (kept, lost) in rows.items()])
 
 
 def main():

@@ -124,7 +124,7 @@ fn curve(sample: &Sample) -> Option<Curve> {
     let point = |generation: usize| {
         let means: Vec<f64> = histories.iter().map(|history| history[generation].mean).collect();
         let found = interval(&means, interquartile_mean);
-        let [low, high] = found.ci95;
+        let [low, high] = found.ci95.unwrap_or([found.value; 2]);
         Point { x: histories[0][generation].generation as f64, low, middle: found.value, high }
     };
     let step = n_generations.div_ceil(POINTS_MAX).max(1);

@@ -12,18 +12,21 @@ const N_RESAMPLES: usize = 10_000;
 /// The same runs give the same interval.
 const SEED: u64 = 0;
 
+/// The least number of runs whose interval is more than these runs themselves.
+const LEAST: usize = 3;
+
 /// A statistic and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     pub value: f64,
-    /// Lower and upper end. Both are the value if there is one run: of the spread of runs
-    /// it says nothing.
-    pub ci95: [f64; 2],
+    /// Lower and upper end; none if a sample has fewer than three runs, which say nothing of
+    /// what others would be.
+    pub ci95: Option<[f64; 2]>,
 }
 
 /// A statistic of a sample. `statistic` may reorder what it is given.
 pub fn interval(values: &[f64], statistic: impl Fn(&mut [f64]) -> f64) -> Interval {
-    interval_of_two(values, &[], |values, _| statistic(values))
+    resample([values, &[]], |values, _| statistic(values))
 }
 
 /// A statistic of two samples, each drawn again by itself.
@@ -32,9 +35,20 @@ pub fn interval_of_two(
     second: &[f64],
     statistic: impl Fn(&mut [f64], &mut [f64]) -> f64,
 ) -> Interval {
+    resample([first, second], statistic)
+}
+
+/// A sample without runs is one that the statistic does not look at.
+fn resample(
+    [first, second]: [&[f64]; 2],
+    statistic: impl Fn(&mut [f64], &mut [f64]) -> f64,
+) -> Interval {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let (mut a, mut b) = (first.to_vec(), second.to_vec());
     let value = statistic(&mut a, &mut b);
+    if first.len() < LEAST || (1..LEAST).contains(&second.len()) {
+        return Interval { value, ci95: None };
+    }
     let mut draw = |from: &[f64], to: &mut Vec<f64>| {
         to.clear();
         to.extend(from.iter().map(|_| from[rng.random_range(0..from.len() as u32) as usize]));
@@ -47,5 +61,5 @@ pub fn interval_of_two(
         })
         .collect();
     resampled.sort_by(f64::total_cmp);
-    Interval { value, ci95: [0.025, 0.975].map(|p| quantile(&resampled, p)) }
+    Interval { value, ci95: Some([0.025, 0.975].map(|p| quantile(&resampled, p))) }
 }

@@ -204,8 +204,8 @@ fn number(value: f64, digits: usize) -> String {
 }
 
 fn span(interval: &Interval, digits: usize) -> String {
-    let [low, high] = interval.ci95.map(|end| number(end, digits));
-    format!("{low} to {high}")
+    let ends = interval.ci95.map(|ends| ends.map(|end| number(end, digits)));
+    ends.map_or_else(|| "-".into(), |[low, high]| format!("{low} to {high}"))
 }
 
 fn average(
