@@ -9,6 +9,7 @@ mod running;
 mod stepping;
 mod trace;
 mod trials;
+mod workers;
 
 use pyo3::prelude::*;
 
@@ -21,6 +22,7 @@ mod _core {
         evolution::{Evolution, Reevaluation, algorithms},
         experiment::Experiment,
         stepping::Episodes,
+        workers::Worker,
     };
 
     /// Names the function that the simulator computes: equal names, equal bits.

@@ -33,11 +33,12 @@ from .records import Individuals, RecordedRun
 from .replay import Replay
 from .trace import Trace
 from .trials import TrialSet
+from .workers import Workers, workers
 
 __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "GA", "Generation", "Individuals", "InternalError",
     "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES",
-    "SepCMAES", "SwarmError", "Trace", "TrialSet", "XNES", "algorithms", "connect", "evolve",
-    "mirror", "open", "parallel_env",
+    "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "algorithms", "connect", "evolve",
+    "mirror", "open", "parallel_env", "workers",
 ]

@@ -1,0 +1,93 @@
+//! Workers on threads of this process.
+
+use std::{
+    sync::{Mutex, PoisonError},
+    thread::{self, JoinHandle},
+};
+
+use pyo3::{
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+};
+use swarm_transport::{CredentialArgs, Credentials, Token};
+use tokio_util::sync::CancellationToken;
+use worker::{WorkerConfig, WorkerError};
+
+/// A worker that computes until it is stopped.
+#[pyclass(frozen, module = "swarmevo._core")]
+pub struct Worker {
+    stop: CancellationToken,
+    thread: Mutex<Option<JoinHandle<Result<(), WorkerError>>>>,
+}
+
+#[pymethods]
+impl Worker {
+    /// Starts it. `slots`: items at the same time, each on a thread of its own.
+    #[new]
+    fn new(
+        coordinator: &str,
+        name: &str,
+        slots: usize,
+        token: Option<&str>,
+        tls: Tls,
+    ) -> PyResult<Self> {
+        let mut config = WorkerConfig::new(coordinator, name, slots);
+        config.credentials = credentials(token, tls)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let stop = CancellationToken::new();
+        let stopped = stop.clone();
+        let thread = thread::Builder::new()
+            .name("swarmevo-worker".into())
+            .spawn(move || runtime.block_on(worker::run(config, stopped)))?;
+        Ok(Self { stop, thread: Mutex::new(Some(thread)) })
+    }
+
+    /// Whether it has not ended: it only ends by itself if the coordinator refuses it.
+    fn is_alive(&self) -> bool {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
+        thread.as_ref().is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Tells it to finish what it computes, and to leave.
+    fn stop(&self) {
+        self.stop.cancel();
+    }
+
+    /// Waits for its end. Raises why it has ended, if it was not told to.
+    fn join(&self, py: Python<'_>) -> PyResult<()> {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(thread) = thread else { return Ok(()) };
+        match py.detach(move || thread.join()) {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(error)) => Err(PyRuntimeError::new_err(error.to_string())),
+            Err(_) => Err(PyRuntimeError::new_err("the worker has panicked")),
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.stop.cancel();
+    }
+}
+
+/// Files of authorities, certificate and key; name in the coordinator's certificate; whether the
+/// token may be sent unencrypted.
+type Tls = (Option<String>, Option<String>, Option<String>, Option<String>, bool);
+
+fn credentials(token: Option<&str>, tls: Tls) -> PyResult<Credentials> {
+    let (tls_ca, tls_cert, tls_key, tls_domain, plaintext) = tls;
+    let args = CredentialArgs {
+        tls_ca: tls_ca.map(Into::into),
+        tls_cert: tls_cert.map(Into::into),
+        tls_key: tls_key.map(Into::into),
+        tls_domain,
+        plaintext,
+    };
+    let token = token.map(Token::parse).transpose();
+    let token = token.map_err(|problem| PyValueError::new_err(format!("the token {problem}")))?;
+    // The variable is read where the workers are asked for, not where they run.
+    let read = args.load(None, "SWARM_NO_TOKEN");
+    let read = read.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(Credentials { token, ..read })
+}

@@ -1,0 +1,228 @@
+"""Workers inside engines that already run: executors, Dask, Ray.
+
+A worker is a thread of this package, in a process of the engine; there is no program to copy.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import threading
+import time
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any, Callable, Protocol, Union, cast
+
+from . import _core
+from .settings import Settings
+
+log = logging.getLogger(__name__)
+
+POLL_S = 0.2
+PAUSE_MIN_S, PAUSE_MAX_S = 0.5, 30.0
+
+_stopping: dict[str, threading.Event] = {}
+"""Of the :class:`Workers` in this process, by key."""
+
+
+class Submits(Protocol):
+    """An executor of ``concurrent.futures``, or a client of Dask."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Any:
+        """Calls ``fn``, somewhere."""
+
+
+Engine = Union[Submits, ModuleType]
+"""Where workers run: an executor, a Dask client, or the module ``ray``."""
+
+
+def workers(
+    where: Engine,
+    n: int,
+    coordinator: str | None = None,
+    *,
+    slots: int = 1,
+    name: str = "swarmevo",
+    turn: float = 60.0,
+    token_file: str | None = None,
+    tls_ca: str | None = None,
+    tls_cert: str | None = None,
+    tls_key: str | None = None,
+    tls_domain: str | None = None,
+    plaintext: bool = False,
+) -> Workers:
+    """Keeps n workers alive inside a ``concurrent.futures`` executor, a Dask cluster (its
+    client) or a Ray cluster (the module ``ray``, after ``ray.init``).
+
+    Each is a task that occupies a thread or process of the engine, computes ``slots`` items at
+    the same time, and leaves after ``turn`` seconds for another one to take its place. So they
+    end by themselves soon after this process does. A worker whose node is lost is started
+    again; what it was computing is computed by others.
+
+    ``coordinator``: its address as the workers' nodes reach it; like the other settings found
+    as :func:`connect` finds it, but the token is a worker's, in ``SWARM_WORKER_TOKEN`` or the
+    file that ``SWARM_WORKER_TOKEN_FILE`` names, here. TLS files are read where workers run.
+    """
+    if n < 1 or slots < 1:
+        raise ValueError(f"workers and slots are 1 or more, not {n} and {slots}")
+    given = Settings(coordinator, None, tls_ca, tls_cert, tls_key, tls_domain, plaintext)
+    settings = Settings.find(given)
+    token_file = token_file or os.environ.get("SWARM_WORKER_TOKEN_FILE")
+    token = Path(token_file).read_text() if token_file else os.environ.get("SWARM_WORKER_TOKEN")
+    tls = (settings.tls_ca, settings.tls_cert, settings.tls_key, settings.tls_domain,
+           settings.plaintext)
+    key = str(uuid.uuid4())
+    places = [
+        _Place((key, settings.address, f"{name}-{index}", slots, token, tls, turn))
+        for index in range(n)
+    ]
+    return Workers(_adapter(where, slots), key, places)
+
+
+def serve(
+    key: str,
+    coordinator: str,
+    name: str,
+    slots: int,
+    token: str | None,
+    tls: tuple[str | None, str | None, str | None, str | None, bool],
+    turn: float,
+) -> None:
+    """Is a worker for ``turn`` seconds, or until the :class:`Workers` of this key in this
+    process stop. Engines call it."""
+    stopping = _stopping.get(key) or threading.Event()
+    worker = _core.Worker(coordinator, f"{name}-{socket.gethostname()}", slots, token, tls)
+    leave_at = time.monotonic() + turn
+    try:
+        while worker.is_alive() and time.monotonic() < leave_at and not stopping.wait(POLL_S):
+            pass
+    finally:
+        # It finishes what it computes, and delivers that.
+        worker.stop()
+        worker.join()
+
+
+@dataclass
+class _Place:
+    """One of the n workers."""
+
+    arguments: tuple[Any, ...]
+    task: Any = None
+    n_failures: int = 0
+    not_before: float = 0.0
+
+
+class _Adapter(Protocol):
+    def start(self, place: _Place) -> Any: ...
+
+    def ended(self, task: Any) -> bool: ...
+
+    def check(self, task: Any) -> None: ...
+
+
+class Workers:
+    """n workers that are kept alive; use :func:`workers`. A context manager, which stops
+    them at its end."""
+
+    def __init__(self, adapter: _Adapter, key: str, places: list[_Place]) -> None:
+        self._adapter, self._key, self._places = adapter, key, places
+        self._stopped = _stopping[key] = threading.Event()
+        self.problem: str | None = None
+        """Why the latest of those ended that were not to: its node is lost, or the
+        coordinator has refused it, say."""
+        self._keeper = threading.Thread(target=self._keep, name="swarmevo-workers", daemon=True)
+        self._keeper.start()
+
+    @property
+    def n_running(self) -> int:
+        """Tasks that the engine has, or will begin when it has room."""
+        return sum(place.task is not None for place in self._places)
+
+    def stop(self, wait: bool = True) -> None:
+        """Has all workers finish what they compute, and leave: in this process at once, in
+        others at the end of their turns. ``wait``: until they have."""
+        self._stopped.set()
+        if wait:
+            self._keeper.join()
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def _keep(self) -> None:
+        while not (self._stopped.is_set() and self.n_running == 0):
+            for place in self._places:
+                self._look_after(place)
+            time.sleep(POLL_S)
+        del _stopping[self._key]
+
+    def _look_after(self, place: _Place) -> None:
+        try:
+            if place.task is not None and self._adapter.ended(place.task):
+                task, place.task = place.task, None
+                self._adapter.check(task)
+                place.n_failures = 0
+            is_due = not self._stopped.is_set() and time.monotonic() >= place.not_before
+            if place.task is None and is_due:
+                place.task = self._adapter.start(place)
+        except Exception as error:
+            place.n_failures += 1
+            pause = min(PAUSE_MIN_S * 2**place.n_failures, PAUSE_MAX_S)
+            place.not_before = time.monotonic() + pause
+            self.problem = f"{place.arguments[2]}: {error or type(error).__name__}"
+            log.warning("worker ended; trying again in %.0f s: %s", pause, self.problem)
+
+    def __repr__(self) -> str:
+        return f"<Workers: {self.n_running} of {len(self._places)}>"
+
+
+class _OfExecutor:
+    """Futures of ``concurrent.futures`` and of Dask."""
+
+    def __init__(self, executor: Submits) -> None:
+        self._executor = executor
+        self._is_dask = type(executor).__module__.split(".")[0] == "distributed"
+
+    def start(self, place: _Place) -> Any:
+        # Dask takes calls with equal arguments for one.
+        options = {"pure": False} if self._is_dask else {}
+        return self._executor.submit(serve, *place.arguments, **options)
+
+    def ended(self, task: Any) -> bool:
+        return bool(task.done())
+
+    def check(self, task: Any) -> None:
+        task.result()
+
+
+class _OfRay:
+    def __init__(self, ray: Any, slots: int) -> None:
+        self._ray = ray
+        self._serve = ray.remote(num_cpus=slots, max_retries=0)(serve)
+
+    def start(self, place: _Place) -> Any:
+        return self._serve.remote(*place.arguments)
+
+    def ended(self, task: Any) -> bool:
+        return bool(self._ray.wait([task], timeout=0)[0])
+
+    def check(self, task: Any) -> None:
+        self._ray.get(task)
+
+
+def _adapter(where: Engine, slots: int) -> _Adapter:
+    if isinstance(where, ModuleType):
+        if where.__name__ != "ray":
+            raise TypeError(f"workers run in an executor, a client of Dask or ray, not {where}")
+        return _OfRay(where, slots)
+    return _OfExecutor(cast(Submits, where))
