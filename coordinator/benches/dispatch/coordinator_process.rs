@@ -3,7 +3,7 @@
 use std::{
     env,
     fs::{self, File},
-    net::TcpListener,
+    net::{SocketAddr, TcpListener},
     path::PathBuf,
     process::{Child, Command, Stdio},
     time::{Duration, Instant},
@@ -20,6 +20,8 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(1);
 pub struct CoordinatorProcess {
     child: Child,
     address: String,
+    /// Where its pages are.
+    pub pages: SocketAddr,
     data_dir: TempDir,
 }
 
@@ -27,10 +29,8 @@ impl CoordinatorProcess {
     /// Starts one that knows nothing.
     pub fn start() -> Self {
         let data_dir = TempDir::new().expect("a temporary directory");
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let address = listener.local_addr().expect("it is bound").to_string();
-        drop(listener);
-        Self { child: spawn(&address, &data_dir), address, data_dir }
+        let (address, pages) = (free_address().to_string(), free_address());
+        Self { child: spawn(&address, pages, &data_dir), address, pages, data_dir }
     }
 
     /// Ends it without warning.
@@ -43,7 +43,7 @@ impl CoordinatorProcess {
     #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
     pub fn restart(&mut self) -> Instant {
         let now = Instant::now();
-        self.child = spawn(&self.address, &self.data_dir);
+        self.child = spawn(&self.address, self.pages, &self.data_dir);
         now
     }
 
@@ -83,7 +83,12 @@ impl Drop for CoordinatorProcess {
     }
 }
 
-fn spawn(address: &str, data_dir: &TempDir) -> Child {
+fn free_address() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    listener.local_addr().expect("it is bound")
+}
+
+fn spawn(address: &str, pages: SocketAddr, data_dir: &TempDir) -> Child {
     let log = File::create(data_dir.path().join("log")).expect("a new directory can be written");
     // As in the harness of the fleet tests: programs of another version.
     let program = env::var_os("SWARM_PROGRAMS").map_or_else(
@@ -91,7 +96,8 @@ fn spawn(address: &str, data_dir: &TempDir) -> Child {
         |programs| PathBuf::from(programs).join("coordinator"),
     );
     Command::new(program)
-        .args(["--listen", address, "--log-format", "json", "--data-dir"])
+        .args(["--listen", address, "--web-listen", &pages.to_string()])
+        .args(["--log-format", "json", "--data-dir"])
         .arg(data_dir.path())
         .stdout(Stdio::null())
         .stderr(log)

@@ -77,6 +77,11 @@ impl InstantWorkers {
         (first..=last).map(|generation| rounds[&generation]).collect()
     }
 
+    /// The generation that they are at.
+    pub fn latest(&self) -> u64 {
+        self.diary.latest.borrow().unwrap_or_default()
+    }
+
     /// The first generation that they see, as soon as it has begun.
     pub async fn first_round(&self) -> Round {
         let mut latest = self.diary.latest.subscribe();

@@ -6,6 +6,7 @@
 mod alone;
 mod coordinator_process;
 mod instant_workers;
+mod open_pages;
 
 use std::{env, time::Duration};
 
@@ -14,6 +15,7 @@ use serde_json::{Value, json};
 use alone::Alone;
 use coordinator_process::CoordinatorProcess;
 use instant_workers::{InstantWorkers, median};
+use open_pages::OpenPages;
 
 /// Each line is measured so often, with a new coordinator each time.
 const N_REPEATS: usize = 5;
@@ -51,6 +53,13 @@ async fn main() {
             detail("beside it: checkpoint and commit, alone", part(|parts| parts.alone.commit));
             detail("of that, fdatasync of as many bytes", part(|parts| parts.alone.sync));
         }
+    }
+    if is_wanted("generation beside 50 open pages, ms") {
+        let (without, with) = beside_pages_ms().await;
+        let ratio = with.iter().zip(&without).map(|(with, without)| with / without).collect();
+        line("generation beside 50 open pages, ms", f64::NAN, f64::NAN, with);
+        detail("without pages", without);
+        line("  pair by pair, times as long", 1.05, 1.0, ratio);
     }
     if is_wanted("peak memory, MiB") {
         let mut runs = Vec::new();
@@ -141,6 +150,33 @@ async fn generation_ms(file: &str) -> GenerationParts {
     let all: Vec<f64> =
         rounds.windows(2).map(|pair| ms(pair[1].started - pair[0].started)).collect();
     GenerationParts { all: median(&all), alone: alone::measure(&file) }
+}
+
+/// A generation of 100 with a thousand workers, after ten thousand generations: stretches
+/// without pages and with 50 of them, by turns.
+async fn beside_pages_ms() -> (Vec<f64>, Vec<f64>) {
+    const N_BEFORE: u64 = 10_000;
+    const STRETCH: u64 = 200;
+    let coordinator = CoordinatorProcess::start();
+    let workers = InstantWorkers::start(&coordinator, 2, 8);
+    coordinator.submit(&experiment(SNES, 100, FOREVER)).await;
+    workers.rounds(N_BEFORE, N_BEFORE).await;
+    drop(workers);
+    let workers = InstantWorkers::start(&coordinator, 1000, 1);
+    workers.first_round().await;
+    let stretch = async || {
+        let first = workers.latest() + 10;
+        let rounds = workers.rounds(first, first + STRETCH).await;
+        ms(rounds[STRETCH as usize].started - rounds[0].started) / STRETCH as f64
+    };
+    let (mut without, mut with) = (Vec::new(), Vec::new());
+    for _ in 0..2 * N_REPEATS {
+        without.push(stretch().await);
+        let pages = OpenPages::open(coordinator.pages, 50).await;
+        with.push(stretch().await);
+        drop(pages);
+    }
+    (without, with)
 }
 
 /// A hundred workers of one slot, P = 10,000, four generations.
