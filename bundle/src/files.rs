@@ -80,8 +80,10 @@ impl Bundle {
             manifest: serde_json::from_slice(&manifest.content)
                 .map_err(|error| malformed(MANIFEST, &error))?,
             config_json: text(experiment)?,
-            history: read_history(&history.content).map_err(|what| malformed(HISTORY, &what))?,
-            log: read_frames(&log.content).map_err(|what| malformed(LOG, &what))?,
+            history: read_history(&history.content, limits::GENERATIONS)
+                .map_err(|what| malformed(HISTORY, &what))?,
+            log: read_frames(&log.content, limits::GENERATIONS)
+                .map_err(|what| malformed(LOG, &what))?,
             keyframes: read_keyframes(&keyframes.content)
                 .map_err(|what| malformed(KEYFRAMES, &what))?,
             champion_json: text(champion)?,
@@ -150,12 +152,13 @@ fn write_history(history: &[GenerationRow]) -> Vec<u8> {
     table.into_inner().expect("memory can be written")
 }
 
-fn read_history(bytes: &[u8]) -> Result<Vec<GenerationRow>, String> {
+/// `n_max`: most generations.
+fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> {
     let mut history = Vec::new();
     for (generation, row) in (0..).zip(csv::Reader::from_reader(bytes).into_deserialize()) {
         let row: Row = row.map_err(|error| error.to_string())?;
-        if generation >= limits::GENERATIONS {
-            return Err(too_many());
+        if generation >= n_max {
+            return Err(too_many(n_max));
         }
         if row.generation != generation {
             return Err(format!("generation {generation} is not where it belongs"));
@@ -193,14 +196,15 @@ fn unframe(bytes: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     Some((content.to_vec(), rest))
 }
 
-fn read_frames(mut bytes: &[u8]) -> Result<Vec<Vec<u8>>, String> {
+/// `n_max`: most of them.
+fn read_frames(mut bytes: &[u8], n_max: u64) -> Result<Vec<Vec<u8>>, String> {
     let mut frames = Vec::new();
     while !bytes.is_empty() {
         let (content, rest) = unframe(bytes).ok_or_else(cut_off)?;
         frames.push(content);
         bytes = rest;
-        if frames.len() as u64 > limits::GENERATIONS {
-            return Err(too_many());
+        if frames.len() as u64 > n_max {
+            return Err(too_many(n_max));
         }
     }
     Ok(frames)
@@ -216,7 +220,7 @@ fn read_keyframes(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<u8>)>, String> {
             return Err("its keyframes are not in order".to_owned());
         }
         if n_generations > limits::GENERATIONS {
-            return Err(too_many());
+            return Err(too_many(limits::GENERATIONS));
         }
         keyframes.push((n_generations, state));
         bytes = rest;
@@ -228,6 +232,82 @@ fn cut_off() -> String {
     "it is cut off".to_owned()
 }
 
-fn too_many() -> String {
-    format!("it has more than {} generations", limits::GENERATIONS)
+fn too_many(n_max: u64) -> String {
+    format!("it has more than {n_max} generations")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of these lengths.
+    fn frames(lengths: &[usize]) -> Vec<u8> {
+        let mut file = Vec::new();
+        lengths.iter().for_each(|&len| frame(&mut file, &vec![7; len]));
+        file
+    }
+
+    fn keyframes(numbers: &[u64]) -> Vec<u8> {
+        let mut file = Vec::new();
+        for number in numbers {
+            file.extend(number.to_le_bytes());
+            frame(&mut file, b"state");
+        }
+        file
+    }
+
+    #[test]
+    fn a_log_has_as_many_entries_as_generations_may_be() {
+        assert_eq!(read_frames(&frames(&[3, 0, 5]), 3).unwrap()[2], [7; 5]);
+        assert_eq!(read_frames(&frames(&[3, 0, 5]), 2), Err(too_many(2)));
+    }
+
+    #[test]
+    fn no_length_leads_beyond_the_end() {
+        let whole = frames(&[3, 5]);
+        for len in (1..whole.len()).filter(|&len| len != 8 + 3) {
+            assert_eq!(read_frames(&whole[..len], 9), Err(cut_off()), "{len}");
+        }
+        for huge in [6, u64::from(u32::MAX), u64::MAX] {
+            let mut lie = whole.clone();
+            lie[11..19].copy_from_slice(&huge.to_le_bytes());
+            assert_eq!(read_frames(&lie, 9), Err(cut_off()), "{huge}");
+        }
+        let whole = keyframes(&[1, 2]);
+        for len in (1..whole.len()).filter(|&len| len != whole.len() / 2) {
+            assert_eq!(read_keyframes(&whole[..len]), Err(cut_off()), "{len}");
+        }
+    }
+
+    #[test]
+    fn keyframes_are_in_order_and_of_generations_that_may_be() {
+        assert_eq!(read_keyframes(&keyframes(&[1, 4])).unwrap()[1].0, 4);
+        for numbers in [[4, 1], [4, 4]] {
+            let error = read_keyframes(&keyframes(&numbers)).unwrap_err();
+            assert!(error.contains("not in order"), "{error}");
+        }
+        let beyond = keyframes(&[1, limits::GENERATIONS + 1]);
+        assert_eq!(read_keyframes(&beyond), Err(too_many(limits::GENERATIONS)));
+    }
+
+    #[test]
+    fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
+        let digest = Digest::default();
+        let statistics = Statistics { best: 1.0, mean: 0.5, min: 0.0, standard_deviation: 0.1 };
+        let row = GenerationRow {
+            statistics,
+            episodes: 1,
+            duration_ms: 1,
+            completed_at_ms: 1,
+            workers: 1,
+            idle_share: 0.0,
+            digest,
+        };
+        let two = write_history(&[row.clone(), row]);
+        assert_eq!(read_history(&two, 2).unwrap().len(), 2);
+        assert_eq!(read_history(&two, 1).unwrap_err(), too_many(1));
+        let twice = String::from_utf8(two).unwrap().replace("\n1,", "\n0,");
+        let error = read_history(twice.as_bytes(), 9).unwrap_err();
+        assert!(error.contains("generation 1 is not where it belongs"), "{error}");
+    }
 }

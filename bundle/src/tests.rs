@@ -260,6 +260,14 @@ fn what_is_no_bundle_is_refused_in_one_line() {
         let more = [(name, b"x".to_vec())];
         archive(contents(bundle()).into_iter().chain(more))
     };
+    // Its length is looked at before anything else of it.
+    refused(&vec![0; LEN_MAX as usize + 1], "and a bundle at most 201326592");
+    // The second file of a name: as long, so that no offset changes.
+    let mut twice = with("champion.jsom");
+    while let Some(at) = twice.windows(13).position(|name| name == b"champion.jsom") {
+        twice[at + 12] = b'n';
+    }
+    refused(&twice, "champion.json");
     refused(&with("notes.txt"), "it has the file `notes.txt`");
     refused(&with("../etc/passwd"), "it has the file `../etc/passwd`");
     refused(&with("a\nb"), "it has the file `a\\nb`");
