@@ -100,12 +100,16 @@ fn check_len(len: u64) -> Result<(), BundleError> {
 pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, BundleError> {
     let damaged = |error: &dyn std::fmt::Display| BundleError::Archive(error.to_string());
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(&error))?;
+    // Of several files of a name the library takes the last, and other programs another.
+    if n_entries(bytes) != Some(archive.len()) {
+        return Err(damaged(&"a file is in it twice, or something follows it"));
+    }
     let known: Vec<&str> = files::all().iter().map(|file| file.name).chain([DESCRIPTION]).collect();
     let mut contents: Vec<(String, Vec<u8>)> = Vec::new();
     for index in 0..archive.len() {
         let entry = archive.by_index(index).map_err(|error| damaged(&error))?;
         let name = entry.name().map_err(|error| damaged(&error))?.into_owned();
-        if !known.contains(&&*name) || contents.iter().any(|(other, _)| *other == name) {
+        if !known.contains(&&*name) {
             return Err(BundleError::ExtraFile(printable(&name)));
         }
         let mut content = Vec::new();
@@ -116,6 +120,13 @@ pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, Bun
         contents.push((name, content));
     }
     Ok(contents)
+}
+
+/// The number of files in an archive that ends without a comment, as its last record has it.
+fn n_entries(bytes: &[u8]) -> Option<usize> {
+    let record: &[u8; 22] = bytes.last_chunk()?;
+    let number = u16::from_le_bytes([record[10], record[11]]);
+    record.starts_with(b"PK\x05\x06").then_some(number.into())
 }
 
 /// That the manifest is of a version that this program can check, which its other files may

@@ -117,7 +117,7 @@ pub enum BundleError {
     #[error("unpacked it has more than {UNPACKED_LEN_MAX} bytes, so it is no bundle")]
     UnpackedTooLong,
     /// A file too many.
-    #[error("it has the file `{0}`, which is not part of a bundle, or has it twice")]
+    #[error("it has the file `{0}`, which is not part of a bundle")]
     ExtraFile(String),
     /// A file too few.
     #[error("it lacks the file `{0}`")]

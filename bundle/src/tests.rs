@@ -267,7 +267,10 @@ fn what_is_no_bundle_is_refused_in_one_line() {
     while let Some(at) = twice.windows(13).position(|name| name == b"champion.jsom") {
         twice[at + 12] = b'n';
     }
-    refused(&twice, "champion.json");
+    refused(&twice, "a file is in it twice");
+    let mut followed = bytes.clone();
+    followed.extend(b"more");
+    refused(&followed, "something follows it");
     refused(&with("notes.txt"), "it has the file `notes.txt`");
     refused(&with("../etc/passwd"), "it has the file `../etc/passwd`");
     refused(&with("a\nb"), "it has the file `a\\nb`");

@@ -129,7 +129,9 @@ async fn names_of_other_sites_do_not_lead_to_pages_of_this_machine() {
 
 #[tokio::test]
 async fn other_sites_change_nothing() {
-    for origin in [None, Some("null"), Some("http://evil.example"), Some("http://127.0.0.1:81")] {
+    let beginning = Some("http://127.0.0.1:778");
+    let longer = Some("http://127.0.0.1:7780.evil.example");
+    for origin in [None, Some("null"), Some("http://evil.example"), beginning, longer] {
         let request = post("/api/experiments/1/cancel", HERE, origin, "{}");
         assert_eq!(answer(HERE, None, request).await.status(), StatusCode::FORBIDDEN, "{origin:?}");
     }
