@@ -109,4 +109,6 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, 
 }
 
 #[cfg(test)]
+mod against_brian2;
+#[cfg(test)]
 mod tests;
