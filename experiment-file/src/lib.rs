@@ -78,6 +78,7 @@ mod robot;
 mod schema;
 mod semantics;
 mod sensors;
+mod synapses;
 mod topology;
 mod variant;
 mod world;
@@ -99,6 +100,7 @@ pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
 pub use sensors::*;
+pub use synapses::*;
 pub use topology::*;
 pub use world::*;
 

@@ -49,6 +49,10 @@ pub const GENES_OF_FULL_MATRIX: u64 = 1_000;
 /// Euler steps of spiking networks, ms: the shortest time constants of their synapses and
 /// decoders are 5 ms.
 pub const SPIKING_DT: RangeInclusive<f64> = 0.001..=2.0;
+/// Axonal delays of dynamic synapses, substeps.
+pub const DELAYS: RangeInclusive<u32> = 1..=9;
+/// Gain of a receptor.
+pub const SYNAPSE_GAIN: f64 = 1_000.0;
 /// Network substeps per environment step.
 pub const TIME_SCALE: u32 = 1_000;
 /// Values of all stimuli together.

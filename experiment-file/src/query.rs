@@ -19,6 +19,8 @@ pub enum GenotypeQuery {
     Neurons(&'static str, EnsembleSelector),
     /// `decoders:weights:...`
     Decoders(OutputSelector),
+    /// `synapses:delays:...`: the axonal delays of neurons with dynamic synapses.
+    Delays(EnsembleSelector),
 }
 
 /// The last part of `decoders:weights:...`.
@@ -57,7 +59,7 @@ pub enum SynapseSelector {
     Named(String),
 }
 
-/// The last part of `neurons:...:...`.
+/// The last part of `neurons:...:...` and of `synapses:delays:...`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EnsembleSelector {
     /// Every ensemble.
@@ -96,6 +98,7 @@ impl fmt::Display for GenotypeQuery {
             Self::Neurons(parameter, selector) => {
                 write!(f, "neurons:{parameter}:{}", selector.as_str())
             }
+            Self::Delays(selector) => write!(f, "synapses:delays:{}", selector.as_str()),
             Self::Decoders(selector) => write!(f, "decoders:weights:{}", selector.as_str()),
         }
     }
@@ -109,7 +112,7 @@ pub enum ParseQueryError {
     Unsupported(String),
     /// It has another form.
     #[error(
-        "expected `synapses:weights:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, \
+        "expected `synapses:weights:NAME`, `synapses:delays:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, \
          with a parameter of the neuron model"
     )]
     Malformed,
@@ -141,9 +144,8 @@ impl FromStr for GenotypeQuery {
                     name => OutputSelector::Named(name.to_owned()),
                 }));
             }
-            ("synapses", "delays")
-            | ("neurons", "decoding")
-            | ("encoders" | "encoding", "weights") => {
+            ("synapses", "delays") => return Ok(Self::Delays(ensembles(selector))),
+            ("neurons", "decoding") | ("encoders" | "encoding", "weights") => {
                 return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
             }
             ("neurons", name) => {
@@ -153,13 +155,14 @@ impl FromStr for GenotypeQuery {
             }
             _ => return Err(ParseQueryError::Malformed),
         };
-        Ok(Self::Neurons(
-            parameter,
-            match selector {
-                "all" => EnsembleSelector::All,
-                name => EnsembleSelector::Named(name.to_owned()),
-            },
-        ))
+        Ok(Self::Neurons(parameter, ensembles(selector)))
+    }
+}
+
+fn ensembles(selector: &str) -> EnsembleSelector {
+    match selector {
+        "all" => EnsembleSelector::All,
+        name => EnsembleSelector::Named(name.to_owned()),
     }
 }
 
@@ -181,7 +184,7 @@ impl JsonSchema for GenotypeQuery {
         json_schema!({
             "description": "Names a part of the network's parameters (Table 4.1).",
             "type": "string",
-            "pattern": format!("^(synapses:weights|deco(ders|ding):weights|neurons:({names})):.+$"),
+            "pattern": format!("^(synapses:(weights|delays)|deco(ders|ding):weights|neurons:({names})):.+$"),
         })
     }
 }

@@ -4,7 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{NamedMap, NeuronModel, SensorQuery, limits, neuron, schema};
+use super::{
+    NamedMap, NeuronModel, Neurotransmitter, SensorQuery, SynapseModel, SynapseParams, limits,
+    neuron, schema,
+};
 
 /// Of [`TopologyConfig::dt`], s.
 pub(super) const DEFAULT_DT: f64 = 0.1;
@@ -19,11 +22,12 @@ pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("dt, time_scale, seed, neuron_model, bias_in_gain, initial_rates, motor_tau"),
+    transform = schema::optional(
+        "dt, time_scale, seed, neuron_model, bias_in_gain, initial_rates, motor_tau, \
+         synapse_model, synapse_params"
+    ),
     transform = schema::property("encoding", schema::encoding()),
-    transform = schema::property("neurons", schema::neurons()),
-    transform = schema::property("synapse_model", json!({"const": "static_synapse"})),
-    transform = schema::ignored("synapse_params")
+    transform = schema::property("neurons", schema::neurons())
 )]
 pub struct TopologyConfig {
     /// Euler step of the network: of rate neurons in seconds, default 0.1; of spiking ones
@@ -52,6 +56,13 @@ pub struct TopologyConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "schema::positive_or_null")]
     pub motor_tau: Option<f64>,
+    /// How spikes become currents; default `static_synapse`.
+    #[serde(skip_serializing_if = "SynapseModel::is_static")]
+    pub synapse_model: SynapseModel,
+    /// The receptors of dynamic synapses; ignored by static ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "SynapseParams")]
+    pub synapse_params: Option<SynapseParams>,
     /// Inputs, in the order in which they are stacked.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub stimuli: NamedMap<StimulusConfig>,
@@ -177,7 +188,11 @@ impl ActuatorQuery {
 #[schemars(
     deny_unknown_fields,
     transform = schema::optional("trainable, p"),
-    transform = schema::ignored("neuroTX, ntx_fixed")
+    transform = schema::property("neuroTX", json!({
+        "description": "Of dynamic synapses, what their spikes release: `AMPA`, `AMPA+NMDA` \
+                        or `GABA`; default `AMPA`. Ignored by static ones."
+    })),
+    transform = schema::ignored("ntx_fixed")
 )]
 pub struct SynapseGroupConfig {
     /// Names of stimuli or ensembles.
@@ -193,6 +208,10 @@ pub struct SynapseGroupConfig {
     /// Connection probability; default 1.
     #[schemars(range(min = 0, max = 1), extend("default" = 1))]
     pub p: f64,
+    /// What their spikes release; none of static synapses.
+    #[serde(rename = "neuroTX", skip_serializing_if = "Option::is_none")]
+    #[schemars(skip)]
+    pub transmitter: Option<Neurotransmitter>,
 }
 
 /// How what an output's ensemble does becomes an action: the first three for rate neurons,

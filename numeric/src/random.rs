@@ -53,7 +53,8 @@ pub enum Purpose {
     SensorNoise = 7,
     /// Movement of lights; stream = light.
     LightMovement = 8,
-    /// Which synapses exist; seed = `topology.seed`, stream = index of the group.
+    /// Which synapses exist; seed = `topology.seed`, stream = index of the group. Delays;
+    /// stream = 2^32.
     Connections = 9,
     /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
     /// decoders; stream = 2^32 + output.

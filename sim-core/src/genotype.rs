@@ -9,7 +9,7 @@ use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use experiment_file::{
     EnsembleSelector, ExperimentConfig, GeneScale, GenotypeQuery, OutputSelector, SynapseSelector,
-    TopologyConfig,
+    TopologyConfig, limits,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -48,6 +48,8 @@ enum Parameter {
         /// Number of the neuron.
         neuron: usize,
     },
+    /// The axonal delay of the neuron of this number.
+    Delay(usize),
     /// A weight of the decoding of an output.
     Decoder {
         /// Number of the output.
@@ -115,6 +117,7 @@ impl Codec {
                 Parameter::Neuron { parameter, neuron } => {
                     phenotype.neurons[parameter][neuron] = value;
                 }
+                Parameter::Delay(neuron) => phenotype.delays[neuron] = libm::round(value),
                 Parameter::Decoder { output, weight } => phenotype.decoders[output][weight] = value,
             }
         }
@@ -139,14 +142,13 @@ fn select(
             let Some((parameter, scale)) = named.and_then(|(i, p)| Some((i, p.gene?))) else {
                 return (Vec::new(), GeneScale::Linear);
             };
-            let neurons = match selector {
-                EnsembleSelector::All => 0..network.n_neurons(),
-                EnsembleSelector::Named(name) => {
-                    network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
-                }
-            };
-            let parameters = neurons.map(|neuron| Parameter::Neuron { parameter, neuron });
+            let parameters =
+                neurons_of(selector, network).map(|neuron| Parameter::Neuron { parameter, neuron });
             (parameters.collect(), scale)
+        }
+        GenotypeQuery::Delays(selector) => {
+            let delays = neurons_of(selector, network).filter(|&it| it < network.n_delays());
+            (delays.map(Parameter::Delay).collect(), GeneScale::Linear)
         }
         GenotypeQuery::Decoders(selector) => {
             let outputs = config.outputs.keys().zip(&network.outputs).enumerate();
@@ -158,6 +160,15 @@ fn select(
                 (0..compiled.n_weights).map(move |weight| Parameter::Decoder { output, weight })
             });
             (parameters.collect(), GeneScale::Linear)
+        }
+    }
+}
+
+fn neurons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
+    match selector {
+        EnsembleSelector::All => 0..network.n_neurons(),
+        EnsembleSelector::Named(name) => {
+            network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
         }
     }
 }
@@ -195,7 +206,12 @@ fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Paramete
 /// The first stream of fixed weights of decoders, after those of groups of synapses.
 const DECODERS: u64 = 1 << 32;
 
-/// Values of what the genotype does not cover. Weights of a decoder are all drawn, so that
+/// The stream of delays, after those of the connections of groups.
+const DELAYS: u64 = 1 << 32;
+/// Substeps that a delay may have.
+const N_DELAYS: usize = (*limits::DELAYS.end() - *limits::DELAYS.start()) as usize + 1;
+
+/// Values of what the genotype does not cover. Weights of a decoder and delays are all drawn, so that
 /// none depends on what else is covered.
 fn defaults(
     config: &TopologyConfig,
@@ -233,7 +249,10 @@ fn defaults(
         (0..output.n_weights).map(|_| -1.0 + 2.0 * stream.uniform()).collect()
     });
     let decoders = decoders.collect();
-    Phenotype { weights, neurons, decoders }
+    let mut stream = Stream::new(config.seed, 0, 0, Purpose::Connections, DELAYS);
+    let delay = |_| f64::from(*limits::DELAYS.start()) + stream.below(N_DELAYS) as f64;
+    let delays = (0..network.n_delays()).map(delay).collect();
+    Phenotype { weights, neurons, delays, decoders }
 }
 
 /// Which values the genotype covers.
@@ -242,6 +261,8 @@ struct ParameterCoverage {
     weights: Vec<bool>,
     /// By index of the parameter and number of the neuron.
     neurons: Vec<Vec<bool>>,
+    /// By number of the neuron.
+    delays: Vec<bool>,
     /// By number of the output and of the weight.
     decoders: Vec<Vec<bool>>,
 }
@@ -252,6 +273,7 @@ impl ParameterCoverage {
         Self {
             weights: vec![false; network.synapses.len()],
             neurons: vec![vec![false; network.n_neurons()]; n_parameters],
+            delays: vec![false; network.n_delays()],
             decoders: network.outputs.iter().map(|output| vec![false; output.n_weights]).collect(),
         }
     }
@@ -261,6 +283,7 @@ impl ParameterCoverage {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
             Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],
+            Parameter::Delay(neuron) => &mut self.delays[neuron],
             Parameter::Decoder { output, weight } => &mut self.decoders[output][weight],
         }
     }
@@ -273,6 +296,10 @@ impl ParameterCoverage {
             if n > 0 {
                 lines.push(format!("synapses:weights:{name}: {n} weights stay random"));
             }
+        }
+        let n = self.delays.iter().filter(|covered| !**covered).count();
+        if n > 0 {
+            lines.push(format!("synapses:delays: {n} delays stay random"));
         }
         for (name, covered) in config.outputs.keys().zip(&self.decoders) {
             let n = covered.iter().filter(|covered| !**covered).count();
@@ -335,6 +362,7 @@ mod tests {
             let value = match gene.parameter {
                 Parameter::Weight(synapse) => phenotype.weights[synapse],
                 Parameter::Neuron { parameter, neuron } => phenotype.neurons[parameter][neuron],
+                Parameter::Delay(neuron) => phenotype.delays[neuron],
                 Parameter::Decoder { output, weight } => phenotype.decoders[output][weight],
             };
             let value = match gene.scale {

@@ -11,7 +11,7 @@ mod suite;
 
 use experiment_file::{
     AlgorithmConfig, AlgorithmDescription, AlgorithmParams, Domain, FitnessFunction, InitialRates,
-    NamedMap, NeuronModel, PopulationConfig, TopologyConfig, WorldConfig,
+    NamedMap, NeuronModel, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
 };
 
 use super::*;
@@ -222,6 +222,8 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
             bias_in_gain: true,
             initial_rates: InitialRates::default(),
             motor_tau: None,
+            synapse_model: SynapseModel::Static,
+            synapse_params: None,
             stimuli: NamedMap::new(),
             ensembles: NamedMap::new(),
             outputs: NamedMap::new(),

@@ -3,7 +3,7 @@
 use crate::report::{Path, Report};
 use crate::{
     AlgorithmDescription, ExperimentConfig, ObjectConfig, RobotConfig, RobotController,
-    TopologyConfig, limits,
+    SynapseModel, TopologyConfig, limits,
 };
 
 pub(super) fn check(
@@ -42,12 +42,16 @@ impl NetworkSize {
         let size_of_all = |names: &[String]| names.iter().map(size).sum::<u64>();
         let groups = topology.synapses.values();
         let model = topology.neuron_model.spec();
+        // A dynamic synapse has a delay, and a neuron's axon the spikes of nine substeps and
+        // four variables of its receptors.
+        let is_dynamic = u64::from(topology.synapse_model == SynapseModel::Dynamic);
+        let of_synapses = 13 * is_dynamic;
         let n_neurons = topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum();
         Self {
             n_inputs: topology.stimuli.values().map(|stimulus| u64::from(stimulus.n)).sum(),
             n_neurons,
-            n_states: n_neurons * model.states_per_neuron,
-            n_neuron_genes: n_neurons * model.evolvable().count() as u64,
+            n_states: n_neurons * (model.states_per_neuron + of_synapses),
+            n_neuron_genes: n_neurons * (model.evolvable().count() as u64 + is_dynamic),
             n_decoder_weights: topology
                 .outputs
                 .iter()
@@ -56,7 +60,7 @@ impl NetworkSize {
                     Some(u64::from(topology.decoding.get(name)?.n_weights(n)))
                 })
                 .sum(),
-            n_neuron_operations: n_neurons * model.operations_per_neuron,
+            n_neuron_operations: n_neurons * (model.operations_per_neuron + 2 * of_synapses),
             n_synapses: groups
                 .map(|group| size_of_all(&group.pre) * size_of_all(&group.post))
                 .sum(),

@@ -4,8 +4,8 @@ use std::fmt;
 
 use crate::report::{Path, Report, suggestion};
 use crate::{
-    EnsembleSelector, GenotypeQuery, OutputSelector, SynapseGroupConfig, SynapseSelector,
-    TopologyConfig,
+    EnsembleSelector, GenotypeQuery, OutputSelector, SynapseGroupConfig, SynapseModel,
+    SynapseSelector, TopologyConfig,
 };
 
 /// The evolvable parts of a network and who claimed them.
@@ -27,6 +27,8 @@ enum PartKind<'a> {
     Weights { group: &'a str, pre: &'a str, source: Source },
     /// A parameter of an ensemble's neurons.
     Neurons { parameter: &'static str, ensemble: &'a str },
+    /// The delays of an ensemble's axons.
+    Delays { ensemble: &'a str },
     /// The weights of an output's decoding.
     Decoder { output: &'a str },
 }
@@ -61,8 +63,11 @@ impl<'a> ParameterCoverage<'a> {
         });
         let weighted = topology.decoding.iter().filter(|(_, decoding)| decoding.n_weights(1) > 0);
         let decoders = weighted.map(|(output, _)| PartKind::Decoder { output });
-        let parts =
-            weights.chain(neurons).chain(decoders).map(|kind| Part { kind, owner: None }).collect();
+        let is_dynamic = topology.synapse_model == SynapseModel::Dynamic;
+        let delayed = topology.ensembles.keys().filter(|_| is_dynamic);
+        let delays = delayed.map(|ensemble| PartKind::Delays { ensemble });
+        let kinds = weights.chain(neurons).chain(delays).chain(decoders);
+        let parts = kinds.map(|kind| Part { kind, owner: None }).collect();
         Self { topology, parts }
     }
 
@@ -83,6 +88,7 @@ impl<'a> ParameterCoverage<'a> {
         }
         let others = match query {
             GenotypeQuery::Neurons(..) => vec![ensembles, part("neuron_model"), part("neurons")],
+            GenotypeQuery::Delays(_) => vec![ensembles, part("synapse_model")],
             GenotypeQuery::Weights(_) => vec![stimuli, part("synapses"), part("outputs")],
             GenotypeQuery::Decoders(_) => vec![outputs, part("decoding")],
         };
@@ -108,7 +114,8 @@ impl<'a> ParameterCoverage<'a> {
     fn n_meanings(&self, query: &GenotypeQuery) -> usize {
         let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
         match query {
-            GenotypeQuery::Neurons(_, EnsembleSelector::Named(name)) => {
+            GenotypeQuery::Neurons(_, EnsembleSelector::Named(name))
+            | GenotypeQuery::Delays(EnsembleSelector::Named(name)) => {
                 usize::from(ensembles.contains_key(name))
             }
             GenotypeQuery::Weights(SynapseSelector::Named(name)) => {
@@ -126,7 +133,7 @@ impl<'a> ParameterCoverage<'a> {
     fn explain(&self, query: &GenotypeQuery) -> String {
         let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
         let (name, what, known): (&str, &str, Vec<&String>) = match query {
-            GenotypeQuery::Neurons(_, selector) => {
+            GenotypeQuery::Neurons(_, selector) | GenotypeQuery::Delays(selector) => {
                 (selector.as_str(), "ensemble", ensembles.keys().collect())
             }
             GenotypeQuery::Weights(selector) => {
@@ -164,6 +171,10 @@ impl PartKind<'_> {
                         EnsembleSelector::Named(name) => name == ensemble,
                     }
             }
+            (Self::Delays { ensemble }, GenotypeQuery::Delays(selector)) => match selector {
+                EnsembleSelector::All => true,
+                EnsembleSelector::Named(name) => name == ensemble,
+            },
             (Self::Decoder { output }, GenotypeQuery::Decoders(selector)) => match selector {
                 OutputSelector::All => true,
                 OutputSelector::Named(name) => name == output,
@@ -182,6 +193,7 @@ impl fmt::Display for PartKind<'_> {
             Self::Neurons { parameter, ensemble } => {
                 write!(f, "the {parameter} of ensemble `{ensemble}`")
             }
+            Self::Delays { ensemble } => write!(f, "the delays of ensemble `{ensemble}`"),
             Self::Decoder { output } => write!(f, "the weights of the decoding of `{output}`"),
         }
     }

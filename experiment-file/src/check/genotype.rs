@@ -61,6 +61,17 @@ fn bounds(
                 format!("the maximum {max} of `{query}` is not above its minimum {min}")
             });
         }
+        if let GenotypeQuery::Delays(_) = query {
+            let (low, high) = (*limits::DELAYS.start(), *limits::DELAYS.end());
+            let is_delay = |bound: f64| (f64::from(low)..=f64::from(high)).contains(&bound);
+            for (bound, path) in [(min, &min_path), (max, &max_path)] {
+                if !is_delay(bound) {
+                    report.conflict(path, &[&query_path], || {
+                        format!("delays are from {low} to {high} substeps, not {bound}")
+                    });
+                }
+            }
+        }
         let GenotypeQuery::Neurons(name, _) = query else { continue };
         let Some(parameter) = topology.neuron_model.spec().parameter(name) else { continue };
         let Some(scale) = parameter.gene else { continue };

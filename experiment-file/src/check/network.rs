@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::report::{Path, Report, suggestion};
-use crate::{ActuatorQuery, DecodingConfig, TopologyConfig};
+use crate::{ActuatorQuery, DecodingConfig, SynapseParams, TopologyConfig};
 
 pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     names(topology, report);
@@ -12,6 +12,25 @@ pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     outputs(topology, report);
     decoding(topology, report);
     motor_tau(topology, report);
+    receptors(topology, report);
+}
+
+/// Euler steps beyond a time constant would take what receptors do below zero.
+fn receptors(topology: &TopologyConfig, report: &Report<'_>) {
+    let Some(SynapseParams { ampa, gaba, nmda }) = topology.synapse_params else { return };
+    for (receptor, key, tau) in [
+        ("AMPA", "tau", ampa.tau),
+        ("GABA", "tau", gaba.tau),
+        ("NMDA", "tau_rise", nmda.tau_rise),
+        ("NMDA", "tau_decay", nmda.tau_decay),
+    ] {
+        if tau < topology.dt {
+            let path = Path::from(["topology", "synapse_params", receptor, key]);
+            report.conflict(&path, &[&Path::from(["topology", "dt"])], || {
+                format!("{tau} ms is below dt: the receptors would overshoot")
+            });
+        }
+    }
 }
 
 /// Euler steps beyond twice the time constant diverge.

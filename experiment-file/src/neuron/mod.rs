@@ -42,9 +42,9 @@ pub enum NeuronModel {
 }
 
 /// Voltages of spiking neurons, mV.
-const VOLTAGE: RangeInclusive<f64> = -200.0..=200.0;
+pub(super) const VOLTAGE: RangeInclusive<f64> = -200.0..=200.0;
 /// Time constants of spiking neurons, ms.
-const TIME: RangeInclusive<f64> = 0.01..=10_000.0;
+pub(super) const TIME: RangeInclusive<f64> = 0.01..=10_000.0;
 
 /// What an experiment file can say of the neurons of a model, and what they cost.
 #[derive(Debug)]

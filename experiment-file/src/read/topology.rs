@@ -8,8 +8,10 @@ use crate::topology::{
     DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_SPIKING_DT, DEFAULT_TIME_SCALE,
 };
 use crate::{
-    Activation, ActuatorQuery, DecodingConfig, EnsembleConfig, InitialRates, NamedMap, NeuronModel,
-    OutputConfig, SensorQuery, StimulusConfig, SynapseGroupConfig, TopologyConfig, limits,
+    Activation, ActuatorQuery, AmpaParams, DecodingConfig, EnsembleConfig, GabaParams,
+    InitialRates, NamedMap, NeuronModel, Neurotransmitter, NmdaParams, OutputConfig, SensorQuery,
+    StimulusConfig, SynapseGroupConfig, SynapseModel, SynapseParams, TopologyConfig, limits,
+    neuron,
 };
 
 pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
@@ -26,6 +28,11 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     };
     let (bias_in_gain, initial_rates, motor_tau) =
         if is_spiking { of_spiking_neurons(o) } else { of_rate_neurons(o, semantics) };
+    let synapse_model: SynapseModel =
+        o.or("synapse_model", SynapseModel::Static, |node| node.variant(&[]).unwrap_or_default());
+    if synapse_model == SynapseModel::Dynamic && model.is_some() && !is_spiking {
+        o.problem("synapse_model", "dynamic synapses need neurons that spike");
+    }
     TopologyConfig {
         dt,
         time_scale: o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE)),
@@ -34,10 +41,14 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
         bias_in_gain,
         initial_rates,
         motor_tau,
+        synapse_params: synapse_params(o, synapse_model),
+        synapse_model,
         stimuli,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
         outputs: o.required("outputs").map(1, |_, node| node.object(output)),
-        synapses: o.required("synapses").map(1, |_, node| node.object(synapse_group)),
+        synapses: o
+            .required("synapses")
+            .map(1, |_, node| node.object(|o| synapse_group(o, synapse_model))),
         decoding: o.required("decoding").map(1, |_, node| node.object(decoding)),
     }
 }
@@ -73,10 +84,6 @@ fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
     {
         o.problem("neuron_model", "`neurons` has another one");
     }
-    if let Some(model) = o.optional("synapse_model") {
-        model.one_of(&["static_synapse"], &["dynamic_synapse"]);
-    }
-    o.ignored("synapse_params", "static synapses have no parameters");
     outer.or(inner).unwrap_or(Some(NeuronModel::default()))
 }
 
@@ -150,15 +157,72 @@ fn output(o: &mut Object<'_>) -> OutputConfig {
     }
 }
 
-fn synapse_group(o: &mut Object<'_>) -> SynapseGroupConfig {
-    for key in ["neuroTX", "ntx_fixed"] {
-        o.ignored(key, "static synapses have no neurotransmitter");
+/// None of static synapses.
+fn synapse_params(o: &mut Object<'_>, model: SynapseModel) -> Option<SynapseParams> {
+    if model == SynapseModel::Static {
+        o.ignored("synapse_params", "static synapses have no parameters");
+        return None;
     }
+    let gain = |o: &mut Object<'_>, default: f64| {
+        o.or("gain", default, |node| node.number(0.0..=limits::SYNAPSE_GAIN))
+    };
+    let tau = |o: &mut Object<'_>, key: &'static str, default: f64| {
+        o.or(key, default, |node| node.number(neuron::TIME))
+    };
+    let reversal = |o: &mut Object<'_>, default: Option<f64>| {
+        o.or("E", default, |node| node.or_null(|node| node.number(neuron::VOLTAGE)))
+    };
+    Some(o.inner("synapse_params", |o| {
+        let SynapseParams { ampa, gaba, nmda } = SynapseParams::default();
+        let nmda_params = |o: &mut Object<'_>| NmdaParams {
+            gain: gain(o, nmda.gain),
+            tau_rise: tau(o, "tau_rise", nmda.tau_rise),
+            tau_decay: tau(o, "tau_decay", nmda.tau_decay),
+            magnesium: o.or("Mg2", nmda.magnesium, |node| node.number(0.0..=1_000.0)),
+            reversal: reversal(o, nmda.reversal),
+        };
+        SynapseParams {
+            ampa: o.inner("AMPA", |o| AmpaParams {
+                gain: gain(o, ampa.gain),
+                tau: tau(o, "tau", ampa.tau),
+                reversal: reversal(o, ampa.reversal),
+            }),
+            gaba: o.inner("GABA", |o| GabaParams {
+                gain: gain(o, gaba.gain),
+                tau: tau(o, "tau", gaba.tau),
+                reversal: reversal(o, gaba.reversal),
+            }),
+            nmda: match o.optional("NDMA") {
+                Some(node) => node.object(nmda_params),
+                None => o.inner("NMDA", nmda_params),
+            },
+        }
+    }))
+}
+
+fn synapse_group(o: &mut Object<'_>, model: SynapseModel) -> SynapseGroupConfig {
+    let transmitter = match model {
+        SynapseModel::Static => {
+            for key in ["neuroTX", "ntx_fixed"] {
+                o.ignored(key, "static synapses have no neurotransmitter");
+            }
+            None
+        }
+        SynapseModel::Dynamic => {
+            if !o.or("ntx_fixed", true, Node::bool) {
+                o.problem("ntx_fixed", "not supported: transmitters are those of the file");
+            }
+            Some(o.or("neuroTX", Neurotransmitter::default(), |node| {
+                node.variant(&[]).unwrap_or_default()
+            }))
+        }
+    };
     SynapseGroupConfig {
         pre: o.required("pre").names(),
         post: o.required("post").names(),
         trainable: o.or("trainable", true, Node::bool),
         p: o.or("p", 1.0, Node::probability),
+        transmitter,
     }
 }
 

@@ -19,7 +19,7 @@ const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
 const IGNORED: &str = "Accepted and ignored.";
 
 /// Parts of the schema in the order of a file: each with its heading.
-const PARTS: [(&str, &str); 28] = [
+const PARTS: [(&str, &str); 32] = [
     ("WorldConfig", "world"),
     ("ObjectConfig", "world.objects.NAME"),
     ("LightParams", "params of a light"),
@@ -44,6 +44,10 @@ const PARTS: [(&str, &str); 28] = [
     ("SensorQuery", "topology.stimuli.NAME.sensor"),
     ("EnsembleConfig", "topology.ensembles.NAME"),
     ("SynapseGroupConfig", "topology.synapses.NAME"),
+    ("SynapseParams", "topology.synapse_params"),
+    ("AmpaParams", "topology.synapse_params.AMPA"),
+    ("GabaParams", "topology.synapse_params.GABA"),
+    ("NmdaParams", "topology.synapse_params.NMDA"),
     ("DecodingConfig", "topology.decoding.NAME"),
     ("AlgorithmConfig", "algorithm"),
     ("FitnessFunction", "algorithm.fitness_function"),

@@ -109,7 +109,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
       line 24: topology.synapses.in.pre[1]: no ensemble or stimulus is named `LIGHT`; known: `H`, `OUT_MSG`, `OUT_LED`, `OUT_MODE`, `OUT_WHEELS`, `MSG`, `H`"),
     // What the original knows and this does not.
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
-     "line 9: topology.synapse_model: not supported: `dynamic_synapse`; known: `static_synapse`"),
+     "line 9: topology.synapse_model: dynamic synapses need neurons that spike"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,
      "line 8: topology.encoding.MSG.scheme: not supported: `PoissonRateCoding`; known: `IdentityEncoding`"),
     (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "ArgmaxDecoding", "params": {"num_outputs": 3}}"#,
@@ -176,7 +176,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neurons:tau:H""#, r#""neurons:tau:HH""#,
      "line 45: algorithm.populations.neurons.objects[1]: no ensemble is named `HH`; did you mean `H`?"),
     (r#""neurons:tau:H""#, r#""neurons:tau""#,
-     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, with a parameter of the neuron model"),
+     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME`, `synapses:delays:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, with a parameter of the neuron model"),
     (r#""neurons:tau:H""#, r#""neurons:bias:H""#,
      "line 45: algorithm.populations.neurons.objects[1]: covers the bias of ensemble `H` a second time, after `neurons:bias:all` of population `neurons`"),
     (r#""neurons:tau:H""#, r#""synapses:weights:in""#,
@@ -326,6 +326,14 @@ fn mistakes_of_spiking_networks_have_answers() {
 const SPIKING_MISTAKES: &[(&str, &str, &str)] = &[
     (r#""dt": 1,"#, r#""dt": 2.5,"#,
      "line 5: topology.dt: must be between 0.001 and 2, is 2.5"),
+    (r#""synapse_model": "static_synapse""#, r#""synapse_model": "dynamic_synapse", "synapse_params": {"AMPA": {"tau": 0.5}}"#,
+     "line 19: topology.synapse_params.AMPA.tau: 0.5 ms is below dt: the receptors would overshoot"),
+    (r#""synapse_model": "static_synapse""#, r#""synapse_model": "dynamic_synapse", "synapse_params": {"NDMA": {"gain": -1}}"#,
+     "line 19: topology.synapse_params.NDMA.gain: must be between 0 and 1000, is -1"),
+    (r#""neurons:v_rest:all""#, r#""synapses:delays:all""#,
+     "line 65: algorithm.populations.p1.objects[3]: covers nothing that can evolve\n\
+      line 66: algorithm.populations.p1.max_vals[3]: delays are from 1 to 9 substeps, not -45\n\
+      line 67: algorithm.populations.p1.min_vals[3]: delays are from 1 to 9 substeps, not -65"),
     (r#""dt": 1,"#, r#""dt": 1, "motor_tau": 0.5,"#,
      "line 5: topology.motor_tau: a key of rate neurons; these spike"),
     (r#""H1": {"n": 10}"#, r#""H1": {"n": 10, "activation": "tanh"}"#,

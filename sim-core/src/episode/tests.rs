@@ -50,6 +50,7 @@ fn add_stimulus(config: &mut ExperimentConfig, name: &str, n: u32, sensor: Senso
         post: vec!["H1".into()],
         trainable: true,
         p: 1.0,
+        transmitter: None,
     };
     config.topology.synapses.insert(format!("{name}-H1"), group);
 }

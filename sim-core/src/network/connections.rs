@@ -6,7 +6,7 @@ use indexmap::IndexMap;
 
 use super::{Ensemble, Stimulus};
 use crate::problems::Problems;
-use experiment_file::TopologyConfig;
+use experiment_file::{Neurotransmitter, TopologyConfig};
 use numeric::random::{Purpose, Stream};
 
 /// Where a synapse comes from.
@@ -34,6 +34,8 @@ pub(crate) struct SynapseGroup {
     pub synapses: Range<usize>,
     /// Whether the genotype may hold its weights.
     pub trainable: bool,
+    /// What its spikes release; none of static synapses.
+    pub transmitter: Option<Neurotransmitter>,
 }
 
 /// Draws the synapses of all groups, in the order that numbers them: group, name
@@ -71,7 +73,9 @@ pub(super) fn draw(
                 }
             }
         }
-        let group = SynapseGroup { synapses: first..synapses.len(), trainable: group.trainable };
+        let synapses = first..synapses.len();
+        let (trainable, transmitter) = (group.trainable, group.transmitter);
+        let group = SynapseGroup { synapses, trainable, transmitter };
         groups.insert(group_name.clone(), group);
     }
     (groups, synapses)

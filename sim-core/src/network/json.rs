@@ -25,6 +25,9 @@ impl Network {
                     .map(|(&name, values)| (name.into(), values[neuron].into()))
                     .collect();
                 keys.insert("ensemble".into(), json!(name));
+                if let Some(delay) = phenotype.delays.get(neuron) {
+                    keys.insert("delay".into(), json!(delay));
+                }
                 if let Some(activation) = ensemble.activation {
                     keys.insert("activation".into(), json!(activation));
                 }
@@ -38,13 +41,17 @@ impl Network {
                     Source::Input(input) => json!({ "input": input }),
                     Source::Neuron(neuron) => json!({ "neuron": neuron }),
                 };
-                json!({
+                let mut json = json!({
                     "group": name,
                     "pre": pre,
                     "post": synapse.post,
                     "weight": phenotype.weights[index],
                     "trainable": group.trainable,
-                })
+                });
+                if let Some(transmitter) = group.transmitter {
+                    json["transmitter"] = json!(transmitter);
+                }
+                json
             })
         });
         let outputs = self.outputs.iter().zip(&phenotype.decoders).map(|(output, weights)| {

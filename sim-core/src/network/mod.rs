@@ -16,7 +16,8 @@ use connections::{Synapse, SynapseGroup};
 use decoding::Output;
 use dynamics::Wiring;
 use experiment_file::{
-    Activation, InitialRates, NamedMap, NeuronModel, NeuronParameter, SensorQuery, TopologyConfig,
+    Activation, InitialRates, NamedMap, NeuronModel, NeuronParameter, SensorQuery, SynapseParams,
+    TopologyConfig,
 };
 pub(crate) use phenotype::Phenotype;
 
@@ -35,6 +36,8 @@ pub(crate) struct Network {
     pub initial_rates: InitialRates,
     /// Time constant of motor neurons, seconds; none: as for all neurons.
     pub motor_tau: Option<f64>,
+    /// Receptors of dynamic synapses; none of static ones.
+    pub receptors: Option<SynapseParams>,
     /// Inputs by name, in the order of their rows.
     pub stimuli: IndexMap<String, Stimulus>,
     /// Neurons by name of their ensemble, in their order.
@@ -111,6 +114,7 @@ impl Network {
             bias_in_gain: config.bias_in_gain,
             initial_rates: config.initial_rates,
             motor_tau: config.motor_tau,
+            receptors: config.synapse_params,
             stimuli,
             ensembles,
             groups,
@@ -122,8 +126,13 @@ impl Network {
 
     /// The order in which its neurons and synapses are computed.
     pub fn wiring(&self) -> &Wiring {
-        let new = || Wiring::new(self.model, &self.ensembles, &self.synapses);
+        let new = || Wiring::new(self.model, &self.ensembles, &self.groups, &self.synapses);
         self.wiring.get_or_init(new)
+    }
+
+    /// Axonal delays: one per neuron with dynamic synapses.
+    pub fn n_delays(&self) -> usize {
+        if self.receptors.is_some() { self.n_neurons() } else { 0 }
     }
 
     /// Number of neurons.

@@ -11,6 +11,9 @@ pub(crate) struct Phenotype {
     /// By name of the parameter, in the order of the neuron model's parameters: its
     /// values, by number of the neuron.
     pub neurons: IndexMap<&'static str, Vec<f64>>,
+    /// By number of the neuron: the delay of its dynamic synapses, whole substeps within
+    /// [`limits::DELAYS`](experiment_file::limits::DELAYS). Empty with static synapses.
+    pub delays: Vec<f64>,
     /// By number of the output: the weights of its decoding, value by value.
     pub decoders: Vec<Vec<f64>>,
 }

@@ -149,6 +149,7 @@ fn decoded_networks_agree() {
         post: post.iter().map(|&name| name.to_owned()).collect(),
         trainable,
         p: 0.5,
+        transmitter: None,
     };
     topology.synapses.insert("mixed".into(), group(&["H2", "I1", "H1"], &["H2", "H1"], true));
     topology.synapses.insert("motors".into(), group(&["OUT_COMM"], &["OUT_ST", "OUT_LED"], false));

@@ -44,6 +44,7 @@ fn all_sensors() -> ExperimentConfig {
                 post: vec!["H1".into()],
                 trainable: true,
                 p: 1.0,
+                transmitter: None,
             },
         );
     }

@@ -1,8 +1,9 @@
 //! Networks of spiking neurons.
 
 use experiment_file::{
-    ActuatorQuery, DecodingConfig, ExperimentConfig, FitnessFunction, GenotypeQuery, NeuronModel,
-    OutputSelector, SynapseSelector,
+    ActuatorQuery, DecodingConfig, EnsembleSelector, ExperimentConfig, FitnessFunction,
+    GenotypeQuery, NeuronModel, Neurotransmitter, OutputSelector, SynapseModel, SynapseParams,
+    SynapseSelector,
 };
 
 use crate::configs::{experiment_a, experiment_c};
@@ -58,5 +59,49 @@ fn swarms_of_every_model_agree() {
             }
         }
         assert!(spread(fitness.iter().copied()) > 0.01, "{model:?}: {fitness:?}");
+    }
+}
+
+/// All receptors, with and without reversal potentials; delays of one ensemble evolve.
+#[test]
+fn swarms_with_dynamic_synapses_agree() {
+    for has_reversal in [true, false] {
+        let mut config = spiking(experiment_c(), NeuronModel::Lif);
+        config.algorithm.fitness_function = FitnessFunction::OrientationConsensus;
+        config.algorithm.evaluation_steps = 12;
+        let topology = &mut config.topology;
+        topology.synapse_model = SynapseModel::Dynamic;
+        let mut params = SynapseParams::default();
+        if !has_reversal {
+            params.ampa.reversal = None;
+            params.gaba.reversal = None;
+            params.nmda.reversal = None;
+        }
+        topology.synapse_params = Some(params);
+        let transmitters =
+            [Neurotransmitter::Gaba, Neurotransmitter::AmpaNmda, Neurotransmitter::Ampa];
+        for (group, transmitter) in
+            topology.synapses.values_mut().zip(transmitters.into_iter().cycle())
+        {
+            group.transmitter = Some(transmitter);
+        }
+        let population = &mut config.algorithm.populations[0];
+        population.objects = vec![
+            GenotypeQuery::Weights(SynapseSelector::Sensory),
+            GenotypeQuery::Weights(SynapseSelector::Hidden),
+            GenotypeQuery::Weights(SynapseSelector::Motor),
+            GenotypeQuery::Delays(EnsembleSelector::Named("H1".into())),
+            GenotypeQuery::Decoders(OutputSelector::All),
+        ];
+        let strength = if has_reversal { 3.0 } else { 80.0 };
+        population.min_vals = vec![-20.0, 0.0, 0.0, 1.0, -1.0];
+        population.max_vals = vec![80.0, strength, strength, 9.0, 1.0];
+        let mut fitness = Vec::new();
+        for seed in 0..5 {
+            let genotype = random_genotype(&config, seed);
+            let episodes = assert_agreement(&config, &genotype, 0, 0..1);
+            fitness.extend(episodes.iter().map(|episode| episode.fitness));
+        }
+        assert!(spread(fitness.iter().copied()) > 0.001, "{fitness:?}");
     }
 }

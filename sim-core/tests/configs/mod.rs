@@ -199,6 +199,8 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
         bias_in_gain: true,
         initial_rates: InitialRates::Activation,
         motor_tau: None,
+        synapse_model: SynapseModel::Static,
+        synapse_params: None,
         stimuli: stimuli
             .iter()
             .map(|&(name, n, sensor)| (name.to_owned(), StimulusConfig { n, sensor }))
@@ -223,6 +225,7 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
                     post: vec![post.into()],
                     trainable: true,
                     p,
+                    transmitter: None,
                 };
                 (format!("{pre}-{post}"), group)
             })

@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use experiment_file::{
-    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, InitialRates, SynapseSelector,
-    TopologyConfig,
+    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, InitialRates, Neurotransmitter,
+    SynapseSelector, TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -20,6 +20,8 @@ pub enum Gene {
     Neuron(&'static str, usize),
     /// Of an output: weight of its decoding.
     Decoder(usize, usize),
+    /// Delay of the neuron of this number.
+    Delay(usize),
 }
 
 /// A gene with its bounds.
@@ -133,13 +135,11 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
                     .map(Gene::Weight)
                     .collect(),
                 GenotypeQuery::Neurons(parameter, selector) => {
-                    let neurons = match selector {
-                        EnsembleSelector::All => 0..n_neurons(topology),
-                        EnsembleSelector::Named(name) => {
-                            neurons_of(topology, name).expect("the query names an ensemble")
-                        }
-                    };
+                    let neurons = ensembles(topology, selector);
                     neurons.map(|neuron| Gene::Neuron(parameter, neuron)).collect()
+                }
+                GenotypeQuery::Delays(selector) => {
+                    ensembles(topology, selector).map(Gene::Delay).collect()
                 }
                 GenotypeQuery::Decoders(selector) => spiking::decoders(topology, selector)
                     .into_iter()
@@ -150,6 +150,15 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
         }
     }
     genes
+}
+
+fn ensembles(topology: &TopologyConfig, selector: &EnsembleSelector) -> Range<usize> {
+    match selector {
+        EnsembleSelector::All => 0..n_neurons(topology),
+        EnsembleSelector::Named(name) => {
+            neurons_of(topology, name).expect("the query names an ensemble")
+        }
+    }
 }
 
 /// What each gene of the experiment's genotypes encodes.
@@ -173,6 +182,10 @@ pub struct Decoded {
     pub w_inputs: Vec<Vec<f64>>,
     /// Parameters of neurons: name, neuron, number within the bounds.
     pub neurons: Vec<(&'static str, usize, f64)>,
+    /// N x N, of the synapses whose transmitter opens AMPA, GABA and NMDA receptors.
+    pub w_receptors: [Vec<Vec<f64>>; 3],
+    /// Neuron and number within the bounds.
+    pub delays: Vec<(usize, f64)>,
     /// Weights of decodings: output, number, value.
     pub decoders: Vec<(usize, usize, f64)>,
 }
@@ -185,17 +198,19 @@ pub fn decode_genes(config: &ExperimentConfig, genotype: &[f64]) -> Decoded {
     let genes = bounded_genes(config, &synapses);
     assert_eq!(genotype.len(), genes.len(), "length of the genotype");
     let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
-    let (mut neurons, mut decoders) = (Vec::new(), Vec::new());
+    let (mut neurons, mut decoders, mut delays) = (Vec::new(), Vec::new(), Vec::new());
     for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
         let value = x * (max - min) + min;
         match *gene {
             Gene::Weight(synapse) => weights[synapse] = Some(value),
             Gene::Neuron(name, neuron) => neurons.push((name, neuron, value)),
+            Gene::Delay(neuron) => delays.push((neuron, value)),
             Gene::Decoder(output, weight) => decoders.push((output, weight, value)),
         }
     }
     let n = n_neurons(topology);
     let mut w_neurons = vec![vec![0.0; n]; n];
+    let mut w_receptors = [(); 3].map(|()| vec![vec![0.0; n]; n]);
     let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
     let mut fixed_weights: Vec<Stream> = (0..topology.synapses.len() as u64)
         .map(|group| Stream::new(topology.seed, 0, 0, Purpose::FixedWeights, group))
@@ -205,10 +220,21 @@ pub fn decode_genes(config: &ExperimentConfig, genotype: &[f64]) -> Decoded {
             weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform());
         match synapse.pre {
             Pre::Input(input) => w_inputs[synapse.post][input] = weight,
-            Pre::Neuron(neuron) => w_neurons[synapse.post][neuron] = weight,
+            Pre::Neuron(neuron) => {
+                w_neurons[synapse.post][neuron] = weight;
+                let opened: &[usize] = match topology.synapses[synapse.group_idx].transmitter {
+                    None => &[],
+                    Some(Neurotransmitter::Ampa) => &[0],
+                    Some(Neurotransmitter::Gaba) => &[1],
+                    Some(Neurotransmitter::AmpaNmda) => &[0, 2],
+                };
+                for &receptor in opened {
+                    w_receptors[receptor][synapse.post][neuron] = weight;
+                }
+            }
         }
     }
-    Decoded { w_neurons, w_inputs, neurons, decoders }
+    Decoded { w_neurons, w_inputs, neurons, w_receptors, delays, decoders }
 }
 
 /// The phenotype: N neurons, I inputs.

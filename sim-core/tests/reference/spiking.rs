@@ -3,7 +3,7 @@
 
 use experiment_file::{
     ActuatorQuery, DecodingConfig, ExperimentConfig, NamedMap, NeuronModel, OutputSelector,
-    TopologyConfig,
+    SynapseParams, TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
@@ -23,6 +23,12 @@ pub struct SpikingNetwork {
     params: Vec<NamedMap<f64>>,
     /// Per output.
     decoders: Vec<Vec<f64>>,
+    /// Of dynamic synapses.
+    receptors: Option<SynapseParams>,
+    /// N x N for AMPA, GABA and NMDA.
+    w_receptors: [Vec<Vec<f64>>; 3],
+    /// Per neuron, substeps.
+    delays: Vec<usize>,
 }
 
 /// What a robot's network remembers, per neuron.
@@ -31,6 +37,10 @@ pub struct SpikingState {
     /// v and what else the model has.
     neurons: Vec<[f64; 3]>,
     spikes: Vec<bool>,
+    /// The spikes of all substeps so far, of dynamic synapses.
+    history: Vec<Vec<bool>>,
+    /// s_ampa, s_gaba, x, s_nmda
+    open: Vec<[f64; 4]>,
     /// x and a of the linear population decoding.
     filters: Vec<[f64; 2]>,
 }
@@ -70,7 +80,7 @@ impl SpikingNetwork {
     /// Decodes a genotype.
     pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
         let topology = &config.topology;
-        let Decoded { w_neurons, w_inputs, neurons, decoders: covered } =
+        let Decoded { w_neurons, w_inputs, neurons, w_receptors, delays, decoders: covered } =
             decode_genes(config, genotype);
         let of_ensembles = topology.ensembles.values();
         let mut params: Vec<NamedMap<f64>> =
@@ -88,8 +98,27 @@ impl SpikingNetwork {
         for (output, weight, value) in covered {
             decoders[output][weight] = value;
         }
-        let &TopologyConfig { neuron_model: model, dt, time_scale, .. } = topology;
-        Self { model, dt, time_scale, w_neurons, w_inputs, params, decoders }
+        let mut stream = Stream::new(topology.seed, 0, 0, Purpose::Connections, 1 << 32);
+        let mut all_delays: Vec<usize> = params.iter().map(|_| 1 + stream.below(9)).collect();
+        for (neuron, delay) in delays {
+            all_delays[neuron] = delay.round() as usize;
+        }
+        let &TopologyConfig {
+            neuron_model: model, dt, time_scale, synapse_params: receptors, ..
+        } = topology;
+        let delays = all_delays;
+        Self {
+            model,
+            dt,
+            time_scale,
+            w_neurons,
+            w_inputs,
+            params,
+            decoders,
+            receptors,
+            w_receptors,
+            delays,
+        }
     }
 
     /// Before the first step.
@@ -106,6 +135,8 @@ impl SpikingNetwork {
         SpikingState {
             neurons: self.params.iter().map(start).collect(),
             spikes: vec![false; self.params.len()],
+            history: Vec::new(),
+            open: vec![[0.0; 4]; self.params.len()],
             filters: vec![[0.0; 2]; self.params.len()],
         }
     }
@@ -122,8 +153,16 @@ impl SpikingNetwork {
         let mut window = Window { counts: vec![0.0; n], first: vec![self.time_scale; n] };
         for substep in 0..self.time_scale {
             let s: Vec<f64> = state.spikes.iter().map(|&s| if s { 1.0 } else { 0.0 }).collect();
+            if let Some(params) = &self.receptors {
+                state.history.push(state.spikes.clone());
+                self.release(params, state);
+            }
             for i in 0..n {
-                let current = dot(&self.w_neurons[i], &s) + dot(&self.w_inputs[i], phi);
+                let from_neurons = match &self.receptors {
+                    None => dot(&self.w_neurons[i], &s),
+                    Some(params) => self.receive(params, state, i),
+                };
+                let current = from_neurons + dot(&self.w_inputs[i], phi);
                 let (next, spiked) =
                     neuron(self.model, &self.params[i], state.neurons[i], current, self.dt);
                 state.neurons[i] = next;
@@ -138,6 +177,33 @@ impl SpikingNetwork {
             }
         }
         self.act(topology, state, &window, msg_length)
+    }
+
+    /// Receptors open where a spike arrives, and close.
+    fn release(&self, params: &SynapseParams, state: &mut SpikingState) {
+        let SynapseParams { ampa, gaba, nmda } = params;
+        let now = state.history.len();
+        for (i, [s_ampa, s_gaba, x, s_nmda]) in state.open.iter_mut().enumerate() {
+            let arrives = now >= self.delays[i] && state.history[now - self.delays[i]][i];
+            for (s, tau) in [(s_ampa, ampa.tau), (s_gaba, gaba.tau), (&mut *x, nmda.tau_rise)] {
+                *s = if arrives { 1.0 } else { *s - self.dt * *s / tau };
+            }
+            *s_nmda += self.dt * (0.5 * *x * (1.0 - *s_nmda) - *s_nmda / nmda.tau_decay);
+        }
+    }
+
+    /// The current of a neuron.
+    fn receive(&self, params: &SynapseParams, state: &SpikingState, i: usize) -> f64 {
+        let SynapseParams { ampa, gaba, nmda } = params;
+        let v = state.neurons[i][0];
+        let flow = |receptor: usize, variable: usize| {
+            let s: Vec<f64> = state.open.iter().map(|open| open[variable]).collect();
+            dot(&self.w_receptors[receptor][i], &s)
+        };
+        ampa.gain * flow(0, 0) * ampa.reversal.map_or(1.0, |e| e - v)
+            + gaba.gain * flow(1, 1) * gaba.reversal.map_or(-1.0, |e| e - v)
+            + nmda.gain * flow(2, 3) * nmda.reversal.map_or(1.0, |e| e - v)
+                / (1.0 + nmda.magnesium * (-0.062 * v).exp() / 3.57)
     }
 
     fn act(

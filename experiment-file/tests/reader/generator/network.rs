@@ -10,6 +10,7 @@ use super::{Dice, insert, object};
 pub(super) struct Network {
     pub(super) topology: Value,
     model: NeuronModel,
+    is_dynamic: bool,
     /// Outputs whose decoding has weights.
     weighted: Vec<String>,
     ensembles: Vec<String>,
@@ -29,6 +30,7 @@ impl Network {
         let mut network = Self {
             topology: json!({}),
             model,
+            is_dynamic: model.is_spiking() && dice.chance(0.5),
             weighted: Vec::new(),
             ensembles: Vec::new(),
             motor: Vec::new(),
@@ -51,13 +53,16 @@ impl Network {
         let outputs = network.outputs(dice, robot, &mut ensembles);
         let synapses = network.synapses(dice, &stimuli);
         let (seed, time_scale) = (dice.below(1 << 20), dice.die(30));
-        let common = [
-            ("time_scale", json!(time_scale)),
-            ("seed", json!(seed)),
-            ("encoding", encoding),
-            ("synapse_model", json!("static_synapse")),
-        ];
+        let common =
+            [("time_scale", json!(time_scale)), ("seed", json!(seed)), ("encoding", encoding)];
         network.topology = object(dice, common);
+        if network.is_dynamic {
+            insert(&mut network.topology, "synapse_model", json!("dynamic_synapse"));
+            let params = receptors(dice);
+            insert(&mut network.topology, "synapse_params", params);
+        } else if dice.chance(0.5) {
+            insert(&mut network.topology, "synapse_model", json!("static_synapse"));
+        }
         let of_model = if model.is_spiking() {
             insert(&mut network.topology, "neuron_model", json!(model));
             let dt = dice.number(0.1, 2.0);
@@ -216,6 +221,10 @@ impl Network {
                 insert(&mut group, "pre", if one { json!(pre[0]) } else { json!(pre) });
                 let post = if dice.chance(0.7) { json!(target) } else { json!([target]) };
                 insert(&mut group, "post", post);
+                if self.is_dynamic && dice.chance(0.7) {
+                    let transmitter = dice.pick(&["AMPA", "GABA", "AMPA+NDMA", "AMPA+NMDA"]);
+                    insert(&mut group, "neuroTX", json!(transmitter));
+                }
                 insert(&mut synapses, &name, group);
                 if is_trainable {
                     self.groups.push((name, pre));
@@ -279,6 +288,12 @@ impl Network {
             let named = selectors.into_iter().map(|s| (format!("neurons:{parameter}:{s}"), bounds));
             queries.extend(named);
         }
+        if self.is_dynamic {
+            let delays = dice.some(&self.ensembles);
+            queries.extend(
+                delays.into_iter().map(|name| (format!("synapses:delays:{name}"), [1.0, 9.0])),
+            );
+        }
         if !self.weighted.is_empty() {
             let outputs = match dice.below(3) {
                 0 => vec!["all".to_owned()],
@@ -299,4 +314,30 @@ impl Network {
         }
         queries
     }
+}
+
+/// Some of the parameters of receptors.
+fn receptors(dice: &mut Dice) -> Value {
+    let mut params = json!({});
+    for name in ["AMPA", "GABA", dice.pick(&["NMDA", "NDMA"])] {
+        let (gain, tau) = (dice.number(0.0, 1000.0), dice.number(2.0, 200.0));
+        let reversal = if dice.chance(0.3) { json!(null) } else { dice.number(-200.0, 200.0) };
+        let receptor = if name.starts_with('N') {
+            let (rise, magnesium) = (dice.number(2.0, 50.0), dice.number(0.0, 1000.0));
+            object(
+                dice,
+                [
+                    ("gain", gain),
+                    ("tau_rise", rise),
+                    ("tau_decay", tau),
+                    ("Mg2", magnesium),
+                    ("E", reversal),
+                ],
+            )
+        } else {
+            object(dice, [("gain", gain), ("tau", tau), ("E", reversal)])
+        };
+        insert(&mut params, name, receptor);
+    }
+    params
 }

@@ -11,7 +11,7 @@ use std::fmt;
 
 use indexmap::IndexMap;
 
-use super::connections::Synapse;
+use super::connections::{Synapse, SynapseGroup};
 use super::{Ensemble, Network, Phenotype};
 use crate::lanes::Lanes;
 use ctrnn::Ctrnn;
@@ -65,6 +65,7 @@ impl Wiring {
     pub fn new(
         model: NeuronModel,
         ensembles: &IndexMap<String, Ensemble>,
+        groups: &IndexMap<String, SynapseGroup>,
         synapses: &[Synapse],
     ) -> Self {
         match model {
@@ -75,7 +76,7 @@ impl Wiring {
             | NeuronModel::Izhikevich
             | NeuronModel::MorrisLecar => {
                 let n_neurons = ensembles.values().last().map_or(0, |last| last.neurons.end);
-                Self::Spiking(spiking::Wiring::new(n_neurons, synapses))
+                Self::Spiking(spiking::Wiring::new(n_neurons, groups, synapses))
             }
         }
     }

@@ -6,6 +6,7 @@ use super::super::SpikeWindow;
 use super::super::aligned::Aligned;
 use super::kernel::Kernel;
 use super::model::Model;
+use super::receptors::ReceptorState;
 use crate::lanes::Lanes;
 use numeric::Isa;
 
@@ -30,6 +31,8 @@ pub(super) struct Chunk {
     drive: Aligned,
     /// `[neuron][lane]`
     current: Aligned,
+    /// Of dynamic synapses.
+    receptors: Option<ReceptorState>,
     /// Spikes in the environment step, `[neuron][lane]`.
     counts: Aligned,
     /// Of motor neurons: the substep of the first spike, x and a of the filter,
@@ -57,6 +60,7 @@ impl Chunk {
             active: Vec::with_capacity(n_neurons),
             drive: rows(n_neurons),
             current: rows(n_neurons),
+            receptors: kernel.receptors.as_ref().map(|_| ReceptorState::new(n_neurons, n_lanes)),
             counts: rows(n_neurons),
             motor: rows(kernel.motor.len() * 3),
         };
@@ -194,6 +198,10 @@ fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
         for &(post, weight) in kernel.outgoing.of(pre) {
             accumulate(simd, &mut currents[post], weight, &spikes[pre]);
         }
+    }
+    if let (Some(receptors), Some(held)) = (&kernel.receptors, &mut chunk.receptors) {
+        let states = rows::<S, W>(chunk.state.values()).as_chunks::<Z>().0;
+        receptors.propagate::<S, Z, W>(simd, held, spikes, states, currents);
     }
 }
 

@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::model::Model;
+use super::receptors::Receptors;
 use super::wiring::{Grouped, Wiring};
 use crate::network::{Network, Phenotype};
 
@@ -17,8 +18,10 @@ pub(super) struct Kernel<M, const C: usize, const Z: usize> {
     pub starts: Vec<[f32; Z]>,
     /// Synapses from stimuli, by postsynaptic neuron.
     pub afferent: Weighted,
-    /// Synapses between neurons, by presynaptic neuron.
+    /// Static synapses between neurons, by presynaptic neuron.
     pub outgoing: Weighted,
+    /// Dynamic synapses between neurons; none if they are static.
+    pub receptors: Option<Receptors>,
     /// Neurons that outputs decode, ascending.
     pub motor: Vec<usize>,
     /// What decoders filter spikes with.
@@ -71,6 +74,9 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Kernel<M, C, Z> {
             starts: starts.collect(),
             afferent: Weighted::new(&wiring.afferent, phenotype),
             outgoing: Weighted::new(&wiring.outgoing, phenotype),
+            receptors: network
+                .receptors
+                .map(|params| Receptors::new(params, wiring, phenotype, network.dt)),
             motor: motor.flat_map(|ensemble| ensemble.neurons.clone()).collect(),
             filter: Filter::new(network.dt),
             model: PhantomData,
@@ -84,7 +90,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Kernel<M, C, Z> {
 }
 
 impl Weighted {
-    fn new(grouped: &Grouped, phenotype: &Phenotype) -> Self {
+    pub fn new(grouped: &Grouped, phenotype: &Phenotype) -> Self {
         let weight = |number: usize| phenotype.weights[number] as f32;
         let members = grouped.members.iter().map(|member| (member.other, weight(member.synapse)));
         Self { groups: grouped.groups.clone(), members: members.collect() }

@@ -17,6 +17,7 @@ mod kernel;
 mod lif;
 mod model;
 mod morris_lecar;
+mod receptors;
 mod wiring;
 
 use super::{Dynamics, SpikeWindow};

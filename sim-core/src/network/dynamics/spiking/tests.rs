@@ -5,7 +5,9 @@ use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::testing::{experiment_a_spiking, genotype};
-use experiment_file::{ExperimentConfig, NeuronModel};
+use experiment_file::{
+    ExperimentConfig, NeuronModel, Neurotransmitter, SynapseModel, SynapseParams,
+};
 use numeric::Isa;
 
 const MODELS: [NeuronModel; 5] = [
@@ -26,14 +28,23 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Networks of each model, substep by substep or in steps of several.
+/// Networks of each model, and one with dynamic synapses, substep by substep or in steps
+/// of several.
 fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
     let networks = MODELS.into_iter().map(|model| {
         let mut config = experiment_a_spiking(model);
         config.topology.time_scale = time_scale;
         compiled(&config)
     });
-    networks.collect()
+    let mut config = experiment_a_spiking(NeuronModel::Lif);
+    config.topology.time_scale = time_scale;
+    config.topology.synapse_model = SynapseModel::Dynamic;
+    config.topology.synapse_params = Some(SynapseParams::default());
+    for (index, group) in config.topology.synapses.values_mut().enumerate() {
+        let transmitters = [Neurotransmitter::AmpaNmda, Neurotransmitter::Gaba];
+        group.transmitter = Some(transmitters[index % 2]);
+    }
+    networks.chain([compiled(&config)]).collect()
 }
 
 fn stimulus(step: usize, lane: usize, input: usize) -> f64 {

@@ -3,15 +3,29 @@
 
 use std::ops::Range;
 
-use crate::network::connections::{Source, Synapse};
+use indexmap::IndexMap;
+
+use crate::network::connections::{Source, Synapse, SynapseGroup};
+use experiment_file::Neurotransmitter;
 
 /// Synapses by what starts them or where they end.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
     /// Synapses from stimuli, by postsynaptic neuron; a neuron's ascend by their input.
     pub afferent: Grouped,
-    /// Synapses between neurons, by presynaptic neuron.
+    /// Static synapses between neurons, by presynaptic neuron.
     pub outgoing: Grouped,
+    /// Dynamic synapses between neurons that open a receptor, by postsynaptic neuron, one
+    /// of each [`Receptor`].
+    pub receptive: [Grouped; 3],
+}
+
+/// What opens when a dynamic synapse has a spike, in the order of [`Wiring::receptive`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Receptor {
+    Ampa,
+    Gaba,
+    Nmda,
 }
 
 /// Synapses in groups.
@@ -34,7 +48,16 @@ pub(crate) struct Member {
 
 impl Wiring {
     /// Orders the synapses of `n_neurons` neurons.
-    pub fn new(n_neurons: usize, synapses: &[Synapse]) -> Self {
+    pub fn new(
+        n_neurons: usize,
+        groups: &IndexMap<String, SynapseGroup>,
+        synapses: &[Synapse],
+    ) -> Self {
+        let mut transmitters = vec![None; synapses.len()];
+        for group in groups.values() {
+            transmitters[group.synapses.clone()].fill(group.transmitter);
+        }
+        let mut receptive = [(); 3].map(|()| vec![Vec::new(); n_neurons]);
         let mut afferent = vec![Vec::new(); n_neurons];
         let mut outgoing = vec![Vec::new(); n_neurons];
         for (number, &Synapse { pre, post }) in synapses.iter().enumerate() {
@@ -42,12 +65,30 @@ impl Wiring {
                 Source::Input(input) => {
                     afferent[post].push(Member { other: input, synapse: number });
                 }
-                Source::Neuron(pre) => {
-                    outgoing[pre].push(Member { other: post, synapse: number });
-                }
+                Source::Neuron(pre) => match transmitters[number] {
+                    None => outgoing[pre].push(Member { other: post, synapse: number }),
+                    Some(transmitter) => {
+                        for &receptor in opened_by(transmitter) {
+                            let member = Member { other: pre, synapse: number };
+                            receptive[receptor as usize][post].push(member);
+                        }
+                    }
+                },
             }
         }
-        Self { afferent: Grouped::new(afferent), outgoing: Grouped::new(outgoing) }
+        Self {
+            afferent: Grouped::new(afferent),
+            outgoing: Grouped::new(outgoing),
+            receptive: receptive.map(Grouped::new),
+        }
+    }
+}
+
+fn opened_by(transmitter: Neurotransmitter) -> &'static [Receptor] {
+    match transmitter {
+        Neurotransmitter::Ampa => &[Receptor::Ampa],
+        Neurotransmitter::AmpaNmda => &[Receptor::Ampa, Receptor::Nmda],
+        Neurotransmitter::Gaba => &[Receptor::Gaba],
     }
 }
 

@@ -1,0 +1,163 @@
+//! Dynamic synapses (section 4.2 of the thesis): a spike arrives after the delay of its
+//! axon, opens receptors of the axon, and these drive a current into every postsynaptic
+//! neuron.
+//!
+//! Of each axon: s_ampa = 1 when a spike arrives, else s_ampa -= dt s_ampa / tau; s_gaba
+//! likewise; x = 1, else x -= dt x / tau_rise, then
+//! s_nmda += dt (0.5 x (1 - s_nmda) - s_nmda / tau_decay).
+//!
+//! Of each neuron: I = sum over receptors of gain * (W s) * (E - v), where NMDA's is divided
+//! by 1 + Mg2 exp(-0.062 v) / 3.57. Without E the last factor is 1, of GABA -1.
+
+use pulp::Simd;
+
+use super::super::aligned::Aligned;
+use super::functions::exp;
+use super::kernel::Weighted;
+use super::wiring::Wiring;
+use crate::network::Phenotype;
+use experiment_file::{SynapseParams, limits};
+
+/// Variables of an axon: s_ampa, s_gaba, x, s_nmda.
+const N_VARIABLES: usize = 4;
+/// Substeps whose spikes may still be on their way.
+const N_SLOTS: usize = *limits::DELAYS.end() as usize;
+
+/// Dynamic synapses with the values of a genotype.
+#[derive(Debug)]
+pub(super) struct Receptors {
+    /// Per neuron, substeps.
+    delays: Vec<usize>,
+    /// By postsynaptic neuron, one for each receptor.
+    incoming: [Weighted; 3],
+    /// Gain and reversal potential of each receptor.
+    drives: [(f32, Option<f32>); 3],
+    /// What is left of s_ampa, s_gaba and x after a substep.
+    retention: [f32; 3],
+    /// Of s_nmda.
+    rise: f32,
+    decay: f32,
+    /// Mg2 / 3.57
+    magnesium: f32,
+}
+
+/// What axons and receptors of a chunk hold.
+#[derive(Debug)]
+pub(super) struct ReceptorState {
+    /// Substeps until now.
+    clock: usize,
+    /// Spikes of the last substeps, `[slot][neuron][lane]`.
+    history: Aligned,
+    /// `[neuron][variable][lane]`
+    open: Aligned,
+}
+
+impl Receptors {
+    /// The synapses of a genotype; `dt`: ms.
+    pub fn new(params: SynapseParams, wiring: &Wiring, phenotype: &Phenotype, dt: f64) -> Self {
+        let SynapseParams { ampa, gaba, nmda } = params;
+        let drive = |gain: f64, reversal: Option<f64>| (gain as f32, reversal.map(|e| e as f32));
+        let left = |tau: f64| (1.0 - dt / tau) as f32;
+        // Without a reversal potential GABA inhibits by its sign.
+        let gaba_gain = if gaba.reversal.is_some() { gaba.gain } else { -gaba.gain };
+        Self {
+            delays: phenotype.delays.iter().map(|&delay| delay as usize).collect(),
+            incoming: wiring.receptive.each_ref().map(|it| Weighted::new(it, phenotype)),
+            drives: [
+                drive(ampa.gain, ampa.reversal),
+                drive(gaba_gain, gaba.reversal),
+                drive(nmda.gain, nmda.reversal),
+            ],
+            retention: [left(ampa.tau), left(gaba.tau), left(nmda.tau_rise)],
+            rise: (0.5 * dt) as f32,
+            decay: (dt / nmda.tau_decay) as f32,
+            magnesium: (nmda.magnesium / 3.57) as f32,
+        }
+    }
+
+    /// Adds to the currents of a substep. `spikes`: of the substep before. `states`: of the
+    /// neurons, their first variable v.
+    #[inline(always)]
+    pub fn propagate<S: Simd, const Z: usize, const W: usize>(
+        &self,
+        simd: S,
+        held: &mut ReceptorState,
+        spikes: &[[S::f32s; W]],
+        states: &[[[S::f32s; W]; Z]],
+        currents: &mut [[S::f32s; W]],
+    ) {
+        let n_neurons = spikes.len();
+        let history: &mut [[S::f32s; W]] =
+            S::as_mut_simd_f32s(held.history.values_mut()).0.as_chunks_mut().0;
+        let slot = |age: usize| (held.clock + N_SLOTS - age) % N_SLOTS * n_neurons;
+        history[slot(0)..][..n_neurons].copy_from_slice(spikes);
+        let open: &mut [[S::f32s; W]] =
+            S::as_mut_simd_f32s(held.open.values_mut()).0.as_chunks_mut().0;
+        let open = open.as_chunks_mut::<N_VARIABLES>().0;
+        let one = simd.splat_f32s(1.0);
+        let [left_ampa, left_gaba, left_x] = self.retention.map(|left| simd.splat_f32s(left));
+        let (rise, decay) = (simd.splat_f32s(self.rise), simd.splat_f32s(self.decay));
+        for (neuron, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
+            // A delay of 1 is that of a static synapse.
+            let arrived = &history[slot(self.delays[neuron] - 1) + neuron];
+            for vector in 0..W {
+                let spiked = simd.equal_f32s(arrived[vector], one);
+                let closed = simd.mul_f32s(ampa[vector], left_ampa);
+                ampa[vector] = simd.select_f32s(spiked, one, closed);
+                let closed = simd.mul_f32s(gaba[vector], left_gaba);
+                gaba[vector] = simd.select_f32s(spiked, one, closed);
+                let closed = simd.mul_f32s(x[vector], left_x);
+                x[vector] = simd.select_f32s(spiked, one, closed);
+                let room = simd.sub_f32s(one, nmda[vector]);
+                let growth = simd.mul_f32s(simd.mul_f32s(rise, x[vector]), room);
+                let loss = simd.mul_f32s(decay, nmda[vector]);
+                nmda[vector] = simd.add_f32s(nmda[vector], simd.sub_f32s(growth, loss));
+            }
+        }
+        held.clock += 1;
+        for (neuron, current) in currents.iter_mut().enumerate() {
+            let v = &states[neuron][0];
+            for (receptor, (incoming, (gain, reversal))) in
+                self.incoming.iter().zip(self.drives).enumerate()
+            {
+                let synapses = incoming.of(neuron);
+                if synapses.is_empty() {
+                    continue;
+                }
+                // s_ampa, s_gaba, s_nmda: x is between the last two.
+                let variable = receptor + usize::from(receptor == 2);
+                let mut sum = [simd.splat_f32s(0.0); W];
+                for &(pre, weight) in synapses {
+                    let weight = simd.splat_f32s(weight);
+                    for vector in 0..W {
+                        let s = open[pre][variable][vector];
+                        sum[vector] = simd.mul_add_f32s(weight, s, sum[vector]);
+                    }
+                }
+                let gain = simd.splat_f32s(gain);
+                for vector in 0..W {
+                    let mut flow = simd.mul_f32s(gain, sum[vector]);
+                    if let Some(reversal) = reversal {
+                        let force = simd.sub_f32s(simd.splat_f32s(reversal), v[vector]);
+                        flow = simd.mul_f32s(flow, force);
+                    }
+                    if receptor == 2 {
+                        let slope = simd.mul_f32s(simd.splat_f32s(-0.062), v[vector]);
+                        let block =
+                            simd.mul_f32s(simd.splat_f32s(self.magnesium), exp(simd, slope));
+                        flow = simd.div_f32s(flow, simd.add_f32s(one, block));
+                    }
+                    current[vector] = simd.add_f32s(current[vector], flow);
+                }
+            }
+        }
+    }
+}
+
+impl ReceptorState {
+    /// All closed, nothing on its way.
+    pub fn new(n_neurons: usize, n_lanes: usize) -> Self {
+        let rows = |n: usize| Aligned::new(n * n_neurons * n_lanes);
+        Self { clock: 0, history: rows(N_SLOTS), open: rows(N_VARIABLES) }
+    }
+}
