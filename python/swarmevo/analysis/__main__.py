@@ -1,0 +1,49 @@
+"""python -m swarmevo.analysis GENOTYPE -o DIRECTORY: writes a report on it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ..errors import SwarmError
+from ..experiment import Experiment
+from ..files import open as open_archive
+from ..fleet import connect
+from .report import report
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m swarmevo.analysis", description="Writes a report on how a genotype does it.")
+    parser.add_argument("genotype", help="champion file, or an address such as 3 or 3@5/7")
+    parser.add_argument("--config", type=Path, help="experiment file of a champion file")
+    parser.add_argument("--data-dir", type=Path, help="read addresses from this directory instead of a coordinator")
+    parser.add_argument("--trials", type=int, default=50, help="episodes (%(default)s)")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="directory of report.html and its tables")
+    arguments = parser.parse_args()
+    try:
+        if Path(arguments.genotype).is_file():
+            if arguments.config is None:
+                parser.error("a champion file needs --config, the experiment file that it was evolved with")
+            champion = json.loads(Path(arguments.genotype).read_text(encoding="utf-8"))
+            experiment, genotype = Experiment.from_file(arguments.config), champion["genotype"]
+        else:
+            records = connect() if arguments.data_dir is None else open_archive(arguments.data_dir)
+            experiment = records.run(_run_of(arguments.genotype)).experiment
+            genotype = records.individual(arguments.genotype).genotype
+        title = f"{experiment.name}: {Path(arguments.genotype).stem}"
+        print(report(experiment, genotype, arguments.output, title=title, trials=arguments.trials))
+    except (SwarmError, OSError, ValueError, KeyError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _run_of(address: str) -> int | str:
+    experiment = address.partition("@")[0]
+    return int(experiment) if experiment.isdecimal() else experiment
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,140 @@
+"""Who says what, what it tells, and who heeds it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..trace import Trace
+from .information import Codes, Dependence, dependence, entropy, mutual_information
+
+FIRST = 10
+"""The first step that counts: until then robots are made to send."""
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """The messages of a swarm, numbered."""
+
+    legend: list[tuple[float, ...]]
+    """The message of each code, most frequent first."""
+    own: Codes
+    """``[T, steps, R]``: code of each robot's own message, sent or not."""
+    heard: Codes
+    """``[T, steps, R]``: code of the message that it heard; -1 without a frame."""
+
+
+def symbols(trace: Trace, first: int = FIRST) -> Symbols:
+    """The messages of a trace, from step ``first`` on."""
+    own, others = trace.messages[:, first:], trace.frame_messages[:, first:]
+    there = trace.frame_emitters[:, first:] >= 0
+    everything = np.concatenate([own.reshape(-1, own.shape[-1]), others[there]])
+    distinct, inverse, counts = np.unique(everything, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    coded = rank[inverse.reshape(-1)]
+    n_own = own[..., 0].size
+    found = np.full(there.shape, -1, dtype=np.int64)
+    found[there] = coded[n_own:]
+    return Symbols([tuple(row) for row in distinct[order].tolist()], coded[:n_own].reshape(there.shape), found)
+
+
+@dataclass(frozen=True)
+class ChannelUse:
+    """How a swarm uses its channel."""
+
+    sends: float
+    """Share of robots and steps that send their own message; the others relay."""
+    shares: dict[tuple[float, ...], float]
+    """Share of each symbol among what is sent, most frequent first."""
+    entropy: float
+    """Of these shares, bits: 0 is a channel without content."""
+    hears: float
+    """Share of robots and steps that hear something."""
+    hops: NDArray[np.float64]
+    """Share of the frames that are heard by their number of emissions, from 1 on."""
+
+
+def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:
+    """What is sent and heard from step ``first`` on."""
+    found = symbols(trace, first)
+    sends = trace.sends[:, first:]
+    sent = found.own[sends]
+    counts = np.bincount(sent, minlength=len(found.legend))
+    order = [int(code) for code in np.argsort(-counts, kind="stable") if counts[code]]
+    hops = trace.frame_hops[:, first:]
+    frames = np.bincount(hops[hops > 0].astype(np.int64))[1:]
+    return ChannelUse(
+        float(sends.mean()),
+        {found.legend[code]: float(counts[code] / counts.sum()) for code in order},
+        entropy(sent),
+        float((found.heard >= 0).mean()),
+        frames / max(1, frames.sum()),
+    )
+
+
+def heard(trace: Trace, first: int = FIRST) -> Codes:
+    """``[T, steps, R]``: what each robot heard, with 0 for nothing, else the symbol's code + 1."""
+    return symbols(trace, first).heard + 1
+
+
+def signalling(trace: Trace, about: ArrayLike, *, first: int = FIRST, shuffles: int = 200) -> Dependence:
+    """*Positive signalling* (Lowe et al. 2019): what a message tells of its sender.
+
+    ``about`` is a code ``[T, steps, R]`` of the sender's state or stimuli in all steps, such as
+    ``trace.leds`` or ``discretise(trace.stimuli[..., 0])``; negative where there is none. Only what is
+    sent counts. It says nothing of whether anybody listens.
+    """
+    state = np.where(trace.sends, np.asarray(about, dtype=np.int64), -1)[:, first:]
+    return dependence(symbols(trace, first).own, state, shuffles=shuffles)
+
+
+def listening(trace: Trace, response: ArrayLike, *, first: int = FIRST, shuffles: int = 200) -> Dependence:
+    """*Positive listening*, as far as a trace shows it: what the message just heard tells of what the
+    robot then does.
+
+    ``response`` is a code ``[T, steps, R]``, such as ``trace.leds``. A robot acts on the frame of the
+    same step. Robots that are near each other also see alike: dependence is no proof of influence.
+    """
+    done = np.asarray(response, dtype=np.int64)[:, first:]
+    return dependence(symbols(trace, first).heard, done, shuffles=shuffles)
+
+
+def speaker_consistency(
+    trace: Trace, action: ArrayLike, lags: Iterable[int] = range(5), *, first: int = FIRST
+) -> dict[int, float]:
+    """Speaker consistency by lag: how far a robot does what it says. Jaques et al. (2019) average
+    normalised conditional entropies; here it is the mutual information of the message that a robot sends
+    and what itself does ``lag`` steps later, as a share of the message's entropy (the uncertainty
+    coefficient, Theil 1970): 1 if the message follows from the action, 0 if it has no content.
+    """
+    found, done = symbols(trace, first).own, np.asarray(action, dtype=np.int64)[:, first:]
+    sends = trace.sends[:, first:]
+    result = {}
+    for lag in lags:
+        end = found.shape[1] - lag
+        if lag < 0 or end <= 0:
+            raise ValueError(f"lag {lag} of a trace of {found.shape[1]} steps that count")
+        there = sends[:, :end]
+        said, did = found[:, :end][there], done[:, lag:][there]
+        whole = entropy(said)
+        result[lag] = mutual_information(said, did) / whole if whole > 0 else 0.0
+    return result
+
+
+def informants(trace: Trace, first: int = FIRST) -> NDArray[np.float64]:
+    """``[R, R]``: of what robot i heard, the share that robot j had first sent, over all trials; rows of
+    robots that heard nothing are zeros."""
+    n = trace.n_robots
+    originators = trace.frame_originators[:, first:]
+    counts = np.zeros((n, n))
+    for robot in range(n):
+        known = originators[:, :, robot]
+        counts[robot] = np.bincount(known[known >= 0], minlength=n)
+    totals = counts.sum(axis=1, keepdims=True)
+    return np.asarray(counts / np.maximum(totals, 1))
+
