@@ -16,13 +16,14 @@ from .channel import (
     symbols,
 )
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
+from .generalisation import Condition, generalisation
 from .information import Dependence, codes, dependence, discretise, entropy, mutual_information
 from .proportions import Proportion, conditional, proportion
 from .report import report
 
 __all__ = [
-    "CTRNN", "ChannelUse", "Dependence", "Equilibrium", "LimitCycle", "Proportion", "Symbols",
-    "channel_use", "codes", "conditional", "dependence", "discretise", "entropy", "heard",
+    "CTRNN", "ChannelUse", "Condition", "Dependence", "Equilibrium", "LimitCycle", "Proportion", "Symbols",
+    "channel_use", "codes", "conditional", "dependence", "discretise", "entropy", "generalisation", "heard",
     "informants", "listening", "mutual_information", "proportion", "report", "signalling",
     "speaker_consistency", "symbols",
 ]

@@ -19,6 +19,7 @@ def main() -> int:
     parser.add_argument("genotype", help="champion file, or an address such as 3 or 3@5/7")
     parser.add_argument("--config", type=Path, help="experiment file of a champion file")
     parser.add_argument("--data-dir", type=Path, help="read addresses from this directory instead of a coordinator")
+    parser.add_argument("--fleet", action="store_true", help="evaluate other conditions on the coordinator's fleet")
     parser.add_argument("--trials", type=int, default=50, help="episodes (%(default)s)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="directory of report.html and its tables")
     arguments = parser.parse_args()
@@ -32,8 +33,9 @@ def main() -> int:
             records = connect() if arguments.data_dir is None else open_archive(arguments.data_dir)
             experiment = records.run(_run_of(arguments.genotype)).experiment
             genotype = records.individual(arguments.genotype).genotype
+        client = connect() if arguments.fleet else None
         title = f"{experiment.name}: {Path(arguments.genotype).stem}"
-        print(report(experiment, genotype, arguments.output, title=title, trials=arguments.trials))
+        print(report(experiment, genotype, arguments.output, title=title, trials=arguments.trials, client=client))
     except (SwarmError, OSError, ValueError, KeyError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

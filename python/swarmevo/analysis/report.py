@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..experiment import Experiment
+from ..fleet import Client
 from ..trace import Trace
 from ..trials import TrialSet
 from .channel import FIRST, channel_use, informants, listening, signalling, symbols
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
+from .generalisation import Condition, generalisation
 from .information import Codes, codes, discretise
 from .page import Page
 from .proportions import conditional
@@ -29,11 +31,13 @@ def report(
     *,
     title: str | None = None,
     trials: int = 50,
+    client: Client | None = None,
 ) -> Path:
     """Writes ``report.html`` and its tables as CSV to ``directory``; returns the page's path.
 
     ``trials`` episodes of the set of evaluations are simulated, which had no part in evolution, and
-    as many for every input that is taken away. Needs SciPy and Matplotlib (``analysis``, ``plot``).
+    as many for every input that is taken away. Other conditions are evaluated on the fleet of ``client``,
+    if there is one. Needs SciPy and Matplotlib (``analysis``, ``plot``).
     """
     genes = np.asarray(genotype, dtype=np.float64)
     trace = experiment.simulate(genes, TrialSet.evaluation(), trials=trials)
@@ -43,6 +47,7 @@ def report(
         f"fitness {_mean(trace.fitness)}."
     )
     _inputs(page, experiment, genes, trace)
+    _conditions(page, generalisation(experiment, genes, trials=trials, client=client))
     _channel(page, trace)
     _meaning(page, trace)
     _episode(page, trace)
@@ -60,6 +65,20 @@ def _inputs(page: Page, experiment: Experiment, genotype: NDArray[np.float64], t
         rows.append([sensor, _mean(fitness), change])
     page.table("inputs", ["input that is 0", "fitness", "change, in the same trials"], rows)
     page.note("Mean over trials with its 95 % interval. The same worlds and noise with and without the input.")
+
+
+def _conditions(page: Page, conditions: list[Condition]) -> None:
+    page.heading("Under other conditions")
+    rows = [
+        [it.what or "as evolved", "" if np.isnan(it.value) else f"{it.value:g}", it.problem or it.mean, *_ends(it)]
+        for it in conditions
+    ]
+    page.table("conditions", ["changed", "to", "fitness", "from", "to (95 %)"], rows)
+    page.note("Mean over trials that have the same numbers in all rows, and its 95 % interval.")
+
+
+def _ends(condition: Condition) -> list[object]:
+    return ["", ""] if condition.problem else list(condition.ci95)
 
 
 def _channel(page: Page, trace: Trace) -> None:

@@ -1,0 +1,114 @@
+"""Under other conditions than those of evolution: sizes, ranges, noise, time steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import ExperimentError
+from ..experiment import Experiment
+from ..fleet import Client
+from ..trials import TrialSet
+
+TRIALS_OF = TrialSet.generation_of(1_000_000)
+"""Trials that no run gets to, and that a fleet computes, too: the same bits there and here."""
+
+Config = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The fitness of a genotype under one condition."""
+
+    what: str
+    """What is changed, such as ``robots``; empty for the experiment as it is."""
+    value: float
+    """Its value; NaN for the experiment as it is."""
+    mean: float
+    """Mean fitness over the trials; NaN if there is no such experiment."""
+    ci95: tuple[float, float]
+    """Mean ± 1.96 standard errors."""
+    problem: str = ""
+    """Why there is no such experiment: a swarm that does not fit into its world, say."""
+
+
+def generalisation(
+    experiment: Experiment, genotype: ArrayLike, *, trials: int = 50, client: Client | None = None
+) -> list[Condition]:
+    """Fitness under every condition that the experiment has: as it is, with half to five times as many
+    robots, with other reaches of the radio, other noise of its sensors, and other steps of its wheels.
+
+    All in trials with the same numbers, which had no part in evolution. ``client``: evaluate on its fleet.
+    """
+    genes = np.asarray(genotype, dtype=np.float64)[np.newaxis]
+    found = []
+    for what, value, config in _conditions(experiment.to_dict()):
+        try:
+            changed = Experiment.from_dict(config)
+            run = changed.evaluate if client is None else lambda *it, **of: client.evaluate(changed, *it, **of)
+            fitness = run(genes, TRIALS_OF, trials=trials)[0]
+        except ExperimentError as error:
+            found.append(Condition(what, value, np.nan, (np.nan, np.nan), error.problems[0].message))
+            continue
+        mean, error_of_mean = float(fitness.mean()), float(fitness.std(ddof=1) / np.sqrt(trials))
+        found.append(Condition(what, value, mean, (mean - 1.96 * error_of_mean, mean + 1.96 * error_of_mean)))
+    return found
+
+
+def _conditions(config: Config) -> Iterator[tuple[str, float, Config]]:
+    yield "", np.nan, config
+    robots = _robots(config)
+    for factor in (0.5, 1.5, 2, 3, 5):
+        n = round(robots["num_instances"] * factor)
+        changed = deepcopy(config)
+        _resize(_robots(changed), n)
+        yield "robots", n, changed
+    for what, keys in _SCALED.items():
+        there = [(key, value) for key in keys if (value := _find(robots, key))]
+        for factor in (0.5, 0.75, 1.5, 2) if there else ():
+            changed = deepcopy(config)
+            for (*path, key), value in there:
+                place = _robots(changed)
+                for name in path:
+                    place = place[name]
+                place[key] = value * factor
+            yield what, there[0][1] * factor, changed
+
+
+_SCALED = {
+    "reach of the radio, cm": (
+        ("sensors", "wireless_receiver", "range"),
+        ("actuators", "wireless_transmitter", "range"),
+    ),
+    "variance of the light sensor's noise": (("sensors", "light_sensor", "noise_variance"),),
+    "variance of the distance sensor's noise": (("sensors", "distance_sensor", "noise_variance"),),
+    "reach of the light sensor, cm": (("sensors", "light_sensor", "range"),),
+    "step of the wheels, s": (("actuators", "wheel_actuator", "step_duration"),),
+}
+
+
+def _robots(config: Config) -> Config:
+    robots: Config = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
+    return robots
+
+
+def _resize(robots: Config, n: int) -> None:
+    """Another number of robots, with the same share of affected ones."""
+    was, robots["num_instances"] = robots["num_instances"], n
+    for perturbation in robots.get("perturbations", {}).values():
+        for it in perturbation if isinstance(perturbation, list) else [perturbation]:
+            if isinstance(it.get("affected_robots"), int):
+                it["affected_robots"] = (2 * it["affected_robots"] * n + was) // (2 * was)
+
+
+def _find(robots: Config, path: tuple[str, ...]) -> float | None:
+    value: Any = robots
+    for key in path:
+        value = value.get(key) if isinstance(value, dict) else None
+    return value if isinstance(value, (int, float)) else None
+
