@@ -17,7 +17,10 @@ mod reference;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use experiment_file::{ExperimentConfig, Initializer};
+use experiment_file::{
+    DecodingConfig, ExperimentConfig, GenotypeQuery, Initializer, NeuronModel, Neurotransmitter,
+    OutputSelector, SynapseModel, SynapseParams, SynapseSelector,
+};
 use numeric::random::{Purpose, Stream};
 use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
 use sim_core::{Isa, Simulation};
@@ -44,6 +47,9 @@ fn main() {
     let best = *isas.last().expect("every processor has the portable level");
     if wants("kernel") {
         kernel(&isas);
+    }
+    if wants("spiking") {
+        spiking(&isas);
     }
     if wants("lanes") {
         lanes(best);
@@ -94,6 +100,65 @@ fn kernel(isas: &[Isa]) {
     }
 }
 
+/// Networks of spiking neurons, beside the rate neurons of the same task: random genotypes.
+fn spiking(isas: &[Isa]) {
+    println!("\nspiking: networks of experiment A, 50 lanes, us per lane and environment step");
+    print!("{:10}", "");
+    let mut configs = vec![("rate_model".to_owned(), experiment_a())];
+    for model in NeuronModel::ALL.into_iter().filter(|model| model.is_spiking()) {
+        configs.push((model.name().to_owned(), spiking_a(model, SynapseModel::Static)));
+    }
+    configs.push(("lif, dynamic".to_owned(), spiking_a(NeuronModel::Lif, SynapseModel::Dynamic)));
+    println!("{}", configs.iter().map(|(name, _)| format!(" {name:>13}")).collect::<String>());
+    for &isa in isas {
+        print!("{:10}", isa.name());
+        for (_, config) in &configs {
+            let simulation = compile(config, isa);
+            let n_lanes = 50;
+            let genotype = genotype(config, 1);
+            let mut load = NetworkLoad::new(&simulation, &genotype, n_lanes).expect("it is valid");
+            let [step] = medians([&mut || seconds_per(|| load.step())]);
+            print!(" {:13.3}", step / n_lanes as f64 * 1e6);
+        }
+        println!();
+    }
+}
+
+/// Experiment A with spiking neurons, whose weights and decoders evolve.
+fn spiking_a(model: NeuronModel, synapses: SynapseModel) -> ExperimentConfig {
+    let mut config = experiment_a();
+    let topology = &mut config.topology;
+    (topology.neuron_model, topology.dt) = (model, 1.0);
+    for ensemble in topology.ensembles.values_mut() {
+        (ensemble.activation, ensemble.params) = (None, model.default_params());
+    }
+    for (name, output) in &topology.outputs {
+        let num_outputs = topology.ensembles[&output.ensemble].n;
+        topology.decoding[name] =
+            DecodingConfig::LinearPopulationDecoding { num_outputs, rest_value: 0.5 };
+    }
+    // Of dynamic synapses the reversal potential makes a current of some tens per weight.
+    let mut strength = 150.0;
+    if synapses == SynapseModel::Dynamic {
+        strength = 5.0;
+        topology.synapse_model = synapses;
+        topology.synapse_params = Some(SynapseParams::default());
+        for group in topology.synapses.values_mut() {
+            group.transmitter = Some(Neurotransmitter::AmpaNmda);
+        }
+    }
+    let population = &mut config.algorithm.populations[0];
+    population.objects = vec![
+        GenotypeQuery::Weights(SynapseSelector::Sensory),
+        GenotypeQuery::Weights(SynapseSelector::Hidden),
+        GenotypeQuery::Weights(SynapseSelector::Motor),
+        GenotypeQuery::Decoders(OutputSelector::All),
+    ];
+    population.min_vals = vec![-60.0, -strength, -strength, -2.0];
+    population.max_vals = vec![60.0, strength, strength, 2.0];
+    config
+}
+
 /// The network in whole vectors of lanes, and in lanes that do not fill one.
 fn lanes(isa: Isa) {
     println!("\nlanes ({isa}): network of experiment A, ns per substep");
@@ -116,6 +181,7 @@ fn episodes(isa: Isa) {
         let name = format!("{} ({} robots)", config.name, n_robots(&config));
         compare(&name, &config, isa);
     }
+    compare("A with LIF neurons", &spiking_a(NeuronModel::Lif, SynapseModel::Static), isa);
 }
 
 /// Swarms of different sizes and one density.
