@@ -214,3 +214,44 @@ def test_affected_robots_stay_the_same_share_of_a_swarm():
     (robots,) = (config for what, value, config in _conditions(experiment.to_dict()) if (what, value) == ("robots", 20))
     inhibited = robots["world"]["objects"]["robotA"]["perturbations"]["stimuli_inhibition"]
     assert (inhibited if isinstance(inhibited, dict) else inhibited[0])["affected_robots"] == 16
+
+
+@pytest.fixture(scope="module")
+def leader():
+    """Experiment A and its champion."""
+    champion = json.loads((PROJECT / "results/champions/leader_selection_snes-0.json").read_text())
+    return swarmevo.Experiment.from_file(PROJECT / "configs/leader_selection_snes.json"), champion["genotype"]
+
+
+def test_what_a_leader_says_moves_others_and_what_relays_would_say_does_not(leader):
+    found = analysis.influence(*leader, [40, 45], trials=4)
+    assert found.said.any() and not found.said.all()
+    assert (found.reached[~found.said] == 0).all(), "a message that is not sent has no influence"
+    assert (found.reached[found.said] > 0).any()
+    assert found.reached.max() <= 9
+
+
+def test_a_message_that_nobody_senses_has_no_influence_at_all(leader):
+    experiment, genotype = leader
+    config = experiment.to_dict()
+    config["world"]["objects"]["robotA"]["perturbations"] = {
+        "stimuli_inhibition": {"stimuli": "wireless_receiver:msg", "affected_robots": "all"}
+    }
+    found = analysis.influence(swarmevo.Experiment.from_dict(config), genotype, [5, 40], trials=4)
+    assert found.said.any()
+    assert not found.reached.any() and not found.leds.any() and not found.fitness.any()
+
+
+def test_a_message_replaced_by_itself_changes_nothing_and_a_wrong_step_is_refused(leader):
+    experiment, genotype = leader
+    trace = experiment.simulate(genotype, swarmevo.TrialSet.evaluation(), trials=1)
+    (sender, *_) = np.flatnonzero(trace.sends[0, 40])
+    episodes = experiment.episodes(swarmevo.TrialSet.evaluation(), trials=1)
+    episodes.load(genotype)
+    while episodes.n_steps_done < 40:
+        episodes.step(episodes.decide())
+    itself = episodes.decide().messages[0, sender]
+    found = analysis.influence(experiment, genotype, [40], replace=itself, agents=[sender], trials=1)
+    assert not found.said.any() and not found.reached.any()
+    with pytest.raises(ValueError, match="steps from 0 to 298"):
+        analysis.influence(experiment, genotype, [299], trials=1)

@@ -15,6 +15,7 @@ from .channel import (
     speaker_consistency,
     symbols,
 )
+from .counterfactual import Influence, influence
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
 from .generalisation import Condition, generalisation
 from .information import Dependence, codes, dependence, discretise, entropy, mutual_information
@@ -22,8 +23,8 @@ from .proportions import Proportion, conditional, proportion
 from .report import report
 
 __all__ = [
-    "CTRNN", "ChannelUse", "Condition", "Dependence", "Equilibrium", "LimitCycle", "Proportion", "Symbols",
-    "channel_use", "codes", "conditional", "dependence", "discretise", "entropy", "generalisation", "heard",
+    "CTRNN", "ChannelUse", "Condition", "Dependence", "Equilibrium", "Influence", "LimitCycle", "Proportion", "Symbols",
+    "channel_use", "codes", "conditional", "dependence", "discretise", "entropy", "generalisation", "heard", "influence",
     "informants", "listening", "mutual_information", "proportion", "report", "signalling",
     "speaker_consistency", "symbols",
 ]

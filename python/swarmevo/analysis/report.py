@@ -14,6 +14,7 @@ from ..fleet import Client
 from ..trace import Trace
 from ..trials import TrialSet
 from .channel import FIRST, channel_use, informants, listening, signalling, symbols
+from .counterfactual import influence
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
 from .generalisation import Condition, generalisation
 from .information import Codes, codes, discretise
@@ -50,6 +51,7 @@ def report(
     _conditions(page, generalisation(experiment, genes, trials=trials, client=client))
     _channel(page, trace)
     _meaning(page, trace)
+    _influence(page, experiment, genes)
     _episode(page, trace)
     _network(page, experiment, genes, trace)
     return page.write()
@@ -125,8 +127,30 @@ def _meaning(page: Page, trace: Trace) -> None:
     page.note(
         "Mutual information. Chance: the same with the trials of one variable in another order. What is "
         "heard and what is done may also depend on each other because neighbours sense alike; what happens "
-        "without the input, above, says whether the message is heeded."
+        "without the input, above, and without single messages, below, says whether they are heeded."
     )
+
+
+def _influence(page: Page, experiment: Experiment, genotype: NDArray[np.float64]) -> None:
+    page.heading("What single messages did")
+    steps = range(FIRST, experiment.n_steps - 1, max(1, experiment.n_steps // 20))
+    it = influence(experiment, genotype, steps, trials=10)
+    if not it.said.any():
+        page.text("Every message that is sent is 0 already: there is nothing to replace.")
+        return
+    moved = it.reached > 0
+    page.text(
+        f"{it.said.sum()} messages were replaced by zeros, one at a time, with all noise as it was: "
+        f"{100 * moved[it.said].mean():.0f} % of them changed what another robot did within 10 steps, "
+        f"{it.reached[it.said].mean():.1f} robots on average; another LED was otherwise for "
+        f"{it.leds[it.said].mean():.2f} steps, and the fitness of these steps changed by {it.fitness[it.said].mean():+.3f}."
+    )
+    figure, axis = _figure(8, 2.6)
+    shown = axis.imshow(it.reached[0].T, aspect="auto", interpolation="nearest", cmap="Oranges", vmin=0)
+    axis.set_xticks(range(len(it.steps))[::2], [str(step) for step in it.steps[::2]])
+    axis.set(xlabel="step in which the message was replaced", ylabel="robot that said it", title="Robots that then acted otherwise, first episode")
+    figure.colorbar(shown)
+    page.figure(figure)
 
 
 def _episode(page: Page, trace: Trace) -> None:
