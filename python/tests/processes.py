@@ -13,8 +13,11 @@ import swarmevo
 class Fleet:
     """A coordinator on a free port, and workers."""
 
-    def __init__(self, programs: Path, directory: Path, environment: dict[str, str]) -> None:
+    def __init__(
+        self, programs: Path, directory: Path, environment: dict[str, str], args: tuple[str, ...]
+    ) -> None:
         self.programs, self.directory, self.environment = programs, directory, environment
+        self.args = args
         self.processes: list[subprocess.Popen] = []
         self.listen = "127.0.0.1:0"
         self.url = self.start_coordinator()
@@ -22,7 +25,8 @@ class Fleet:
     def start_coordinator(self) -> str:
         """Starts it, the second time on the same port."""
         log = self.directory / f"coordinator-{len(self.processes)}.log"
-        args = ["coordinator", "--listen", self.listen, "--data-dir", self.directory / "data"]
+        args = ["coordinator", "--listen", self.listen, "--data-dir", self.directory / "data",
+                *self.args]
         self.coordinator = self._start(log, *args)
         give_up_at = time.monotonic() + 60
         while time.monotonic() < give_up_at and self.coordinator.poll() is None:
@@ -57,9 +61,9 @@ class Fleet:
 
 
 @contextmanager
-def fleet(programs: Path, directory: Path, **environment: str) -> Iterator[Fleet]:
-    """A fleet without workers."""
-    started = Fleet(programs, directory, environment)
+def fleet(programs: Path, directory: Path, *args: str, **environment: str) -> Iterator[Fleet]:
+    """A fleet without workers; ``args`` are the coordinator's."""
+    started = Fleet(programs, directory, environment, args)
     try:
         yield started
     finally:

@@ -1,6 +1,9 @@
 """A coordinator and its fleet, as real processes."""
 
+import concurrent.futures
 import json
+import shutil
+import subprocess
 import threading
 import time
 
@@ -208,6 +211,30 @@ def test_tokens_are_required_where_the_coordinator_has_them(programs, tmp_path, 
         (tmp_path / "token").write_text(token + "\n")
         with started.connect(token_file=str(tmp_path / "token")) as client:
             assert len(client.experiments()) == 0
+
+
+def test_tls_is_spoken_by_client_and_workers(programs, tmp_path, quickstart, genotypes):
+    openssl = shutil.which("openssl")
+    if openssl is None:
+        pytest.skip("SKIPPED: no openssl to make a certificate with")
+    certificate, key = tmp_path / "cert.pem", tmp_path / "key.pem"
+    subprocess.run(
+        [openssl, "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1",
+         "-nodes", "-keyout", key, "-out", certificate, "-days", "2", "-subj", "/CN=localhost",
+         "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1",
+         "-addext", "basicConstraints=critical,CA:FALSE"],
+        check=True, capture_output=True,
+    )
+    files = ("--tls-cert", str(certificate), "--tls-key", str(key))
+    with fleet(programs, tmp_path, *files) as started:
+        url = started.url.replace("http://127.0.0.1", "https://localhost")
+        with swarmevo.connect(url, tls_ca=str(certificate)) as client:
+            with concurrent.futures.ThreadPoolExecutor(1) as executor:
+                with swarmevo.workers(executor, 1, url, tls_ca=str(certificate)):
+                    fitness = client.evaluate(quickstart, genotypes)
+        assert np.array_equal(fitness, quickstart.evaluate(genotypes))
+        with swarmevo.connect(url, patience=0) as stranger, pytest.raises(FleetError):
+            stranger.experiments()
 
 
 def test_a_coordinator_that_is_not_there_is_an_error():
