@@ -9,7 +9,7 @@ use super::{AlgorithmParams, FitnessFunction, GenotypeQuery, NamedMap, limits, s
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("champion_every, champion_trials, judgement_trials")
+    transform = schema::optional("champion_every, champion_trials, judgement_trials, fitness_function")
 )]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm, by the name in its
@@ -30,7 +30,7 @@ pub struct AlgorithmConfig {
     /// Trials per individual.
     #[schemars(range(min = 1, max = limits::TRIALS))]
     pub num_evaluations: u32,
-    /// Fitness of a trial.
+    /// Fitness of a trial; may be left out if there is a `task`.
     pub fitness_function: FitnessFunction,
     /// Stop when the mean fitness of a generation reaches this.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -14,6 +14,8 @@ pub(crate) enum Need {
     OutputTo(ActuatorQuery),
     /// There is a light in the world.
     Light,
+    /// The file brings a script.
+    Script,
     /// An episode is longer than so many steps, which do not count.
     StepsBeyond(u32),
 }
@@ -74,4 +76,6 @@ fitness_functions! {
     "goto_light" = GotoLight: [Need::Light],
     /// Robots near their centroid, but not on top of each other.
     "grouping" = Grouping: [],
+    /// The function `fitness` of `task.script`; the default of files that have one.
+    "script" = Script: [Need::Script],
 }

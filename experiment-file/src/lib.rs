@@ -79,6 +79,7 @@ mod schema;
 mod semantics;
 mod sensors;
 mod synapses;
+mod task;
 mod topology;
 mod variant;
 mod world;
@@ -101,6 +102,7 @@ pub use robot::*;
 pub use schema::json_schema;
 pub use sensors::*;
 pub use synapses::*;
+pub use task::*;
 pub use topology::*;
 pub use world::*;
 
@@ -114,7 +116,7 @@ pub type NamedMap<T> = indexmap::IndexMap<String, T>;
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("name, seed"),
+    transform = schema::optional("name, seed, task"),
     transform = schema::property("$schema", json!({"type": "string"})),
     transform = schema::property("semantics", schema::semantics()),
     transform = schema::property("checkpoint_file", json!({"type": ["string", "null"]})),
@@ -132,6 +134,10 @@ pub struct ExperimentConfig {
     pub algorithm: AlgorithmConfig,
     /// Arena, robots, lights, ground areas.
     pub world: WorldConfig,
+    /// A task of the file's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "TaskConfig")]
+    pub task: Option<TaskConfig>,
 }
 
 impl ExperimentConfig {

@@ -9,6 +9,8 @@ use std::ops::RangeInclusive;
 
 /// Bytes of an experiment file.
 pub const FILE_BYTES: usize = 1 << 20;
+/// Bytes of a script.
+pub const SCRIPT_BYTES: usize = 32 << 10;
 /// Lists and objects within each other.
 pub const NESTING: usize = 64;
 /// Problems that are reported one by one; the rest is counted.

@@ -94,6 +94,16 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// A string of any content, of bounded length.
+    pub(crate) fn text(self, max_bytes: usize) -> String {
+        let (report, path) = (self.report, self.path.clone());
+        let text = self.string().unwrap_or_default();
+        if text.len() > max_bytes {
+            report.problem(&path, format!("has {} bytes, the limit is {max_bytes}", text.len()));
+        }
+        text.to_owned()
+    }
+
     /// A string that is shown to people and refers to things.
     pub(crate) fn name(self) -> String {
         let (report, path) = (self.report, self.path.clone());
@@ -367,6 +377,11 @@ impl<'a> Object<'a> {
         self.known.push(key);
         let value = self.properties.swap_remove(key)?;
         Some(Node { report: self.report, path: self.path.key(key), value: Some(value) })
+    }
+
+    /// Whether the file has a key that nobody has asked for yet.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.properties.contains_key(key)
     }
 
     pub(crate) fn required(&mut self, key: &'static str) -> Node<'a> {

@@ -165,6 +165,22 @@ pub(super) fn positive_or_null(_: &mut SchemaGenerator) -> Schema {
     json_schema!({"type": ["number", "null"], "exclusiveMinimum": 0, "default": null})
 }
 
+/// The path of a script, which `swarmctl` reads, or the script itself.
+pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"anyOf": [
+        {"type": "string", "description": "Path of the script, from the experiment file."},
+        {
+            "type": "object",
+            "properties": {
+                "name": {"type": "string", "description": "Name of its file."},
+                "text": {"type": "string", "description": "Its whole text."},
+            },
+            "required": ["name", "text"],
+            "additionalProperties": false,
+        },
+    ]})
+}
+
 /// A number in \[0, 1\].
 pub(super) fn share(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "maximum": 1, "description": description})

@@ -59,6 +59,8 @@ pub enum Purpose {
     /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
     /// decoders; stream = 2^32 + output.
     FixedWeights = 10,
+    /// What the script of a task draws; stream = 0.
+    Script = 12,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,
 }

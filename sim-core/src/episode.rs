@@ -40,7 +40,8 @@ pub(crate) fn run(
             }
             episodes.step(step, first, recorder)?;
         }
-        for (episode, trial) in (first..).zip(&episodes.trials) {
+        for (episode, trial) in (first..).zip(&mut episodes.trials) {
+            trial.end()?;
             recorder.end(episode, trial);
         }
     }
@@ -92,8 +93,8 @@ impl<'a> Episodes<'a> {
             controller.decide(&mut self.trials);
         }
         for (episode, trial) in (first..).zip(&mut self.trials) {
-            let fitness = trial.act(step);
-            recorder.step(episode, step, trial, &self.controllers, fitness);
+            let fitness = trial.act(step)?;
+            recorder.step(episode, step, trial, &self.controllers, fitness)?;
             trial.move_lights(step);
         }
         Ok(())

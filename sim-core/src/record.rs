@@ -1,16 +1,21 @@
 //! What there is to see in an episode: every robot in every step, and how well
 //! the task is done.
 
+use std::borrow::Cow;
+
 use indexmap::IndexMap;
 use serde::Serialize;
 
 use crate::communication::Mode;
 use crate::torus::Vec2;
 
+/// Name of a measure.
+pub type MeasureName = Cow<'static, str>;
+
 /// Named measures of a task, beside its fitness; `docs/evaluation.md` lists them
 /// with their units. A measure that does not exist in a step (of distances to a
 /// light without lights, of robots with the LED on when there are none) is absent.
-pub type Measures = IndexMap<&'static str, f64>;
+pub type Measures = IndexMap<MeasureName, f64>;
 
 /// The result of an episode that was watched.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,6 +1,7 @@
 //! An experiment, compiled: everything that is the same for all its episodes.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::episode::{self, AllMeasures, FitnessOnly, Viewer};
 use crate::fitness::{self, Definition};
@@ -9,11 +10,13 @@ use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 #[cfg(doc)]
 use crate::record::Measures;
-use crate::record::{EpisodeSummary, StepRecord};
+use crate::record::{EpisodeSummary, MeasureName, StepRecord};
+use crate::script::{self, ScriptTask};
 use crate::trial::Trial;
 use crate::world::World;
 use experiment_file::{ConfigError, ExperimentConfig, limits};
 use numeric::{Isa, random::TrialSet};
+use task_script::ScriptError;
 
 /// Trials whose start is tried out when an experiment is compiled.
 const N_TRIED_TRIALS: u32 = 8;
@@ -25,7 +28,10 @@ pub struct Simulation {
     pub(crate) seed: u64,
     pub(crate) n_steps: u32,
     n_trials: u32,
-    pub(crate) fitness: &'static Definition,
+    /// None: the script computes it.
+    pub(crate) fitness: Option<&'static Definition>,
+    pub(crate) script: Option<Arc<ScriptTask>>,
+    measure_names: Vec<MeasureName>,
     pub(crate) network: Network,
     codec: Codec,
     pub(crate) world: World,
@@ -72,6 +78,18 @@ pub enum EvaluateError {
         /// The trial.
         trial: u32,
     },
+    /// The script of the experiment's task went wrong.
+    #[error("{error} (in step {step} of {trial_set}, trial {trial})")]
+    Script {
+        /// Where and why.
+        error: ScriptError,
+        /// The environment step, from 0.
+        step: u32,
+        /// The set that the trial is of.
+        trial_set: TrialSet,
+        /// The trial.
+        trial: u32,
+    },
 }
 
 impl Simulation {
@@ -85,13 +103,27 @@ impl Simulation {
         let codec = Codec::compile(config, &network, &mut problems);
         let world =
             World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
+        let fitness = fitness::definition(algorithm.fitness_function);
+        let script = config.task.as_ref();
+        let script = script.and_then(|task| ScriptTask::compile(&task.script, &mut problems));
+        if let (None, Some(script)) = (fitness, &script)
+            && !script.has_fitness()
+        {
+            problems.add(
+                script::PATH,
+                "has no function `fitness` or `final`, and `algorithm.fitness_function` names no other",
+            );
+        }
         problems.check()?;
+        let measure_names = measure_names(fitness, script.as_ref());
         let simulation = Self {
             isa: Isa::best(),
             seed: config.seed,
             n_steps: algorithm.evaluation_steps,
             n_trials: algorithm.num_evaluations,
-            fitness: fitness::definition(algorithm.fitness_function),
+            fitness,
+            script: script.map(Arc::new),
+            measure_names,
             network,
             codec,
             world: world.expect("a world without problems is one"),
@@ -167,8 +199,8 @@ impl Simulation {
     }
 
     /// Names of the measures of the task, in their order; see [`Measures`].
-    pub fn measure_names(&self) -> &'static [&'static str] {
-        self.fitness.measures
+    pub fn measure_names(&self) -> &[MeasureName] {
+        &self.measure_names
     }
 
     /// Environment steps of an episode.
@@ -248,6 +280,21 @@ impl Simulation {
             None => Ok(()),
         }
     }
+}
+
+/// Those of the function, then those of the script that have other names.
+fn measure_names(
+    fitness: Option<&'static Definition>,
+    script: Option<&ScriptTask>,
+) -> Vec<MeasureName> {
+    let of_function = fitness.map_or(&[][..], |definition| definition.measures);
+    let mut names: Vec<MeasureName> = of_function.iter().map(|&name| name.into()).collect();
+    for name in script.map_or(&[][..], ScriptTask::measure_names) {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::neighbours::Neighbours;
 use crate::objects::{Site, StaticObjects};
 use crate::perturbations::Perturbations;
 use crate::record::{Measures, StepRecord};
+use crate::script::{ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
@@ -22,6 +23,7 @@ use crate::world::World;
 use experiment_file::SensorQuery;
 use numeric::Isa;
 use numeric::random::{Purpose, Stream, TrialSet};
+use task_script::ScriptError;
 
 /// State of a trial.
 pub(crate) struct Trial<'a> {
@@ -38,9 +40,14 @@ pub(crate) struct Trial<'a> {
     groups: Vec<Group>,
     /// Stochastic decoding, per robot.
     decoding: Vec<Stream>,
-    fitness: Box<dyn Fitness>,
+    /// None: the script computes it.
+    fitness: Option<Box<dyn Fitness>>,
+    script: Option<ScriptRun<'a>>,
+    n_steps: u32,
     fitness_sum: f64,
     n_scored_steps: u32,
+    /// Fitness of the whole episode, if that is not the mean over the steps.
+    of_episode: Option<f64>,
 }
 
 /// What belongs to a group of robots.
@@ -71,6 +78,11 @@ impl Address {
     /// One stream for each of `n` robots, or lights.
     fn streams(self, purpose: Purpose, n: usize) -> Vec<Stream> {
         (0..n).map(|number| self.stream(purpose, number)).collect()
+    }
+
+    /// The failure of a script in a step of this trial.
+    fn failed(self, error: ScriptError, step: u32) -> EvaluateError {
+        EvaluateError::Script { error, step, trial_set: self.trial_set, trial: self.trial }
     }
 
     /// Draws the positions of an object's instances.
@@ -177,9 +189,19 @@ impl<'a> Trial<'a> {
             areas,
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
-            fitness: (simulation.fitness.start)(world),
+            fitness: simulation.fitness.map(|definition| (definition.start)(world)),
+            script: match &simulation.script {
+                Some(task) => {
+                    let stream = address.stream(Purpose::Script, 0);
+                    let started = ScriptRun::start(task, stream, n_robots);
+                    Some(started.map_err(|error| address.failed(error, 0))?)
+                }
+                None => None,
+            },
+            n_steps: simulation.n_steps,
             fitness_sum: 0.0,
             n_scored_steps: 0,
+            of_episode: None,
         })
     }
 
@@ -254,7 +276,7 @@ impl<'a> Trial<'a> {
 
     /// Actions take effect and are scored: fitness of the step, none if it does not
     /// count.
-    pub fn act(&mut self, step: u32) -> Option<f64> {
+    pub fn act(&mut self, step: u32) -> Result<Option<f64>, EvaluateError> {
         let world = self.world;
         // Frames have to spread before relaying them makes sense.
         for group in world.groups.iter().filter(|group| step < group.sending_steps) {
@@ -271,12 +293,36 @@ impl<'a> Trial<'a> {
             self.radio.emit(self.isa, world, &mut self.swarm, group);
         }
         // The step is scored.
-        let fitness = self.fitness.step(&Moment::new(world, &self.swarm, &self.lights, step));
+        let fitness = match &mut self.fitness {
+            Some(fitness) => fitness.step(&Moment::new(world, &self.swarm, &self.lights, step)),
+            None => self.run_script(step, ScriptRun::fitness)?.flatten(),
+        };
         if let Some(fitness) = fitness {
             self.fitness_sum += fitness;
             self.n_scored_steps += 1;
         }
-        fitness
+        Ok(fitness)
+    }
+
+    /// Has the script look at this step, if there is one.
+    fn run_script<T>(
+        &mut self,
+        step: u32,
+        run: impl FnOnce(&mut ScriptRun<'a>, View<'_>) -> Result<T, ScriptError>,
+    ) -> Result<Option<T>, EvaluateError> {
+        let Some(script) = &mut self.script else { return Ok(None) };
+        let Self { world, swarm, lights, areas, n_steps, .. } = self;
+        let view = View::new(world, swarm, lights, areas, [step, *n_steps]);
+        run(script, view).map(Some).map_err(|error| self.address.failed(error, step))
+    }
+
+    /// The last step is over.
+    pub fn end(&mut self) -> Result<(), EvaluateError> {
+        if self.fitness.is_none() {
+            let last = self.n_steps.saturating_sub(1);
+            self.of_episode = self.run_script(last, ScriptRun::last)?.flatten();
+        }
+        Ok(())
     }
 
     /// End of a step: lights move.
@@ -287,28 +333,39 @@ impl<'a> Trial<'a> {
     }
 
     /// Measures of the step that was scored last.
-    pub fn measures(&self, step: u32) -> Measures {
+    pub fn measures(&mut self, step: u32) -> Result<Measures, EvaluateError> {
         let mut measures = Measures::new();
-        let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
-        self.fitness.measure(&moment, &mut measures);
-        measures
+        if let Some(fitness) = &self.fitness {
+            let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
+            fitness.measure(&moment, &mut measures);
+        }
+        self.run_script(step, |script, view| script.measure(view, &mut measures))?;
+        Ok(measures)
     }
 
     /// The step that was scored last, without what controllers keep.
-    pub fn record(&self, step: u32, fitness: Option<f64>) -> StepRecord {
-        let measures = self.measures(step);
+    pub fn record(
+        &mut self,
+        step: u32,
+        fitness: Option<f64>,
+    ) -> Result<StepRecord, EvaluateError> {
+        let measures = self.measures(step)?;
         let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
         let mut robots: Vec<_> = robots.collect();
-        for (robot, target) in self.world.evaluated().zip(self.fitness.targets()) {
+        let targets = self.fitness.as_ref().map_or(&[][..], |fitness| fitness.targets());
+        for (robot, target) in self.world.evaluated().zip(targets) {
             robots[robot].target = Some(*target);
         }
         let (lights, areas) = (self.lights.clone(), self.areas.clone());
-        StepRecord { step, fitness, measures, robots, lights, areas }
+        Ok(StepRecord { step, fitness, measures, robots, lights, areas })
     }
 
-    /// Mean fitness over the steps that count; 0 without any.
+    /// Fitness of the episode: the mean over the steps that count, 0 without any, unless the
+    /// script says otherwise.
     pub fn fitness(&self) -> f64 {
-        if self.n_scored_steps == 0 {
+        if let Some(fitness) = self.of_episode {
+            fitness
+        } else if self.n_scored_steps == 0 {
             0.0
         } else {
             self.fitness_sum / f64::from(self.n_scored_steps)
@@ -370,7 +427,7 @@ mod tests {
         for own in trial.swarm.messages.chunks_exact_mut(2) {
             own.copy_from_slice(&message);
         }
-        trial.act(SENDING_STEPS);
+        trial.act(SENDING_STEPS).unwrap();
     }
 
     #[test]
@@ -441,7 +498,7 @@ mod tests {
             let heard = (1..=10).contains(&step);
             assert_eq!(trial.swarm.received[0].is_some(), heard, "step {step}");
             trial.swarm.modes.fill(Mode::Relay);
-            trial.act(step);
+            trial.act(step).unwrap();
         }
     }
 
@@ -465,7 +522,7 @@ mod tests {
                 assert!((received.sending_direction.x + 1.0).abs() < 1e-15);
             }
             trial.swarm.modes.fill(Mode::Relay);
-            trial.act(step);
+            trial.act(step).unwrap();
         }
     }
 
@@ -488,7 +545,7 @@ mod tests {
         assert_eq!(read(&trial, SensorQuery::ReceiverReceivingDirection), [0.0; 2]);
         assert_eq!(read(&trial, SensorQuery::ReceiverSendingDirection), [0.0; 2]);
         trial.swarm.messages.copy_from_slice(&[0.0, 0.0, 1.0, 0.0]);
-        trial.act(0);
+        trial.act(0).unwrap();
         trial.swarm.modes[0] = Mode::Relay;
         trial.sense(1).unwrap();
         assert_eq!(read_value(&trial, SensorQuery::ReceiverState, 0), 0.0);

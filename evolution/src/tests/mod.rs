@@ -248,6 +248,7 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
                 .collect(),
         },
         world: WorldConfig { height: 1000.0, width: 1000.0, objects: NamedMap::new() },
+        task: None,
     }
 }
 

@@ -62,6 +62,11 @@ fn fitness(config: &ExperimentConfig, report: &Report<'_>) {
                     );
                 }
             }
+            Need::Script => {
+                if config.task.is_none() {
+                    report.conflict(&path, &[], "needs a `task` with a `script`");
+                }
+            }
             Need::StepsBeyond(first) => {
                 let steps = config.algorithm.evaluation_steps;
                 if steps <= first {

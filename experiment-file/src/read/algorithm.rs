@@ -5,7 +5,13 @@ use super::node::{Node, Object};
 use super::population::{ParamsReader, population};
 use crate::{AlgorithmConfig, FitnessFunction, limits};
 
-pub(super) fn algorithm(o: &mut Object<'_>, algorithms: Algorithms) -> AlgorithmConfig {
+/// `has_task`: whether the file has a task of its own, which computes the fitness unless a
+/// function is named.
+pub(super) fn algorithm(
+    o: &mut Object<'_>,
+    algorithms: Algorithms,
+    has_task: bool,
+) -> AlgorithmConfig {
     let name = o.required("name");
     let (name, params) = match algorithms {
         Algorithms::Unchecked => (name.name(), ParamsReader::Unchecked),
@@ -23,10 +29,11 @@ pub(super) fn algorithm(o: &mut Object<'_>, algorithms: Algorithms) -> Algorithm
         generations: o.required("generations").u64(1..=limits::GENERATIONS),
         evaluation_steps: o.required("evaluation_steps").u32(1..=limits::STEPS),
         num_evaluations: o.required("num_evaluations").u32(1..=limits::TRIALS),
-        fitness_function: o
-            .required("fitness_function")
-            .variant(&[])
-            .unwrap_or(FitnessFunction::Grouping),
+        fitness_function: if has_task {
+            o.or("fitness_function", FitnessFunction::Script, fitness_function)
+        } else {
+            fitness_function(o.required("fitness_function"))
+        },
         target_fitness: o.optional("target_fitness").map(Node::quantity),
         champion_every: o.or("champion_every", 10, |node| node.u64(1..=limits::GENERATIONS)),
         champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
@@ -35,4 +42,8 @@ pub(super) fn algorithm(o: &mut Object<'_>, algorithms: Algorithms) -> Algorithm
             .required("populations")
             .map(1, |_, node| node.object(|o| population(o, params))),
     }
+}
+
+fn fitness_function(node: Node<'_>) -> FitnessFunction {
+    node.variant(&[]).unwrap_or(FitnessFunction::Grouping)
 }

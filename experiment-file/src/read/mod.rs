@@ -6,6 +6,7 @@ mod algorithm;
 mod parse;
 mod population;
 mod robot;
+mod task;
 mod topology;
 mod world;
 
@@ -60,8 +61,12 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
         }),
         seed: o.or("seed", 0, |node| node.u64(0..=u64::MAX)),
         topology: o.required("topology").object(|o| topology::topology(o, semantics)),
-        algorithm: o.required("algorithm").object(|o| algorithm::algorithm(o, algorithms)),
+        algorithm: {
+            let has_task = o.has("task");
+            o.required("algorithm").object(|o| algorithm::algorithm(o, algorithms, has_task))
+        },
         world: o.required("world").object(|o| world::world(o, semantics)),
+        task: o.optional("task").map(|node| node.object(task::task)),
     };
     for key in ["num_processes", "render"] {
         o.ignored(key, "it concerns the original simulator's processes and window");

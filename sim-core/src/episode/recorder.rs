@@ -3,8 +3,8 @@
 use indexmap::IndexMap;
 
 use super::GroupController;
-use crate::record::{EpisodeSummary, StepRecord};
-use crate::simulation::Simulation;
+use crate::record::{EpisodeSummary, MeasureName, StepRecord};
+use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::Trial;
 
 /// Sees every step of a number of episodes, numbered from 0.
@@ -15,10 +15,10 @@ pub(crate) trait Recorder {
         &mut self,
         episode: usize,
         step: u32,
-        trial: &Trial<'_>,
+        trial: &mut Trial<'_>,
         controllers: &[GroupController<'_>],
         fitness: Option<f64>,
-    );
+    ) -> Result<(), EvaluateError>;
 
     /// The last step of an episode was simulated. Episodes end in their order.
     fn end(&mut self, episode: usize, trial: &Trial<'_>);
@@ -32,7 +32,15 @@ pub(crate) struct FitnessOnly {
 }
 
 impl Recorder for FitnessOnly {
-    fn step(&mut self, _: usize, _: u32, _: &Trial<'_>, _: &[GroupController<'_>], _: Option<f64>) {
+    fn step(
+        &mut self,
+        _: usize,
+        _: u32,
+        _: &mut Trial<'_>,
+        _: &[GroupController<'_>],
+        _: Option<f64>,
+    ) -> Result<(), EvaluateError> {
+        Ok(())
     }
 
     fn end(&mut self, _: usize, trial: &Trial<'_>) {
@@ -43,17 +51,17 @@ impl Recorder for FitnessOnly {
 /// Keeps the fitness of each episode and, step by step, all measures, NaN where
 /// there is none.
 #[derive(Debug)]
-pub(crate) struct AllMeasures {
-    names: &'static [&'static str],
+pub(crate) struct AllMeasures<'a> {
+    names: &'a [MeasureName],
     /// Numbers per episode.
     n_values: usize,
     /// `[episode][value]`, the fitness first.
     pub values: Vec<f64>,
 }
 
-impl AllMeasures {
+impl<'a> AllMeasures<'a> {
     /// Of so many episodes.
-    pub fn new(simulation: &Simulation, n_episodes: usize) -> Self {
+    pub fn new(simulation: &'a Simulation, n_episodes: usize) -> Self {
         let n_values = simulation.values_per_trial();
         let values = vec![f64::NAN; n_episodes * n_values];
         Self { names: simulation.measure_names(), n_values, values }
@@ -64,21 +72,22 @@ impl AllMeasures {
     }
 }
 
-impl Recorder for AllMeasures {
+impl Recorder for AllMeasures<'_> {
     fn step(
         &mut self,
         episode: usize,
         step: u32,
-        trial: &Trial<'_>,
+        trial: &mut Trial<'_>,
         _: &[GroupController<'_>],
         _: Option<f64>,
-    ) {
-        let measures = trial.measures(step);
+    ) -> Result<(), EvaluateError> {
+        let measures = trial.measures(step)?;
         let names = self.names;
         let start = 1 + step as usize * names.len();
         for (value, name) in self.row(episode)[start..].iter_mut().zip(names) {
             *value = measures.get(name).copied().unwrap_or(f64::NAN);
         }
+        Ok(())
     }
 
     fn end(&mut self, episode: usize, trial: &Trial<'_>) {
@@ -90,7 +99,7 @@ impl Recorder for AllMeasures {
 pub(crate) struct Viewer<'a> {
     observe: &'a mut dyn FnMut(StepRecord),
     /// Per measure its sum, and over how many steps.
-    sums: IndexMap<&'static str, (f64, u32)>,
+    sums: IndexMap<MeasureName, (f64, u32)>,
     fitness: f64,
 }
 
@@ -112,20 +121,21 @@ impl Recorder for Viewer<'_> {
         &mut self,
         _: usize,
         step: u32,
-        trial: &Trial<'_>,
+        trial: &mut Trial<'_>,
         controllers: &[GroupController<'_>],
         fitness: Option<f64>,
-    ) {
-        let mut record = trial.record(step, fitness);
+    ) -> Result<(), EvaluateError> {
+        let mut record = trial.record(step, fitness)?;
         for controller in controllers {
             controller.record(&mut record);
         }
         for (name, value) in &record.measures {
-            let (sum, n) = self.sums.entry(name).or_default();
+            let (sum, n) = self.sums.entry(name.clone()).or_default();
             *sum += value;
             *n += 1;
         }
         (self.observe)(record);
+        Ok(())
     }
 
     fn end(&mut self, _: usize, trial: &Trial<'_>) {

@@ -39,12 +39,12 @@ impl Fitness for IdentifyBorderline {
 
     fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let rates = Rates::new(&self.targets, moment.leds);
-        measures.insert("true_positive_rate", rates.true_positive);
-        measures.insert("true_negative_rate", rates.true_negative);
+        measures.insert("true_positive_rate".into(), rates.true_positive);
+        measures.insert("true_negative_rate".into(), rates.true_negative);
         if let Some(precision) = rates.precision {
-            measures.insert("precision", precision);
+            measures.insert("precision".into(), precision);
         }
-        measures.insert("accuracy", rates.accuracy);
+        measures.insert("accuracy".into(), rates.accuracy);
     }
 
     fn targets(&self) -> &[bool] {

@@ -38,7 +38,7 @@ impl Fitness for Grouping {
         let centroid = moment.torus.centroid(moment.positions);
         let distances =
             moment.positions.iter().map(|&robot| moment.torus.distance(robot, centroid));
-        measures.insert("center_distance", mean(distances));
+        measures.insert("center_distance".into(), mean(distances));
     }
 }
 

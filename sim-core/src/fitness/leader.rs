@@ -32,8 +32,8 @@ impl Fitness for IdentifyLeader {
 
     fn measure(&self, moment: &Moment<'_>, measures: &mut Measures) {
         let n_leaders = moment.leds.iter().filter(|&&led| led > 0).count();
-        measures.insert("leaders", n_leaders as f64);
-        measures.insert("one_leader", f64::from(self.leadership.has_leader()));
+        measures.insert("leaders".into(), n_leaders as f64);
+        measures.insert("one_leader".into(), f64::from(self.leadership.has_leader()));
     }
 }
 

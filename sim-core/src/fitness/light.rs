@@ -57,12 +57,12 @@ impl Fitness for GotoLight {
                     let distances = moment.lights.iter().map(|&light| torus.distance(robot, light));
                     distances.fold(f64::INFINITY, f64::min)
                 };
-                measures.insert(light_distance, mean(robots.iter().map(to_light)));
+                measures.insert(light_distance.into(), mean(robots.iter().map(to_light)));
                 let near = |robot| f64::from(to_light(robot) <= NEAR);
-                measures.insert(near_light, mean(robots.iter().map(near)));
+                measures.insert(near_light.into(), mean(robots.iter().map(near)));
             }
             let to_center = |&robot: &Vec2| torus.distance(robot, centroid);
-            measures.insert(center_distance, mean(robots.iter().map(to_center)));
+            measures.insert(center_distance.into(), mean(robots.iter().map(to_center)));
         }
     }
 }

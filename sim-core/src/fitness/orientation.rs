@@ -41,8 +41,8 @@ impl Fitness for OrientationConsensus {
 }
 
 fn measure(moment: &Moment<'_>, measures: &mut Measures) {
-    measures.insert("misalignment", misalignment(moment.headings));
-    measures.insert("turning", turning(moment.wheels));
+    measures.insert("misalignment".into(), misalignment(moment.headings));
+    measures.insert("turning".into(), turning(moment.wheels));
 }
 
 /// Mean |right wheel|: robots whose only output turns them.

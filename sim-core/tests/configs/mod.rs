@@ -27,6 +27,7 @@ pub fn experiment_a() -> ExperimentConfig {
         ),
         algorithm: algorithm(FitnessFunction::IdentifyLeader, 300),
         world: world([("robotA", ObjectConfig::Robot(leader_robots()))]),
+        task: None,
     }
 }
 
@@ -60,6 +61,7 @@ pub fn experiment_c() -> ExperimentConfig {
         topology: topology(&stimuli, wheel_neurons(1)),
         algorithm: algorithm(FitnessFunction::OrientationConsensus, 600),
         world: world([("robotA", ObjectConfig::Robot(robots))]),
+        task: None,
     }
 }
 
@@ -110,6 +112,7 @@ pub fn experiment_d() -> ExperimentConfig {
             ("robotA", ObjectConfig::Robot(robots)),
             ("light_red", ObjectConfig::LightSource(light)),
         ]),
+        task: None,
     }
 }
 

@@ -445,6 +445,7 @@ impl<'a> Simulation<'a> {
             FitnessFunction::Alignment => fitness::alignment(robots),
             FitnessFunction::GotoLight => fitness::goto_light(robots, &self.lights, self.torus),
             FitnessFunction::Grouping => fitness::grouping(robots, self.torus),
+            FitnessFunction::Script => unreachable!("scripts are compared with the functions"),
         }
     }
 }

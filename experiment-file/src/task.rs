@@ -1,0 +1,69 @@
+//! `task`: what a swarm has to do, as a script that the file itself brings.
+
+use std::ops::Range;
+
+use jsonc_parser::ast::Value;
+use jsonc_parser::common::Ranged as _;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{read, schema};
+
+/// A task of the file's own.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct TaskConfig {
+    /// What computes fitness and measures, moves lights, and controls robots.
+    #[schemars(schema_with = "schema::script")]
+    pub script: ScriptConfig,
+}
+
+/// A script with the name that messages give it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct ScriptConfig {
+    /// Its file's name.
+    pub name: String,
+    /// Its whole text.
+    pub text: String,
+}
+
+/// The script that a file refers to by a path, and where in the text of the file the path
+/// stands. None if there is no such path, or if the text is no JSON.
+pub fn script_path(text: &str) -> Option<(String, Range<usize>)> {
+    let root = read::parse(text).ok()?;
+    let script = property(property(&root, "task")?, "script")?;
+    match script {
+        Value::StringLit(path) => Some((path.value.to_string(), script.start()..script.end())),
+        _ => None,
+    }
+}
+
+fn property<'a>(value: &'a Value<'a>, name: &str) -> Option<&'a Value<'a>> {
+    let properties = &value.as_object()?.properties;
+    properties.iter().find(|property| property.name.as_str() == name).map(|it| &it.value)
+}
+
+/// The text of a file with its script in the place of the path, in the same number of lines.
+pub fn inline_script(text: &str, place: Range<usize>, script: &ScriptConfig) -> String {
+    let script = serde_json::to_string(script).expect("two strings serialise");
+    [&text[..place.start], &script, &text[place.end..]].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_replaced_by_the_script_and_nothing_else_changes() {
+        let text = "{\n\"name\": \"skript ü\", \"task\": {\n\"script\": \"a\\u002estar\"\n}, \"x\": 1}";
+        let (path, place) = script_path(text).unwrap();
+        assert_eq!(path, "a.star");
+        let script = ScriptConfig { name: path, text: "def f():\n    pass".into() };
+        let inlined = inline_script(text, place, &script);
+        let expected = "{\n\"name\": \"skript ü\", \"task\": {\n\"script\": \
+                        {\"name\":\"a.star\",\"text\":\"def f():\\n    pass\"}\n}, \"x\": 1}";
+        assert_eq!(inlined, expected);
+        assert_eq!(script_path(&inlined), None);
+    }
+}

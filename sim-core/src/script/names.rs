@@ -1,0 +1,68 @@
+//! The names that scripts give to what they see and change.
+
+use task_script::Vocabulary;
+
+/// From a row per name: an enum and the vocabulary.
+macro_rules! names {
+    ($($name:literal = $variant:ident,)*) => {
+        /// An attribute or a method.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub(super) enum Named { $($variant),* }
+
+        /// All of them, in the order of the vocabulary.
+        const ALL: &[Named] = &[$(Named::$variant),*];
+
+        /// All names.
+        pub(super) const VOCABULARY: Vocabulary = Vocabulary { names: &[$($name),*] };
+    };
+}
+
+names! {
+    "all_robots" = AllRobots,
+    "angle" = Angle,
+    "areas" = Areas,
+    "bearing" = Bearing,
+    "border" = Border,
+    "center" = Center,
+    "centroid" = Centroid,
+    "color" = Color,
+    "distance" = Distance,
+    "group" = Group,
+    "heading" = Heading,
+    "heard" = Heard,
+    "heard_from" = HeardFrom,
+    "height" = Height,
+    "id" = Id,
+    "led" = Led,
+    "left" = Left,
+    "lights" = Lights,
+    "message" = Message,
+    "mode" = Mode,
+    "neighbours" = Neighbours,
+    "normal" = Normal,
+    "random" = Random,
+    "range" = Range,
+    "right" = Right,
+    "robots" = Robots,
+    "sees_light" = SeesLight,
+    "state" = State,
+    "step" = Step,
+    "steps" = Steps,
+    "turn" = Turn,
+    "way" = Way,
+    "width" = Width,
+    "x" = X,
+    "y" = Y,
+}
+
+impl Named {
+    /// The name of a number of the vocabulary.
+    pub fn numbered(name: task_script::Name) -> Self {
+        ALL[usize::from(name)]
+    }
+
+    /// As scripts write it.
+    pub fn name(self) -> &'static str {
+        VOCABULARY.names[self as usize]
+    }
+}

@@ -1,0 +1,372 @@
+//! What a script sees of a trial, and what it may change. Nothing is copied: a thing of
+//! the world is a kind and a number, and its attributes are read where the trial has them.
+
+use std::f64::consts::PI;
+use std::rc::Rc;
+
+use numeric::random::Stream;
+use task_script::{Host, Meter, Name, Object, Value};
+
+use super::names::Named;
+use crate::border;
+use crate::communication::Mode;
+use crate::objects::StaticObjects;
+use crate::swarm::Swarm;
+use crate::torus::{Vec2, wrap_angle};
+use crate::world::World;
+
+/// The only thing of its kind.
+pub(super) const WORLD: Value = Value::Object(Object { kind: Kind::World as u8, index: 0 });
+
+/// Kinds of things.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Kind {
+    World,
+    Robot,
+    Light,
+    Area,
+}
+
+impl Kind {
+    fn of(object: Object) -> Self {
+        match object.kind {
+            1 => Self::Robot,
+            2 => Self::Light,
+            3 => Self::Area,
+            _ => Self::World,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::World => "the world",
+            Self::Robot => "a robot",
+            Self::Light => "a light",
+            Self::Area => "an area",
+        }
+    }
+}
+
+/// What a call may change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum May {
+    /// Nothing but `state`.
+    Look,
+}
+
+/// What a script keeps from step to step.
+#[derive(Debug)]
+pub(super) struct Kept {
+    stream: Stream,
+    /// Lists of things that are always the same.
+    lists: Vec<(Named, Value)>,
+    /// `state` of things.
+    states: Vec<(Object, Value)>,
+}
+
+impl Kept {
+    pub fn new(stream: Stream) -> Self {
+        Self { stream, lists: Vec::new(), states: Vec::new() }
+    }
+}
+
+/// A step of a trial, for one call.
+pub(crate) struct View<'a> {
+    pub world: &'a World,
+    pub swarm: &'a mut Swarm,
+    pub lights: &'a mut [Vec2],
+    pub areas: &'a mut [Vec2],
+    /// Environment step, from 0.
+    pub step: u32,
+    /// Steps of the episode.
+    pub n_steps: u32,
+    pub may: May,
+    /// Set by the caller of the script.
+    pub(super) kept: Option<&'a mut Kept>,
+}
+
+type Answer = Result<Value, String>;
+
+impl<'a> View<'a> {
+    /// A view that changes nothing.
+    pub fn new(
+        world: &'a World,
+        swarm: &'a mut Swarm,
+        lights: &'a mut [Vec2],
+        areas: &'a mut [Vec2],
+        [step, n_steps]: [u32; 2],
+    ) -> Self {
+        Self { world, swarm, lights, areas, step, n_steps, may: May::Look, kept: None }
+    }
+
+    fn kept(&mut self) -> Result<&mut Kept, String> {
+        self.kept.as_deref_mut().ok_or_else(|| "nothing is kept outside functions".into())
+    }
+
+    /// `world.state`.
+    pub(super) fn world_state(&mut self, meter: &Rc<Meter>) -> Answer {
+        self.state(Object { kind: Kind::World as u8, index: 0 }, meter)
+    }
+
+    fn state(&mut self, object: Object, meter: &Rc<Meter>) -> Answer {
+        let kept = self.kept()?;
+        match kept.states.binary_search_by_key(&(object.kind, object.index), |(it, _)| (it.kind, it.index)) {
+            Ok(place) => Ok(kept.states[place].1.clone()),
+            Err(place) => {
+                let state = Value::dict(meter)?;
+                kept.states.insert(place, (object, state.clone()));
+                Ok(state)
+            }
+        }
+    }
+
+    /// A list of things that is the same in all steps.
+    fn list(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {
+        let (kind, numbers) = match name {
+            Named::Robots => (Kind::Robot, self.world.evaluated()),
+            Named::AllRobots => (Kind::Robot, 0..self.world.n_robots()),
+            Named::Lights => (Kind::Light, 0..self.lights.len()),
+            _ => (Kind::Area, 0..self.areas.len()),
+        };
+        let kept = self.kept()?;
+        if let Some((_, list)) = kept.lists.iter().find(|(known, _)| *known == name) {
+            return Ok(list.clone());
+        }
+        let list = Value::list(numbers.map(|number| thing(kind, number)).collect(), meter)?;
+        list.freeze();
+        kept.lists.push((name, list.clone()));
+        Ok(list)
+    }
+
+    fn position(&self, object: Object) -> Result<Vec2, String> {
+        let number = object.index as usize;
+        match Kind::of(object) {
+            Kind::World => Err("the world has no position; `world.center` has".into()),
+            Kind::Robot => Ok(self.swarm.positions[number]),
+            Kind::Light => Ok(self.lights[number]),
+            Kind::Area => Ok(self.areas[number]),
+        }
+    }
+
+    /// A thing's position, or the point `(x, y)`, in the torus.
+    fn point(&self, value: &Value) -> Result<Vec2, String> {
+        match value {
+            Value::Object(object) => self.position(*object),
+            Value::List(list) if list.len() == 2 => {
+                let coordinate = |index| list.get(index).as_ref().and_then(Value::number);
+                match (coordinate(0), coordinate(1)) {
+                    (Some(x), Some(y)) if x.is_finite() && y.is_finite() => {
+                        Ok(self.world.torus.wrap(Vec2 { x, y }))
+                    }
+                    _ => Err("a point is a thing or two finite numbers, `(x, y)`".into()),
+                }
+            }
+            _ => Err(format!("a point is a thing or `(x, y)`, not a {}", value.kind())),
+        }
+    }
+
+    /// The lights or areas that a thing is one of.
+    fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
+        let groups = match Kind::of(object) {
+            Kind::Light => &self.world.lights,
+            _ => &self.world.areas,
+        };
+        let number = object.index as usize;
+        let found = groups.iter().find(|group| group.members.contains(&number));
+        found.ok_or_else(|| "there is no such thing".into())
+    }
+
+    fn of_world(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {
+        let torus = self.world.torus;
+        match name {
+            Named::Robots | Named::AllRobots | Named::Lights | Named::Areas => self.list(name, meter),
+            Named::Center => pair(torus.center(), meter),
+            Named::Width => Ok(Value::Float(torus.width)),
+            Named::Height => Ok(Value::Float(torus.height)),
+            Named::Step => Ok(Value::Int(self.step.into())),
+            Named::Steps => Ok(Value::Int(self.n_steps.into())),
+            Named::Range => Ok(Value::Float(self.world.communication_range())),
+            _ => Err(no_such(Kind::World, name)),
+        }
+    }
+
+    fn of_robot(&mut self, robot: usize, name: Named, meter: &Rc<Meter>) -> Answer {
+        let swarm = &*self.swarm;
+        let floats = |values: &[f64]| Value::list(values.iter().copied().map(Value::Float).collect(), meter);
+        Ok(match name {
+            Named::Id => Value::Int(robot as i64),
+            Named::Heading => Value::Float(swarm.headings[robot]),
+            Named::Led => Value::Int(swarm.leds[robot].into()),
+            Named::Right => Value::Float(swarm.wheels[robot][0]),
+            Named::Left => Value::Float(swarm.wheels[robot][1]),
+            Named::Mode => match swarm.modes[robot] {
+                Mode::Send => Value::text("send", meter)?,
+                Mode::Relay => Value::text("relay", meter)?,
+            },
+            Named::Message => floats(&swarm.messages[swarm.message_range(robot)])?,
+            Named::Heard => match swarm.received[robot] {
+                Some(_) => floats(&swarm.received_messages[swarm.message_range(robot)])?,
+                None => Value::Nothing,
+            },
+            Named::HeardFrom => match &swarm.received[robot] {
+                Some(received) => Value::Float(received.receiving_direction.angle()),
+                None => Value::Nothing,
+            },
+            Named::SeesLight => Value::Bool(swarm.photosensitive[robot]),
+            Named::Group => {
+                let groups = &self.world.groups;
+                let group = groups.iter().find(|group| group.robots.contains(&robot));
+                let name = group.map_or("", |group| group.site.name.as_str());
+                Value::text(name, meter)?
+            }
+            _ => return Err(no_such(Kind::Robot, name)),
+        })
+    }
+
+    /// Robots within reach of a thing or point, but not the thing itself.
+    fn neighbours(&self, of: &Value, range: f64, meter: &Rc<Meter>) -> Answer {
+        meter.work(self.world.n_robots() / 4)?;
+        let from = self.point(of)?;
+        let torus = &self.world.torus;
+        let near = (0..self.world.n_robots()).filter(|&robot| {
+            torus.distance(from, self.swarm.positions[robot]) <= range
+        });
+        let near = near.map(|robot| thing(Kind::Robot, robot));
+        let itself = |value: &Value| match (value, of) {
+            (Value::Object(a), Value::Object(b)) => a == b,
+            _ => false,
+        };
+        Value::list(near.filter(|value| !itself(value)).collect(), meter)
+    }
+
+    fn points(&self, list: &Value, meter: &Rc<Meter>) -> Result<Vec<Vec2>, String> {
+        let Value::List(list) = list else {
+            return Err(format!("expected a list of things, not a {}", list.kind()));
+        };
+        meter.work(list.len())?;
+        list.items().iter().map(|value| self.point(value)).collect()
+    }
+
+    fn call_world(&mut self, name: Named, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
+        let torus = self.world.torus;
+        Ok(match (name, arguments) {
+            (Named::Distance, [a, b]) => Value::Float(torus.distance(self.point(a)?, self.point(b)?)),
+            (Named::Way, [a, b]) => {
+                pair(torus.displacement(self.point(a)?, self.point(b)?), meter)?
+            }
+            (Named::Angle, [x, y]) => Value::Float(Vec2 { x: number(x)?, y: number(y)? }.angle()),
+            (Named::Turn, [from, to]) => {
+                Value::Float(wrap_angle(number(to)? - number(from)? + PI) - PI)
+            }
+            (Named::Centroid, [list]) => pair(torus.centroid(&self.points(list, meter)?), meter)?,
+            (Named::Neighbours, [of, range]) => self.neighbours(of, number(range)?, meter)?,
+            (Named::Border, []) => {
+                let evaluated = self.world.evaluated();
+                meter.work(evaluated.len() * evaluated.len() / 16)?;
+                let positions = &self.swarm.positions[evaluated.clone()];
+                let border = border::of_swarm(&torus, positions, self.world.communication_range());
+                let robots = evaluated.zip(border).filter(|(_, is)| *is);
+                let robots = robots.map(|(robot, _)| thing(Kind::Robot, robot));
+                Value::list(robots.collect(), meter)?
+            }
+            (Named::Random, []) => Value::Float(self.kept()?.stream.uniform()),
+            (Named::Normal, []) => Value::Float(self.kept()?.stream.normal()),
+            _ => return Err(wrong_call(Kind::World, name, arguments)),
+        })
+    }
+
+    fn call_thing(&mut self, object: Object, name: Named, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
+        let kind = Kind::of(object);
+        let itself = Value::Object(object);
+        match (name, arguments) {
+            (Named::Distance | Named::Way, [other]) => {
+                let arguments = [itself, other.clone()];
+                self.call_world(name, &arguments, meter)
+            }
+            (Named::Neighbours, [range]) => self.neighbours(&itself, number(range)?, meter),
+            (Named::Bearing, [other]) if kind == Kind::Robot => {
+                let way = self.world.torus.displacement(self.position(object)?, self.point(other)?);
+                let heading = self.swarm.headings[object.index as usize];
+                Ok(Value::Float(wrap_angle(way.angle() - heading + PI) - PI))
+            }
+            _ => Err(wrong_call(kind, name, arguments)),
+        }
+    }
+}
+
+impl Host for View<'_> {
+    fn get(&mut self, object: Object, name: Name, meter: &Rc<Meter>) -> Answer {
+        let kind = Kind::of(object);
+        match (Named::numbered(name), kind) {
+            (Named::State, _) => self.state(object, meter),
+            (name, Kind::World) => self.of_world(name, meter),
+            (Named::X, _) => Ok(Value::Float(self.position(object)?.x)),
+            (Named::Y, _) => Ok(Value::Float(self.position(object)?.y)),
+            (name, Kind::Robot) => self.of_robot(object.index as usize, name, meter),
+            (Named::Id, _) => Ok(Value::Int(object.index.into())),
+            (Named::Color, _) => Value::text(&self.objects(object)?.color, meter),
+            (Named::Range, _) => Ok(Value::Float(self.objects(object)?.range)),
+            (Named::Group, _) => Value::text(&self.objects(object)?.site.name, meter),
+            (name, kind) => Err(no_such(kind, name)),
+        }
+    }
+
+    fn set(&mut self, object: Object, name: Name, _: Value) -> Result<(), String> {
+        let name = Named::numbered(name).name();
+        let kind = Kind::of(object).name();
+        match self.may {
+            May::Look => Err(format!(
+                "`{name}` of {kind} cannot be changed here; what is to be remembered goes into \
+                 `state`, a dict"
+            )),
+        }
+    }
+
+    fn call(&mut self, object: Object, name: Name, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
+        let name = Named::numbered(name);
+        match Kind::of(object) {
+            Kind::World => self.call_world(name, arguments, meter),
+            _ => self.call_thing(object, name, arguments, meter),
+        }
+    }
+}
+
+/// What a script sees outside functions.
+pub(super) struct Nothing;
+
+impl Host for Nothing {
+    fn get(&mut self, _: Object, _: Name, _: &Rc<Meter>) -> Answer {
+        Err(OUTSIDE.into())
+    }
+
+    fn set(&mut self, _: Object, _: Name, _: Value) -> Result<(), String> {
+        Err(OUTSIDE.into())
+    }
+
+    fn call(&mut self, _: Object, _: Name, _: &[Value], _: &Rc<Meter>) -> Answer {
+        Err(OUTSIDE.into())
+    }
+}
+
+const OUTSIDE: &str = "there is no world outside functions";
+
+fn thing(kind: Kind, number: usize) -> Value {
+    Value::Object(Object { kind: kind as u8, index: number as u32 })
+}
+
+fn pair(point: Vec2, meter: &Rc<Meter>) -> Answer {
+    Value::tuple(vec![Value::Float(point.x), Value::Float(point.y)], meter)
+}
+
+fn number(value: &Value) -> Result<f64, String> {
+    value.number().ok_or_else(|| format!("expected a number, not a {}", value.kind()))
+}
+
+fn no_such(kind: Kind, name: Named) -> String {
+    format!("{} has no `{}`", kind.name(), name.name())
+}
+
+fn wrong_call(kind: Kind, name: Named, arguments: &[Value]) -> String {
+    format!("{} has no `{}` of {} arguments", kind.name(), name.name(), arguments.len())
+}

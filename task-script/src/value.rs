@@ -1,0 +1,533 @@
+//! The values of a script.
+
+use std::cell::{Cell, RefCell};
+use std::fmt;
+use std::mem;
+use std::rc::{Rc, Weak};
+
+use indexmap::IndexMap;
+
+use crate::error::Outcome;
+use crate::meter::Meter;
+
+/// Bytes that an element of a list takes, at most.
+const ELEMENT: usize = 2 * size_of::<Value>();
+/// Bytes that an entry of a dict takes, at most.
+const ENTRY: usize = 2 * (size_of::<(Key, Value)>() + 16);
+/// Bytes that a list, dict or text takes without its content, at most.
+const OVERHEAD: usize = 160;
+/// Lists within each other that are compared.
+const COMPARED_DEPTH: usize = 16;
+
+/// A value. Lists and dicts are shared, as in Python.
+#[derive(Clone)]
+pub enum Value {
+    /// `None`.
+    Nothing,
+    /// `True` or `False`.
+    Bool(bool),
+    /// A whole number of 64 bits.
+    Int(i64),
+    /// A number of double precision.
+    Float(f64),
+    /// A text.
+    Text(Rc<Text>),
+    /// A list or a tuple.
+    List(Rc<List>),
+    /// A dict, which keeps the order in which its keys came.
+    Dict(Rc<Dict>),
+    /// A thing of the host's.
+    Object(Object),
+}
+
+/// A thing of the host's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Object {
+    /// What kind of thing it is, an index of the [vocabulary](crate::Vocabulary)'s.
+    pub kind: u8,
+    /// Which one.
+    pub index: u32,
+}
+
+/// A text.
+pub struct Text {
+    text: String,
+    meter: Rc<Meter>,
+}
+
+/// A list or a tuple.
+pub struct List {
+    items: RefCell<Vec<Value>>,
+    is_tuple: bool,
+    state: Cell<State>,
+    meter: Rc<Meter>,
+}
+
+/// A dict.
+pub struct Dict {
+    entries: RefCell<IndexMap<Key, Value>>,
+    state: Cell<State>,
+    meter: Rc<Meter>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct State {
+    /// Cannot be changed any more.
+    is_frozen: bool,
+    /// May be part of a cycle.
+    is_noted: bool,
+}
+
+/// What a dict finds its entries by.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) enum Key {
+    Nothing,
+    Bool(bool),
+    /// Whole numbers, and floats that are.
+    Int(i64),
+    /// Bits of another float.
+    Float(u64),
+    Text(String),
+    Tuple(Vec<Key>),
+    Object(Object),
+}
+
+/// A list or dict that may hold itself.
+#[derive(Debug)]
+pub(crate) enum Holder {
+    List(Weak<List>),
+    Dict(Weak<Dict>),
+}
+
+impl Holder {
+    pub(crate) fn is_used(&self) -> bool {
+        match self {
+            Self::List(list) => list.strong_count() > 0,
+            Self::Dict(dict) => dict.strong_count() > 0,
+        }
+    }
+
+    pub(crate) fn empty(&self) {
+        match self {
+            Self::List(list) => list.upgrade().map(|list| bury(list.take())),
+            Self::Dict(dict) => dict.upgrade().map(|dict| bury(dict.take())),
+        };
+    }
+}
+
+/// Drops values, however deep they are nested.
+fn bury(mut values: Vec<Value>) {
+    while let Some(value) = values.pop() {
+        match value {
+            Value::List(list) => {
+                if let Some(list) = Rc::into_inner(list) {
+                    values.append(&mut list.take());
+                }
+            }
+            Value::Dict(dict) => {
+                if let Some(dict) = Rc::into_inner(dict) {
+                    values.append(&mut dict.take());
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Drop for Text {
+    fn drop(&mut self) {
+        self.meter.release(OVERHEAD + self.text.len());
+    }
+}
+
+impl Drop for List {
+    fn drop(&mut self) {
+        bury(self.take());
+        self.meter.release(OVERHEAD);
+    }
+}
+
+impl Drop for Dict {
+    fn drop(&mut self) {
+        bury(self.take());
+        self.meter.release(OVERHEAD);
+    }
+}
+
+impl List {
+    fn take(&self) -> Vec<Value> {
+        let items = mem::take(&mut *self.items.borrow_mut());
+        self.meter.release(ELEMENT * items.len());
+        items
+    }
+
+    /// A copy of its elements.
+    pub fn items(&self) -> Vec<Value> {
+        self.items.borrow().clone()
+    }
+
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.items.borrow().len()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.items.borrow().is_empty()
+    }
+
+    /// An element.
+    pub fn get(&self, index: usize) -> Option<Value> {
+        self.items.borrow().get(index).cloned()
+    }
+
+    fn check_mutable(&self) -> Result<(), String> {
+        if self.is_tuple {
+            Err("a tuple cannot be changed; use a list, `[...]`".into())
+        } else if self.state.get().is_frozen {
+            Err("this list cannot be changed: it is a constant of the script, or the host's".into())
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Puts an element in front of number `index`.
+    pub(crate) fn insert(self: &Rc<Self>, index: usize, value: Value) -> Outcome<()> {
+        self.check_mutable()?;
+        self.meter.take(ELEMENT)?;
+        self.note(&value);
+        let mut items = self.items.borrow_mut();
+        let index = index.min(items.len());
+        items.insert(index, value);
+        Ok(())
+    }
+
+    /// Replaces an element, which must exist.
+    pub(crate) fn set(self: &Rc<Self>, index: usize, value: Value) -> Outcome<()> {
+        self.check_mutable()?;
+        self.note(&value);
+        let old = mem::replace(&mut self.items.borrow_mut()[index], value);
+        drop(old);
+        Ok(())
+    }
+
+    /// Takes an element out, which must exist.
+    pub(crate) fn remove(&self, index: usize) -> Outcome<Value> {
+        self.check_mutable()?;
+        let value = self.items.borrow_mut().remove(index);
+        self.meter.release(ELEMENT);
+        Ok(value)
+    }
+
+    pub(crate) fn clear(&self) -> Outcome<()> {
+        self.check_mutable()?;
+        bury(self.take());
+        Ok(())
+    }
+
+    fn note(self: &Rc<Self>, value: &Value) {
+        let state = self.state.get();
+        if value.is_container() && !state.is_noted {
+            self.state.set(State { is_noted: true, ..state });
+            self.meter.note(Holder::List(Rc::downgrade(self)));
+        }
+    }
+}
+
+impl Dict {
+    fn take(&self) -> Vec<Value> {
+        let entries = mem::take(&mut *self.entries.borrow_mut());
+        self.meter.release(entries.keys().map(|key| ENTRY + key.bytes()).sum());
+        entries.into_values().collect()
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.entries.borrow().len()
+    }
+
+    /// The value of a text as key.
+    pub fn get_text(&self, key: &str) -> Option<Value> {
+        self.entries.borrow().get(&Key::Text(key.to_owned())).cloned()
+    }
+
+    pub(crate) fn get(&self, key: &Key) -> Option<Value> {
+        self.entries.borrow().get(key).cloned()
+    }
+
+    pub(crate) fn set(self: &Rc<Self>, key: Key, value: Value) -> Outcome<()> {
+        self.check_mutable()?;
+        let state = self.state.get();
+        if value.is_container() && !state.is_noted {
+            self.state.set(State { is_noted: true, ..state });
+            self.meter.note(Holder::Dict(Rc::downgrade(self)));
+        }
+        let mut entries = self.entries.borrow_mut();
+        if !entries.contains_key(&key) {
+            self.meter.take(ENTRY + key.bytes())?;
+        }
+        let old = entries.insert(key, value);
+        drop(entries);
+        drop(old);
+        Ok(())
+    }
+
+    pub(crate) fn remove(&self, key: &Key) -> Outcome<Option<Value>> {
+        self.check_mutable()?;
+        let value = self.entries.borrow_mut().shift_remove(key);
+        if value.is_some() {
+            self.meter.release(ENTRY + key.bytes());
+        }
+        Ok(value)
+    }
+
+    pub(crate) fn clear(&self) -> Outcome<()> {
+        self.check_mutable()?;
+        bury(self.take());
+        Ok(())
+    }
+
+    pub(crate) fn keys(&self) -> Vec<Key> {
+        self.entries.borrow().keys().cloned().collect()
+    }
+
+    fn check_mutable(&self) -> Result<(), String> {
+        if self.state.get().is_frozen {
+            return Err("this dict cannot be changed: it is a constant of the script".into());
+        }
+        Ok(())
+    }
+}
+
+impl Key {
+    /// The key that a value is.
+    pub(crate) fn new(value: &Value) -> Result<Self, String> {
+        Self::within(value, COMPARED_DEPTH)
+    }
+
+    fn within(value: &Value, depth: usize) -> Result<Self, String> {
+        Ok(match value {
+            Value::Nothing => Self::Nothing,
+            Value::Bool(value) => Self::Bool(*value),
+            Value::Int(value) => Self::Int(*value),
+            Value::Float(value) => match whole(*value) {
+                Some(value) => Self::Int(value),
+                None => Self::Float(value.to_bits()),
+            },
+            Value::Text(text) => {
+                text.meter.work(text.text.len() / 64)?;
+                Self::Text(text.text.clone())
+            }
+            Value::List(list) if list.is_tuple && depth > 0 => {
+                list.meter.work(list.len())?;
+                let keys = list.items.borrow();
+                let keys = keys.iter().map(|value| Self::within(value, depth - 1));
+                Self::Tuple(keys.collect::<Result<_, _>>()?)
+            }
+            Value::Object(object) => Self::Object(*object),
+            _ => return Err(format!("a {} cannot be a key of a dict", value.kind())),
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Text(text) => text.len(),
+            Self::Tuple(keys) => keys.iter().map(|key| size_of::<Self>() + key.bytes()).sum(),
+            _ => 0,
+        }
+    }
+
+    /// The value that the key stands for.
+    pub(crate) fn value(&self, meter: &Rc<Meter>) -> Result<Value, String> {
+        Ok(match self {
+            Self::Nothing => Value::Nothing,
+            Self::Bool(value) => Value::Bool(*value),
+            Self::Int(value) => Value::Int(*value),
+            Self::Float(bits) => Value::Float(f64::from_bits(*bits)),
+            Self::Text(text) => Value::text(text, meter)?,
+            Self::Tuple(keys) => {
+                let values = keys.iter().map(|key| key.value(meter));
+                Value::tuple(values.collect::<Result<_, _>>()?, meter)?
+            }
+            Self::Object(object) => Value::Object(*object),
+        })
+    }
+}
+
+/// A float as a whole number, if it is one.
+fn whole(value: f64) -> Option<i64> {
+    /// Up to there, every whole number is a float.
+    const EXACT: f64 = (1_i64 << 53) as f64;
+    (value.abs() <= EXACT && value.fract() == 0.0).then_some(value as i64)
+}
+
+impl Value {
+    /// A text.
+    pub fn text(text: &str, meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.take(OVERHEAD + text.len())?;
+        Ok(Self::Text(Rc::new(Text { text: text.to_owned(), meter: Rc::clone(meter) })))
+    }
+
+    /// A list.
+    pub fn list(items: Vec<Self>, meter: &Rc<Meter>) -> Result<Self, String> {
+        Self::sequence(items, false, meter)
+    }
+
+    /// A tuple.
+    pub fn tuple(items: Vec<Self>, meter: &Rc<Meter>) -> Result<Self, String> {
+        Self::sequence(items, true, meter)
+    }
+
+    fn sequence(items: Vec<Self>, is_tuple: bool, meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.take(OVERHEAD + ELEMENT * items.len())?;
+        let (items, meter) = (RefCell::new(items), Rc::clone(meter));
+        Ok(Self::List(Rc::new(List { items, is_tuple, state: Cell::default(), meter })))
+    }
+
+    /// An empty dict.
+    pub fn dict(meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.take(OVERHEAD)?;
+        let (entries, meter) = (RefCell::default(), Rc::clone(meter));
+        Ok(Self::Dict(Rc::new(Dict { entries, state: Cell::default(), meter })))
+    }
+
+    /// The number, if it is one.
+    #[inline]
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Int(value) => Some(*value as f64),
+            Self::Float(value) => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// The text, if it is one.
+    pub fn as_text(&self) -> Option<&str> {
+        if let Self::Text(text) = self { Some(&text.text) } else { None }
+    }
+
+    /// Whether a condition holds: all but `None`, `False`, zero and what is empty.
+    pub fn is_true(&self) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Bool(value) => *value,
+            Self::Int(value) => *value != 0,
+            Self::Float(value) => *value != 0.0,
+            Self::Text(text) => !text.text.is_empty(),
+            Self::List(list) => !list.is_empty(),
+            Self::Dict(dict) => dict.len() > 0,
+            Self::Object(_) => true,
+        }
+    }
+
+    /// What kind of value it is, for messages.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Nothing => "None",
+            Self::Bool(_) => "bool",
+            Self::Int(_) => "int",
+            Self::Float(_) => "float",
+            Self::Text(_) => "string",
+            Self::List(list) if list.is_tuple => "tuple",
+            Self::List(_) => "list",
+            Self::Dict(_) => "dict",
+            Self::Object(_) => "thing of the world",
+        }
+    }
+
+    fn is_container(&self) -> bool {
+        matches!(self, Self::List(_) | Self::Dict(_))
+    }
+
+    /// Lists and dicts within the value cannot be changed any more.
+    pub fn freeze(&self) {
+        let mut pending = vec![self.clone()];
+        while let Some(value) = pending.pop() {
+            let (state, inner) = match &value {
+                Self::List(list) => (&list.state, list.items()),
+                Self::Dict(dict) => {
+                    (&dict.state, dict.entries.borrow().values().cloned().collect())
+                }
+                _ => continue,
+            };
+            if !state.get().is_frozen {
+                state.set(State { is_frozen: true, ..state.get() });
+                pending.extend(inner);
+            }
+        }
+    }
+
+    /// `==`.
+    pub(crate) fn equals(&self, other: &Self, meter: &Meter) -> Result<bool, String> {
+        self.equals_within(other, meter, COMPARED_DEPTH)
+    }
+
+    fn equals_within(&self, other: &Self, meter: &Meter, depth: usize) -> Result<bool, String> {
+        meter.work(1)?;
+        Ok(match (self, other) {
+            (Self::Nothing, Self::Nothing) => true,
+            (Self::Bool(a), Self::Bool(b)) => a == b,
+            (Self::Int(a), Self::Int(b)) => a == b,
+            (Self::Text(a), Self::Text(b)) => {
+                meter.work(a.text.len() / 64)?;
+                a.text == b.text
+            }
+            (Self::Object(a), Self::Object(b)) => a == b,
+            (Self::List(a), Self::List(b)) => {
+                if Rc::ptr_eq(a, b) {
+                    return Ok(true);
+                }
+                if a.len() != b.len() || a.is_tuple != b.is_tuple {
+                    return Ok(false);
+                }
+                if depth == 0 {
+                    return Err("lists that are nested so deep are not compared".into());
+                }
+                let (a, b) = (a.items.borrow(), b.items.borrow());
+                for (a, b) in a.iter().zip(b.iter()) {
+                    if !a.equals_within(b, meter, depth - 1)? {
+                        return Ok(false);
+                    }
+                }
+                true
+            }
+            (Self::Dict(a), Self::Dict(b)) if Rc::ptr_eq(a, b) => true,
+            (Self::Dict(_), Self::Dict(_)) => return Err("dicts are not compared".into()),
+            _ => match (self.number(), other.number()) {
+                (Some(a), Some(b)) => a == b,
+                _ => false,
+            },
+        })
+    }
+}
+
+impl fmt::Debug for Value {
+    /// Its kind and, if it is simple, the value; what is nested is not shown.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(value) => write!(f, "{value}"),
+            Self::Int(value) => write!(f, "{value}"),
+            Self::Float(value) => write!(f, "{value:?}"),
+            Self::Text(text) => write!(f, "{:?}", text.text),
+            Self::Object(object) => write!(f, "{object:?}"),
+            _ => f.write_str(self.kind()),
+        }
+    }
+}
+
+impl fmt::Debug for List {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "list of {}", self.len())
+    }
+}
+
+impl fmt::Debug for Dict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "dict of {}", self.len())
+    }
+}
+
+impl fmt::Debug for Text {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", self.text)
+    }
+}
