@@ -8,7 +8,9 @@ use std::{
 
 use coordinator::limits::KEY_LEN_MAX;
 use evolution::ALGORITHMS;
-use experiment_file::{ConfigError, ExperimentConfig, Problem, limits};
+use experiment_file::{
+    ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, script_path,
+};
 use sim_core::Simulation;
 use swarm_proto::v1::SubmitExperimentRequest;
 
@@ -55,20 +57,29 @@ impl ExperimentFile {
         Error::invalid(&self.path, error)
     }
 
-    /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input.
+    /// Reads a file of UTF-8 text of at most 1 MiB; `-` is standard input. The script that
+    /// it refers to, by a path from the file's folder, becomes part of it.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let problem = |what: String| ConfigError {
-            problems: vec![unlocated(format!("cannot be read: {what}"))],
+        let problem = |path: &str, what: String| ConfigError {
+            problems: vec![Problem {
+                path: path.into(),
+                line: None,
+                message: format!("cannot be read: {what}"),
+            }],
         };
-        let mut bytes = Vec::new();
-        open(path)
-            .and_then(|file| file.take(limits::FILE_BYTES as u64 + 1).read_to_end(&mut bytes))
-            .map_err(|error: io::Error| problem(error.to_string()))?;
-        if bytes.len() > limits::FILE_BYTES {
-            return Err(problem("an experiment file has at most 1 MiB".into()));
-        }
-        let text = String::from_utf8(bytes).map_err(|error| problem(error.to_string()))?;
-        Ok(Self { path: path.into(), text })
+        let text = read_text(path, limits::FILE_BYTES).map_err(|what| problem("", what))?;
+        let Some((script, place)) = script_path(&text) else {
+            return Ok(Self { path: path.into(), text });
+        };
+        let script = path.parent().unwrap_or(Path::new("")).join(script);
+        let name = script.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let script = ScriptConfig {
+            text: read_text(&script, limits::SCRIPT_BYTES).map_err(|what| {
+                problem("task.script", format!("`{}`: {what}", script.display()))
+            })?,
+            name,
+        };
+        Ok(Self { path: path.into(), text: inline_script(&text, place, &script) })
     }
 
     /// This file with changes, if they leave it one that can be read.
@@ -140,6 +151,18 @@ impl ExperimentFile {
         let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= KEY_LEN_MAX;
         stem.char_indices().take_while(fits).map(|(_, c)| c).collect()
     }
+}
+
+/// The text of a file of at most so many bytes.
+fn read_text(path: &Path, max_bytes: usize) -> Result<String, String> {
+    let mut bytes = Vec::new();
+    open(path)
+        .and_then(|file| file.take(max_bytes as u64 + 1).read_to_end(&mut bytes))
+        .map_err(|error: io::Error| error.to_string())?;
+    if bytes.len() > max_bytes {
+        return Err(format!("it has more than {} KiB", max_bytes / 1024));
+    }
+    String::from_utf8(bytes).map_err(|error| error.to_string())
 }
 
 /// A file to read; `-` is standard input.

@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn a_path_is_replaced_by_the_script_and_nothing_else_changes() {
-        let text = "{\n\"name\": \"skript ü\", \"task\": {\n\"script\": \"a\\u002estar\"\n}, \"x\": 1}";
+        let text =
+            "{\n\"name\": \"skript ü\", \"task\": {\n\"script\": \"a\\u002estar\"\n}, \"x\": 1}";
         let (path, place) = script_path(text).unwrap();
         assert_eq!(path, "a.star");
         let script = ScriptConfig { name: path, text: "def f():\n    pass".into() };

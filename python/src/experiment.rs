@@ -62,8 +62,8 @@ impl Experiment {
     }
 
     #[getter]
-    fn measure_names(&self) -> Vec<&'static str> {
-        self.simulation.measure_names().to_vec()
+    fn measure_names(&self) -> Vec<&str> {
+        self.simulation.measure_names().iter().map(|name| &**name).collect()
     }
 
     /// The file with all defaults, as JSON.

@@ -18,8 +18,9 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use experiment_file::{
-    DecodingConfig, ExperimentConfig, GenotypeQuery, Initializer, NeuronModel, Neurotransmitter,
-    OutputSelector, SynapseModel, SynapseParams, SynapseSelector,
+    DecodingConfig, ExperimentConfig, FitnessFunction, GenotypeQuery, Initializer, NeuronModel,
+    Neurotransmitter, OutputSelector, ScriptConfig, SynapseModel, SynapseParams, SynapseSelector,
+    TaskConfig,
 };
 use numeric::random::{Purpose, Stream};
 use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
@@ -62,6 +63,9 @@ fn main() {
     }
     if wants("items") {
         items(best);
+    }
+    if wants("scripts") {
+        scripts(best);
     }
 }
 
@@ -221,6 +225,31 @@ fn items(isa: Isa) {
             "{}",
             [one, two, three, four].map(|time| format!(" {:9.2}x", time / all)).concat()
         );
+    }
+}
+
+/// Fitness as a script, beside the same function in Rust.
+fn scripts(isa: Isa) {
+    println!("\nscripts ({isa}): whole episodes of experiment A, us per step of a trial");
+    println!("{:20} {:>10} {:>10} {:>10}", "", "Rust", "script", "ratio");
+    let text = include_str!("../../configs/tasks/thesis/identify_leader.star");
+    for n in [10, 100] {
+        let mut config = experiment_a();
+        resize(&mut config, n);
+        let steps = f64::from(config.algorithm.evaluation_steps * N_TRIALS);
+        let rust = compile(&config, isa);
+        config.algorithm.fitness_function = FitnessFunction::Script;
+        let script = ScriptConfig { name: "identify_leader.star".into(), text: text.into() };
+        config.task = Some(TaskConfig { script });
+        let script = compile(&config, isa);
+        let genotype = genotype(&config, 1);
+        let seconds = |simulation: &Simulation| {
+            seconds_per(|| simulation.evaluate(&genotype, 0, 0..N_TRIALS).expect("it is valid"))
+        };
+        let [rust, script] = medians([&mut || seconds(&rust), &mut || seconds(&script)]);
+        let [rust_us, script_us] = [rust, script].map(|seconds| seconds / steps * 1e6);
+        let name = format!("{n} robots");
+        println!("{name:20} {rust_us:10.2} {script_us:10.2} {:9.2}x", script / rust);
     }
 }
 

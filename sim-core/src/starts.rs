@@ -6,12 +6,15 @@ use numeric::random::TrialSet;
 use crate::initializers::Positions;
 use crate::objects::Site;
 use crate::problems::Problems;
+use crate::script;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial;
 
 /// Starts that are tried at the most: the first of those that fail one time in a hundred
 /// is found almost always.
 const N_STARTS_MAX: u64 = 512;
+/// Steps of the episode in which a script is tried.
+const N_TRIED_STEPS: u32 = 50;
 /// Pairs of robots whose distances a check may take, about.
 const N_PAIRS_MAX: u64 = 50_000_000;
 
@@ -19,7 +22,11 @@ impl Simulation {
     /// Tries where objects start in trials of a run: those of the judgement at its end,
     /// then those of its first generations, as far as that is quick. One where an
     /// object finds no place would end the run.
+    ///
+    /// A script is executed for an episode's first steps, so that what it gets wrong is
+    /// known before anything is computed.
     pub fn check_starts(&self, algorithm: &AlgorithmConfig) -> Result<(), ConfigError> {
+        self.try_script()?;
         let n_pairs: u64 = self.world.sites().map(n_pairs_of_a_draw).sum();
         if n_pairs == 0 {
             return Ok(());
@@ -45,6 +52,22 @@ impl Simulation {
                 problems.add(path, message);
                 break;
             }
+        }
+        problems.check()
+    }
+
+    /// Executes the script in a short episode, measures included.
+    fn try_script(&self) -> Result<(), ConfigError> {
+        if self.script.is_none() {
+            return Ok(());
+        }
+        let mut short = self.clone();
+        short.n_steps = self.n_steps.min(N_TRIED_STEPS);
+        let genotype = vec![0.5; self.genotype_len()];
+        let tried = short.measure_while(&genotype, TrialSet::Generation(0), 0..1, &|| true);
+        let mut problems = Problems::default();
+        if let Err(error @ EvaluateError::Script { .. }) = tried {
+            problems.add(script::PATH, error.to_string());
         }
         problems.check()
     }

@@ -244,12 +244,16 @@ impl<'a> Stepper<'a> {
             }
         }
         let step = self.step;
+        let n_steps = self.simulation.n_steps;
         let fitness = self.trials.iter_mut().map(|trial| {
-            let fitness = trial.act(step);
+            let fitness = trial.act(step)?;
             trial.move_lights(step);
-            fitness
+            if step + 1 == n_steps {
+                trial.end()?;
+            }
+            Ok(fitness)
         });
-        let fitness = fitness.collect();
+        let fitness = fitness.collect::<Result<_, EvaluateError>>()?;
         self.step += 1;
         if self.step < self.simulation.n_steps {
             self.sense()?;
@@ -257,7 +261,8 @@ impl<'a> Stepper<'a> {
         Ok(fitness)
     }
 
-    /// Fitness of each trial so far: the mean over the steps that count.
+    /// Fitness of each trial so far: the mean over the steps that count, unless a script says
+    /// otherwise at the end.
     pub fn fitness(&self) -> Vec<f64> {
         self.trials.iter().map(Trial::fitness).collect()
     }

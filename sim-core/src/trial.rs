@@ -344,11 +344,7 @@ impl<'a> Trial<'a> {
     }
 
     /// The step that was scored last, without what controllers keep.
-    pub fn record(
-        &mut self,
-        step: u32,
-        fitness: Option<f64>,
-    ) -> Result<StepRecord, EvaluateError> {
+    pub fn record(&mut self, step: u32, fitness: Option<f64>) -> Result<StepRecord, EvaluateError> {
         let measures = self.measures(step)?;
         let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
         let mut robots: Vec<_> = robots.collect();

@@ -5,8 +5,9 @@ use std::rc::Rc;
 
 use crate::code::{Binary, Builtin, Method};
 use crate::error::{Fault, Outcome, shortened};
+use crate::key::Key;
 use crate::meter::Meter;
-use crate::value::{Dict, Key, List, Value};
+use crate::value::{Dict, List, Value};
 
 /// The result of an operator of two numbers, or of what else it takes.
 pub(crate) fn binary(operator: Binary, a: &Value, b: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
@@ -44,9 +45,9 @@ fn integers(operator: Binary, a: i64, b: i64) -> Outcome<Value> {
             // Rounds down, whatever the signs.
             if b < 0 && a.rem_euclid(b) != 0 { quotient - 1 } else { quotient }
         }),
-        Binary::Remainder if b != 0 => a.checked_rem(b).map(|rest| {
-            if rest != 0 && (rest < 0) != (b < 0) { rest + b } else { rest }
-        }),
+        Binary::Remainder if b != 0 => a
+            .checked_rem(b)
+            .map(|rest| if rest != 0 && (rest < 0) != (b < 0) { rest + b } else { rest }),
         Binary::Equal => return Ok(Value::Bool(a == b)),
         Binary::NotEqual => return Ok(Value::Bool(a != b)),
         Binary::Less => return Ok(Value::Bool(a < b)),
@@ -57,7 +58,10 @@ fn integers(operator: Binary, a: i64, b: i64) -> Outcome<Value> {
     };
     match value {
         Some(value) => Ok(Value::Int(value)),
-        None => Err(format!("the result of `{}` has more than 64 bits; use floats", operator.symbol()).into()),
+        None => {
+            Err(format!("the result of `{}` has more than 64 bits; use floats", operator.symbol())
+                .into())
+        }
     }
 }
 
@@ -82,7 +86,9 @@ fn floats(operator: Binary, a: f64, b: f64) -> Outcome<Value> {
         Binary::LessOrEqual => Value::Bool(a <= b),
         Binary::Greater => Value::Bool(a > b),
         Binary::GreaterOrEqual => Value::Bool(a >= b),
-        Binary::In | Binary::NotIn => return Err(format!("`{}` needs a list, dict or string", operator.symbol()).into()),
+        Binary::In | Binary::NotIn => {
+            return Err(format!("`{}` needs a list, dict or string", operator.symbol()).into());
+        }
     })
 }
 
@@ -183,9 +189,9 @@ pub(crate) fn element(container: &Value, index: &Value) -> Outcome<Value> {
             let place = place(index, list.len())?;
             Ok(list.get(place).expect("its place is below its length"))
         }
-        Value::Dict(dict) => dict
-            .get(&Key::new(index)?)
-            .ok_or_else(|| format!("the dict has no key {}", shortened(&format!("{index:?}"))).into()),
+        Value::Dict(dict) => dict.get(&Key::new(index)?).ok_or_else(|| {
+            format!("the dict has no key {}", shortened(&format!("{index:?}"))).into()
+        }),
         _ => Err(format!("a {} has no elements", container.kind()).into()),
     }
 }
@@ -212,7 +218,12 @@ pub(crate) fn slice(value: &Value, from: &Value, to: &Value, meter: &Rc<Meter>) 
 }
 
 /// A method of lists or dicts.
-pub(crate) fn method(value: &Value, method: Method, arguments: &[Value], meter: &Rc<Meter>) -> Outcome<Value> {
+pub(crate) fn method(
+    value: &Value,
+    method: Method,
+    arguments: &[Value],
+    meter: &Rc<Meter>,
+) -> Outcome<Value> {
     match value {
         Value::List(list) => list_method(list, method, arguments, meter),
         Value::Dict(dict) => dict_method(dict, method, arguments, meter),
@@ -220,7 +231,12 @@ pub(crate) fn method(value: &Value, method: Method, arguments: &[Value], meter: 
     }
 }
 
-fn list_method(list: &Rc<List>, method: Method, arguments: &[Value], meter: &Rc<Meter>) -> Outcome<Value> {
+fn list_method(
+    list: &Rc<List>,
+    method: Method,
+    arguments: &[Value],
+    meter: &Rc<Meter>,
+) -> Outcome<Value> {
     match (method, arguments) {
         (Method::Append, [value]) => list.insert(list.len(), value.clone())?,
         (Method::Extend, [other]) => {
@@ -258,10 +274,17 @@ fn list_method(list: &Rc<List>, method: Method, arguments: &[Value], meter: &Rc<
     Ok(Value::Nothing)
 }
 
-fn dict_method(dict: &Rc<Dict>, method: Method, arguments: &[Value], meter: &Rc<Meter>) -> Outcome<Value> {
+fn dict_method(
+    dict: &Rc<Dict>,
+    method: Method,
+    arguments: &[Value],
+    meter: &Rc<Meter>,
+) -> Outcome<Value> {
     Ok(match (method, arguments) {
         (Method::Get, [key]) => dict.get(&Key::new(key)?).unwrap_or(Value::Nothing),
-        (Method::Get, [key, default]) => dict.get(&Key::new(key)?).unwrap_or_else(|| default.clone()),
+        (Method::Get, [key, default]) => {
+            dict.get(&Key::new(key)?).unwrap_or_else(|| default.clone())
+        }
         (Method::Keys, []) => Value::list(keys(dict, meter)?, meter)?,
         (Method::Values | Method::Items, []) => {
             meter.work(2 * dict.len())?;
@@ -406,7 +429,8 @@ fn range(from: &Value, to: &Value, step: &Value, meter: &Rc<Meter>) -> Outcome<V
     let distance = u64::try_from(i128::from(*last) - i128::from(*first)).unwrap_or(0);
     let n = distance.div_ceil(step.unsigned_abs());
     meter.work(usize::try_from(n).unwrap_or(usize::MAX))?;
-    let numbers = (0..n as i64).map(|index| Value::Int(from.wrapping_add(index.wrapping_mul(*step))));
+    let numbers =
+        (0..n as i64).map(|index| Value::Int(from.wrapping_add(index.wrapping_mul(*step))));
     Ok(Value::list(numbers.collect(), meter)?)
 }
 

@@ -7,8 +7,9 @@ use crate::code::{
     Binary, Clause, ElementKey, Expr, Function, Op, Order, Stmt, StmtKind, Target, Which,
 };
 use crate::error::{Fault, Outcome};
+use crate::key::Key;
 use crate::meter::Meter;
-use crate::value::{Key, Value};
+use crate::value::Value;
 use crate::{Host, Program};
 
 /// Calls within each other.
@@ -349,7 +350,11 @@ impl Machine<'_> {
         match clauses {
             [] => each(self),
             [Clause::If(condition), rest @ ..] => {
-                if self.eval(condition)?.is_true() { self.comprehend(rest, each) } else { Ok(()) }
+                if self.eval(condition)?.is_true() {
+                    self.comprehend(rest, each)
+                } else {
+                    Ok(())
+                }
             }
             [Clause::For(target, list), rest @ ..] => {
                 let list = self.eval(list)?;

@@ -48,6 +48,7 @@ mod builtins;
 mod code;
 mod error;
 mod eval;
+mod key;
 mod lexer;
 mod meter;
 mod parser;

@@ -1,6 +1,9 @@
 //! From tokens to code: expressions are in `expression.rs`, statements and names here.
 
+mod containers;
+mod depth;
 mod expression;
+mod outlook;
 mod scope;
 
 use experiment_file::suggestion;
@@ -97,38 +100,6 @@ impl<'a> Parser<'a> {
         };
         parser.look_ahead();
         parser
-    }
-
-    /// Finds the names of functions and constants, so that order does not matter.
-    fn look_ahead(&mut self) {
-        let mut n_blocks = 0;
-        let mut is_line_start = true;
-        for (index, token) in self.tokens.iter().enumerate() {
-            let next = |n| self.tokens.get(index + n).map(|token: &Token<'a>| &token.kind);
-            match token.kind {
-                Kind::Indent => n_blocks += 1,
-                Kind::Dedent => n_blocks -= 1,
-                Kind::Name("def") if n_blocks == 0 && is_line_start => {
-                    if let Some(Kind::Name(name)) = next(1) {
-                        let parameters = self.tokens[index..].iter().skip(3);
-                        let parameters =
-                            parameters.take_while(|it| it.kind != Kind::Operator(")"));
-                        let n = parameters.filter(|it| matches!(it.kind, Kind::Name(_))).count();
-                        self.signatures.push((name, n));
-                    }
-                }
-                Kind::Name(name)
-                    if n_blocks == 0
-                        && is_line_start
-                        && next(1) == Some(&Kind::Operator("="))
-                        && !self.globals.contains(&name) =>
-                {
-                    self.globals.push(name);
-                }
-                _ => {}
-            }
-            is_line_start = matches!(token.kind, Kind::Newline | Kind::Dedent | Kind::Indent);
-        }
     }
 
     fn kind(&self) -> &'a Kind<'a> {
@@ -279,31 +250,6 @@ impl<'a> Parser<'a> {
         own.chain(functions).chain(builtins).chain(["True", "False", "None", "math"]).collect()
     }
 
-    /// The literal keys of the dicts that a body returns, if it returns nothing else.
-    fn returned_keys(&self, body: &[Stmt]) -> Option<Vec<String>> {
-        let mut keys = Vec::new();
-        for statement in body {
-            match &statement.kind {
-                StmtKind::Return(Some(Expr { op: Op::Dict(entries), .. })) => {
-                    for (key, _) in entries {
-                        let Op::Text(text) = key.op else { return None };
-                        add_new(&mut keys, vec![self.texts[text].clone()]);
-                    }
-                }
-                StmtKind::Return(_) => return None,
-                StmtKind::If(conditions, otherwise) => {
-                    let blocks = conditions.iter().map(|(_, block)| block);
-                    for block in blocks.chain([otherwise]) {
-                        add_new(&mut keys, self.returned_keys(block)?);
-                    }
-                }
-                StmtKind::For(_, _, block) => add_new(&mut keys, self.returned_keys(block)?),
-                _ => {}
-            }
-        }
-        Some(keys)
-    }
-
     /// `:` and what is to be done, in this line or in an indented block.
     fn block(&mut self) -> Outcome<Vec<Stmt>> {
         self.expect(":")?;
@@ -363,7 +309,9 @@ impl<'a> Parser<'a> {
                 return Ok(statements);
             }
             if !is_more {
-                return Err(self.fault(format!("expected the end of the line, found {}", self.found())));
+                return Err(
+                    self.fault(format!("expected the end of the line, found {}", self.found()))
+                );
             }
         }
     }
@@ -390,7 +338,11 @@ impl<'a> Parser<'a> {
                 return Err(self.fault("`return` belongs into a function"));
             }
             let is_empty = matches!(self.kind(), Kind::Newline | Kind::Operator(";"));
-            return Ok(StmtKind::Return(if is_empty { None } else { Some(self.expression_list()?) }));
+            return Ok(StmtKind::Return(if is_empty {
+                None
+            } else {
+                Some(self.expression_list()?)
+            }));
         }
         let start = self.at;
         // The left side of an assignment declares names, which reading it does not.
@@ -487,7 +439,8 @@ impl<'a> Parser<'a> {
         let is_shared = self.signatures.iter().any(|(function, _)| *function == name)
             || (self.in_function && self.globals.contains(&name));
         if is_shared {
-            let message = format!("`{name}` is a constant or function of the script; choose another name");
+            let message =
+                format!("`{name}` is a constant or function of the script; choose another name");
             self.problem(line, message);
         }
         if !self.in_function
@@ -524,13 +477,5 @@ impl<'a> Parser<'a> {
             return Err(self.fault("too many expressions within each other; use variables"));
         }
         Ok(())
-    }
-}
-
-fn add_new(keys: &mut Vec<String>, more: Vec<String>) {
-    for key in more {
-        if !keys.contains(&key) {
-            keys.push(key);
-        }
     }
 }

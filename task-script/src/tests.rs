@@ -73,24 +73,40 @@ fn scripts_compute_what_python_does() {
         ("a = [3, 1, 2]\na.append(0)\nb = sorted(a)", "a == [3, 1, 2, 0] and b == [0, 1, 2, 3]"),
         ("a = sorted([3, -1, 2], key=lambda n: n * n, reverse=True)", "a == [3, 2, -1]"),
         ("a = min([4, -5], key=abs_of)", "a == 4 and max(1, 2.5) == 2.5 and min([2, 1]) == 1"),
-        ("a = [1, 2, 3, 4]", "a[-1] == 4 and a[1:3] == [2, 3] and a[:-1] == [1, 2, 3] and a[2:] == [3, 4]"),
+        (
+            "a = [1, 2, 3, 4]",
+            "a[-1] == 4 and a[1:3] == [2, 3] and a[:-1] == [1, 2, 3] and a[2:] == [3, 4]",
+        ),
         ("a = [1]\nb = a\nb += [2]\na.extend([3])", "b == [1, 2] and a == [1, 3]"),
-        ("a = 0\nfor i in range(10):\n    if i == 2:\n        continue\n    if i == 5: break\n    a += i", "a == 8"),
+        (
+            "a = 0\nfor i in range(10):\n    if i == 2:\n        continue\n    if i == 5: break\n    a += i",
+            "a == 8",
+        ),
         ("a = 1 if x else 2\nb = 'y' if [] else 'n'", "a == 1 and b == 'n' and (0 or 3) == 3"),
         ("a = range(10, 0, -3)", "a == [10, 7, 4, 1] and range(3, 3) == [] and sum(a) == 22"),
         ("a = enumerate('ab' and ['p', 'q'])", "a == [(0, 'p'), (1, 'q')]"),
         ("a = zip([1, 2], [3, 4, 5])", "a == [(1, 3), (2, 4)] and reversed(a) == [(2, 4), (1, 3)]"),
-        ("a = math.sqrt(2.0)", "abs(a * a - 2) < 1e-15 and math.floor(-1.5) == -2 and int(-1.5) == -1"),
-        ("a = math.atan2(1, -1)", "a == 0.75 * math.pi and math.cos(0) == 1 and math.ceil(1.1) == 2"),
-        ("a = 'le' + \"ft\"", "a == 'left' and 'ef' in a and 'a' < 'b' and any([0, 1]) and not all([0, 1])"),
+        (
+            "a = math.sqrt(2.0)",
+            "abs(a * a - 2) < 1e-15 and math.floor(-1.5) == -2 and int(-1.5) == -1",
+        ),
+        (
+            "a = math.atan2(1, -1)",
+            "a == 0.75 * math.pi and math.cos(0) == 1 and math.ceil(1.1) == 2",
+        ),
+        (
+            "a = 'le' + \"ft\"",
+            "a == 'left' and 'ef' in a and 'a' < 'b' and any([0, 1]) and not all([0, 1])",
+        ),
         ("n = 0\nfor i in [1, 2]:\n    if n > 0:\n        m = p\n    p = i\n    n += 1", "m == 1"),
         ("i = 5\na = [i for i in range(3)]", "i == 5 and a == [0, 1, 2]"),
     ];
     for (statements, condition) in cases {
         let statements = statements.replace("abs_of", "g");
         let statements = statements.replace('\n', "\n    ");
-        let text =
-            format!("def g(n):\n    return abs(n)\n\ndef f(x):\n    {statements}\n    return {condition}");
+        let text = format!(
+            "def g(n):\n    return abs(n)\n\ndef f(x):\n    {statements}\n    return {condition}"
+        );
         let value = run(&text).unwrap_or_else(|error| panic!("{text}\n{error}"));
         assert!(value.is_true(), "{statements}: {condition}");
     }

@@ -8,6 +8,7 @@ use std::rc::{Rc, Weak};
 use indexmap::IndexMap;
 
 use crate::error::Outcome;
+use crate::key::Key;
 use crate::meter::Meter;
 
 /// Bytes that an element of a list takes, at most.
@@ -17,7 +18,7 @@ const ENTRY: usize = 2 * (size_of::<(Key, Value)>() + 16);
 /// Bytes that a list, dict or text takes without its content, at most.
 const OVERHEAD: usize = 160;
 /// Lists within each other that are compared.
-const COMPARED_DEPTH: usize = 16;
+pub(crate) const COMPARED_DEPTH: usize = 16;
 
 /// A value. Lists and dicts are shared, as in Python.
 #[derive(Clone)]
@@ -76,20 +77,6 @@ struct State {
     is_frozen: bool,
     /// May be part of a cycle.
     is_noted: bool,
-}
-
-/// What a dict finds its entries by.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) enum Key {
-    Nothing,
-    Bool(bool),
-    /// Whole numbers, and floats that are.
-    Int(i64),
-    /// Bits of another float.
-    Float(u64),
-    Text(String),
-    Tuple(Vec<Key>),
-    Object(Object),
 }
 
 /// A list or dict that may hold itself.
@@ -179,6 +166,10 @@ impl List {
     /// An element.
     pub fn get(&self, index: usize) -> Option<Value> {
         self.items.borrow().get(index).cloned()
+    }
+
+    pub(crate) fn is_tuple(&self) -> bool {
+        self.is_tuple
     }
 
     fn check_mutable(&self) -> Result<(), String> {
@@ -296,68 +287,6 @@ impl Dict {
         }
         Ok(())
     }
-}
-
-impl Key {
-    /// The key that a value is.
-    pub(crate) fn new(value: &Value) -> Result<Self, String> {
-        Self::within(value, COMPARED_DEPTH)
-    }
-
-    fn within(value: &Value, depth: usize) -> Result<Self, String> {
-        Ok(match value {
-            Value::Nothing => Self::Nothing,
-            Value::Bool(value) => Self::Bool(*value),
-            Value::Int(value) => Self::Int(*value),
-            Value::Float(value) => match whole(*value) {
-                Some(value) => Self::Int(value),
-                None => Self::Float(value.to_bits()),
-            },
-            Value::Text(text) => {
-                text.meter.work(text.text.len() / 64)?;
-                Self::Text(text.text.clone())
-            }
-            Value::List(list) if list.is_tuple && depth > 0 => {
-                list.meter.work(list.len())?;
-                let keys = list.items.borrow();
-                let keys = keys.iter().map(|value| Self::within(value, depth - 1));
-                Self::Tuple(keys.collect::<Result<_, _>>()?)
-            }
-            Value::Object(object) => Self::Object(*object),
-            _ => return Err(format!("a {} cannot be a key of a dict", value.kind())),
-        })
-    }
-
-    fn bytes(&self) -> usize {
-        match self {
-            Self::Text(text) => text.len(),
-            Self::Tuple(keys) => keys.iter().map(|key| size_of::<Self>() + key.bytes()).sum(),
-            _ => 0,
-        }
-    }
-
-    /// The value that the key stands for.
-    pub(crate) fn value(&self, meter: &Rc<Meter>) -> Result<Value, String> {
-        Ok(match self {
-            Self::Nothing => Value::Nothing,
-            Self::Bool(value) => Value::Bool(*value),
-            Self::Int(value) => Value::Int(*value),
-            Self::Float(bits) => Value::Float(f64::from_bits(*bits)),
-            Self::Text(text) => Value::text(text, meter)?,
-            Self::Tuple(keys) => {
-                let values = keys.iter().map(|key| key.value(meter));
-                Value::tuple(values.collect::<Result<_, _>>()?, meter)?
-            }
-            Self::Object(object) => Value::Object(*object),
-        })
-    }
-}
-
-/// A float as a whole number, if it is one.
-fn whole(value: f64) -> Option<i64> {
-    /// Up to there, every whole number is a float.
-    const EXACT: f64 = (1_i64 << 53) as f64;
-    (value.abs() <= EXACT && value.fract() == 0.0).then_some(value as i64)
 }
 
 impl Value {

@@ -22,6 +22,7 @@ mod protocol;
 mod python_client;
 mod read_out;
 mod reproduction;
+mod scripts;
 mod security;
 mod simulate;
 mod slurm;

@@ -7,7 +7,7 @@ mod trace;
 use std::{borrow::Cow, path::Path};
 
 use serde::Serialize;
-use sim_core::{EpisodeSummary, EvaluateError, Measures};
+use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
 
 use crate::{
     archive::Archive,
@@ -132,9 +132,9 @@ impl SimulationReport<'_> {
         let mut lines = vec![format!(
             "{name}: {genotype}, seed {seed}, generation {generation}, {steps} steps per trial"
         )];
-        let names: Vec<&str> = self.mean.measures.keys().copied().collect();
+        let names: Vec<&str> = self.mean.measures.keys().map(|name| &**name).collect();
         let row = |name: &str, summary: &EpisodeSummary| -> Vec<String> {
-            let metrics = names.iter().map(|name| summary.measures.get(name).copied());
+            let metrics = names.iter().map(|name| summary.measures.get(*name).copied());
             let numbers = std::iter::once(Some(summary.fitness)).chain(metrics);
             let cells = numbers.map(|n| n.map_or("-".into(), |n| format!("{n:.6}")));
             std::iter::once(name.to_owned()).chain(cells).collect()
@@ -160,10 +160,13 @@ fn mean(trials: &[Trial]) -> EpisodeSummary {
         sum / n
     };
     let measures = || trials.iter().flat_map(|trial| &trial.summary.measures);
-    let names: Vec<&'static str> = measures().map(|(name, _)| *name).collect();
+    let names: Vec<MeasureName> = measures().map(|(name, _)| name.clone()).collect();
     let means: Measures = names
         .into_iter()
-        .map(|name| (name, mean(&mut measures().filter(|m| *m.0 == name).map(|m| *m.1))))
+        .map(|name| {
+            let mean = mean(&mut measures().filter(|m| *m.0 == name).map(|m| *m.1));
+            (name, mean)
+        })
         .collect();
     EpisodeSummary {
         fitness: mean(&mut trials.iter().map(|trial| trial.summary.fitness)),

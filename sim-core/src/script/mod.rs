@@ -100,7 +100,11 @@ pub(crate) struct ScriptRun<'a> {
 
 impl<'a> ScriptRun<'a> {
     /// At the start of a trial; `stream` is what the script draws from.
-    pub fn start(task: &'a ScriptTask, stream: Stream, n_robots: usize) -> Result<Self, ScriptError> {
+    pub fn start(
+        task: &'a ScriptTask,
+        stream: Stream,
+        n_robots: usize,
+    ) -> Result<Self, ScriptError> {
         let limits = Limits { work: WORK, memory: MEMORY + MEMORY_PER_ROBOT * n_robots };
         let script = task.program.start(limits, &mut view::Nothing)?;
         Ok(Self { task, script, kept: Kept::new(stream) })

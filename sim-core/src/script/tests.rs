@@ -1,6 +1,8 @@
 //! Scripts in episodes: the built-in tasks as scripts, to the same bits, and what goes wrong.
 
-use experiment_file::{ExperimentConfig, FitnessFunction, LightController, ScriptConfig, TaskConfig};
+use experiment_file::{
+    ExperimentConfig, FitnessFunction, LightController, ScriptConfig, TaskConfig,
+};
 use numeric::Isa;
 use numeric::random::TrialSet;
 
@@ -14,14 +16,16 @@ fn with_script(mut config: ExperimentConfig, name: &str, text: &str) -> Experime
     config
 }
 
+const N_TRIALS: u32 = 2;
+
 /// Fitness of some trials, and the measures of all steps.
 fn measured(simulation: &Simulation) -> Vec<Vec<u64>> {
-    let trials = (0..4_u64).map(|seed| {
+    let trials = (0..2_u64).map(|seed| {
         let genotype = genotype(simulation.genotype_len(), seed);
         let trial_set = TrialSet::Generation(seed);
-        let values = simulation.measure_while(&genotype, trial_set, 0..3, &|| true);
+        let values = simulation.measure_while(&genotype, trial_set, 0..N_TRIALS, &|| true);
         let values = values.unwrap().unwrap();
-        let fitness = simulation.evaluate(&genotype, trial_set, 0..3).unwrap();
+        let fitness = simulation.evaluate(&genotype, trial_set, 0..N_TRIALS).unwrap();
         assert_eq!(fitness[0], values[0], "measuring changes no fitness");
         values.into_iter().map(f64::to_bits).collect()
     });
@@ -38,9 +42,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
     let shipped = |function: FitnessFunction| match function {
         FitnessFunction::IdentifyLeader => (experiment_a(), script!("identify_leader")),
         FitnessFunction::IdentifyBorderline => (experiment_b(), script!("identify_borderline")),
-        FitnessFunction::OrientationConsensus => {
-            (experiment_c(), script!("orientation_consensus"))
-        }
+        FitnessFunction::OrientationConsensus => (experiment_c(), script!("orientation_consensus")),
         FitnessFunction::Alignment => (experiment_c(), script!("alignment")),
         FitnessFunction::GotoLight => (experiment_d(), script!("goto_light")),
         FitnessFunction::Grouping => (experiment_d(), script!("grouping")),
@@ -50,7 +52,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
     for &function in built_in {
         let (mut config, text) = shipped(function);
         config.algorithm.fitness_function = function;
-        config.algorithm.evaluation_steps = 160;
+        config.algorithm.evaluation_steps = 130;
         let rust = Simulation::compile(&config).unwrap();
         let name = format!("{}.star", function.name());
         let script = Simulation::compile(&with_script(config, &name, text)).unwrap();
@@ -59,7 +61,7 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
         if script.measure_names().is_empty() {
             for (rust, script) in rust_values.iter().zip(&script_values) {
                 let fitness: Vec<u64> =
-                    rust.iter().step_by(rust.len() / 3).copied().collect();
+                    rust.iter().step_by(rust.len() / N_TRIALS as usize).copied().collect();
                 assert_eq!(script, &fitness, "{name}");
             }
         } else {
@@ -104,7 +106,10 @@ fn scripts_that_cannot_work_are_refused_with_all_that_is_wrong() {
         ("def fitness(): return 1", "t.star:1: `fitness` takes 1 argument, not 0"),
         ("def fitness(w): return w.robot", "nothing has a `robot`; did you mean `robots`?"),
         ("def measures(w): return {'a': 1}", "has no function `fitness` or `final`"),
-        ("def fitness(w): return 1\ndef measures(w): return 1", "`measures` returns something else"),
+        (
+            "def fitness(w): return 1\ndef measures(w): return 1",
+            "`measures` returns something else",
+        ),
     ] {
         let config = with_script(experiment_a(), "t.star", text);
         let error = Simulation::compile(&config).unwrap_err();

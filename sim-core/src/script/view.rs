@@ -111,7 +111,10 @@ impl<'a> View<'a> {
 
     fn state(&mut self, object: Object, meter: &Rc<Meter>) -> Answer {
         let kept = self.kept()?;
-        match kept.states.binary_search_by_key(&(object.kind, object.index), |(it, _)| (it.kind, it.index)) {
+        match kept
+            .states
+            .binary_search_by_key(&(object.kind, object.index), |(it, _)| (it.kind, it.index))
+        {
             Ok(place) => Ok(kept.states[place].1.clone()),
             Err(place) => {
                 let state = Value::dict(meter)?;
@@ -180,7 +183,9 @@ impl<'a> View<'a> {
     fn of_world(&mut self, name: Named, meter: &Rc<Meter>) -> Answer {
         let torus = self.world.torus;
         match name {
-            Named::Robots | Named::AllRobots | Named::Lights | Named::Areas => self.list(name, meter),
+            Named::Robots | Named::AllRobots | Named::Lights | Named::Areas => {
+                self.list(name, meter)
+            }
             Named::Center => pair(torus.center(), meter),
             Named::Width => Ok(Value::Float(torus.width)),
             Named::Height => Ok(Value::Float(torus.height)),
@@ -193,7 +198,8 @@ impl<'a> View<'a> {
 
     fn of_robot(&mut self, robot: usize, name: Named, meter: &Rc<Meter>) -> Answer {
         let swarm = &*self.swarm;
-        let floats = |values: &[f64]| Value::list(values.iter().copied().map(Value::Float).collect(), meter);
+        let floats =
+            |values: &[f64]| Value::list(values.iter().copied().map(Value::Float).collect(), meter);
         Ok(match name {
             Named::Id => Value::Int(robot as i64),
             Named::Heading => Value::Float(swarm.headings[robot]),
@@ -229,9 +235,8 @@ impl<'a> View<'a> {
         meter.work(self.world.n_robots() / 4)?;
         let from = self.point(of)?;
         let torus = &self.world.torus;
-        let near = (0..self.world.n_robots()).filter(|&robot| {
-            torus.distance(from, self.swarm.positions[robot]) <= range
-        });
+        let near = (0..self.world.n_robots())
+            .filter(|&robot| torus.distance(from, self.swarm.positions[robot]) <= range);
         let near = near.map(|robot| thing(Kind::Robot, robot));
         let itself = |value: &Value| match (value, of) {
             (Value::Object(a), Value::Object(b)) => a == b,
@@ -251,7 +256,9 @@ impl<'a> View<'a> {
     fn call_world(&mut self, name: Named, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
         let torus = self.world.torus;
         Ok(match (name, arguments) {
-            (Named::Distance, [a, b]) => Value::Float(torus.distance(self.point(a)?, self.point(b)?)),
+            (Named::Distance, [a, b]) => {
+                Value::Float(torus.distance(self.point(a)?, self.point(b)?))
+            }
             (Named::Way, [a, b]) => {
                 pair(torus.displacement(self.point(a)?, self.point(b)?), meter)?
             }
@@ -276,7 +283,13 @@ impl<'a> View<'a> {
         })
     }
 
-    fn call_thing(&mut self, object: Object, name: Named, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
+    fn call_thing(
+        &mut self,
+        object: Object,
+        name: Named,
+        arguments: &[Value],
+        meter: &Rc<Meter>,
+    ) -> Answer {
         let kind = Kind::of(object);
         let itself = Value::Object(object);
         match (name, arguments) {
@@ -323,7 +336,13 @@ impl Host for View<'_> {
         }
     }
 
-    fn call(&mut self, object: Object, name: Name, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
+    fn call(
+        &mut self,
+        object: Object,
+        name: Name,
+        arguments: &[Value],
+        meter: &Rc<Meter>,
+    ) -> Answer {
         let name = Named::numbered(name);
         match Kind::of(object) {
             Kind::World => self.call_world(name, arguments, meter),

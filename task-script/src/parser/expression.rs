@@ -4,8 +4,7 @@ use experiment_file::suggestion;
 
 use super::{Parser, REFUSED};
 use crate::code::{
-    Binary, Builtin, Called, Clause, DEPTH, ElementKey, Expr, Method, Name, Op, Order, Target,
-    Which,
+    Binary, Builtin, Called, DEPTH, ElementKey, Expr, Method, Name, Op, Order, Which,
 };
 use crate::error::{Outcome, shortened};
 use crate::lexer::Kind;
@@ -53,7 +52,7 @@ impl<'a> Parser<'a> {
         Ok(value)
     }
 
-    fn any_of(&mut self) -> Outcome<Expr> {
+    pub(super) fn any_of(&mut self) -> Outcome<Expr> {
         let line = self.line();
         let mut value = self.all_of()?;
         while self.accept_word("or") {
@@ -137,7 +136,9 @@ impl<'a> Parser<'a> {
                 Kind::Operator("/") => Binary::Divide,
                 Kind::Operator("//") => Binary::FloorDivide,
                 Kind::Operator("%") => Binary::Remainder,
-                Kind::Operator("**") => return Err(self.fault("there is no `**`; use `math.pow(a, b)`")),
+                Kind::Operator("**") => {
+                    return Err(self.fault("there is no `**`; use `math.pow(a, b)`"));
+                }
                 _ => return Ok(value),
             };
             let line = self.line();
@@ -188,7 +189,8 @@ impl<'a> Parser<'a> {
         if host.is_none() && container.is_none() {
             let methods: &[&str] = if is_call { Method::NAMES } else { &[] };
             let known: Vec<&str> = self.vocabulary.names.iter().chain(methods).copied().collect();
-            let message = format!("nothing has a `{}`; {}", shortened(name), suggestion(name, &known));
+            let message =
+                format!("nothing has a `{}`; {}", shortened(name), suggestion(name, &known));
             self.problem(line, message);
         }
         if !is_call {
@@ -202,7 +204,8 @@ impl<'a> Parser<'a> {
     }
 
     fn index(&mut self, value: Expr, line: u32) -> Outcome<Expr> {
-        let from = if *self.kind() == Kind::Operator(":") { None } else { Some(self.expression_list()?) };
+        let from =
+            if *self.kind() == Kind::Operator(":") { None } else { Some(self.expression_list()?) };
         if !self.accept(":") {
             self.expect("]")?;
             let Some(index) = from else { return Err(self.fault("expected an index")) };
@@ -281,7 +284,8 @@ impl<'a> Parser<'a> {
         let Some(builtin) = Builtin::named(&format!("math.{name}")) else {
             let functions = Builtin::NAMES.iter().filter_map(|name| name.strip_prefix("math."));
             let known: Vec<&str> = functions.chain(["pi", "tau", "inf"]).collect();
-            let message = format!("`math` has no `{}`; {}", shortened(name), suggestion(name, &known));
+            let message =
+                format!("`math` has no `{}`; {}", shortened(name), suggestion(name, &known));
             return Err(crate::error::Fault::new(line, message));
         };
         self.expect("(")?;
@@ -327,7 +331,9 @@ impl<'a> Parser<'a> {
         let known: Vec<&str> = functions.chain(Builtin::NAMES.iter().copied()).collect();
         let message = match REFUSED.iter().find(|(word, _)| *word == name) {
             Some((_, advice)) => (*advice).to_owned(),
-            None => format!("no function is named `{}`; {}", shortened(name), suggestion(name, &known)),
+            None => {
+                format!("no function is named `{}`; {}", shortened(name), suggestion(name, &known))
+            }
         };
         self.problem(line, message);
         self.expr(line, Op::Nothing)
@@ -366,7 +372,8 @@ impl<'a> Parser<'a> {
                 return Err(self.fault("expected a function or `lambda x: ...`"));
             };
             let function = self.signatures.iter().position(|(function, _)| *function == name);
-            let Some(function) = function.filter(|&function| self.signatures[function].1 == 1) else {
+            let Some(function) = function.filter(|&function| self.signatures[function].1 == 1)
+            else {
                 return Err(self.fault("expected a function of one argument or `lambda x: ...`"));
             };
             self.at += 1;
@@ -393,152 +400,13 @@ impl<'a> Parser<'a> {
         Ok(value)
     }
 
-    fn list(&mut self, line: u32) -> Outcome<Expr> {
-        if self.accept("]") {
-            return self.expr(line, Op::List(Vec::new()));
-        }
-        if let Some((clauses, value)) = self.comprehension("]", Self::expression)? {
-            return self.expr(line, Op::ListOf(Box::new(value), clauses));
-        }
-        let mut values = Vec::new();
-        while !self.accept("]") {
-            values.push(self.expression()?);
-            if !self.accept(",") {
-                self.expect("]")?;
-                break;
-            }
-        }
-        self.expr(line, Op::List(values))
-    }
-
-    fn dict(&mut self, line: u32) -> Outcome<Expr> {
-        fn entry(parser: &mut Parser<'_>) -> Outcome<(Expr, Expr)> {
-            let key = parser.expression()?;
-            parser.expect(":")?;
-            Ok((key, parser.expression()?))
-        }
-        if self.accept("}") {
-            return self.expr(line, Op::Dict(Vec::new()));
-        }
-        if let Some((clauses, value)) = self.comprehension("}", |parser| entry(parser))? {
-            return self.expr(line, Op::DictOf(Box::new(value), clauses));
-        }
-        let mut entries = Vec::new();
-        while !self.accept("}") {
-            entries.push(entry(self)?);
-            if !self.accept(",") {
-                self.expect("}")?;
-                break;
-            }
-        }
-        self.expr(line, Op::Dict(entries))
-    }
-
-    /// The clauses of a comprehension, whose value stands before them, and the value; none
-    /// if there is no `for` before the end of the brackets.
-    fn comprehension<T>(
-        &mut self,
-        close: &'static str,
-        value: impl Fn(&mut Self) -> Outcome<T>,
-    ) -> Outcome<Option<(Vec<Clause>, T)>> {
-        let Some(clauses_at) = self.comprehension_clauses() else { return Ok(None) };
-        let value_at = std::mem::replace(&mut self.at, clauses_at);
-        let mark = self.scope.open();
-        let mut clauses = Vec::new();
-        loop {
-            if self.accept_word("for") {
-                // The list is evaluated before the variable has a value.
-                let target_at = self.at;
-                while !matches!(self.kind(), Kind::Name("in") | Kind::End) {
-                    self.at += 1;
-                }
-                if !self.accept_word("in") {
-                    return Err(self.fault("expected `in`"));
-                }
-                let list = self.any_of()?;
-                let after = std::mem::replace(&mut self.at, target_at);
-                let target = self.targets()?;
-                if !self.accept_word("in") {
-                    return Err(self.fault(format!("expected `in`, found {}", self.found())));
-                }
-                if matches!(target, Target::Index(_) | Target::Attribute(..)) {
-                    return Err(self.fault("expected a name after `for`"));
-                }
-                self.at = after;
-                clauses.push(Clause::For(target, list));
-            } else if self.accept_word("if") {
-                clauses.push(Clause::If(self.any_of()?));
-            } else {
-                break;
-            }
-        }
-        self.expect(close)?;
-        let end = std::mem::replace(&mut self.at, value_at);
-        let value = value(self)?;
-        if self.at != clauses_at {
-            return Err(self.fault(format!("expected `for`, found {}", self.found())));
-        }
-        self.scope.close(mark);
-        self.at = end;
-        Ok(Some((clauses, value)))
-    }
-
-    /// Where the clauses begin, if these brackets hold a comprehension.
-    fn comprehension_clauses(&self) -> Option<usize> {
-        let mut n_brackets = 0;
-        for (index, token) in self.tokens.iter().enumerate().skip(self.at) {
-            match token.kind {
-                Kind::Operator("(" | "[" | "{") => n_brackets += 1,
-                Kind::Operator(")" | "]" | "}") if n_brackets == 0 => return None,
-                Kind::Operator(")" | "]" | "}") => n_brackets -= 1,
-                Kind::Operator(",") if n_brackets == 0 => return None,
-                Kind::Name("for") if n_brackets == 0 => return Some(index),
-                _ => {}
-            }
-        }
-        None
-    }
-
     /// An expression, unless it is too deep.
-    fn expr(&self, line: u32, op: Op) -> Outcome<Expr> {
-        let depth = 1 + depth_within(&op);
+    pub(super) fn expr(&self, line: u32, op: Op) -> Outcome<Expr> {
+        let depth = 1 + super::depth::within(&op);
         if depth > DEPTH {
             let message = "too many operations in one expression; use variables";
             return Err(crate::error::Fault::new(line, message));
         }
         Ok(Expr { line, depth, op })
-    }
-}
-
-/// The depth of the deepest operand.
-fn depth_within(op: &Op) -> u16 {
-    fn deepest<'e>(of: impl IntoIterator<Item = &'e Expr>) -> u16 {
-        of.into_iter().map(|expr| expr.depth).max().unwrap_or(0)
-    }
-    let clauses = |clauses: &[Clause]| {
-        let lists = clauses.iter().map(|clause| match clause {
-            Clause::For(_, expr) | Clause::If(expr) => expr.depth,
-        });
-        lists.max().unwrap_or(0)
-    };
-    match op {
-        Op::List(of) | Op::Tuple(of) | Op::Call(_, of) | Op::Builtin(_, of) => deepest(of),
-        Op::Dict(of) => of.iter().map(|(key, value)| key.depth.max(value.depth)).max().unwrap_or(0),
-        Op::ListOf(of, over) => of.depth.max(clauses(over)),
-        Op::DictOf(of, over) => of.0.depth.max(of.1.depth).max(clauses(over)),
-        Op::Not(of) | Op::Negative(of) | Op::Positive(of) | Op::Attribute(of, _) => of.depth,
-        Op::Binary(_, of) | Op::And(of) | Op::Or(of) | Op::Index(of) => of.0.depth.max(of.1.depth),
-        Op::If(of) => of.0.depth.max(of.1.depth).max(of.2.depth),
-        Op::Slice(of) => of.0.depth.max(deepest(of.1.iter().chain(&of.2))),
-        Op::Order(of) => {
-            let key = match &of.key {
-                Some(ElementKey::Lambda(_, expr)) => expr.depth,
-                _ => 0,
-            };
-            of.list.depth.max(key).max(deepest(&of.reverse))
-        }
-        Op::Method(of, _, arguments) => of.depth.max(deepest(arguments)),
-        Op::Nothing | Op::Bool(_) | Op::Int(_) | Op::Float(_) | Op::Text(_) | Op::Local(_)
-        | Op::Global(_) => 0,
     }
 }

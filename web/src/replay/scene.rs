@@ -2,7 +2,7 @@
 
 use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController, SensorQuery};
 use serde::Serialize;
-use sim_core::{TrialSet, Vec2};
+use sim_core::{MeasureName, TrialSet, Vec2};
 
 use super::Episode;
 
@@ -31,7 +31,7 @@ pub struct Scene {
     ensembles: Vec<Rows>,
     pub lights: Vec<Disc>,
     areas: Vec<Disc>,
-    pub measure_names: &'static [&'static str],
+    pub measure_names: Vec<MeasureName>,
 }
 
 /// The robots of one object.
@@ -114,7 +114,7 @@ impl Scene {
                 }
                 _ => None,
             }),
-            measure_names: episode.simulation.measure_names(),
+            measure_names: episode.simulation.measure_names().to_vec(),
         }
     }
 

@@ -1,0 +1,161 @@
+//! Scripts that are damaged in every way: each is refused, fails with its file and line, or
+//! computes finite numbers; it never panics, hangs or takes memory without bound.
+//!
+//! `SWARM_TEST_SCRIPTS` says how many.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use experiment_file::{ExperimentConfig, FitnessFunction, ScriptConfig, TaskConfig};
+use numeric::random::{Purpose, Stream, TrialSet};
+use sim_core::{EvaluateError, Simulation};
+
+/// Valid scripts, and the experiment file beside each that has one.
+fn scripts() -> Vec<(String, ExperimentConfig)> {
+    let tasks = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/tasks");
+    let read = |path: &Path| fs::read_to_string(path).unwrap();
+    let of_folder =
+        |folder: PathBuf| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> =
+        of_folder(tasks.clone()).chain(of_folder(tasks.join("thesis"))).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "star"));
+    paths.sort();
+    let experiment = |path: &Path| {
+        let own = path.with_extension("json");
+        let file = if own.exists() { own } else { tasks.join("../light_follower_snes.json") };
+        let text = read(&file);
+        let script = ScriptConfig { name: "hostile.star".into(), text: read(path) };
+        let text = match experiment_file::script_path(&text) {
+            Some((_, place)) => experiment_file::inline_script(&text, place, &script),
+            None => text,
+        };
+        let (mut config, _) =
+            ExperimentConfig::from_json(&text, "hostile", evolution::ALGORITHMS).unwrap();
+        config.algorithm.fitness_function = FitnessFunction::Script;
+        config.algorithm.evaluation_steps = 5;
+        (script.text, config)
+    };
+    paths.iter().map(|path| experiment(path)).collect()
+}
+
+/// How many of the pieces are values, the first ones.
+const N_VALUES: usize = 17;
+/// What a mutation puts in.
+const PIECES: [&str; 36] = [
+    "0",
+    "-1",
+    "1e308",
+    "9223372036854775807",
+    "None",
+    "''",
+    "[]",
+    "{}",
+    "()",
+    "x",
+    "world",
+    "world.state",
+    "robot",
+    "math.inf",
+    "range(100000)",
+    "range(10)",
+    "[x for x in range(999)]",
+    "(",
+    ")",
+    "[",
+    "]",
+    "{",
+    "}",
+    ":",
+    "\n",
+    "    ",
+    " + ",
+    " * ",
+    " / ",
+    " % ",
+    " for x in ",
+    " if ",
+    " in ",
+    ".",
+    ", ",
+    "\"",
+];
+
+/// A text with some of its pieces gone, doubled, moved or replaced.
+fn mutated(text: &str, stream: &mut Stream) -> String {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut pieces: Vec<String> = Vec::new();
+    for c in text.chars() {
+        match pieces.last_mut() {
+            Some(last) if last.ends_with(is_word) && is_word(c) => last.push(c),
+            _ => pieces.push(c.to_string()),
+        }
+    }
+    // One word for another: what is still a script, mostly.
+    let words: Vec<usize> =
+        (0..pieces.len()).filter(|&at| pieces[at].starts_with(is_word)).collect();
+    for _ in 0..=stream.below(2) {
+        let at = words[stream.below(words.len())];
+        pieces[at] = match stream.below(2) {
+            0 => pieces[words[stream.below(words.len())]].clone(),
+            _ => PIECES[stream.below(N_VALUES)].to_owned(),
+        };
+    }
+    // Anything.
+    for _ in 0..stream.below(3).saturating_sub(1) {
+        let at = stream.below(pieces.len());
+        let other = stream.below(pieces.len());
+        match stream.below(4) {
+            0 => drop(pieces.remove(at)),
+            1 => pieces.insert(at, pieces[other].clone()),
+            2 => pieces.swap(at, other),
+            _ => pieces.insert(at, PIECES[stream.below(PIECES.len())].to_owned()),
+        }
+    }
+    pieces.concat()
+}
+
+#[test]
+fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
+    let n = std::env::var("SWARM_TEST_SCRIPTS").map_or(300, |n| n.parse().unwrap());
+    let scripts = scripts();
+    let mut stream = Stream::new(1, 0, 0, Purpose::Evolution, 0);
+    let (mut n_refused, mut n_failed, mut n_computed) = (0, 0, 0);
+    for number in 0..n {
+        let (text, config) = &scripts[number % scripts.len()];
+        let text = mutated(text, &mut stream);
+        let mut config = config.clone();
+        let script = ScriptConfig { name: "hostile.star".into(), text: text.clone() };
+        config.task = Some(TaskConfig { script });
+        let simulation = match Simulation::compile(&config) {
+            Ok(simulation) => simulation,
+            Err(error) => {
+                assert!(
+                    error.problems.iter().all(|problem| problem.path == "task.script"),
+                    "{error}"
+                );
+                n_refused += 1;
+                continue;
+            }
+        };
+        let genotype = vec![0.6; simulation.genotype_len()];
+        match simulation.measure_while(&genotype, TrialSet::Generation(0), 0..1, &|| true) {
+            Ok(values) => {
+                assert!(values.unwrap()[0].is_finite(), "{text}");
+                n_computed += 1;
+            }
+            Err(EvaluateError::Script { error, .. }) => {
+                let n_lines = text.lines().count() as u32;
+                assert!((1..=n_lines.max(1)).contains(&error.line), "{error}\n{text}");
+                assert!(error.message.len() < 1000, "{error}");
+                n_failed += 1;
+            }
+            Err(error) => panic!("{error}\n{text}"),
+        }
+    }
+    // All three happen, or the mutations are not worth their name.
+    assert!(
+        n_refused > n / 10 && n_failed > n / 50 && n_computed > n / 50,
+        "{n_refused} refused, {n_failed} failed, {n_computed} computed"
+    );
+}

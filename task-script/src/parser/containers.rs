@@ -1,0 +1,114 @@
+//! Lists, dicts and comprehensions.
+
+use super::Parser;
+use crate::code::{Clause, Expr, Op, Target};
+use crate::error::Outcome;
+use crate::lexer::Kind;
+
+impl Parser<'_> {
+    pub(super) fn list(&mut self, line: u32) -> Outcome<Expr> {
+        if self.accept("]") {
+            return self.expr(line, Op::List(Vec::new()));
+        }
+        if let Some((clauses, value)) = self.comprehension("]", Self::expression)? {
+            return self.expr(line, Op::ListOf(Box::new(value), clauses));
+        }
+        let mut values = Vec::new();
+        while !self.accept("]") {
+            values.push(self.expression()?);
+            if !self.accept(",") {
+                self.expect("]")?;
+                break;
+            }
+        }
+        self.expr(line, Op::List(values))
+    }
+
+    pub(super) fn dict(&mut self, line: u32) -> Outcome<Expr> {
+        fn entry(parser: &mut Parser<'_>) -> Outcome<(Expr, Expr)> {
+            let key = parser.expression()?;
+            parser.expect(":")?;
+            Ok((key, parser.expression()?))
+        }
+        if self.accept("}") {
+            return self.expr(line, Op::Dict(Vec::new()));
+        }
+        if let Some((clauses, value)) = self.comprehension("}", |parser| entry(parser))? {
+            return self.expr(line, Op::DictOf(Box::new(value), clauses));
+        }
+        let mut entries = Vec::new();
+        while !self.accept("}") {
+            entries.push(entry(self)?);
+            if !self.accept(",") {
+                self.expect("}")?;
+                break;
+            }
+        }
+        self.expr(line, Op::Dict(entries))
+    }
+
+    /// The clauses of a comprehension, whose value stands before them, and the value; none
+    /// if there is no `for` before the end of the brackets.
+    fn comprehension<T>(
+        &mut self,
+        close: &'static str,
+        value: impl Fn(&mut Self) -> Outcome<T>,
+    ) -> Outcome<Option<(Vec<Clause>, T)>> {
+        let Some(clauses_at) = self.comprehension_clauses() else { return Ok(None) };
+        let value_at = std::mem::replace(&mut self.at, clauses_at);
+        let mark = self.scope.open();
+        let mut clauses = Vec::new();
+        loop {
+            if self.accept_word("for") {
+                // The list is evaluated before the variable has a value.
+                let target_at = self.at;
+                while !matches!(self.kind(), Kind::Name("in") | Kind::End) {
+                    self.at += 1;
+                }
+                if !self.accept_word("in") {
+                    return Err(self.fault("expected `in`"));
+                }
+                let list = self.any_of()?;
+                let after = std::mem::replace(&mut self.at, target_at);
+                let target = self.targets()?;
+                if !self.accept_word("in") {
+                    return Err(self.fault(format!("expected `in`, found {}", self.found())));
+                }
+                if matches!(target, Target::Index(_) | Target::Attribute(..)) {
+                    return Err(self.fault("expected a name after `for`"));
+                }
+                self.at = after;
+                clauses.push(Clause::For(target, list));
+            } else if self.accept_word("if") {
+                clauses.push(Clause::If(self.any_of()?));
+            } else {
+                break;
+            }
+        }
+        self.expect(close)?;
+        let end = std::mem::replace(&mut self.at, value_at);
+        let value = value(self)?;
+        if self.at != clauses_at {
+            return Err(self.fault(format!("expected `for`, found {}", self.found())));
+        }
+        self.scope.close(mark);
+        self.at = end;
+        Ok(Some((clauses, value)))
+    }
+
+    /// Where the clauses begin, if these brackets hold a comprehension.
+    fn comprehension_clauses(&self) -> Option<usize> {
+        let mut n_brackets = 0;
+        for (index, token) in self.tokens.iter().enumerate().skip(self.at) {
+            match token.kind {
+                Kind::Operator("(" | "[" | "{") => n_brackets += 1,
+                Kind::Operator(")" | "]" | "}") if n_brackets == 0 => return None,
+                Kind::Operator(")" | "]" | "}") => n_brackets -= 1,
+                Kind::Operator(",") if n_brackets == 0 => return None,
+                Kind::Name("for") if n_brackets == 0 => return Some(index),
+                _ => {}
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,81 @@
+//! Experiments that bring their task as a script, on workers that never saw it.
+
+use std::fs;
+
+use harness::{
+    CoordinatorProcess, Experiment, WorkerProcess, swarmctl, undisturbed, workspace_file,
+};
+use serde_json::json;
+
+/// The small experiment, with a script beside its file.
+fn scripted(generations: u64, script: &str) -> Experiment {
+    let experiment = Experiment::small(generations).edit(|experiment| {
+        experiment["task"] = json!({"script": "task.star"});
+        let algorithm = experiment["algorithm"].as_object_mut().unwrap();
+        algorithm.remove("fitness_function");
+    });
+    fs::write(experiment.path().with_file_name("task.star"), script).unwrap();
+    experiment
+}
+
+fn leader_selection() -> String {
+    let path = workspace_file("configs/tasks/thesis/identify_leader.star");
+    fs::read_to_string(path).unwrap()
+}
+
+#[test]
+fn workers_that_never_saw_a_script_compute_the_same_bits_through_a_kill() {
+    let coordinator = CoordinatorProcess::start();
+    let mut workers = WorkerProcess::start_many(&coordinator, 4);
+    let experiment = scripted(5, &leader_selection());
+    let watch = coordinator.watch(coordinator.submit(&experiment.path()));
+    coordinator.wait_for_generation(1);
+    drop(workers.pop());
+    let digests = watch.finish().digests();
+    assert_eq!(digests, undisturbed(&experiment), "one worker, in one process");
+    // The fitness is that of the built-in function: only the name of the task differs.
+    let best = |experiment: &Experiment| {
+        let directory = tempfile::tempdir().unwrap();
+        let path = experiment.path();
+        let args = ["run", path.to_str().unwrap(), "--generations", "2", "--data-dir"];
+        let args = args.into_iter().chain([directory.path().to_str().unwrap()]);
+        let lines = swarmctl(args).expect_success().json_lines();
+        [lines[0]["best"].clone(), lines[1]["mean"].clone()]
+    };
+    assert_eq!(best(&experiment), best(&Experiment::small(5)));
+}
+
+#[test]
+fn a_script_that_goes_wrong_fails_its_experiment_and_nothing_else() {
+    let coordinator = CoordinatorProcess::start();
+    let workers = WorkerProcess::start_many(&coordinator, 2);
+    let script = "def fitness(world):\n    return 1 / (world.step - 200)\n";
+    let id = coordinator.submit(&scripted(3, script).path());
+    let (code, finished) = coordinator.watch(id).end();
+    assert_ne!(code, Some(0));
+    let error = finished.last["reason"].as_str().unwrap_or_default().to_owned();
+    assert!(error.contains("task.star:2: division by zero (in step 200 of"), "{}", finished.last);
+    let experiment = Experiment::tiny(2);
+    let other = coordinator.watch(coordinator.submit(&experiment.path())).finish();
+    assert_eq!(other.digests(), undisturbed(&experiment));
+    drop(workers);
+}
+
+#[test]
+fn what_is_wrong_with_a_script_is_said_before_anything_is_computed() {
+    let script = "def fitness(world):\n    return len(world.robos)\n";
+    let experiment = scripted(3, script);
+    let path = experiment.path();
+    let validated = swarmctl(["validate", path.to_str().unwrap()]);
+    let expected = "task.script: task.star:2: nothing has a `robos`; did you mean `robots`?";
+    assert!(validated.stderr.contains(expected), "{}", validated.stderr);
+    assert_eq!(validated.code, Some(2));
+    // In an early step.
+    fs::write(path.with_file_name("task.star"), "def fitness(world):\n    return [1][world.step]")
+        .unwrap();
+    let validated = swarmctl(["validate", path.to_str().unwrap()]);
+    assert!(validated.stderr.contains("there is no element 1 in a list of 1"), "{validated:?}");
+    fs::remove_file(path.with_file_name("task.star")).unwrap();
+    let validated = swarmctl(["validate", path.to_str().unwrap()]);
+    assert!(validated.stderr.contains("task.script: cannot be read: "), "{}", validated.stderr);
+}
