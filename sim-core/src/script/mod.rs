@@ -14,6 +14,8 @@ use crate::problems::Problems;
 use crate::record::{MeasureName, Measures};
 use view::Kept;
 
+/// Largest absolute value that a function may return: sums and squares of it are finite.
+const LARGEST: f64 = 1e100;
 /// Units of work in a call.
 const WORK: u64 = 2_000_000;
 /// Memory that a trial may keep, bytes, beside [`MEMORY_PER_ROBOT`].
@@ -168,8 +170,10 @@ impl<'a> ScriptRun<'a> {
     fn finite(&self, function: FunctionId, value: &Value) -> Result<f64, ScriptError> {
         let problem = |message| self.task.program.problem(function, message);
         match value.number() {
-            Some(number) if number.is_finite() => Ok(number),
-            Some(number) => Err(problem(format!("returns {number}, which is not a finite number"))),
+            Some(number) if number.abs() <= LARGEST => Ok(number),
+            Some(number) => Err(problem(format!(
+                "returns {number:e}; numbers are finite and at most {LARGEST:e}"
+            ))),
             None => Err(problem(format!("returns a {}, not a number", value.kind()))),
         }
     }
