@@ -73,6 +73,8 @@ struct Rows<W> {
     stimuli: IndexSet<String>,
     /// Names of all neurons, in the order of their activities; empty if nobody asked.
     neurons: Vec<String>,
+    /// Whether neurons have voltages, too.
+    has_voltages: bool,
     has_frames: bool,
     has_targets: bool,
     n_rows: u64,
@@ -114,6 +116,7 @@ impl<W: io::Write> Rows<W> {
             objects,
             stimuli,
             neurons: neurons.collect(),
+            has_voltages: config.topology.neuron_model.is_spiking(),
             has_frames: wants(ExtraColumns::Frames),
             has_targets: wants(ExtraColumns::Targets),
             n_rows: 0,
@@ -153,6 +156,10 @@ impl<W: io::Write> Rows<W> {
         // Robots without a network have no activity.
         let activity = |i| robot.activity.get(i).copied().map(number).unwrap_or_default();
         let mut cells: Vec<String> = (0..self.neurons.len()).map(activity).collect();
+        if self.has_voltages {
+            let voltage = |i| robot.voltages.get(i).copied().map(number).unwrap_or_default();
+            cells.extend((0..self.neurons.len()).map(voltage));
+        }
         if self.has_frames {
             cells.push(robot.received.map(|it| it.emitter.to_string()).unwrap_or_default());
             let message = robot.received_message.iter();
@@ -182,6 +189,10 @@ impl<W: io::Write> Rows<W> {
         heading.push("step_fitness".into());
         heading.extend(record.measures.keys().map(|name| format!("metric_{name}")));
         heading.extend(self.neurons.iter().map(|neuron| quoted(&format!("neuron_{neuron}"))));
+        if self.has_voltages {
+            let voltages = self.neurons.iter();
+            heading.extend(voltages.map(|neuron| quoted(&format!("voltage_{neuron}"))));
+        }
         if self.has_frames {
             heading.push("frame_emitter".into());
             heading.extend((0..message_len).map(|i| format!("frame_message_{i}")));

@@ -116,3 +116,18 @@ fn a_failure_is_reported_at_the_end() {
         assert!(trace.finish().unwrap_err().to_string().starts_with("cannot write /dev/full: "));
     }
 }
+
+#[test]
+fn spiking_neurons_have_voltages() {
+    let file = quickstart().with_file_name("spiking/leader_selection_lif.json");
+    let mut text: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+    text["algorithm"]["evaluation_steps"] = 2.into();
+    let (config, _) =
+        ExperimentConfig::from_json(&text.to_string(), "", evolution::ALGORITHMS).unwrap();
+    let (rows, records) = trace(&config);
+    let column = rows[0].iter().position(|cell| cell == "voltage_OUT_LED_1").unwrap();
+    let voltage = records[0].robots[0].voltages[25];
+    assert_eq!(rows[1][column].parse::<f64>().unwrap().to_bits(), voltage.to_bits());
+    assert_eq!(records[0].robots[0].voltages.len(), 26);
+}
