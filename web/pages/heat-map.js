@@ -13,11 +13,11 @@ const PAGE = 500;
 /** Colours from bad to good: seen by all eyes, and in grey. */
 const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 
+/** Red, green and blue of a share from 0 to 1. */
 function colorOf(share) {
   const at = Math.max(0, Math.min(1, share)) * (STOPS.length - 1);
   const low = Math.min(Math.floor(at), STOPS.length - 2);
-  const mix = STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
-  return `rgb(${mix.join(" ")})`;
+  return STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
 }
 
 /** The map of an experiment; `update(n_generations)` shows more of it. */
@@ -25,6 +25,9 @@ export function heatMap(id) {
   /** Per generation the fitness of its individuals, sorted as they are numbered. */
   const generations = new Map();
   const asked = new Set();
+  /** Pictures of pages of generations, a pixel for each individual, so that scrolling draws few
+   *  of them instead of every cell. */
+  const pictures = new Map();
   let n_generations = 0;
   let first = 0;
   let n_individuals = 0;
@@ -33,7 +36,7 @@ export function heatMap(id) {
   let atEnd = true;
 
   const title = element("span", { className: "readout" });
-  const sort = element("input", { type: "checkbox", id: "sort-individuals", onchange: () => { isSorted = sort.checked; picture.redraw(); } });
+  const sort = element("input", { type: "checkbox", id: "sort-individuals", onchange: () => { isSorted = sort.checked; pictures.clear(); picture.redraw(); } });
   const spacer = element("div", { className: "spacer" });
   const picture = canvas((context, width, height) => draw(context, width, height), "fitness of every individual");
   const scroller = element("div", { className: "scroller", tabIndex: 0, "aria-label": "generations, left to right" }, spacer, picture);
@@ -54,6 +57,25 @@ export function heatMap(id) {
     return isSorted ? indices.sort((a, b) => values[b] - values[a]) : indices;
   };
 
+  /** The picture of the generations from `page * PAGE` on. */
+  const pictureOf = (page) => {
+    if (pictures.has(page)) return pictures.get(page);
+    const drawn = element("canvas", { width: PAGE, height: n_individuals });
+    const context = drawn.getContext("2d");
+    const image = context.createImageData(PAGE, n_individuals);
+    const [low, high] = range;
+    for (let column = 0; column < PAGE; column++) {
+      const values = generations.get(page * PAGE + column);
+      if (!values) continue;
+      order(values).forEach((individual, place) => {
+        image.data.set([...colorOf((values[individual] - low) / (high - low || 1)), 255], 4 * (place * PAGE + column));
+      });
+    }
+    context.putImageData(image, 0, 0);
+    pictures.set(page, drawn);
+    return drawn;
+  };
+
   const draw = (context, width, height) => {
     context.clearRect(0, 0, width, height);
     if (n_generations === 0) return;
@@ -62,19 +84,17 @@ export function heatMap(id) {
     const from = Math.max(first, Math.floor(left / cell));
     const to = Math.min(n_generations, Math.ceil((left + width) / cell));
     const row = rowHeight();
-    const [low, high] = range;
-    for (let generation = from; generation < to; generation++) {
-      const values = generations.get(generation);
-      if (!values) {
-        load(generation);
-        continue;
-      }
-      const x = generation * cell - left;
-      order(values).forEach((individual, place) => {
-        context.fillStyle = colorOf((values[individual] - low) / (high - low || 1));
-        context.fillRect(x, place * row, cell - 1, row > 4 ? row - 1 : row);
-      });
+    for (let generation = from; generation < to; generation++) if (!generations.has(generation)) load(generation);
+    if (n_individuals === 0) return;
+    context.imageSmoothingEnabled = false;
+    for (let page = Math.floor(from / PAGE); page * PAGE < to; page++) {
+      const begin = Math.max(from, page * PAGE);
+      const n = Math.min(to, (page + 1) * PAGE) - begin;
+      context.drawImage(pictureOf(page), begin - page * PAGE, 0, n, n_individuals, begin * cell - left, 0, n * cell, n_individuals * row);
     }
+    // Lines between the cells.
+    for (let generation = from; generation < to; generation++) context.clearRect((generation + 1) * cell - left - 1, 0, 1, height);
+    for (let place = 1; row > 4 && place <= n_individuals; place++) context.clearRect(0, place * row - 1, width, 1);
   };
 
   /** Asks for the generations around one, unless that is under way. */
@@ -95,6 +115,7 @@ export function heatMap(id) {
       }
       if (from === 0 || start > from) first = Math.max(first, start);
       n_individuals = Math.max(n_individuals, individuals);
+      pictures.clear();
       resize();
     } catch (error) {
       complain(error);

@@ -156,7 +156,7 @@ async fn generation_ms(file: &str) -> GenerationParts {
 /// without pages and with 50 of them, by turns.
 async fn beside_pages_ms() -> (Vec<f64>, Vec<f64>) {
     const N_BEFORE: u64 = 10_000;
-    const STRETCH: u64 = 200;
+    const STRETCH: u64 = 100;
     let coordinator = CoordinatorProcess::start();
     let workers = InstantWorkers::start(&coordinator, 2, 8);
     coordinator.submit(&experiment(SNES, 100, FOREVER)).await;
@@ -170,7 +170,7 @@ async fn beside_pages_ms() -> (Vec<f64>, Vec<f64>) {
         ms(rounds[STRETCH as usize].started - rounds[0].started) / STRETCH as f64
     };
     let (mut without, mut with) = (Vec::new(), Vec::new());
-    for _ in 0..2 * N_REPEATS {
+    for _ in 0..N_REPEATS {
         without.push(stretch().await);
         let pages = OpenPages::open(coordinator.pages, 50).await;
         with.push(stretch().await);
