@@ -166,6 +166,8 @@ def main():
     for path in sorted((folder / "champions").glob("*.json")):
         name = json.loads(path.read_text())["name"]
         config = RESULTS.parent / "configs" / f"{name}.json"
+        if not config.exists():
+            continue  # a task of another folder
         stimuli = {of["sensor"].rpartition(":")[2]: key for key, of in json.loads(config.read_text())["topology"]["stimuli"].items()}
         rows = simulated(path, config)
         print(f"## {path.stem}\n")

@@ -13,7 +13,7 @@ use crate::{read, schema};
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 pub struct TaskConfig {
-    /// What computes fitness and measures, moves lights, and controls robots.
+    /// What computes fitness and measures, each step.
     #[schemars(schema_with = "schema::script")]
     pub script: ScriptConfig,
 }

@@ -52,7 +52,11 @@ impl Run {
 
     fn config_path(&self) -> String {
         let name = self.champion["name"].as_str().unwrap();
-        workspace_file(&format!("configs/{name}.json")).to_str().unwrap().to_owned()
+        let mut files = ["", "tasks/", "spiking/"]
+            .map(|folder| workspace_file(&format!("configs/{folder}{name}.json")))
+            .into_iter();
+        let file = files.find(|file| file.exists());
+        file.unwrap_or_else(|| panic!("no file of {name} in configs/")).to_str().unwrap().to_owned()
     }
 
     /// The experiment file, with the run's seed.

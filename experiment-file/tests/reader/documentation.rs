@@ -19,7 +19,7 @@ const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
 const IGNORED: &str = "Accepted and ignored.";
 
 /// Parts of the schema in the order of a file: each with its heading.
-const PARTS: [(&str, &str); 32] = [
+const PARTS: [(&str, &str); 33] = [
     ("WorldConfig", "world"),
     ("ObjectConfig", "world.objects.NAME"),
     ("LightParams", "params of a light"),
@@ -52,6 +52,7 @@ const PARTS: [(&str, &str); 32] = [
     ("AlgorithmConfig", "algorithm"),
     ("FitnessFunction", "algorithm.fitness_function"),
     ("PopulationConfig", "algorithm.populations.NAME"),
+    ("TaskConfig", "task"),
 ];
 
 struct Schema(Value);
