@@ -2,7 +2,7 @@
 
 use std::{f64::consts::PI, str::FromStr};
 
-use experiment_file::ExperimentConfig;
+use experiment_file::{ExperimentConfig, ObjectConfig};
 use plotters::{coord::Shift, prelude::*};
 use sim_core::{Mode, StepRecord, Vec2};
 
@@ -80,6 +80,7 @@ pub fn png(
         return Err(Error::Input(format!("an animation has at most {FRAMES_MAX} steps")));
     }
     let camera = Camera::around(config, &steps[shown.clone()]);
+    let discs = discs(config);
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, SIDE, SIDE);
     encoder.set_color(png::ColorType::Rgb);
@@ -94,7 +95,7 @@ pub fn png(
         {
             let backend = BitMapBackend::with_buffer(&mut pixels, (SIDE, SIDE));
             let way = &steps[step.saturating_sub(TRAIL)..=step];
-            draw(&backend.into_drawing_area(), &camera, way).map_err(internal)?;
+            draw(&backend.into_drawing_area(), &camera, &discs, way).map_err(internal)?;
         }
         writer.write_image_data(&pixels).map_err(internal)?;
     }
@@ -152,6 +153,32 @@ fn places(step: &StepRecord) -> impl Iterator<Item = Vec2> {
     step.robots.iter().map(|robot| robot.position).chain(step.lights.iter().copied())
 }
 
+/// Radius, cm, and colour of every ground area, in the order of the records.
+fn discs(config: &ExperimentConfig) -> Vec<(f64, RGBColor)> {
+    let areas = config.world.objects.values().filter_map(|object| match object {
+        ObjectConfig::GroundArea(area) => Some(area),
+        _ => None,
+    });
+    let each = areas.flat_map(|area| {
+        let disc = (area.params.range, color_named(&area.params.color));
+        std::iter::repeat_n(disc, area.num_instances as usize)
+    });
+    each.collect()
+}
+
+/// The colour of a word; grey for those that only the task knows.
+fn color_named(name: &str) -> RGBColor {
+    match name {
+        "black" => RGBColor(0, 0, 0),
+        "white" => RGBColor(200, 206, 216), // against a ground that is white
+        "red" => ON,
+        "green" => TARGET,
+        "blue" => FRAME,
+        "yellow" => LIGHT,
+        _ => OFF,
+    }
+}
+
 /// The representative of a difference with the least absolute value.
 fn shortest(difference: f64, period: f64) -> f64 {
     difference - period * (difference / period).round()
@@ -161,10 +188,19 @@ type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 type Drawn<'a> = Result<(), DrawingAreaErrorKind<<BitMapBackend<'a> as DrawingBackend>::ErrorType>>;
 
 /// Draws the last of some steps, and the ways that lead to it.
-fn draw<'a>(area: &Area<'a>, camera: &Camera, way: &[StepRecord]) -> Drawn<'a> {
+fn draw<'a>(
+    area: &Area<'a>,
+    camera: &Camera,
+    discs: &[(f64, RGBColor)],
+    way: &[StepRecord],
+) -> Drawn<'a> {
     let Some(now) = way.last() else { return Ok(()) };
     embed_font();
     area.fill(&GROUND)?;
+    for ((radius, color), center) in discs.iter().zip(&now.areas) {
+        let radius = (radius * camera.scale).round() as i32;
+        area.draw(&Circle::new(camera.place(*center), radius, color.mix(0.25).filled()))?;
+    }
     draw_grid(area, camera)?;
     for light in &now.lights {
         for (radius, opacity) in [(36, 0.2), (20, 0.35), (9, 1.0)] {

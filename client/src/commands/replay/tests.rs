@@ -58,6 +58,27 @@ async fn a_png_is_one_step_or_an_animation_of_several() {
     assert_eq!(error.to_string(), "--at 100: the episode has steps 0 to 99");
 }
 
+#[tokio::test]
+async fn a_png_shows_ground_areas_in_their_colour() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("swarm.png");
+    let n_green = async |changes: &[&str]| {
+        let options = [&["--to", path.to_str().unwrap(), "--at", "3"], changes].concat();
+        run(directory.path(), &options).await.unwrap();
+        let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(&path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        let more = |a: u8, b: u8| a.saturating_sub(b);
+        let is_green = |rgb: &&[u8]| more(rgb[1], rgb[0]) > 20 && more(rgb[1], rgb[2]) > 5;
+        pixels.chunks(3).filter(is_green).count()
+    };
+    let food = r#"world.objects.food={"type": "ground_area", "num_instances": 1, "initializers":
+        {"positions": {"name": "fixed", "params": {"values": [[500, 500]]}}},
+        "params": {"range": 60, "color": "green"}}"#;
+    assert!(n_green(&["--set", food]).await > n_green(&[]).await + 10_000);
+}
+
 #[test]
 fn steps_are_read_like_seeds() {
     assert_eq!("0..9".parse::<Moments>(), "00..9".parse());
