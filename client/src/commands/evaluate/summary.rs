@@ -77,7 +77,9 @@ pub struct ConditionSummary {
 /// The results of one measure.
 #[derive(Debug, Clone, Serialize)]
 pub struct MetricSummary {
-    unit: &'static str,
+    /// Absent of the measures of a script, which does not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unit: Option<&'static str>,
     /// Estimate of the mean over the steps.
     pub time_mean: Estimate,
     /// Estimate of the value in the last step.
@@ -138,13 +140,36 @@ pub fn time_mean(measured: &Measured, trial: usize, metric: usize) -> Option<f64
     mean(&values)
 }
 
-/// What a measure counts in, and whether it is a share of something.
-fn unit(metric: &str) -> (&'static str, bool) {
+/// What a measure of a built-in task counts in, and whether it is a share of something.
+fn unit(metric: &str) -> (Option<&'static str>, bool) {
     match metric {
-        "leaders" => ("robots", false),
-        "misalignment" => ("rad", false),
-        "turning" => ("share of the greatest speed", true),
-        distance if distance.contains("_distance") => ("cm", false),
-        _ => ("share", true),
+        "leaders" => (Some("robots"), false),
+        "misalignment" => (Some("rad"), false),
+        "turning" => (Some("share of the greatest speed"), true),
+        "one_leader"
+        | "true_positive_rate"
+        | "true_negative_rate"
+        | "precision"
+        | "accuracy"
+        | "near_light_photosensitive"
+        | "near_light_others" => (Some("share"), true),
+        "light_distance_photosensitive"
+        | "light_distance_others"
+        | "center_distance_photosensitive"
+        | "center_distance_others"
+        | "center_distance" => (Some("cm"), false),
+        _ => (None, false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit;
+
+    #[test]
+    fn shares_are_known_by_name_and_what_a_script_counts_is_not_taken_for_one() {
+        assert_eq!(unit("near_light_others"), (Some("share"), true));
+        assert_eq!(unit("center_distance"), (Some("cm"), false));
+        assert_eq!(unit("delivered"), (None, false));
     }
 }
