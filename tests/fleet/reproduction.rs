@@ -9,7 +9,7 @@ use std::{
 };
 
 use evolution::Digest;
-use experiment_file::ExperimentConfig;
+use experiment_file::{ExperimentConfig, ScriptConfig, inline_script, script_path};
 use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
 
@@ -61,7 +61,12 @@ impl Run {
 
     /// The experiment file, with the run's seed.
     fn config(&self) -> ExperimentConfig {
-        let text = fs::read_to_string(self.config_path()).unwrap();
+        let path = self.config_path();
+        let mut text = fs::read_to_string(&path).unwrap();
+        if let Some((name, place)) = script_path(&text) {
+            let script = fs::read_to_string(Path::new(&path).with_file_name(&name)).unwrap();
+            text = inline_script(&text, place, &ScriptConfig { name, text: script });
+        }
         let (mut config, _) =
             ExperimentConfig::from_json(&text, "", evolution::ALGORITHMS).unwrap();
         config.seed = self.champion["seed"].as_u64().unwrap();
