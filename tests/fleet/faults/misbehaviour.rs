@@ -263,5 +263,6 @@ async fn a_genotype_that_takes_every_worker_down_is_computed_by_the_coordinator(
     // The genotype does no harm to the coordinator's own process.
     TINY.assert_undisturbed(coordinator.watch(poisoned));
     let n_lost = n_lost(&coordinator);
-    assert!((2..=12).contains(&n_lost), "{n_lost}: few more than it takes");
+    // They also fall while the coordinator computes it, the more the busier the machine is.
+    assert!((2..=30).contains(&n_lost), "{n_lost}: few more than it takes");
 }
