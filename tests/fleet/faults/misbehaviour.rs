@@ -263,6 +263,7 @@ async fn a_genotype_that_takes_every_worker_down_is_computed_by_the_coordinator(
     // The genotype does no harm to the coordinator's own process.
     TINY.assert_undisturbed(coordinator.watch(poisoned));
     let n_lost = n_lost(&coordinator);
-    // They also fall while the coordinator computes it, the more the busier the machine is.
-    assert!((2..=30).contains(&n_lost), "{n_lost}: few more than it takes");
+    // Each of two trials may be an item of its own; the referee is asked at its third loss at the
+    // latest, and copies that all three workers lose within a second are one loss.
+    assert!((2..=2 * 3 * 3).contains(&n_lost), "{n_lost}: few more than it takes");
 }
