@@ -3,13 +3,15 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{AlgorithmParams, FitnessFunction, GenotypeQuery, NamedMap, limits, schema};
+use super::{
+    AlgorithmParams, FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, limits, schema,
+};
 
 /// Evolution and evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("champion_every, champion_trials, judgement_trials, fitness_function")
+    transform = schema::optional("champion_every, champion_trials, judgement_trials, fitness_function, fitness_params")
 )]
 pub struct AlgorithmConfig {
     /// The evolutionary algorithm, by the name in its
@@ -32,6 +34,9 @@ pub struct AlgorithmConfig {
     pub num_evaluations: u32,
     /// Fitness of a trial; may be left out if there is a `task`.
     pub fitness_function: FitnessFunction,
+    /// Constants of the task.
+    #[serde(skip_serializing_if = "FitnessParams::is_default")]
+    pub fitness_params: FitnessParams,
     /// Stop when the mean fitness of a generation reaches this.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(default, with = "f64")]

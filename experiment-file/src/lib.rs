@@ -66,7 +66,9 @@ mod actuators;
 mod algorithm;
 mod check;
 mod description;
+mod encoding;
 mod fitness;
+mod learning;
 pub mod limits;
 mod neuron;
 mod node;
@@ -93,7 +95,9 @@ pub use algorithm::*;
 pub use description::{
     AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, Parameter, ParameterValue,
 };
+pub use encoding::*;
 pub use fitness::*;
+pub use learning::*;
 pub use neuron::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;

@@ -55,6 +55,20 @@ pub const SPIKING_DT: RangeInclusive<f64> = 0.001..=2.0;
 pub const DELAYS: RangeInclusive<u32> = 1..=9;
 /// Gain of a receptor.
 pub const SYNAPSE_GAIN: f64 = 1_000.0;
+/// Nodes of a receptive field per value of the stimulus.
+pub const FIELD_NODES: u32 = 1_000;
+/// Absolute value of what receptive fields take and yield.
+pub const FIELD_VALUE: f64 = 1e6;
+/// How fast a receptive field falls.
+pub const STEEPNESS: f64 = 1e6;
+/// Rates of Poisson encoders: with the highest, a node spikes in every substep.
+pub const POISSON_RATE: RangeInclusive<f64> = 0.0..=10_000.0;
+/// Absolute value of A, B, C and D of plasticity.
+pub const COEFFICIENT: f64 = 1e6;
+/// Absolute value of a plastic weight.
+pub const PLASTIC_WEIGHT: f64 = 1e6;
+/// Environment steps from activities to the reward that they get.
+pub const REWARD_DELAY: u32 = 1_000;
 /// Network substeps per environment step.
 pub const TIME_SCALE: u32 = 1_000;
 /// Values of all stimuli together.

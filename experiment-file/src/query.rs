@@ -19,8 +19,51 @@ pub enum GenotypeQuery {
     Neurons(&'static str, EnsembleSelector),
     /// `decoders:weights:...`
     Decoders(OutputSelector),
-    /// `synapses:delays:...`: the axonal delays of neurons with dynamic synapses.
+    /// `synapses:delays:...`: the axonal delays of neurons, and of nodes of encoders, with
+    /// dynamic synapses.
     Delays(EnsembleSelector),
+    /// `encoders:weights:...`
+    Encoders(StimulusSelector),
+    /// `learning:coefficients:...`: A, B, C and D of groups of synapses.
+    Learning(GroupSelector),
+}
+
+/// The last part of `learning:coefficients:...`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum GroupSelector {
+    /// Every plastic group of synapses.
+    All,
+    /// One group.
+    Named(String),
+}
+
+impl GroupSelector {
+    /// As it stands in a query.
+    pub fn as_str(&self) -> &str {
+        match self {
+            Self::All => "all",
+            Self::Named(name) => name,
+        }
+    }
+}
+
+/// The last part of `encoders:weights:...`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StimulusSelector {
+    /// Every stimulus whose receptive field has weights.
+    All,
+    /// One stimulus.
+    Named(String),
+}
+
+impl StimulusSelector {
+    /// As it stands in a query.
+    pub fn as_str(&self) -> &str {
+        match self {
+            Self::All => "all",
+            Self::Named(name) => name,
+        }
+    }
 }
 
 /// The last part of `decoders:weights:...`.
@@ -62,9 +105,9 @@ pub enum SynapseSelector {
 /// The last part of `neurons:...:...` and of `synapses:delays:...`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EnsembleSelector {
-    /// Every ensemble.
+    /// Every ensemble, and of delays every stimulus whose spikes have one.
     All,
-    /// One ensemble.
+    /// One ensemble, or of delays a stimulus.
     Named(String),
 }
 
@@ -100,6 +143,8 @@ impl fmt::Display for GenotypeQuery {
             }
             Self::Delays(selector) => write!(f, "synapses:delays:{}", selector.as_str()),
             Self::Decoders(selector) => write!(f, "decoders:weights:{}", selector.as_str()),
+            Self::Encoders(selector) => write!(f, "encoders:weights:{}", selector.as_str()),
+            Self::Learning(selector) => write!(f, "learning:coefficients:{}", selector.as_str()),
         }
     }
 }
@@ -112,8 +157,9 @@ pub enum ParseQueryError {
     Unsupported(String),
     /// It has another form.
     #[error(
-        "expected `synapses:weights:NAME`, `synapses:delays:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, \
-         with a parameter of the neuron model"
+        "expected `synapses:weights:NAME`, `synapses:delays:NAME`, `encoders:weights:NAME`, \
+         `decoders:weights:NAME`, `learning:coefficients:NAME` or `neurons:PARAMETER:NAME`, with a \
+         parameter of the neuron model"
     )]
     Malformed,
 }
@@ -145,7 +191,19 @@ impl FromStr for GenotypeQuery {
                 }));
             }
             ("synapses", "delays") => return Ok(Self::Delays(ensembles(selector))),
-            ("neurons", "decoding") | ("encoders" | "encoding", "weights") => {
+            ("encoders" | "encoding", "weights") => {
+                return Ok(Self::Encoders(match selector {
+                    "all" => StimulusSelector::All,
+                    name => StimulusSelector::Named(name.to_owned()),
+                }));
+            }
+            ("learning", "coefficients") => {
+                return Ok(Self::Learning(match selector {
+                    "all" => GroupSelector::All,
+                    name => GroupSelector::Named(name.to_owned()),
+                }));
+            }
+            ("neurons", "decoding") => {
                 return Err(ParseQueryError::Unsupported(format!("{part}:{parameter}")));
             }
             ("neurons", name) => {
@@ -184,7 +242,7 @@ impl JsonSchema for GenotypeQuery {
         json_schema!({
             "description": "Names a part of the network's parameters (Table 4.1).",
             "type": "string",
-            "pattern": format!("^(synapses:(weights|delays)|deco(ders|ding):weights|neurons:({names})):.+$"),
+            "pattern": format!("^(synapses:(weights|delays)|(de|en)co(ders|ding):weights|learning:coefficients|neurons:({names})):.+$"),
         })
     }
 }

@@ -40,6 +40,8 @@ pub enum RobotController {
     /// Braitenberg vehicle 2b: light-sensor halves to crossed wheels.
     #[serde(alias = "Braitenberg2")]
     BraitenbergLightFollower,
+    /// The function `control` of the script of `task`.
+    ScriptController,
 }
 
 /// Switches of a robot.

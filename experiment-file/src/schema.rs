@@ -107,6 +107,30 @@ pub(super) fn or_name_or_null(schema: &mut Schema) {
     }
 }
 
+/// Ground areas by the names that they have in the original simulator, with their colours.
+pub(super) fn food_areas_and_nests(schema: &mut Schema) {
+    let Some(Value::Array(variants)) = schema.get_mut("oneOf") else { return };
+    let is_area = |it: &&Value| it.pointer("/properties/type/const") == Some(&json!("ground_area"));
+    let Some(area) = variants.iter().find(is_area).cloned() else { return };
+    for (name, description) in [
+        ("food_area", "A green ground area; `range` is 150 cm by default, `color` fixed."),
+        ("nest", "A black ground area; `range` is 150 cm by default, `color` fixed."),
+    ] {
+        let mut variant = area.clone();
+        variant["properties"]["type"]["const"] = json!(name);
+        variant["description"] = json!(description);
+        variant["properties"]["params"] = json!({
+            "type": "object",
+            "properties": {"range": {
+                "type": "number", "exclusiveMinimum": 0, "default": 150,
+                "description": "Radius, cm; default 150.",
+            }},
+            "additionalProperties": false,
+        });
+        variants.push(variant);
+    }
+}
+
 /// Every decoding may say `is_cat`, and has no parameter that it must state.
 pub(super) fn decodings(schema: &mut Schema) {
     if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
@@ -203,21 +227,5 @@ pub(super) fn neurons() -> Value {
         "properties": {"model": {"enum": NeuronModel::names()}},
         "required": ["model"],
         "additionalProperties": false,
-    })
-}
-
-/// How stimuli are encoded: not at all.
-pub(super) fn encoding() -> Value {
-    json!({
-        "type": "object",
-        "additionalProperties": {
-            "type": "object",
-            "properties": {
-                "scheme": {"const": "IdentityEncoding"},
-                "receptive_field": {"description": "Accepted and ignored."},
-            },
-            "required": ["scheme"],
-            "additionalProperties": false,
-        },
     })
 }

@@ -113,6 +113,6 @@ impl OriginalDefault for LightParams {
 
 impl OriginalDefault for OrbitConfig {
     fn original() -> Self {
-        Self { angle_step: 0.013, radius_step: Some(1.0) }
+        Self { angle_step: 0.013, radius_step: Some(1.0), ..Self::default() }
     }
 }

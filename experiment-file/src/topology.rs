@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::{
-    NamedMap, NeuronModel, Neurotransmitter, SensorQuery, SynapseModel, SynapseParams, limits,
-    neuron, schema,
+    EncodingConfig, LearningConfig, NamedMap, NeuronModel, Neurotransmitter, SensorQuery,
+    SynapseModel, SynapseParams, encoding, limits, neuron, schema,
 };
 
 /// Of [`TopologyConfig::dt`], s.
@@ -24,9 +24,8 @@ pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
     deny_unknown_fields,
     transform = schema::optional(
         "dt, time_scale, seed, neuron_model, bias_in_gain, initial_rates, motor_tau, \
-         synapse_model, synapse_params"
+         synapse_model, synapse_params, encoding, learning"
     ),
-    transform = schema::property("encoding", schema::encoding()),
     transform = schema::property("neurons", schema::neurons())
 )]
 pub struct TopologyConfig {
@@ -66,6 +65,11 @@ pub struct TopologyConfig {
     /// Inputs, in the order in which they are stacked.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub stimuli: NamedMap<StimulusConfig>,
+    /// How stimuli become spikes. A stimulus without an entry, or with `IdentityEncoding`, acts as
+    /// it is.
+    #[serde(skip_serializing_if = "NamedMap::is_empty")]
+    #[schemars(schema_with = "encoding::entries")]
+    pub encoding: NamedMap<EncodingConfig>,
     /// Groups of neurons, in the order in which they are numbered.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub ensembles: NamedMap<EnsembleConfig>,
@@ -75,9 +79,20 @@ pub struct TopologyConfig {
     /// Groups of synapses.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub synapses: NamedMap<SynapseGroupConfig>,
+    /// How weights change while robots live; default null: they do not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learning: Option<LearningConfig>,
     /// How activities become actions; one entry per output, same names.
     #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
     pub decoding: NamedMap<DecodingConfig>,
+}
+
+impl TopologyConfig {
+    /// What synapses can start from in a stimulus: nodes of its encoder, or its values.
+    pub fn n_sources(&self, stimulus: &str) -> u32 {
+        let n = self.stimuli.get(stimulus).map_or(0, |stimulus| stimulus.n);
+        self.encoding.get(stimulus).map_or(n, |it| it.receptive_field.n_nodes(n))
+    }
 }
 
 /// Activities u of rate neurons before the first substep of an episode; v is 0.

@@ -1,8 +1,7 @@
 //! `world`: the arena, its lights and ground areas, and where objects start.
 
 use schemars::JsonSchema;
-use serde::Serialize;
-use serde_json::json;
+use serde::{Deserialize, Serialize};
 
 use super::{NamedMap, RobotConfig, limits, schema};
 
@@ -31,6 +30,7 @@ pub struct WorldConfig {
 /// One kind of object.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
+#[schemars(transform = schema::food_areas_and_nests)]
 #[expect(clippy::large_enum_variant, reason = "a world has a handful of them")]
 pub enum ObjectConfig {
     /// A swarm of equal robots.
@@ -121,12 +121,18 @@ pub enum LightController {
     /// Circles the centre of the world (Eq. 5.7-5.8).
     #[schemars(transform = schema::optional(""))]
     LightOrbitController(OrbitConfig),
+    /// Flees from robots within 150 cm, 3 cm per step, until one is within 30 cm.
+    #[schemars(transform = schema::optional(""))]
+    LightPreyController {},
     /// Goes to random targets (section 6.4).
     #[schemars(transform = schema::optional(""))]
     LightRndPosController(RandomTargetsConfig),
+    /// As the function `move` of the script of `task` says.
+    #[schemars(transform = schema::optional(""))]
+    ScriptController {},
 }
 
-/// A light's orbit, of radius 200 cm in the end.
+/// A light's orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[schemars(default, deny_unknown_fields)]
 pub struct OrbitConfig {
@@ -139,11 +145,15 @@ pub struct OrbitConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "schema::positive_or_null")]
     pub radius_step: Option<f64>,
+    /// Radius in the end, cm; default 200.
+    #[serde(skip_serializing_if = "is_radius_of_thesis")]
+    #[schemars(range(min = 0))]
+    pub radius: f64,
 }
 
 impl Default for OrbitConfig {
     fn default() -> Self {
-        Self { angle_step: 0.01, radius_step: None }
+        Self { angle_step: 0.01, radius_step: None, radius: 200.0 }
     }
 }
 
@@ -151,6 +161,12 @@ impl Default for OrbitConfig {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_angle_of_thesis(angle_step: &f64) -> bool {
     *angle_step == OrbitConfig::default().angle_step
+}
+
+/// Whether the canonical form leaves `radius` out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_radius_of_thesis(radius: &f64) -> bool {
+    *radius == OrbitConfig::default().radius
 }
 
 /// A light's way to random targets.
@@ -167,6 +183,11 @@ pub struct RandomTargetsConfig {
     /// Period at which the target is redrawn, steps; default 50.
     #[schemars(range(min = 1, max = limits::STEPS))]
     pub every: u32,
+    /// Side of the square around the centre of the world that targets are drawn from, cm;
+    /// default 200.
+    #[serde(skip_serializing_if = "is_default_square")]
+    #[schemars(range(min = 0))]
+    pub square: f64,
     /// How fast it goes.
     #[serde(flatten)]
     #[schemars(skip)]
@@ -185,8 +206,14 @@ pub enum Pace {
 
 impl Default for RandomTargetsConfig {
     fn default() -> Self {
-        Self { every: 50, pace: Pace::Speed(3.0) }
+        Self { every: 50, square: 200.0, pace: Pace::Speed(3.0) }
     }
+}
+
+/// Whether the canonical form leaves `square` out.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_default_square(square: &f64) -> bool {
+    *square == RandomTargetsConfig::default().square
 }
 
 /// Start of a light or ground area.
@@ -218,18 +245,28 @@ impl Default for LightParams {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(
     deny_unknown_fields,
-    transform = schema::optional("params"),
-    transform = schema::property("controller", json!({"type": "null"})),
+    transform = schema::optional("controller, params"),
     transform = schema::ignored("positions, orientations")
 )]
 pub struct GroundAreaConfig {
     /// Number of discs.
     #[schemars(range(min = 1, max = limits::STATIC_OBJECTS))]
     pub num_instances: u32,
+    /// How they move; null: they do not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub controller: Option<AreaController>,
     /// Where they are.
     pub initializers: PositionInitializers,
     /// Physical properties.
     pub params: GroundAreaParams,
+}
+
+/// How a ground area moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AreaController {
+    /// As the function `move` of the script of `task` says.
+    ScriptController,
 }
 
 /// Physical properties of a ground area.

@@ -53,14 +53,20 @@ pub enum Purpose {
     SensorNoise = 7,
     /// Movement of lights; stream = light.
     LightMovement = 8,
-    /// Which synapses exist; seed = `topology.seed`, stream = index of the group. Delays;
-    /// stream = 2^32.
+    /// Which synapses exist; seed = `topology.seed`, stream = index of the group. Delays, of
+    /// neurons and then of nodes of encoders; stream = 2^32.
     Connections = 9,
     /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
     /// decoders; stream = 2^32 + output.
     FixedWeights = 10,
     /// What the script of a task draws; stream = 0.
     Script = 12,
+    /// Spikes of Poisson encoders; stream = robot, per step and substep one draw per node.
+    Encoding = 13,
+    /// What robots draw whose actions a script decides; stream = robot.
+    Control = 14,
+    /// Movement of ground areas; stream = area.
+    AreaMovement = 15,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,
 }

@@ -60,6 +60,13 @@ impl Episodes {
         Ok(self.ask(py, |stage| stage.stepper.stimuli())?.into_pyarray(py))
     }
 
+    /// Has the agents get this instead in this step, flat.
+    fn set_stimuli(&self, py: Python<'_>, stimuli: PyReadonlyArray1<'_, f32>) -> PyResult<()> {
+        let stimuli = stimuli.to_vec()?;
+        let set = self.ask(py, move |stage| stage.stepper.set_stimuli(&stimuli))?;
+        set.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
     /// One step with these actions, flat. Returns its fitness in each trial, NaN where it does
     /// not count.
     fn step<'py>(

@@ -18,8 +18,9 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use experiment_file::{
-    DecodingConfig, ExperimentConfig, FitnessFunction, GenotypeQuery, Initializer, NeuronModel,
-    Neurotransmitter, OutputSelector, ScriptConfig, SynapseModel, SynapseParams, SynapseSelector,
+    DecodingConfig, EncodingConfig, EncodingScheme, ExperimentConfig, FitnessFunction,
+    GaussianField, GenotypeQuery, Initializer, LearningConfig, NeuronModel, Neurotransmitter,
+    OutputSelector, ReceptiveField, ScriptConfig, SynapseModel, SynapseParams, SynapseSelector,
     TaskConfig,
 };
 use numeric::random::{Purpose, Stream};
@@ -113,6 +114,10 @@ fn spiking(isas: &[Isa]) {
         configs.push((model.name().to_owned(), spiking_a(model, SynapseModel::Static)));
     }
     configs.push(("lif, dynamic".to_owned(), spiking_a(NeuronModel::Lif, SynapseModel::Dynamic)));
+    let lif = spiking_a(NeuronModel::Lif, SynapseModel::Static);
+    configs.push(("lif, Poisson".to_owned(), encoded(&lif)));
+    configs.push(("lif, learns".to_owned(), plastic(&lif)));
+    configs.push(("rate, learns".to_owned(), plastic(&experiment_a())));
     println!("{}", configs.iter().map(|(name, _)| format!(" {name:>13}")).collect::<String>());
     for &isa in isas {
         print!("{:10}", isa.name());
@@ -126,6 +131,43 @@ fn spiking(isas: &[Isa]) {
         }
         println!();
     }
+}
+
+/// The same with all weights plastic.
+fn plastic(config: &ExperimentConfig) -> ExperimentConfig {
+    let mut config = config.clone();
+    config.topology.learning = Some(LearningConfig {
+        learning_rate: 1e-4,
+        max_weight: 300.0,
+        a: 1.0,
+        b: 0.0,
+        c: 0.0,
+        d: 0.0,
+        synapses: config.topology.synapses.keys().cloned().collect(),
+        reward: None,
+    });
+    config
+}
+
+/// The same with Poisson nodes for each of the five inputs, three per value.
+fn encoded(config: &ExperimentConfig) -> ExperimentConfig {
+    let mut config = config.clone();
+    let field = GaussianField {
+        sigma: 6.0,
+        n_neurons: 3,
+        min_stim: 0.0,
+        max_stim: 1.0,
+        min_val: 0.0,
+        max_val: 1_000.0,
+        inverted: false,
+    };
+    let encoding = EncodingConfig {
+        scheme: EncodingScheme::PoissonRate,
+        receptive_field: ReceptiveField::Gaussian(field),
+    };
+    let names = config.topology.stimuli.keys().cloned();
+    config.topology.encoding = names.map(|name| (name, encoding)).collect();
+    config
 }
 
 /// Experiment A with spiking neurons, whose weights and decoders evolve.

@@ -1,4 +1,4 @@
-//! What benchmarks measure beside whole episodes. Not part of the interface.
+//! Networks at work without robots, for benchmarks and figures. Not part of the interface.
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -9,6 +9,7 @@ use crate::lanes::Lanes;
 use crate::network::dynamics::NetworkState;
 use crate::simulation::{EvaluateError, Simulation};
 use numeric::Isa;
+use numeric::random::{Purpose, Stream};
 
 /// The network of a genotype, at work without robots.
 #[derive(Debug)]
@@ -33,13 +34,31 @@ impl NetworkLoad {
                 stimuli.set(input, lane, ((lane + 3 * input) % 11) as f32 / 11.0);
             }
         }
-        let state = NetworkState::new(simulation.isa, network, &phenotype, n_lanes);
+        let stream = |lane: usize| Stream::new(0, 0, 0, Purpose::Encoding, lane as u64);
+        let streams = if network.n_drawing() > 0 { n_lanes } else { 0 };
+        let state = NetworkState::new(simulation.isa, network, &phenotype, n_lanes)
+            .drawing_from((0..streams).map(stream).collect());
         Ok(Self { state, stimuli })
     }
 
     /// One environment step.
     pub fn step(&mut self) {
         self.state.step(black_box(&self.stimuli));
+    }
+
+    /// Sets an input of a lane.
+    pub fn set_stimulus(&mut self, input: usize, lane: usize, value: f64) {
+        self.stimuli.set(input, lane, value as f32);
+    }
+
+    /// The activity of a neuron in a lane: of a spiking one, the share of substeps with a spike.
+    pub fn activity(&self, neuron: usize, lane: usize) -> f64 {
+        self.state.activity().get(neuron, lane).into()
+    }
+
+    /// The voltage of a neuron in a lane, mV; none of rate neurons.
+    pub fn voltage(&self, neuron: usize, lane: usize) -> Option<f64> {
+        self.state.voltages().map(|voltages| voltages.get(neuron, lane).into())
     }
 }
 

@@ -3,14 +3,13 @@
 use crate::alpha_shape;
 use crate::torus::{Torus, Vec2};
 
-/// alpha, with the width of the world as unit of length.
-const ALPHA: f64 = 15.0;
 /// Robots below which a component has no interior.
 const MIN_WITH_INTERIOR: usize = 4;
 
 /// For each robot whether it lies on the outer border of the alpha shape of its
-/// component; robots less than `range` apart are connected.
-pub(crate) fn of_swarm(torus: &Torus, positions: &[Vec2], range: f64) -> Vec<bool> {
+/// component; robots less than `range` apart are connected. `alpha`: with the width of the world
+/// as unit of length.
+pub(crate) fn of_swarm(torus: &Torus, positions: &[Vec2], range: f64, alpha: f64) -> Vec<bool> {
     let mut border = vec![true; positions.len()];
     let mut seen = vec![false; positions.len()];
     for first in 0..positions.len() {
@@ -22,7 +21,7 @@ pub(crate) fn of_swarm(torus: &Torus, positions: &[Vec2], range: f64) -> Vec<boo
             continue;
         }
         let points: Vec<Vec2> = component.iter().map(|&(_, point)| point).collect();
-        let on_border = alpha_shape::border(&points, torus.width / ALPHA);
+        let on_border = alpha_shape::border(&points, torus.width / alpha);
         for (&(robot, _), on_border) in component.iter().zip(on_border) {
             border[robot] = on_border;
         }
@@ -70,7 +69,7 @@ mod tests {
     fn border(positions: &[(f64, f64)]) -> Vec<bool> {
         let positions: Vec<Vec2> =
             positions.iter().map(|&(x, y)| TORUS.wrap(Vec2::new(x, y))).collect();
-        of_swarm(&TORUS, &positions, 100.0)
+        of_swarm(&TORUS, &positions, 100.0, 15.0)
     }
 
     #[test]
@@ -108,7 +107,7 @@ mod tests {
             let robots = graph(20, trial);
             let moved: Vec<Vec2> =
                 robots.iter().map(|p| TORUS.wrap(Vec2::new(p.x + x, p.y + y))).collect();
-            prop_assert_eq!(of_swarm(&TORUS, &robots, 100.0), of_swarm(&TORUS, &moved, 100.0));
+            prop_assert_eq!(of_swarm(&TORUS, &robots, 100.0, 15.0), of_swarm(&TORUS, &moved, 100.0, 15.0));
         }
     }
 
@@ -117,7 +116,7 @@ mod tests {
         const N_SAMPLES: u64 = 200;
         for (n, expected) in [(10, 0.83), (20, 0.61), (30, 0.50)] {
             let share = |trial| {
-                let border = of_swarm(&TORUS, &graph(n, trial), 100.0);
+                let border = of_swarm(&TORUS, &graph(n, trial), 100.0, 15.0);
                 border.iter().filter(|on_border| **on_border).count() as f64 / n as f64
             };
             let mean = (0..N_SAMPLES).map(share).sum::<f64>() / N_SAMPLES as f64;

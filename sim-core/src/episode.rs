@@ -7,12 +7,12 @@ pub(crate) use recorder::{AllMeasures, FitnessOnly, Recorder, Viewer};
 
 use std::ops::Range;
 
-use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController};
+use crate::controllers::{BraitenbergLightFollower, Controller, NeuralController, Scripted};
 use crate::lanes::Lanes;
 use crate::network::Phenotype;
 use crate::record::StepRecord;
 use crate::simulation::{EvaluateError, Simulation};
-use crate::trial::Trial;
+use crate::trial::{Trial, encoding_streams};
 use experiment_file::RobotController;
 use numeric::random::TrialSet;
 
@@ -74,7 +74,7 @@ impl<'a> Episodes<'a> {
         let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
         let groups = 0..simulation.world.groups.len();
-        let controller = |group| GroupController::new(simulation, group, phenotype, trials.len());
+        let controller = |group| GroupController::new(simulation, group, phenotype, &trials);
         let controllers = groups.map(controller).collect();
         Ok(Self { trials, controllers })
     }
@@ -95,7 +95,7 @@ impl<'a> Episodes<'a> {
         for (episode, trial) in (first..).zip(&mut self.trials) {
             let fitness = trial.act(step)?;
             recorder.step(episode, step, trial, &self.controllers, fitness)?;
-            trial.move_lights(step);
+            trial.move_things(step)?;
         }
         Ok(())
     }
@@ -108,6 +108,8 @@ pub(crate) struct GroupController<'a> {
     robots: Range<usize>,
     controller: Box<dyn Controller + 'a>,
     stimuli: Lanes,
+    /// Whether it changes with reward.
+    is_learning: bool,
 }
 
 impl<'a> GroupController<'a> {
@@ -115,10 +117,10 @@ impl<'a> GroupController<'a> {
         simulation: &'a Simulation,
         group_index: usize,
         phenotype: &Phenotype,
-        n_trials: usize,
+        trials: &[Trial<'_>],
     ) -> Self {
         let group = &simulation.world.groups[group_index];
-        let n_lanes = n_trials * group.robots.len();
+        let n_lanes = trials.len() * group.robots.len();
         let n_inputs = group.stimuli.last().map_or(0, |(_, inputs)| inputs.end);
         let controller: Box<dyn Controller> = match group.controller {
             RobotController::NeuralController => Box::new(NeuralController::new(
@@ -126,16 +128,19 @@ impl<'a> GroupController<'a> {
                 &simulation.network,
                 phenotype,
                 n_lanes,
+                encoding_streams(simulation, trials, group_index),
             )),
             RobotController::BraitenbergLightFollower => {
                 Box::new(BraitenbergLightFollower::new(n_inputs, n_lanes))
             }
+            RobotController::ScriptController => Box::new(Scripted),
         };
         Self {
             group: group_index,
             robots: group.robots.clone(),
             controller,
             stimuli: Lanes::new(n_inputs, n_lanes),
+            is_learning: simulation.network.learning.is_some(),
         }
     }
 
@@ -144,6 +149,9 @@ impl<'a> GroupController<'a> {
         let n_robots = self.robots.len();
         for (index, trial) in trials.iter().enumerate() {
             trial.stimulate(self.group, index * n_robots, &mut self.stimuli);
+            if self.is_learning {
+                trial.reward(self.group, index * n_robots, &mut *self.controller);
+            }
         }
         self.controller.perceive(&self.stimuli);
         for (index, trial) in trials.iter_mut().enumerate() {

@@ -1,17 +1,15 @@
 //! From genes in \[0, 1\] to the network's parameters (section 3.4.2, Eq. 3.17).
 
+mod coverage;
+mod select;
+
 use std::ops::Range;
 
-use indexmap::IndexMap;
-
-use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
-use experiment_file::{
-    EnsembleSelector, ExperimentConfig, GeneScale, GenotypeQuery, OutputSelector, SynapseSelector,
-    TopologyConfig, limits,
-};
-use numeric::random::{Purpose, Stream};
+use coverage::{ParameterCoverage, defaults};
+use experiment_file::{ExperimentConfig, GeneScale};
+use select::select;
 
 /// What each gene means.
 #[derive(Debug, Clone)]
@@ -48,8 +46,23 @@ enum Parameter {
         /// Number of the neuron.
         neuron: usize,
     },
-    /// The axonal delay of the neuron of this number.
+    /// The axonal delay of the neuron of this number, or after the last neuron of a node of
+    /// an encoder.
     Delay(usize),
+    /// A, B, C or D of a group of synapses.
+    Coefficient {
+        /// Number of the group.
+        group: usize,
+        /// Which, from 0.
+        index: usize,
+    },
+    /// A weight of a receptive field.
+    Encoder {
+        /// Number of the encoder.
+        encoder: usize,
+        /// Number of the weight.
+        weight: usize,
+    },
     /// A weight of the decoding of an output.
     Decoder {
         /// Number of the output.
@@ -118,6 +131,10 @@ impl Codec {
                     phenotype.neurons[parameter][neuron] = value;
                 }
                 Parameter::Delay(neuron) => phenotype.delays[neuron] = libm::round(value),
+                Parameter::Coefficient { group, index } => phenotype.learning[group][index] = value,
+                Parameter::Encoder { encoder, weight } => {
+                    phenotype.encoders[encoder][weight] = value;
+                }
                 Parameter::Decoder { output, weight } => phenotype.decoders[output][weight] = value,
             }
         }
@@ -128,203 +145,13 @@ impl Codec {
     }
 }
 
-/// The parameters that a query covers, in genotype order, and the scale of its genes.
-fn select(
-    query: &GenotypeQuery,
-    config: &TopologyConfig,
-    network: &Network,
-) -> (Vec<Parameter>, GeneScale) {
-    match query {
-        GenotypeQuery::Weights(selector) => (select_weights(selector, network), GeneScale::Linear),
-        GenotypeQuery::Neurons(name, selector) => {
-            let mut parameters = network.model.spec().parameters.iter().enumerate();
-            let named = parameters.find(|(_, parameter)| parameter.name == *name);
-            let Some((parameter, scale)) = named.and_then(|(i, p)| Some((i, p.gene?))) else {
-                return (Vec::new(), GeneScale::Linear);
-            };
-            let parameters =
-                neurons_of(selector, network).map(|neuron| Parameter::Neuron { parameter, neuron });
-            (parameters.collect(), scale)
-        }
-        GenotypeQuery::Delays(selector) => {
-            let delays = neurons_of(selector, network).filter(|&it| it < network.n_delays());
-            (delays.map(Parameter::Delay).collect(), GeneScale::Linear)
-        }
-        GenotypeQuery::Decoders(selector) => {
-            let outputs = config.outputs.keys().zip(&network.outputs).enumerate();
-            let selected = outputs.filter(|(_, (name, _))| match selector {
-                OutputSelector::All => true,
-                OutputSelector::Named(selected) => selected == *name,
-            });
-            let parameters = selected.flat_map(|(output, (_, compiled))| {
-                (0..compiled.n_weights).map(move |weight| Parameter::Decoder { output, weight })
-            });
-            (parameters.collect(), GeneScale::Linear)
-        }
-    }
-}
-
-fn neurons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
-    match selector {
-        EnsembleSelector::All => 0..network.n_neurons(),
-        EnsembleSelector::Named(name) => {
-            network.ensembles.get(name).map_or(0..0, |ensemble| ensemble.neurons.clone())
-        }
-    }
-}
-
-/// A name is that of a group of synapses, a stimulus or an ensemble; the reader of
-/// experiment files sees to it that it is not several of them.
-fn select_weights(selector: &SynapseSelector, network: &Network) -> Vec<Parameter> {
-    let is_motor = |neuron: &usize| {
-        let mut ensembles = network.ensembles.values();
-        ensembles.any(|ensemble| ensemble.motor && ensemble.neurons.contains(neuron))
-    };
-    let trainable = network.groups.iter().filter(|(_, group)| group.trainable);
-    let selected = trainable.flat_map(|(group_name, group)| {
-        group.synapses.clone().filter(move |&synapse| {
-            let pre = network.synapses[synapse].pre;
-            match (selector, pre) {
-                (SynapseSelector::All, _) => true,
-                (SynapseSelector::Sensory, pre) => matches!(pre, Source::Input(_)),
-                (SynapseSelector::Hidden, Source::Neuron(neuron)) => !is_motor(&neuron),
-                (SynapseSelector::Motor, Source::Neuron(neuron)) => is_motor(&neuron),
-                (SynapseSelector::Hidden | SynapseSelector::Motor, Source::Input(_)) => false,
-                (SynapseSelector::Named(name), _) if name == group_name => true,
-                (SynapseSelector::Named(name), Source::Input(input)) => {
-                    network.stimuli.get(name).is_some_and(|s| s.inputs.contains(&input))
-                }
-                (SynapseSelector::Named(name), Source::Neuron(neuron)) => {
-                    network.ensembles.get(name).is_some_and(|e| e.neurons.contains(&neuron))
-                }
-            }
-        })
-    });
-    selected.map(Parameter::Weight).collect()
-}
-
-/// The first stream of fixed weights of decoders, after those of groups of synapses.
-const DECODERS: u64 = 1 << 32;
-
-/// The stream of delays, after those of the connections of groups.
-const DELAYS: u64 = 1 << 32;
-/// Substeps that a delay may have.
-const N_DELAYS: usize = (*limits::DELAYS.end() - *limits::DELAYS.start()) as usize + 1;
-
-/// Values of what the genotype does not cover. Weights of a decoder and delays are all drawn, so that
-/// none depends on what else is covered.
-fn defaults(
-    config: &TopologyConfig,
-    network: &Network,
-    coverage: &ParameterCoverage,
-    problems: &mut Problems,
-) -> Phenotype {
-    let mut weights = vec![0.0; network.synapses.len()];
-    for (index, group) in network.groups.values().enumerate() {
-        let mut stream = Stream::new(config.seed, 0, 0, Purpose::FixedWeights, index as u64);
-        for synapse in group.synapses.clone().filter(|&synapse| !coverage.weights[synapse]) {
-            weights[synapse] = -1.0 + 2.0 * stream.uniform();
-        }
-    }
-    let mut neurons = IndexMap::new();
-    for (parameter, covered) in network.model.spec().parameters.iter().zip(&coverage.neurons) {
-        let mut values = Vec::with_capacity(network.n_neurons());
-        for (name, ensemble) in &network.ensembles {
-            let value = ensemble.default_of(parameter);
-            let is_used = !covered[ensemble.neurons.clone()].iter().all(|&covered| covered);
-            // Euler steps beyond twice the time constant diverge.
-            if parameter.is_time_constant && network.dt > 2.0 * value && is_used {
-                let value = parameter.with_unit(value);
-                let message = format!("{value} is less than half of topology.dt: unstable");
-                let path = format!("topology.ensembles.{name}.params.{}", parameter.name);
-                problems.add(path, message);
-            }
-            values.extend(ensemble.neurons.clone().map(|_| value));
-        }
-        neurons.insert(parameter.name, values);
-    }
-    let decoders = network.outputs.iter().enumerate().map(|(index, output)| {
-        let number = DECODERS + index as u64;
-        let mut stream = Stream::new(config.seed, 0, 0, Purpose::FixedWeights, number);
-        (0..output.n_weights).map(|_| -1.0 + 2.0 * stream.uniform()).collect()
-    });
-    let decoders = decoders.collect();
-    let mut stream = Stream::new(config.seed, 0, 0, Purpose::Connections, DELAYS);
-    let delay = |_| f64::from(*limits::DELAYS.start()) + stream.below(N_DELAYS) as f64;
-    let delays = (0..network.n_delays()).map(delay).collect();
-    Phenotype { weights, neurons, delays, decoders }
-}
-
-/// Which values the genotype covers.
-struct ParameterCoverage {
-    /// By number of the synapse.
-    weights: Vec<bool>,
-    /// By index of the parameter and number of the neuron.
-    neurons: Vec<Vec<bool>>,
-    /// By number of the neuron.
-    delays: Vec<bool>,
-    /// By number of the output and of the weight.
-    decoders: Vec<Vec<bool>>,
-}
-
-impl ParameterCoverage {
-    fn new(network: &Network) -> Self {
-        let n_parameters = network.model.spec().parameters.len();
-        Self {
-            weights: vec![false; network.synapses.len()],
-            neurons: vec![vec![false; network.n_neurons()]; n_parameters],
-            delays: vec![false; network.n_delays()],
-            decoders: network.outputs.iter().map(|output| vec![false; output.n_weights]).collect(),
-        }
-    }
-
-    /// Whether a value is covered.
-    fn of(&mut self, parameter: Parameter) -> &mut bool {
-        match parameter {
-            Parameter::Weight(synapse) => &mut self.weights[synapse],
-            Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],
-            Parameter::Delay(neuron) => &mut self.delays[neuron],
-            Parameter::Decoder { output, weight } => &mut self.decoders[output][weight],
-        }
-    }
-
-    /// What is not covered, except what the experiment declares untrainable.
-    fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
-        let mut lines = Vec::new();
-        for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {
-            let n = group.synapses.clone().filter(|&synapse| !self.weights[synapse]).count();
-            if n > 0 {
-                lines.push(format!("synapses:weights:{name}: {n} weights stay random"));
-            }
-        }
-        let n = self.delays.iter().filter(|covered| !**covered).count();
-        if n > 0 {
-            lines.push(format!("synapses:delays: {n} delays stay random"));
-        }
-        for (name, covered) in config.outputs.keys().zip(&self.decoders) {
-            let n = covered.iter().filter(|covered| !**covered).count();
-            if n > 0 {
-                lines.push(format!("decoders:weights:{name}: {n} weights stay random"));
-            }
-        }
-        let parameters = network.model.spec().parameters.iter().zip(&self.neurons);
-        for (parameter, covered) in parameters.filter(|(parameter, _)| parameter.gene.is_some()) {
-            for (name, ensemble) in &network.ensembles {
-                if covered[ensemble.neurons.clone()].iter().any(|covered| !covered) {
-                    let value = ensemble.default_of(parameter);
-                    lines.push(format!("neurons:{}:{name} stays {value}", parameter.name));
-                }
-            }
-        }
-        lines
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use experiment_file::{EnsembleSelector, GenotypeQuery, SynapseSelector};
+
     use crate::testing::{experiment_a, genotype};
 
     fn compile(config: &ExperimentConfig) -> (Network, Codec, Problems) {
@@ -363,6 +190,8 @@ mod tests {
                 Parameter::Weight(synapse) => phenotype.weights[synapse],
                 Parameter::Neuron { parameter, neuron } => phenotype.neurons[parameter][neuron],
                 Parameter::Delay(neuron) => phenotype.delays[neuron],
+                Parameter::Coefficient { group, index } => phenotype.learning[group][index],
+                Parameter::Encoder { encoder, weight } => phenotype.encoders[encoder][weight],
                 Parameter::Decoder { output, weight } => phenotype.decoders[output][weight],
             };
             let value = match gene.scale {

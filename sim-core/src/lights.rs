@@ -1,17 +1,21 @@
 //! Lights and how they move.
 
+use std::f64::consts::FRAC_PI_4;
+
 use crate::torus::{Torus, Vec2, wrap_angle};
 use experiment_file::{LightController, OrbitConfig, Pace, RandomTargetsConfig};
 use numeric::random::Stream;
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
-/// Radius that an orbit tends to, cm.
-const ORBIT_RADIUS: f64 = 200.0;
-/// Time constant with which an orbit's radius tends to it, steps.
+/// Time constant with which an orbit's radius tends to its end, steps.
 const ORBIT_SETTLING: f64 = 50.0;
-/// Side of the square around the world's centre that targets are drawn from, cm.
-const TARGET_SQUARE: f64 = 200.0;
+/// Within this distance of a robot prey flees, cm.
+const PREY_SIGHT: f64 = 150.0;
+/// Within this distance of a robot prey is caught, cm.
+const PREY_CATCH: f64 = 30.0;
+/// What prey goes per step, cm.
+const PREY_SPEED: f64 = 3.0;
 
 /// The path of one light in one trial.
 #[derive(Debug, Clone)]
@@ -30,6 +34,11 @@ enum Motion {
         radius: f64,
         sense: f64,
     },
+    /// The prey of the original simulator.
+    Prey {
+        direction: Vec2,
+        is_caught: bool,
+    },
     /// Section 6.4.
     RandomTargets {
         config: RandomTargetsConfig,
@@ -46,10 +55,14 @@ impl LightPath {
         stream: Stream,
     ) -> Self {
         let motion = match *controller {
-            LightController::Static {} => Motion::Static,
+            // A script moves it.
+            LightController::ScriptController {} | LightController::Static {} => Motion::Static,
             LightController::LightOrbitController(config) => {
                 let away = torus.displacement(torus.center(), position);
                 Motion::Orbit { config, angle: away.angle(), radius: away.norm(), sense: 1.0 }
+            }
+            LightController::LightPreyController {} => {
+                Motion::Prey { direction: Vec2::unit(FRAC_PI_4), is_caught: false }
             }
             LightController::LightRndPosController(config) => {
                 Motion::RandomTargets { config, target: position }
@@ -58,8 +71,8 @@ impl LightPath {
         Self { stream, motion }
     }
 
-    /// Position after environment step `step`, from the position before.
-    pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus) -> Vec2 {
+    /// Position after environment step `step`, from the position before, among `robots`.
+    pub fn advance(&mut self, position: Vec2, step: u32, torus: &Torus, robots: &[Vec2]) -> Vec2 {
         match &mut self.motion {
             Motion::Static => position,
             Motion::Orbit { config, angle, radius, sense } => {
@@ -68,8 +81,8 @@ impl LightPath {
                 }
                 *angle = wrap_angle(*angle + *sense * config.angle_step);
                 *radius = match config.radius_step {
-                    None => *radius + (ORBIT_RADIUS - *radius) / ORBIT_SETTLING,
-                    Some(step) => (*radius + step).min(ORBIT_RADIUS),
+                    None => *radius + (config.radius - *radius) / ORBIT_SETTLING,
+                    Some(step) => (*radius + step).min(config.radius),
                 };
                 let (center, direction) = (torus.center(), Vec2::unit(*angle));
                 torus.wrap(Vec2 {
@@ -77,10 +90,13 @@ impl LightPath {
                     y: center.y + *radius * direction.y,
                 })
             }
+            Motion::Prey { direction, is_caught } => {
+                flee(position, torus, robots, direction, is_caught)
+            }
             Motion::RandomTargets { config, target } => {
                 if step.is_multiple_of(config.every) {
                     let mut coordinate = |center: f64| {
-                        center - 0.5 * TARGET_SQUARE + TARGET_SQUARE * self.stream.uniform()
+                        center - 0.5 * config.square + config.square * self.stream.uniform()
                     };
                     let x = coordinate(torus.center().x);
                     *target = torus.wrap(Vec2 { x, y: coordinate(torus.center().y) });
@@ -97,6 +113,37 @@ impl LightPath {
     }
 }
 
+/// Where prey goes next: away from the robots that it sees, the nearer the more; straight on
+/// while it sees none; nowhere once it is caught.
+fn flee(
+    position: Vec2,
+    torus: &Torus,
+    robots: &[Vec2],
+    direction: &mut Vec2,
+    is_caught: &mut bool,
+) -> Vec2 {
+    let seen = robots.iter().map(|&robot| torus.displacement(position, robot));
+    let seen: Vec<Vec2> = seen.filter(|way| way.norm() < PREY_SIGHT).collect();
+    let weight = |way: &Vec2| (PREY_SIGHT - way.norm()) / PREY_SIGHT;
+    let total: f64 = seen.iter().map(weight).fold(0.0, |sum, weight| sum + weight);
+    let towards = seen.iter().fold(Vec2::default(), |sum, way| {
+        let share = weight(way) / total;
+        Vec2 { x: sum.x + share * way.x, y: sum.y + share * way.y }
+    });
+    let length = towards.norm();
+    if length > 0.0 {
+        *direction = Vec2 { x: -towards.x / length, y: -towards.y / length };
+    }
+    if *is_caught {
+        return position;
+    }
+    *is_caught = seen.iter().any(|way| way.norm() < PREY_CATCH);
+    torus.wrap(Vec2 {
+        x: position.x + PREY_SPEED * direction.x,
+        y: position.y + PREY_SPEED * direction.y,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,7 +156,7 @@ mod tests {
         let mut path = LightPath::new(&controller, start, &TORUS, stream);
         let mut position = start;
         move |step| {
-            position = path.advance(position, step, &TORUS);
+            position = path.advance(position, step, &TORUS, &[]);
             position
         }
     }
@@ -120,7 +167,11 @@ mod tests {
 
     #[test]
     fn an_orbit_may_grow_by_a_constant_step() {
-        let mut path = orbit(OrbitConfig { angle_step: 0.013, radius_step: Some(1.5) });
+        let mut path = orbit(OrbitConfig {
+            angle_step: 0.013,
+            radius_step: Some(1.5),
+            ..OrbitConfig::default()
+        });
         for step in 0..40 {
             let (radius, angle) = (1.0 + 1.5 * f64::from(step + 1), 0.013 * f64::from(step + 1));
             let expected =
@@ -163,7 +214,7 @@ mod tests {
 
     /// The path of a light, and its targets.
     fn random_targets(pace: Pace) -> (impl FnMut(u32) -> Vec2, impl FnMut(u32) -> Vec2) {
-        let config = RandomTargetsConfig { every: 50, pace };
+        let config = RandomTargetsConfig { pace, ..Default::default() };
         let mut draws = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
         let mut target = START;
         let targets = move |step| {
@@ -205,6 +256,58 @@ mod tests {
             n_at_target += usize::from(from < 3.0 && to < 3.0);
         }
         assert!(n_at_target > 20, "{n_at_target}");
+    }
+
+    #[test]
+    fn orbits_and_target_squares_have_the_size_that_is_asked_for() {
+        let mut path_of_orbit = orbit(OrbitConfig { radius: 50.0, ..OrbitConfig::default() });
+        let settled = (0..1000).map(&mut path_of_orbit).last().unwrap();
+        assert!((TORUS.distance(settled, TORUS.center()) - 50.0).abs() < 1e-3);
+        let config = RandomTargetsConfig { square: 20.0, pace: Pace::Step(1.0), every: 1 };
+        let mut path = path(LightController::LightRndPosController(config), START);
+        let away = (0..500).map(|step| {
+            let way = TORUS.displacement(TORUS.center(), path(step));
+            way.x.abs().max(way.y.abs())
+        });
+        let farthest = away.fold(0.0, f64::max);
+        assert!(farthest <= 10.0 && farthest > 9.0, "{farthest}");
+    }
+
+    /// The way of prey in a step, among robots.
+    fn way_of_prey(robots: &[Vec2]) -> Vec2 {
+        let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
+        let mut path =
+            LightPath::new(&LightController::LightPreyController {}, START, &TORUS, stream);
+        TORUS.displacement(START, path.advance(START, 0, &TORUS, robots))
+    }
+
+    fn assert_way(way: Vec2, (x, y): (f64, f64)) {
+        assert!((way.x - x).abs() + (way.y - y).abs() < 1e-9, "{way:?}");
+    }
+
+    #[test]
+    fn prey_flees_from_what_it_sees_the_nearer_the_more() {
+        let at = |x: f64, y: f64| Vec2::new(START.x + x, START.y + y);
+        let straight = 3.0 * libm::sqrt(0.5);
+        assert_way(way_of_prey(&[at(150.0, 0.0)]), (straight, straight));
+        assert_way(way_of_prey(&[at(100.0, 0.0)]), (-3.0, 0.0));
+        // Weights 2/3 and 1/3 of ways (-50, 0) and (0, 100): towards them lies (-1, 1).
+        assert_way(way_of_prey(&[at(-50.0, 0.0), at(0.0, 100.0)]), (straight, -straight));
+        // Surrounded, it goes on as before.
+        assert_way(way_of_prey(&[at(-50.0, 0.0), at(50.0, 0.0)]), (straight, straight));
+    }
+
+    #[test]
+    fn caught_prey_stays() {
+        let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
+        let mut path =
+            LightPath::new(&LightController::LightPreyController {}, START, &TORUS, stream);
+        let near = [Vec2::new(START.x + 29.0, START.y)];
+        let position = path.advance(START, 0, &TORUS, &near);
+        assert!((TORUS.distance(START, position) - 3.0).abs() < 1e-9, "its last way");
+        for step in 1..20 {
+            assert_eq!(path.advance(position, step, &TORUS, &[]), position);
+        }
     }
 
     #[test]

@@ -45,6 +45,17 @@ pub(crate) struct StaticObjects {
     pub range: f64,
     /// Colour, by which sensors tell them apart.
     pub color: String,
+    /// Whether a script moves them.
+    pub by_script: bool,
+}
+
+/// Which lights and ground areas are on: sensors do not see the others.
+#[derive(Debug, Clone)]
+pub(crate) struct Switches {
+    /// Per light.
+    pub lights: Vec<bool>,
+    /// Per ground area.
+    pub areas: Vec<bool>,
 }
 
 impl StaticObjects {

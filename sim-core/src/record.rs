@@ -2,6 +2,7 @@
 //! the task is done.
 
 use std::borrow::Cow;
+use std::ops::Not;
 
 use indexmap::IndexMap;
 use serde::Serialize;
@@ -41,7 +42,7 @@ pub struct StepRecord {
     pub robots: Vec<RobotRecord>,
     /// Positions of all lights during the step.
     pub lights: Vec<Vec2>,
-    /// Positions of all ground areas, which do not move.
+    /// Positions of all ground areas during the step.
     pub areas: Vec<Vec2>,
 }
 
@@ -73,6 +74,12 @@ pub struct RobotRecord {
     pub mode: Mode,
     /// Its own message, as quantised; on the air if it sent.
     pub message: Vec<f64>,
+    /// Whether a script has put it out of order.
+    #[serde(skip_serializing_if = "Not::not")]
+    pub failed: bool,
+    /// Whether it carries something, as a script says.
+    #[serde(skip_serializing_if = "Not::not")]
+    pub carries: bool,
     /// Whether its LED should be on, where the task says who it should be.
     pub target: Option<bool>,
 }

@@ -122,6 +122,40 @@ impl Senses {
         }
     }
 
+    /// A reading of a robot of the group, its `index` among them, without inhibition; zeros
+    /// before the first step.
+    pub fn reading(
+        &self,
+        (query, len): (SensorQuery, usize),
+        robots: &Range<usize>,
+        index: usize,
+        swarm: &Swarm,
+    ) -> Vec<f64> {
+        let robot = robots.start + index;
+        let received = swarm.received[robot].as_ref();
+        let pair = |direction: Option<Vec2>| (0..2).map(|at| component(direction, at)).collect();
+        match query {
+            SensorQuery::ReceiverMessage => {
+                swarm.received_messages[swarm.message_range(robot)].to_vec()
+            }
+            SensorQuery::ReceiverSignal => vec![received.map_or(0.0, Received::signal)],
+            SensorQuery::ReceiverReceivingDirection => {
+                pair(received.map(|it| it.receiving_direction))
+            }
+            SensorQuery::ReceiverSendingDirection => pair(received.map(|it| it.sending_direction)),
+            SensorQuery::ReceiverState => {
+                vec![f64::from(swarm.modes[robot] == Mode::Send)]
+            }
+            query => {
+                let sensor = self.sensors.iter().find(|sensor| sensor.query == query);
+                sensor.map_or_else(
+                    || vec![0.0; len],
+                    |sensor| sensor.readings[index * len..(index + 1) * len].to_vec(),
+                )
+            }
+        }
+    }
+
     /// Senses with every robot of the group, sensor by sensor in the order in which
     /// they are mounted.
     pub fn update(&mut self, group: &RobotGroup, swarm: &Swarm, surroundings: &Surroundings<'_>) {

@@ -14,7 +14,7 @@ use crate::record::{EpisodeSummary, MeasureName, StepRecord};
 use crate::script::{self, ScriptTask};
 use crate::trial::Trial;
 use crate::world::World;
-use experiment_file::{ConfigError, ExperimentConfig, limits};
+use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
 use numeric::{Isa, random::TrialSet};
 use task_script::ScriptError;
 
@@ -30,6 +30,7 @@ pub struct Simulation {
     n_trials: u32,
     /// None: the script computes it.
     pub(crate) fitness: Option<&'static Definition>,
+    pub(crate) fitness_params: FitnessParams,
     pub(crate) script: Option<Arc<ScriptTask>>,
     measure_names: Vec<MeasureName>,
     pub(crate) network: Network,
@@ -101,8 +102,7 @@ impl Simulation {
         let algorithm = &config.algorithm;
         let network = Network::compile(&config.topology, &mut problems);
         let codec = Codec::compile(config, &network, &mut problems);
-        let world =
-            World::compile(&config.world, &algorithm.evolvable_object, &network, &mut problems);
+        let world = World::compile(&config.world, algorithm, &network, &mut problems);
         let fitness = fitness::definition(algorithm.fitness_function);
         let script = config.task.as_ref();
         let script = script.and_then(|task| ScriptTask::compile(&task.script, &mut problems));
@@ -114,6 +114,9 @@ impl Simulation {
                 "has no function `fitness` or `final`, and `algorithm.fitness_function` names no other",
             );
         }
+        if let (Some(task), Some(script), Some(world)) = (&config.task, &script, &world) {
+            script.check(&task.script.name, world, &mut problems);
+        }
         problems.check()?;
         let measure_names = measure_names(fitness, script.as_ref());
         let simulation = Self {
@@ -122,6 +125,7 @@ impl Simulation {
             n_steps: algorithm.evaluation_steps,
             n_trials: algorithm.num_evaluations,
             fitness,
+            fitness_params: algorithm.fitness_params,
             script: script.map(Arc::new),
             measure_names,
             network,

@@ -3,10 +3,12 @@
 use std::ops::Range;
 
 use crate::communication::Mode;
-use crate::controllers::{Action, BraitenbergLightFollower, Controller, NeuralController};
+use crate::controllers::{
+    Action, BraitenbergLightFollower, Controller, NeuralController, Scripted,
+};
 use crate::lanes::Lanes;
 use crate::simulation::{EvaluateError, Simulation};
-use crate::trial::Trial;
+use crate::trial::{Trial, encoding_streams};
 use experiment_file::RobotController;
 use numeric::random::{Stream, TrialSet};
 
@@ -137,6 +139,7 @@ impl<'a> Stepper<'a> {
                 RobotController::BraitenbergLightFollower => {
                     Decider::Own(Box::new(BraitenbergLightFollower::new(n_inputs, n_lanes)))
                 }
+                RobotController::ScriptController => Decider::Own(Box::new(Scripted)),
             };
             let stimuli = Lanes::new(n_inputs, n_lanes);
             Group { index, robots: group.robots.clone(), stimuli, n_inputs, decider }
@@ -172,16 +175,44 @@ impl<'a> Stepper<'a> {
     pub fn stimuli(&self) -> Vec<f32> {
         let width = self.n_inputs();
         let mut values = Vec::with_capacity(self.trials.len() * self.n_agents * width);
-        for trial in 0..self.trials.len() {
-            for group in self.commanded() {
-                let first = trial * group.robots.len();
-                for lane in first..first + group.robots.len() {
-                    values.extend((0..group.n_inputs).map(|input| group.stimuli.get(input, lane)));
-                    values.extend((group.n_inputs..width).map(|_| f32::NAN));
-                }
-            }
+        for (group, lane) in self.lanes_of_agents() {
+            let group = &self.groups[group];
+            values.extend((0..group.n_inputs).map(|input| group.stimuli.get(input, lane)));
+            values.extend((group.n_inputs..width).map(|_| f32::NAN));
         }
         values
+    }
+
+    /// Has the agents get something else in this step, `[trial][agent][input]`: what
+    /// [`decide`](Self::decide) sees. Radios still relay what they heard. Values of inputs that an
+    /// agent has not do not matter.
+    pub fn set_stimuli(&mut self, stimuli: &[f32]) -> Result<(), StepError> {
+        let width = self.n_inputs();
+        let lanes = self.lanes_of_agents();
+        let (expected, actual) = (lanes.len() * width, stimuli.len());
+        if expected != actual {
+            return Err(StepError::Length { what: "stimuli", expected, actual });
+        }
+        let agents = || lanes.iter().zip(stimuli.chunks_exact(width.max(1))).enumerate();
+        for (agent, (&(group, _), values)) in agents() {
+            let given = &values[..self.groups[group].n_inputs];
+            if let Some(input) = given.iter().position(|value| !value.is_finite()) {
+                let (index, value) = (agent * width + input, given[input].into());
+                return Err(StepError::Range {
+                    what: "stimulus",
+                    index,
+                    value,
+                    range: "the finite numbers",
+                });
+            }
+        }
+        for (_, (&(group, lane), values)) in agents() {
+            let group = &mut self.groups[group];
+            for (input, &value) in values[..group.n_inputs].iter().enumerate() {
+                group.stimuli.set(input, lane, value);
+            }
+        }
+        Ok(())
     }
 
     /// The network of a genotype, at rest, for as many trials.
@@ -191,8 +222,10 @@ impl<'a> Stepper<'a> {
         let controllers = self.groups.iter().map(|group| {
             let n_lanes = self.trials.len() * group.robots.len();
             let network = &simulation.network;
-            matches!(group.decider, Decider::Caller { .. })
-                .then(|| NeuralController::new(simulation.isa, network, &phenotype, n_lanes))
+            matches!(group.decider, Decider::Caller { .. }).then(|| {
+                let streams = encoding_streams(simulation, &self.trials, group.index);
+                NeuralController::new(simulation.isa, network, &phenotype, n_lanes, streams)
+            })
         });
         Ok(Policy { controllers: controllers.collect() })
     }
@@ -202,6 +235,9 @@ impl<'a> Stepper<'a> {
     pub fn decide(&mut self, policy: &mut Policy<'_>) -> Actions {
         for (group, controller) in self.groups.iter().zip(&mut policy.controllers) {
             let Some(controller) = controller else { continue };
+            for (index, trial) in self.trials.iter().enumerate() {
+                trial.reward(group.index, index * group.robots.len(), controller);
+            }
             controller.perceive(&group.stimuli);
             for (index, trial) in self.trials.iter_mut().enumerate() {
                 trial.decide(group.index, index * group.robots.len(), controller);
@@ -247,7 +283,7 @@ impl<'a> Stepper<'a> {
         let n_steps = self.simulation.n_steps;
         let fitness = self.trials.iter_mut().map(|trial| {
             let fitness = trial.act(step)?;
-            trial.move_lights(step);
+            trial.move_things(step)?;
             if step + 1 == n_steps {
                 trial.end()?;
             }
@@ -270,6 +306,19 @@ impl<'a> Stepper<'a> {
     /// The groups of agents.
     fn commanded(&self) -> impl Iterator<Item = &Group<'a>> {
         self.groups.iter().filter(|group| matches!(group.decider, Decider::Caller { .. }))
+    }
+
+    /// Group and lane of each agent, trial by trial.
+    fn lanes_of_agents(&self) -> Vec<(usize, usize)> {
+        let groups = self.groups.iter().enumerate();
+        let groups = groups.filter(|(_, group)| matches!(group.decider, Decider::Caller { .. }));
+        let of_trial = |trial| {
+            groups.clone().flat_map(move |(index, group)| {
+                let n_robots = group.robots.len();
+                (0..n_robots).map(move |robot| (index, trial * n_robots + robot))
+            })
+        };
+        (0..self.trials.len()).flat_map(of_trial).collect()
     }
 
     fn sense(&mut self) -> Result<(), EvaluateError> {
@@ -313,14 +362,47 @@ impl<'a> Stepper<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{experiment_a, genotype};
+    use crate::testing::{experiment_a, experiment_a_spiking, genotype};
+    use experiment_file::{
+        EncodingConfig, EncodingScheme, ExperimentConfig, GenotypeQuery, LearningConfig,
+        LinearField, NeuronModel, ReceptiveField, RewardConfig, StimulusSelector,
+    };
+
+    /// Leader selection with LIF neurons that learn, of which one stimulus has spikes drawn at
+    /// random.
+    fn experiment_a_plastic() -> ExperimentConfig {
+        let mut config = experiment_a_spiking(NeuronModel::Lif);
+        let receptive_field = ReceptiveField::Linear(LinearField { n_neurons: 3 });
+        let encoding = EncodingConfig { scheme: EncodingScheme::PoissonRate, receptive_field };
+        config.topology.encoding.insert("I1".to_owned(), encoding);
+        config.topology.learning = Some(LearningConfig {
+            learning_rate: 1.0,
+            max_weight: 300.0,
+            a: 500.0,
+            b: 0.0,
+            c: -20.0,
+            d: 0.0,
+            synapses: vec!["I1-H1".to_owned(), "H1-H1".to_owned()],
+            reward: Some(RewardConfig { delay: 5, discount: 0.9 }),
+        });
+        let population = &mut config.algorithm.populations[0];
+        population.objects.push(GenotypeQuery::Encoders(StimulusSelector::All));
+        population.min_vals.push(0.0);
+        population.max_vals.push(5_000.0);
+        config
+    }
 
     #[test]
     fn stepping_with_the_network_of_a_genotype_gives_the_bits_of_its_simulation() {
-        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        for config in [experiment_a(), experiment_a_plastic()] {
+            assert_stepping_gives_the_bits(&Simulation::compile(&config).unwrap());
+        }
+    }
+
+    fn assert_stepping_gives_the_bits(simulation: &Simulation) {
         let genotype = genotype(simulation.genotype_len(), 3);
         let trial_set = TrialSet::Generation(4);
-        let mut stepper = Stepper::new(&simulation, trial_set, 2..5).unwrap();
+        let mut stepper = Stepper::new(simulation, trial_set, 2..5).unwrap();
         let mut policy = stepper.policy(&genotype).unwrap();
         let (mut fitness, mut stimuli) = (Vec::new(), Vec::new());
         for _ in 0..simulation.n_steps() {
@@ -348,6 +430,40 @@ mod tests {
             .unwrap();
         let actions = stepper.decide(&mut policy);
         assert_eq!(stepper.step(&actions), Err(StepError::Over(simulation.n_steps())));
+    }
+
+    #[test]
+    fn agents_decide_by_the_stimuli_that_they_are_given() {
+        let simulation = Simulation::compile(&experiment_a()).unwrap();
+        let genotype = genotype(simulation.genotype_len(), 3);
+        let episode = |changed: Option<f32>| {
+            let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..2).unwrap();
+            let mut policy = stepper.policy(&genotype).unwrap();
+            let mut course = Vec::new();
+            for step in 0..30 {
+                let mut stimuli = stepper.stimuli();
+                if let Some(value) = changed.filter(|_| step == 12) {
+                    stimuli.fill(value);
+                }
+                stepper.set_stimuli(&stimuli).unwrap();
+                assert_eq!(stepper.stimuli(), stimuli);
+                course.push(stepper.decide(&mut policy));
+                stepper.step(&course[step]).unwrap();
+            }
+            course
+        };
+        let (as_it_was, otherwise) = (episode(None), episode(Some(1.0)));
+        assert_eq!(as_it_was[..12], otherwise[..12]);
+        assert_ne!(as_it_was[12], otherwise[12]);
+
+        let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..2).unwrap();
+        let before = stepper.stimuli();
+        let short = stepper.set_stimuli(&before[1..]);
+        assert!(matches!(short, Err(StepError::Length { what: "stimuli", .. })));
+        let mut wrong = vec![0.5; before.len()];
+        wrong[7] = f32::NAN;
+        assert!(matches!(stepper.set_stimuli(&wrong), Err(StepError::Range { index: 7, .. })));
+        assert_eq!(stepper.stimuli(), before);
     }
 
     #[test]

@@ -30,6 +30,10 @@ pub(crate) struct Swarm {
     pub message_len: usize,
     /// Whether the controller gets light readings.
     pub photosensitive: Vec<bool>,
+    /// Whether it is out of order: it stands, its LED is off, nobody hears it.
+    pub failed: Vec<bool>,
+    /// Whether it carries something.
+    pub carries: Vec<bool>,
     /// Whether any robot changed its place in this step.
     pub moved: bool,
     /// Whether any robot changed its heading in this step.
@@ -76,6 +80,8 @@ impl Swarm {
             received_messages: vec![0.0; n * message_len],
             message_len,
             photosensitive: vec![false; n],
+            failed: vec![false; n],
+            carries: vec![false; n],
             moved: true,
             turned: true,
         }
@@ -101,6 +107,8 @@ impl Swarm {
             led: self.leds[robot],
             mode: self.modes[robot],
             message: self.messages[self.message_range(robot)].to_vec(),
+            failed: self.failed[robot],
+            carries: self.carries[robot],
             target: None,
         }
     }
@@ -108,6 +116,14 @@ impl Swarm {
     /// Place of a robot's message in `messages` and `received_messages`.
     pub fn message_range(&self, robot: usize) -> Range<usize> {
         robot * self.message_len..(robot + 1) * self.message_len
+    }
+
+    /// Robots out of order stand, with their LED off.
+    pub fn stop_failed(&mut self) {
+        for robot in (0..self.failed.len()).filter(|&robot| self.failed[robot]) {
+            self.wheels[robot] = [0.0; 2];
+            self.leds[robot] = 0;
+        }
     }
 
     /// The robot's action, reset to: stand, LED off, send zeros.

@@ -9,10 +9,10 @@ use crate::fitness::{Fitness, Moment};
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
-use crate::objects::{Site, StaticObjects};
+use crate::objects::{Site, StaticObjects, Switches};
 use crate::perturbations::Perturbations;
 use crate::record::{Measures, StepRecord};
-use crate::script::{ScriptRun, View};
+use crate::script::{May, ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
@@ -36,6 +36,7 @@ pub(crate) struct Trial<'a> {
     lights: Vec<Vec2>,
     light_paths: Vec<LightPath>,
     areas: Vec<Vec2>,
+    switches: Switches,
     /// What each group of robots has beside the swarm's state.
     groups: Vec<Group>,
     /// Stochastic decoding, per robot.
@@ -44,6 +45,8 @@ pub(crate) struct Trial<'a> {
     fitness: Option<Box<dyn Fitness>>,
     script: Option<ScriptRun<'a>>,
     n_steps: u32,
+    /// Fitness of the last step, 0 if it does not count.
+    reward: f64,
     fitness_sum: f64,
     n_scored_steps: u32,
     /// Fitness of the whole episode, if that is not the mean over the steps.
@@ -51,9 +54,11 @@ pub(crate) struct Trial<'a> {
 }
 
 /// What belongs to a group of robots.
-struct Group {
-    senses: Senses,
-    perturbations: Perturbations,
+pub(crate) struct Group {
+    /// What they perceive.
+    pub senses: Senses,
+    /// What goes wrong.
+    pub perturbations: Perturbations,
     /// Start positions, and those after each switch of the topology.
     positions: Stream,
 }
@@ -113,6 +118,22 @@ impl Address {
         }
         Ok(positions)
     }
+}
+
+/// What encoders of a group's robots draw from, trial by trial; nothing if none draws.
+pub(crate) fn encoding_streams(
+    simulation: &Simulation,
+    trials: &[Trial<'_>],
+    group: usize,
+) -> Vec<Stream> {
+    if simulation.network.n_drawing() == 0 {
+        return Vec::new();
+    }
+    let of_trial = |trial: &Trial<'_>| {
+        let (robots, address) = (trial.world.groups[group].robots.clone(), trial.address);
+        robots.map(move |robot| address.stream(Purpose::Encoding, robot))
+    };
+    trials.iter().flat_map(of_trial).collect()
 }
 
 /// Draws where all objects of a trial start; fails where [`Trial::new`] does.
@@ -184,21 +205,25 @@ impl<'a> Trial<'a> {
             swarm,
             neighbours: Neighbours::new(world.sensing_range(), n_robots),
             radio,
+            switches: Switches { lights: vec![true; lights.len()], areas: vec![true; areas.len()] },
             lights,
             light_paths,
             areas,
             groups,
             decoding: address.streams(Purpose::Decoding, n_robots),
-            fitness: simulation.fitness.map(|definition| (definition.start)(world)),
+            fitness: simulation
+                .fitness
+                .map(|definition| (definition.start)(world, &simulation.fitness_params)),
             script: match &simulation.script {
                 Some(task) => {
-                    let stream = address.stream(Purpose::Script, 0);
-                    let started = ScriptRun::start(task, stream, n_robots);
+                    let stream = |purpose, number| address.stream(purpose, number);
+                    let started = ScriptRun::start(task, world, stream);
                     Some(started.map_err(|error| address.failed(error, 0))?)
                 }
                 None => None,
             },
             n_steps: simulation.n_steps,
+            reward: 0.0,
             fitness_sum: 0.0,
             n_scored_steps: 0,
             of_episode: None,
@@ -206,7 +231,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Start of a step: every robot senses, from positions and headings now and
-    /// from the frames that are on the air.
+    /// from the frames that are on the air. The script plans what its robots do.
     pub fn sense(&mut self, step: u32) -> Result<(), EvaluateError> {
         let mut moved = mem::replace(&mut self.swarm.moved, false);
         let turned = mem::replace(&mut self.swarm.turned, false);
@@ -232,12 +257,15 @@ impl<'a> Trial<'a> {
         for (group, state) in self.world.groups.iter().zip(&mut self.groups) {
             let surroundings = Surroundings {
                 torus: &self.world.torus,
+                swarm: &self.swarm,
                 neighbours: &self.neighbours,
                 lights: &self.lights,
                 areas: &self.areas,
+                switches: &self.switches,
             };
             state.senses.update(group, &self.swarm, &surroundings);
         }
+        self.run_script(step, ScriptRun::control)?;
         Ok(())
     }
 
@@ -255,12 +283,21 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Tells a group's controller what its robots are rewarded with for the step before.
+    pub fn reward(&self, group: usize, first_lane: usize, controller: &mut dyn Controller) {
+        let n_robots = self.world.groups[group].robots.len();
+        (first_lane..first_lane + n_robots).for_each(|lane| controller.reward(lane, self.reward));
+    }
+
     /// Takes a group's actions from its controller.
     pub fn decide(&mut self, group: usize, first_lane: usize, controller: &mut dyn Controller) {
         let robots = self.world.groups[group].robots.clone();
         for (lane, robot) in (first_lane..).zip(robots) {
             let mut action = self.swarm.fresh_action(robot);
-            controller.act(lane, &mut self.decoding[robot], &mut action);
+            match self.script.as_ref().and_then(|script| script.plan(robot)) {
+                Some(plan) => plan.carry_out(&mut action),
+                None => controller.act(lane, &mut self.decoding[robot], &mut action),
+            }
         }
     }
 
@@ -286,22 +323,36 @@ impl<'a> Trial<'a> {
         for (group, state) in world.groups.iter().zip(&mut self.groups) {
             state.perturbations.rewrite(step, group, &mut self.swarm);
         }
+        self.swarm.stop_failed();
         // Wheels turn.
         self.drive();
         // Every transmitter puts its frame on the air.
         for group in &world.groups {
             self.radio.emit(self.isa, world, &mut self.swarm, group);
         }
+        self.react(step)?;
         // The step is scored.
         let fitness = match &mut self.fitness {
             Some(fitness) => fitness.step(&Moment::new(world, &self.swarm, &self.lights, step)),
             None => self.run_script(step, ScriptRun::fitness)?.flatten(),
         };
+        self.reward = fitness.unwrap_or(0.0);
         if let Some(fitness) = fitness {
             self.fitness_sum += fitness;
             self.n_scored_steps += 1;
         }
         Ok(fitness)
+    }
+
+    /// The script says what happens to robots, lights and areas after the actions.
+    fn react(&mut self, step: u32) -> Result<(), EvaluateError> {
+        if self.run_script(step, ScriptRun::react)?.is_some()
+            && self.radio.mute(self.world, &self.swarm.failed)
+        {
+            // Others are the loudest now.
+            self.swarm.turned = true;
+        }
+        Ok(())
     }
 
     /// Has the script look at this step, if there is one.
@@ -311,8 +362,10 @@ impl<'a> Trial<'a> {
         run: impl FnOnce(&mut ScriptRun<'a>, View<'_>) -> Result<T, ScriptError>,
     ) -> Result<Option<T>, EvaluateError> {
         let Some(script) = &mut self.script else { return Ok(None) };
-        let Self { world, swarm, lights, areas, n_steps, .. } = self;
-        let view = View::new(world, swarm, lights, areas, [step, *n_steps]);
+        let Self { world, swarm, lights, areas, switches, groups, n_steps, .. } = self;
+        let n_steps = *n_steps;
+        let (may, kept) = (May::Look, None);
+        let view = View { world, swarm, lights, areas, switches, groups, step, n_steps, may, kept };
         run(script, view).map(Some).map_err(|error| self.address.failed(error, step))
     }
 
@@ -325,11 +378,13 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// End of a step: lights move.
-    pub fn move_lights(&mut self, step: u32) {
+    /// End of a step: lights and ground areas move.
+    pub fn move_things(&mut self, step: u32) -> Result<(), EvaluateError> {
+        self.run_script(step, ScriptRun::move_things)?;
         for (position, path) in self.lights.iter_mut().zip(&mut self.light_paths) {
-            *position = path.advance(*position, step, &self.world.torus);
+            *position = path.advance(*position, step, &self.world.torus, &self.swarm.positions);
         }
+        Ok(())
     }
 
     /// Measures of the step that was scored last.

@@ -11,8 +11,8 @@ use crate::problems::Problems;
 use crate::sensors::{self, Decay, MountedSensor};
 use crate::torus::Torus;
 use experiment_file::{
-    GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig, PerturbationsConfig,
-    RobotConfig, RobotController, SensorQuery, WorldConfig,
+    AlgorithmConfig, GroundAreaConfig, LightController, LightSourceConfig, ObjectConfig,
+    PerturbationsConfig, RobotConfig, RobotController, SensorQuery, SensorsConfig, WorldConfig,
 };
 
 /// Communication range of robots without radio, cm.
@@ -37,6 +37,9 @@ pub(crate) struct World {
     pub message_len: usize,
     /// Index in `groups` of the robots that evolve and are evaluated.
     pub evolvable: usize,
+    /// What the border of the swarm is the alpha shape of, with the world's width as unit of
+    /// length.
+    pub alpha: f64,
 }
 
 /// The robots of one object.
@@ -52,10 +55,14 @@ pub(crate) struct RobotGroup {
     pub controller: RobotController,
     /// What their controller gets, and in which of its inputs.
     pub stimuli: Vec<(SensorQuery, Range<usize>)>,
+    /// All readings that they have, each with its number of values.
+    pub readings: Vec<(SensorQuery, usize)>,
     /// Sensors beside the radio, in the order in which they draw noise.
     pub sensors: Vec<MountedSensor>,
     /// Their wheels; none: they stand.
     pub drive: Option<Drive>,
+    /// Whether they have an LED.
+    pub has_led: bool,
     /// What quantises their messages.
     pub quantiser: Option<Quantiser>,
     /// Steps at the start of an episode in which they send, whatever their network says.
@@ -81,14 +88,15 @@ impl World {
         robots.chain(static_objects.map(|objects| &objects.site))
     }
 
-    /// Compiles the objects, of which `evolvable_object` names the robots that
+    /// Compiles the objects, of which `algorithm.evolvable_object` names the robots that
     /// are evaluated; none if there are no such robots.
     pub fn compile(
         config: &WorldConfig,
-        evolvable_object: &str,
+        algorithm: &AlgorithmConfig,
         network: &Network,
         problems: &mut Problems,
     ) -> Option<Self> {
+        let evolvable_object = &algorithm.evolvable_object;
         let mut world = Self {
             torus: Torus { width: config.width, height: config.height },
             groups: Vec::new(),
@@ -98,6 +106,7 @@ impl World {
             areas: Vec::new(),
             message_len: 0,
             evolvable: 0,
+            alpha: algorithm.fitness_params.alpha,
         };
         // Sensors refer to lights and areas, which may come after their robots.
         for (index, (name, object)) in config.objects.iter().enumerate() {
@@ -121,6 +130,19 @@ impl World {
             problems.add("algorithm.evolvable_object", message);
         }
         Some(Self { evolvable: evolvable?, ..world })
+    }
+
+    /// The group that a robot is of.
+    pub fn group_of(&self, robot: usize) -> usize {
+        let group = self.groups.iter().position(|group| group.robots.contains(&robot));
+        group.expect("every robot is of a group")
+    }
+
+    /// The robots whose actions a script decides.
+    pub fn scripted_robots(&self) -> impl Iterator<Item = usize> {
+        let is_scripted =
+            |group: &&RobotGroup| group.controller == RobotController::ScriptController;
+        self.groups.iter().filter(is_scripted).flat_map(|group| group.robots.clone())
     }
 
     /// Number of robots of all objects.
@@ -172,7 +194,8 @@ impl World {
         let Some(site) = Site::new(index, name, positions, problems) else { return };
         let members = self.n_lights()..self.n_lights() + n;
         let (range, color) = (config.params.range, config.params.color.clone());
-        self.lights.push(StaticObjects { site, members, range, color });
+        let by_script = config.controller == (LightController::ScriptController {});
+        self.lights.push(StaticObjects { site, members, range, color, by_script });
         self.light_controllers.push(config.controller.clone());
     }
 
@@ -188,7 +211,8 @@ impl World {
         let Some(site) = Site::new(index, name, positions, problems) else { return };
         let members = self.n_areas()..self.n_areas() + n;
         let (range, color) = (config.params.range, config.params.color.clone());
-        self.areas.push(StaticObjects { site, members, range, color });
+        let by_script = config.controller.is_some();
+        self.areas.push(StaticObjects { site, members, range, color, by_script });
     }
 
     fn add_robots(
@@ -225,6 +249,7 @@ impl World {
                 let n_sectors = config.sensors.reading_len(SensorQuery::Light).unwrap_or(0);
                 vec![(SensorQuery::Light, 0..n_sectors as usize)]
             }
+            RobotController::ScriptController => Vec::new(),
         };
         let group = RobotGroup {
             site,
@@ -232,12 +257,14 @@ impl World {
             robots: self.n_robots()..self.n_robots() + n,
             controller: config.controller,
             stimuli,
+            readings: readings(&config.sensors),
             sensors: sensors::mount(&config.sensors, &self.lights, &self.areas),
             drive: config.actuators.wheel_actuator.as_ref().map(|wheels| Drive {
                 max_speed: wheels.max_speed,
                 axle_length: wheels.axle_length,
                 step_duration: wheels.step_duration,
             }),
+            has_led: config.actuators.led_actuator.is_some(),
             quantiser: transmitter
                 .filter(|transmitter| transmitter.quantize)
                 .map(|t| Quantiser::new(t.msg_length as usize, t.n_levels() as usize, t.beta)),
@@ -250,10 +277,16 @@ impl World {
     }
 }
 
+/// What robots with these sensors can read, with the number of values of each reading.
+fn readings(sensors: &SensorsConfig) -> Vec<(SensorQuery, usize)> {
+    let reading = |&query: &SensorQuery| Some((query, sensors.reading_len(query)? as usize));
+    SensorQuery::ALL.iter().filter_map(reading).collect()
+}
+
 fn antenna(robot: &RobotConfig, network: &Network) -> Antenna {
     let mut stimuli = network.stimuli.values().map(|stimulus| stimulus.sensor);
-    let observes_sending_direction =
-        stimuli.any(|sensor| sensor == SensorQuery::ReceiverSendingDirection);
+    let observes_sending_direction = robot.controller == RobotController::ScriptController
+        || stimuli.any(|sensor| sensor == SensorQuery::ReceiverSendingDirection);
     let transmitter = robot.actuators.wireless_transmitter.as_ref();
     let receiver = robot.sensors.wireless_receiver.as_ref();
     Antenna {

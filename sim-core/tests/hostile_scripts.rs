@@ -7,7 +7,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use experiment_file::{ExperimentConfig, FitnessFunction, ScriptConfig, TaskConfig};
+use experiment_file::{
+    ExperimentConfig, FitnessFunction, LightController, ObjectConfig, RobotController,
+    ScriptConfig, TaskConfig,
+};
 use numeric::random::{Purpose, Stream, TrialSet};
 use sim_core::{EvaluateError, Simulation};
 
@@ -36,8 +39,53 @@ fn scripts() -> Vec<(String, ExperimentConfig)> {
         config.algorithm.evaluation_steps = 5;
         (script.text, config)
     };
-    paths.iter().map(|path| experiment(path)).collect()
+    let mut scripts: Vec<_> = paths.iter().map(|path| experiment(path)).collect();
+    // Some do more than look.
+    for file in ["light_orbit.star", "light_prey.star"] {
+        let (text, mut config) = experiment(&tasks.join("thesis/goto_light.star"));
+        let moves = read(&tasks.join("moves").join(file));
+        for object in config.world.objects.values_mut() {
+            match object {
+                ObjectConfig::Robot(robot) => robot.controller = RobotController::ScriptController,
+                ObjectConfig::LightSource(light) => {
+                    light.controller = LightController::ScriptController {};
+                }
+                ObjectConfig::GroundArea(_) => {}
+            }
+        }
+        scripts.push((format!("{text}\n{moves}\n{ACTS}"), config));
+    }
+    let mut by_hand: Vec<PathBuf> = of_folder(tasks.join("by_hand")).collect();
+    by_hand.sort();
+    for by_hand in by_hand {
+        let (text, mut config) = experiment(&tasks.join(by_hand.file_name().unwrap()));
+        for object in config.world.objects.values_mut() {
+            if let ObjectConfig::Robot(robot) = object {
+                robot.controller = RobotController::ScriptController;
+            }
+        }
+        scripts.push((format!("{text}\n{}", read(&by_hand)), config));
+    }
+    scripts
 }
+
+/// Robots that turn to what they heard, and break down by chance.
+const ACTS: &str = "
+def control(robot):
+    light = robot.sense('light_sensor')
+    turn = robot.heard_from / math.pi if robot.heard else robot.random()
+    robot.left = min(light[0] + 0.3, 1)
+    robot.right = max(min(robot.left + turn, 1), -1)
+    robot.mode = 'send' if robot.state.get('n', 0) % 2 else 'relay'
+    robot.message = [robot.random(), 0.5]
+    robot.state['n'] = robot.state.get('n', 0) + 1
+
+def react(world):
+    for robot in world.robots:
+        robot.failed = world.random() < 0.1
+        robot.carries = not robot.failed
+    world.lights[0].on = world.step % 2 == 0
+";
 
 /// How many of the pieces are values, the first ones.
 const N_VALUES: usize = 17;

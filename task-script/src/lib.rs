@@ -201,10 +201,27 @@ impl Script {
         host: &mut dyn Host,
     ) -> Result<Value, ScriptError> {
         self.meter.refill();
+        self.call_again(program, function, arguments, host)
+    }
+
+    /// As [`call`](Self::call), with the work that the calls since the last
+    /// [`refill`](Self::refill) have left.
+    pub fn call_again(
+        &mut self,
+        program: &Program,
+        function: FunctionId,
+        arguments: &[Value],
+        host: &mut dyn Host,
+    ) -> Result<Value, ScriptError> {
         self.stack.clear();
         let function = &program.functions[function.0];
         let called = self.machine(program, host).call(function, arguments);
         called.map_err(|fault| fault.at(function.line).into_error(&program.file))
+    }
+
+    /// Several calls follow that share what one may do.
+    pub fn refill(&self) {
+        self.meter.refill();
     }
 
     fn machine<'a>(&'a mut self, program: &'a Program, host: &'a mut dyn Host) -> Machine<'a> {

@@ -45,6 +45,52 @@ fn workers_that_never_saw_a_script_compute_the_same_bits_through_a_kill() {
     assert_eq!(best(&experiment), best(&Experiment::small(5)));
 }
 
+/// Robots that a script controls, breaks and drives a lamp among, beside those that evolve.
+const ACTS: &str = "
+def control(robot):
+    robot.led = robot.heard != None and robot.heard[0] > robot.random()
+    robot.message = [robot.random(), 0.5]
+    robot.mode = 'send' if robot.led else 'relay'
+
+def move(lamp):
+    return lamp.x + 3 * lamp.normal(), lamp.y + 3
+
+def react(world):
+    for robot in world.robots:
+        robot.failed = world.random() < 0.1 and robot.distance(world.lights[0]) < 200
+    world.lights[0].on = world.step % 50 < 25
+";
+
+#[test]
+fn a_script_that_acts_gives_the_same_bits_on_one_and_on_four_workers_through_kills() {
+    let script = leader_selection() + ACTS;
+    let experiment = scripted(6, &script).edit(|experiment| {
+        let objects = experiment["world"]["objects"].as_object_mut().unwrap();
+        let mut extras = objects.values().next().unwrap().clone();
+        extras["num_instances"] = json!(3);
+        extras["controller"] = json!("script_controller");
+        extras["perturbations"] = json!({});
+        objects.insert("extras".into(), extras);
+        let positions = json!({"name": "fixed", "params": {"values": [[500, 500]]}});
+        let lamp = json!({
+            "type": "light_source", "num_instances": 1, "controller": "script_controller",
+            "initializers": {"positions": positions},
+        });
+        objects.insert("lamp".into(), lamp);
+    });
+    let mut coordinator = CoordinatorProcess::start();
+    let mut workers = WorkerProcess::start_many(&coordinator, 4);
+    let id = coordinator.submit(&experiment.path());
+    let watch = coordinator.watch(id);
+    coordinator.wait_for_generation(1);
+    drop(workers.pop());
+    coordinator.wait_for_generation(3);
+    coordinator.process.kill();
+    coordinator.restart();
+    drop(workers.pop());
+    assert_eq!(watch.finish().digests(), undisturbed(&experiment), "one worker, in one process");
+}
+
 #[test]
 fn a_script_that_goes_wrong_fails_its_experiment_and_nothing_else() {
     let coordinator = CoordinatorProcess::start();

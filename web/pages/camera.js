@@ -29,8 +29,10 @@ export class Camera {
       for (let light = 0; light < episode.lights.length; light++) {
         include(episode.at("light_x", light, step), episode.at("light_y", light, step));
       }
+      for (let area = 0; area < episode.areas.length; area++) {
+        include(episode.at("area_x", area, step), episode.at("area_y", area, step));
+      }
     }
-    for (const area of episode.areas) include(area.x, area.y);
     const [across, along] = [high[0] - low[0], high[1] - low[1]];
     if (across > 0.7 * episode.width || along > 0.7 * episode.height) return this.showWorld();
     this.look(first[0] + (low[0] + high[0]) / 2, first[1] + (low[1] + high[1]) / 2, across + 70, along + 70);

@@ -122,13 +122,14 @@ export class World {
   /** Ground areas and lights. */
   drawPlaces(context) {
     const { camera, episode, view } = this;
-    for (const { x, y, range, color } of episode.areas) {
+    episode.areas.forEach(({ range, color }, area) => {
+      const [x, y] = ["area_x", "area_y"].map((name) => episode.at(name, area, view.step));
       camera.eachImage(x, y, range * camera.scale, (sx, sy) => {
         context.globalAlpha = 0.25;
         context.fillStyle = color;
         disc(context, sx, sy, range * camera.scale).fill();
       });
-    }
+    });
     context.globalAlpha = 1;
     episode.lights.forEach(({ range, color }, light) => {
       const [x, y] = ["light_x", "light_y"].map((name) => episode.at(name, light, view.step));

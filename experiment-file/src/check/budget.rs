@@ -17,6 +17,11 @@ pub(super) fn check(
     episode(config, &network, report);
 }
 
+/// Numbers that a worker keeps for a node of an encoder, beside one per substep.
+const STATES_PER_NODE: u64 = 8;
+/// Operations of a node of an encoder in a substep: a draw costs as much.
+const OPERATIONS_PER_NODE: u64 = 16;
+
 struct NetworkSize {
     n_inputs: u64,
     n_neurons: u64,
@@ -24,6 +29,14 @@ struct NetworkSize {
     n_states: u64,
     /// Parameters of all neurons that can evolve.
     n_neuron_genes: u64,
+    /// A, B, C and D of plastic groups.
+    n_learning_coefficients: u64,
+    /// Numbers that a worker keeps for plasticity of one robot.
+    n_learning_states: u64,
+    /// Operations of plasticity per environment step.
+    n_learning_operations: u64,
+    /// Weights of all receptive fields.
+    n_encoder_weights: u64,
     /// Weights of all decodings.
     n_decoder_weights: u64,
     /// Operations of all neurons in a substep.
@@ -35,9 +48,8 @@ struct NetworkSize {
 impl NetworkSize {
     fn of(topology: &TopologyConfig) -> Self {
         let size = |name: &String| {
-            let stimulus = || topology.stimuli.get(name).map(|stimulus| stimulus.n);
             let ensemble = topology.ensembles.get(name).map(|ensemble| ensemble.n);
-            u64::from(ensemble.or_else(stimulus).unwrap_or(0))
+            u64::from(ensemble.unwrap_or_else(|| topology.n_sources(name)))
         };
         let size_of_all = |names: &[String]| names.iter().map(size).sum::<u64>();
         let groups = topology.synapses.values();
@@ -46,12 +58,38 @@ impl NetworkSize {
         // four variables of its receptors.
         let is_dynamic = u64::from(topology.synapse_model == SynapseModel::Dynamic);
         let of_synapses = 13 * is_dynamic;
-        let n_neurons = topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum();
+        let n_neurons: u64 =
+            topology.ensembles.values().map(|ensemble| u64::from(ensemble.n)).sum();
+        let encoded = topology.encoding.keys().map(|name| u64::from(topology.n_sources(name)));
+        let n_encoded: u64 = encoded.sum();
+        let n_synapses =
+            groups.map(|group| size_of_all(&group.pre) * size_of_all(&group.post)).sum::<u64>();
+        let n_inputs = topology.stimuli.values().map(|stimulus| u64::from(stimulus.n)).sum::<u64>()
+            + n_encoded;
+        let (mut n_learning_coefficients, mut n_learning_states) = (0, 0);
+        if let Some(learning) = &topology.learning {
+            let n_remembered = learning.reward.map_or(1, |reward| u64::from(reward.delay));
+            n_learning_coefficients = 4 * learning.synapses.len() as u64;
+            n_learning_states = n_synapses + n_remembered * (n_inputs + n_neurons + 1);
+        }
         Self {
-            n_inputs: topology.stimuli.values().map(|stimulus| u64::from(stimulus.n)).sum(),
+            n_learning_coefficients,
+            n_learning_states,
+            n_learning_operations: if topology.learning.is_some() { 4 * n_synapses } else { 0 },
+            n_inputs,
             n_neurons,
-            n_states: n_neurons * (model.states_per_neuron + of_synapses),
-            n_neuron_genes: n_neurons * (model.evolvable().count() as u64 + is_dynamic),
+            n_states: n_neurons * (model.states_per_neuron + of_synapses)
+                + n_encoded * (STATES_PER_NODE + of_synapses + u64::from(topology.time_scale)),
+            n_neuron_genes: n_neurons * (model.evolvable().count() as u64 + is_dynamic)
+                + n_encoded * is_dynamic,
+            n_encoder_weights: topology
+                .encoding
+                .iter()
+                .filter_map(|(name, encoding)| {
+                    let n = topology.stimuli.get(name)?.n;
+                    Some(u64::from(encoding.receptive_field.n_weights(n)))
+                })
+                .sum(),
             n_decoder_weights: topology
                 .outputs
                 .iter()
@@ -60,10 +98,9 @@ impl NetworkSize {
                     Some(u64::from(topology.decoding.get(name)?.n_weights(n)))
                 })
                 .sum(),
-            n_neuron_operations: n_neurons * (model.operations_per_neuron + 2 * of_synapses),
-            n_synapses: groups
-                .map(|group| size_of_all(&group.pre) * size_of_all(&group.post))
-                .sum(),
+            n_neuron_operations: n_neurons * (model.operations_per_neuron + 2 * of_synapses)
+                + n_encoded * (OPERATIONS_PER_NODE + 2 * of_synapses),
+            n_synapses,
         }
     }
 }
@@ -103,7 +140,11 @@ fn generation(
     let parts = [&algorithm.key("num_evaluations")];
     limit(n_trials, limits::TRIALS_PER_GENERATION, what, &size_path, &parts, report);
 
-    let n_genes = network.n_synapses + network.n_neuron_genes + network.n_decoder_weights;
+    let n_genes = network.n_synapses
+        + network.n_learning_coefficients
+        + network.n_neuron_genes
+        + network.n_encoder_weights
+        + network.n_decoder_weights;
     let what = "possible genes per generation";
     let parts = [&topology];
     limit(size * n_genes, limits::GENES_PER_GENERATION, what, &size_path, &parts, report);
@@ -134,7 +175,7 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
         report,
     );
 
-    let states = n_robots * (network.n_inputs + network.n_states);
+    let states = n_robots * (network.n_inputs + network.n_states + network.n_learning_states);
     let what = "inputs and neurons of all robots";
     limit(states, limits::NETWORK_STATES, what, &path, &[&topology], report);
 
@@ -146,8 +187,10 @@ fn episode(config: &ExperimentConfig, network: &NetworkSize, report: &Report<'_>
     let of_robot = |robot: &RobotConfig| {
         let substep = network.n_synapses + network.n_neuron_operations;
         let think = match robot.controller {
-            RobotController::NeuralController => substep * u64::from(config.topology.time_scale),
-            RobotController::BraitenbergLightFollower => 0,
+            RobotController::NeuralController => {
+                substep * u64::from(config.topology.time_scale) + network.n_learning_operations
+            }
+            RobotController::BraitenbergLightFollower | RobotController::ScriptController => 0,
         };
         let sense = n_sensed * u64::from(robot.sensors.n_sectors());
         u64::from(robot.num_instances) * (think + sense + n_lattice_points(robot))

@@ -4,8 +4,8 @@ use std::fmt;
 
 use crate::report::{Path, Report, suggestion};
 use crate::{
-    EnsembleSelector, GenotypeQuery, OutputSelector, SynapseGroupConfig, SynapseModel,
-    SynapseSelector, TopologyConfig,
+    EnsembleSelector, GenotypeQuery, GroupSelector, OutputSelector, StimulusSelector,
+    SynapseGroupConfig, SynapseModel, SynapseSelector, TopologyConfig,
 };
 
 /// The evolvable parts of a network and who claimed them.
@@ -27,8 +27,12 @@ enum PartKind<'a> {
     Weights { group: &'a str, pre: &'a str, source: Source },
     /// A parameter of an ensemble's neurons.
     Neurons { parameter: &'static str, ensemble: &'a str },
-    /// The delays of an ensemble's axons.
-    Delays { ensemble: &'a str },
+    /// The delays of an ensemble's axons, or of an encoded stimulus's.
+    Delays { source: &'a str },
+    /// The weights of a stimulus's receptive field.
+    Encoder { stimulus: &'a str },
+    /// The coefficients by which a group's weights change.
+    Learning { group: &'a str },
     /// The weights of an output's decoding.
     Decoder { output: &'a str },
 }
@@ -64,9 +68,15 @@ impl<'a> ParameterCoverage<'a> {
         let weighted = topology.decoding.iter().filter(|(_, decoding)| decoding.n_weights(1) > 0);
         let decoders = weighted.map(|(output, _)| PartKind::Decoder { output });
         let is_dynamic = topology.synapse_model == SynapseModel::Dynamic;
-        let delayed = topology.ensembles.keys().filter(|_| is_dynamic);
-        let delays = delayed.map(|ensemble| PartKind::Delays { ensemble });
-        let kinds = weights.chain(neurons).chain(delays).chain(decoders);
+        let delayed = topology.ensembles.keys().chain(topology.encoding.keys());
+        let delays = delayed.filter(|_| is_dynamic).map(|source| PartKind::Delays { source });
+        let weighted = topology.encoding.iter();
+        let weighted = weighted.filter(|(_, encoding)| encoding.receptive_field.n_weights(1) > 0);
+        let encoders = weighted.map(|(stimulus, _)| PartKind::Encoder { stimulus });
+        let plastic = topology.learning.iter().flat_map(|learning| &learning.synapses);
+        let learning = plastic.map(|group| PartKind::Learning { group });
+        let kinds = weights.chain(neurons).chain(delays).chain(encoders);
+        let kinds = kinds.chain(learning).chain(decoders);
         let parts = kinds.map(|kind| Part { kind, owner: None }).collect();
         Self { topology, parts }
     }
@@ -88,7 +98,9 @@ impl<'a> ParameterCoverage<'a> {
         }
         let others = match query {
             GenotypeQuery::Neurons(..) => vec![ensembles, part("neuron_model"), part("neurons")],
-            GenotypeQuery::Delays(_) => vec![ensembles, part("synapse_model")],
+            GenotypeQuery::Delays(_) => vec![ensembles, part("encoding"), part("synapse_model")],
+            GenotypeQuery::Encoders(_) => vec![stimuli, part("encoding")],
+            GenotypeQuery::Learning(_) => vec![synapses, part("learning")],
             GenotypeQuery::Weights(_) => vec![stimuli, part("synapses"), part("outputs")],
             GenotypeQuery::Decoders(_) => vec![outputs, part("decoding")],
         };
@@ -112,15 +124,23 @@ impl<'a> ParameterCoverage<'a> {
 
     /// How many things the last part of `query` may mean.
     fn n_meanings(&self, query: &GenotypeQuery) -> usize {
-        let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
+        let TopologyConfig { stimuli, encoding, ensembles, synapses, .. } = self.topology;
         match query {
-            GenotypeQuery::Neurons(_, EnsembleSelector::Named(name))
-            | GenotypeQuery::Delays(EnsembleSelector::Named(name)) => {
+            GenotypeQuery::Neurons(_, EnsembleSelector::Named(name)) => {
                 usize::from(ensembles.contains_key(name))
+            }
+            GenotypeQuery::Delays(EnsembleSelector::Named(name)) => {
+                usize::from(ensembles.contains_key(name) || encoding.contains_key(name))
+            }
+            GenotypeQuery::Encoders(StimulusSelector::Named(name)) => {
+                usize::from(stimuli.contains_key(name))
             }
             GenotypeQuery::Weights(SynapseSelector::Named(name)) => {
                 let is_source = ensembles.contains_key(name) || stimuli.contains_key(name);
                 usize::from(is_source) + usize::from(synapses.contains_key(name))
+            }
+            GenotypeQuery::Learning(GroupSelector::Named(name)) => {
+                usize::from(synapses.contains_key(name))
             }
             GenotypeQuery::Decoders(OutputSelector::Named(name)) => {
                 usize::from(self.topology.outputs.contains_key(name))
@@ -133,12 +153,22 @@ impl<'a> ParameterCoverage<'a> {
     fn explain(&self, query: &GenotypeQuery) -> String {
         let TopologyConfig { stimuli, ensembles, synapses, .. } = self.topology;
         let (name, what, known): (&str, &str, Vec<&String>) = match query {
-            GenotypeQuery::Neurons(_, selector) | GenotypeQuery::Delays(selector) => {
+            GenotypeQuery::Neurons(_, selector) => {
                 (selector.as_str(), "ensemble", ensembles.keys().collect())
+            }
+            GenotypeQuery::Delays(selector) => {
+                let known = ensembles.keys().chain(self.topology.encoding.keys());
+                (selector.as_str(), "ensemble or encoded stimulus", known.collect())
+            }
+            GenotypeQuery::Encoders(selector) => {
+                (selector.as_str(), "stimulus", stimuli.keys().collect())
             }
             GenotypeQuery::Weights(selector) => {
                 let known = ensembles.keys().chain(stimuli.keys()).chain(synapses.keys());
                 (selector.as_str(), "ensemble, stimulus or synapse group", known.collect())
+            }
+            GenotypeQuery::Learning(selector) => {
+                (selector.as_str(), "synapse group", synapses.keys().collect())
             }
             GenotypeQuery::Decoders(selector) => {
                 (selector.as_str(), "output", self.topology.outputs.keys().collect())
@@ -171,9 +201,17 @@ impl PartKind<'_> {
                         EnsembleSelector::Named(name) => name == ensemble,
                     }
             }
-            (Self::Delays { ensemble }, GenotypeQuery::Delays(selector)) => match selector {
+            (Self::Delays { source }, GenotypeQuery::Delays(selector)) => match selector {
                 EnsembleSelector::All => true,
-                EnsembleSelector::Named(name) => name == ensemble,
+                EnsembleSelector::Named(name) => name == source,
+            },
+            (Self::Encoder { stimulus }, GenotypeQuery::Encoders(selector)) => match selector {
+                StimulusSelector::All => true,
+                StimulusSelector::Named(name) => name == stimulus,
+            },
+            (Self::Learning { group }, GenotypeQuery::Learning(selector)) => match selector {
+                GroupSelector::All => true,
+                GroupSelector::Named(name) => name == group,
             },
             (Self::Decoder { output }, GenotypeQuery::Decoders(selector)) => match selector {
                 OutputSelector::All => true,
@@ -193,7 +231,13 @@ impl fmt::Display for PartKind<'_> {
             Self::Neurons { parameter, ensemble } => {
                 write!(f, "the {parameter} of ensemble `{ensemble}`")
             }
-            Self::Delays { ensemble } => write!(f, "the delays of ensemble `{ensemble}`"),
+            Self::Delays { source } => write!(f, "the delays of `{source}`"),
+            Self::Encoder { stimulus } => {
+                write!(f, "the weights of the receptive field of `{stimulus}`")
+            }
+            Self::Learning { group } => {
+                write!(f, "the coefficients of the learning of group `{group}`")
+            }
             Self::Decoder { output } => write!(f, "the weights of the decoding of `{output}`"),
         }
     }

@@ -72,6 +72,16 @@ fn bounds(
                 }
             }
         }
+        if let GenotypeQuery::Learning(_) = query {
+            for (bound, path) in [(min, &min_path), (max, &max_path)] {
+                let limit = limits::COEFFICIENT;
+                if bound.abs() > limit {
+                    report.conflict(path, &[&query_path], || {
+                        format!("coefficients are from -{limit} to {limit}, not {bound}")
+                    });
+                }
+            }
+        }
         let GenotypeQuery::Neurons(name, _) = query else { continue };
         let Some(parameter) = topology.neuron_model.spec().parameter(name) else { continue };
         let Some(scale) = parameter.gene else { continue };

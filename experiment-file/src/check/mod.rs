@@ -6,7 +6,9 @@
 
 mod budget;
 mod coverage;
+mod encoding;
 mod genotype;
+mod learning;
 mod network;
 mod task;
 mod world;

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::{encoding, learning};
 use crate::report::{Path, Report, suggestion};
 use crate::{ActuatorQuery, DecodingConfig, SynapseParams, TopologyConfig};
 
@@ -13,6 +14,10 @@ pub(super) fn check(topology: &TopologyConfig, report: &Report<'_>) {
     decoding(topology, report);
     motor_tau(topology, report);
     receptors(topology, report);
+    encoding::check(topology, report);
+    if let Some(config) = &topology.learning {
+        learning::check(topology, config, report);
+    }
 }
 
 /// Euler steps beyond a time constant would take what receptors do below zero.

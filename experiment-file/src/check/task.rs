@@ -2,11 +2,34 @@
 
 use crate::fitness::Need;
 use crate::report::{Path, Report, suggestion};
-use crate::{ExperimentConfig, NamedMap, ObjectConfig, RobotController};
+use crate::{
+    ExperimentConfig, FitnessFunction, FitnessParams, NamedMap, ObjectConfig, RobotController,
+};
 
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
     evolvable_object(config, report);
     fitness(config, report);
+    fitness_params(config, report);
+}
+
+/// Constants that are not those of the function would be without effect.
+fn fitness_params(config: &ExperimentConfig, report: &Report<'_>) {
+    let function = config.algorithm.fitness_function;
+    let (given, default) = (config.algorithm.fitness_params, FitnessParams::default());
+    let of_alpha = function == FitnessFunction::IdentifyBorderline || config.task.is_some();
+    let of_near = function == FitnessFunction::GotoLight;
+    let path = Path::from(["algorithm", "fitness_params"]);
+    for (key, is_used, is_given) in [
+        ("alpha", of_alpha, given.alpha != default.alpha),
+        ("near", of_near, given.near != default.near),
+    ] {
+        if is_given && !is_used {
+            let others = [&Path::from(["algorithm", "fitness_function"]), &Path::from(["task"])];
+            report.conflict(&path.key(key), &others, || {
+                format!("`{}` has no such constant", function.name())
+            });
+        }
+    }
 }
 
 fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
@@ -21,7 +44,14 @@ fn evolvable_object(config: &ExperimentConfig, report: &Report<'_>) {
             });
         }
         Some(ObjectConfig::Robot(robot)) => {
-            if robot.controller != RobotController::NeuralController {
+            if robot.controller == RobotController::ScriptController {
+                return report.warning(&object_path.key("controller"), || {
+                    format!(
+                        "`{name}` does what the script says, whatever its genotype: this can be \
+                         evaluated, but nothing of it evolves"
+                    )
+                });
+            } else if robot.controller != RobotController::NeuralController {
                 "has no `neural_controller`, so nothing of it can evolve"
             } else if !robot.params.trainable {
                 "is not `trainable`"

@@ -2,8 +2,8 @@
 
 use crate::report::{Path, Report};
 use crate::{
-    ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, ObjectConfig, RobotConfig,
-    RobotController, SensorQuery, TopologyConfig, WirelessTransmitterConfig, limits,
+    ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, LightController, ObjectConfig,
+    RobotConfig, RobotController, SensorQuery, TopologyConfig, WirelessTransmitterConfig, limits,
 };
 
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
@@ -23,13 +23,20 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
                     RobotController::BraitenbergLightFollower => {
                         braitenberg_ports(robot, &path, report);
                     }
+                    RobotController::ScriptController => script(config, "control", &path, report),
                 }
                 perturbations(robot, &path, report);
             }
             ObjectConfig::LightSource(light) => {
+                if light.controller == (LightController::ScriptController {}) {
+                    script(config, "move", &path, report);
+                }
                 initializer(&light.initializers.positions, n, &positions, report);
             }
             ObjectConfig::GroundArea(area) => {
+                if area.controller.is_some() {
+                    script(config, "move", &path, report);
+                }
                 initializer(&area.initializers.positions, n, &positions, report);
             }
         }
@@ -130,6 +137,15 @@ fn braitenberg_ports(robot: &RobotConfig, path: &Path, report: &Report<'_>) {
     if robot.actuators.wheel_actuator.is_none() {
         let (path, actuators) = path("actuators");
         report.conflict(&path, &[&actuators], "needs a `wheel_actuator`");
+    }
+}
+
+/// There is a script that says what the object does.
+fn script(config: &ExperimentConfig, function: &str, path: &Path, report: &Report<'_>) {
+    if config.task.is_none() {
+        report.conflict(&path.key("controller"), &[&Path::from(["task"])], || {
+            format!("needs a `task` whose `script` has a function `{function}`")
+        });
     }
 }
 

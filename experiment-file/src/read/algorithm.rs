@@ -3,7 +3,7 @@
 use super::Algorithms;
 use super::node::{Node, Object};
 use super::population::{ParamsReader, population};
-use crate::{AlgorithmConfig, FitnessFunction, limits};
+use crate::{AlgorithmConfig, FitnessFunction, FitnessParams, limits};
 
 /// `has_task`: whether the file has a task of its own, which computes the fitness unless a
 /// function is named.
@@ -34,6 +34,7 @@ pub(super) fn algorithm(
         } else {
             fitness_function(o.required("fitness_function"))
         },
+        fitness_params: o.inner("fitness_params", fitness_params),
         target_fitness: o.optional("target_fitness").map(Node::quantity),
         champion_every: o.or("champion_every", 10, |node| node.u64(1..=limits::GENERATIONS)),
         champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
@@ -41,6 +42,14 @@ pub(super) fn algorithm(
         populations: o
             .required("populations")
             .map(1, |_, node| node.object(|o| population(o, params))),
+    }
+}
+
+fn fitness_params(o: &mut Object<'_>) -> FitnessParams {
+    let default = FitnessParams::default();
+    FitnessParams {
+        alpha: o.or("alpha", default.alpha, Node::positive),
+        near: o.or("near", default.near, Node::amount),
     }
 }
 

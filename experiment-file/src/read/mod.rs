@@ -3,6 +3,8 @@
 //! for `check` to see.
 
 mod algorithm;
+mod encoding;
+mod learning;
 mod parse;
 mod population;
 mod robot;

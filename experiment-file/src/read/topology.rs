@@ -1,7 +1,7 @@
 //! Reads `topology`.
 
 use super::node::{Node, Object};
-use crate::report::suggestion;
+use super::{encoding, learning};
 use crate::semantics::Semantics;
 use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
 use crate::topology::{
@@ -17,9 +17,8 @@ use crate::{
 pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
     let model = neuron_model(o);
     let stimuli = o.required("stimuli").map(1, |_, node| node.object(stimulus));
-    if let Some(node) = o.optional("encoding") {
-        node.map(0, |name, node| encoding(name, node, &stimuli));
-    }
+    let time_scale = o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE));
+    let encoding = encoding::encodings(o, &stimuli, time_scale);
     let is_spiking = model.is_some_and(NeuronModel::is_spiking);
     let dt = if is_spiking {
         o.or("dt", DEFAULT_SPIKING_DT, |node| node.number(limits::SPIKING_DT))
@@ -33,9 +32,15 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     if synapse_model == SynapseModel::Dynamic && model.is_some() && !is_spiking {
         o.problem("synapse_model", "dynamic synapses need neurons that spike");
     }
+    let synapses: NamedMap<_> =
+        o.required("synapses").map(1, |_, node| node.object(|o| synapse_group(o, synapse_model)));
+    let learning = o.optional("learning").and_then(|node| {
+        let groups = synapses.keys().cloned();
+        node.or_null(|node| node.object(|o| learning::learning(o, is_spiking, groups)))
+    });
     TopologyConfig {
         dt,
-        time_scale: o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE)),
+        time_scale,
         seed: o.or("seed", DEFAULT_CONNECTION_SEED, |node| node.u64(0..=u64::MAX)),
         neuron_model: model.unwrap_or_default(),
         bias_in_gain,
@@ -44,11 +49,11 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
         synapse_params: synapse_params(o, synapse_model),
         synapse_model,
         stimuli,
+        encoding,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
         outputs: o.required("outputs").map(1, |_, node| node.object(output)),
-        synapses: o
-            .required("synapses")
-            .map(1, |_, node| node.object(|o| synapse_group(o, synapse_model))),
+        synapses,
+        learning,
         decoding: o.required("decoding").map(1, |_, node| node.object(decoding)),
     }
 }
@@ -93,19 +98,6 @@ fn stimulus(o: &mut Object<'_>) -> StimulusConfig {
         n: o.required("n").u32(1..=limits::INPUTS),
         sensor: o.required("sensor").variant(&unsupported).unwrap_or(SensorQuery::Ground),
     }
-}
-
-/// Rate neurons take stimuli as they are; the encodings are for spiking ones.
-fn encoding(name: &str, node: Node<'_>, stimuli: &NamedMap<StimulusConfig>) {
-    const SPIKING: [&str; 3] = ["LIF_Encoding", "PoissonRateCoding", "RankOrderCoding"];
-    if !stimuli.is_empty() && !stimuli.contains_key(name) {
-        let names: Vec<_> = stimuli.keys().collect();
-        node.problem(|| format!("no stimulus has this name; {}", suggestion(name, &names)));
-    }
-    node.object(|o| {
-        o.required("scheme").one_of(&["IdentityEncoding"], &SPIKING);
-        o.ignored("receptive_field", "`IdentityEncoding` has none");
-    });
 }
 
 /// `model`: none if it is unreadable; then nobody can tell which parameters are

@@ -24,18 +24,21 @@ pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
 }
 
 fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectConfig {
-    const KNOWN: [&str; 3] = ["robot", "light_source", "ground_area"];
+    const KNOWN: [&str; 5] = ["robot", "light_source", "ground_area", "food_area", "nest"];
     for key in ["positions", "orientations"] {
         o.ignored(key, "`initializers` say where objects start");
     }
-    match o.required("type").one_of(&KNOWN, &["food_area", "nest"]) {
+    match o.required("type").one_of(&KNOWN, &[]) {
         Some("robot") => ObjectConfig::Robot(robot(o, center, semantics)),
         Some("light_source") => ObjectConfig::LightSource(light_source(o, center, semantics)),
-        Some(_) => ObjectConfig::GroundArea(ground_area(o, center)),
+        Some("food_area") => ObjectConfig::GroundArea(ground_area(o, center, Some("green"))),
+        Some("nest") => ObjectConfig::GroundArea(ground_area(o, center, Some("black"))),
+        Some(_) => ObjectConfig::GroundArea(ground_area(o, center, None)),
         None => {
             o.accept_rest();
             ObjectConfig::GroundArea(GroundAreaConfig {
                 num_instances: 1,
+                controller: None,
                 initializers: PositionInitializers {
                     positions: Initializer::Fixed { values: vec![vec![0.0; 2]] },
                 },
@@ -64,12 +67,18 @@ fn light_source(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> L
 
 /// A name, an object of `name` and `params`, or null for none.
 fn light_controller(node: Node<'_>, semantics: Semantics) -> LightController {
-    const KNOWN: [&str; 3] = ["static", "light_orbit_controller", "light_rnd_pos_controller"];
+    const KNOWN: [&str; 5] = [
+        "static",
+        "light_orbit_controller",
+        "light_prey_controller",
+        "light_rnd_pos_controller",
+        "script_controller",
+    ];
     if node.is_null() {
         return LightController::Static {};
     }
     node.object_or_name(|o| {
-        let Some(name) = o.required("name").one_of(&KNOWN, &["light_prey_controller"]) else {
+        let Some(name) = o.required("name").one_of(&KNOWN, &[]) else {
             o.accept_rest();
             return LightController::Static {};
         };
@@ -78,6 +87,8 @@ fn light_controller(node: Node<'_>, semantics: Semantics) -> LightController {
                 LightController::LightOrbitController(orbit(o, semantics.defaults()))
             }
             "light_rnd_pos_controller" => LightController::LightRndPosController(random_targets(o)),
+            "light_prey_controller" => LightController::LightPreyController {},
+            "script_controller" => LightController::ScriptController {},
             _ => LightController::Static {},
         })
     })
@@ -87,6 +98,7 @@ fn orbit(o: &mut Object<'_>, default: OrbitConfig) -> OrbitConfig {
     OrbitConfig {
         angle_step: o.or("angle_step", default.angle_step, Node::amount),
         radius_step: o.or("radius_step", default.radius_step, |node| node.or_null(Node::positive)),
+        radius: o.or("radius", default.radius, Node::amount),
     }
 }
 
@@ -101,21 +113,32 @@ fn random_targets(o: &mut Object<'_>) -> RandomTargetsConfig {
     let step = step.map(|node| Pace::Step(node.probability()));
     RandomTargetsConfig {
         every: o.or("every", default.every, |node| node.u32(1..=limits::STEPS)),
+        square: o.or("square", default.square, Node::amount),
         pace: speed.or(step).unwrap_or(default.pace),
     }
 }
 
-fn ground_area(o: &mut Object<'_>, center: [f64; 2]) -> GroundAreaConfig {
-    let default = GroundAreaParams::default();
-    if let Some(controller) = o.optional("controller").filter(|node| !node.is_null()) {
-        controller.problem("a ground area has no controller; expected null or no such key");
-    }
+/// `color`: of food areas and nests, which have no other one.
+fn ground_area(o: &mut Object<'_>, center: [f64; 2], color: Option<&str>) -> GroundAreaConfig {
+    /// Radius of the original's areas, cm.
+    const RANGE: f64 = 150.0;
+    let default = match color {
+        Some(color) => GroundAreaParams { range: RANGE, color: color.to_owned() },
+        None => GroundAreaParams::default(),
+    };
     GroundAreaConfig {
         num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
+        controller: o.or("controller", None, |node| {
+            let read = |o: &mut Object<'_>| o.required("name").variant(&[]);
+            if node.is_null() { None } else { node.object_or_name(read) }
+        }),
         initializers: position_initializers(o, center),
         params: o.inner("params", |o| GroundAreaParams {
             range: o.or("range", default.range, Node::positive),
-            color: o.or("color", default.color, Node::name),
+            color: match color {
+                Some(color) => color.to_owned(),
+                None => o.or("color", default.color, Node::name),
+            },
         }),
     }
 }

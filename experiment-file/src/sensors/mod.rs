@@ -6,11 +6,15 @@
 mod distance;
 mod ground;
 mod light;
+mod neighborhood;
+mod plain;
 mod receiver;
 
 pub use distance::DistanceSensorConfig;
 pub use ground::GroundSensorConfig;
 pub use light::LightSensorConfig;
+pub use neighborhood::NeighborhoodSensorConfig;
+pub use plain::PlainSensorConfig;
 pub use receiver::{SendingDirection, WirelessReceiverConfig};
 
 use std::f64::consts::PI;
@@ -36,15 +40,7 @@ trait SensorConfig: Sized {
 }
 
 /// Sensors of the original simulator that this one lacks.
-pub(crate) const UNSUPPORTED: [&str; 7] = [
-    "food_area_sensor",
-    "food_sensor",
-    "neighborhood_pos_sensor",
-    "neighbors_state_sensor",
-    "nest_sensor",
-    "own_orientation_sensor",
-    "own_position_sensor",
-];
+pub(crate) const UNSUPPORTED: [&str; 1] = ["neighbors_state_sensor"];
 
 /// Readings that are refused by name, beside those of [`UNSUPPORTED`] sensors.
 pub(crate) const UNSUPPORTED_READINGS: [&str; 7] = [
@@ -125,6 +121,16 @@ macro_rules! sensors {
         }
 
         impl SensorQuery {
+            /// All of them.
+            pub const ALL: &[Self] = &[$($(Self::$query,)*)*];
+
+            /// Its name in the file.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $($(Self::$query => $name,)*)*
+                }
+            }
+
             /// Key in `sensors` of the sensor that gives the reading.
             pub(crate) fn sensor_key(self) -> &'static str {
                 match self {
@@ -163,6 +169,36 @@ sensors! {
     ground_sensor: GroundSensorConfig {
         /// 1 on a ground area of the sensor's colour; 1 value.
         "ground_sensor" = Ground: |_| 1,
+    }
+    /// Whether the robot stands on a `food_area`, which is a green ground area.
+    food_area_sensor: PlainSensorConfig {
+        /// 1 on a food area; 1 value.
+        "food_area_sensor" = FoodArea: |_| 1,
+    }
+    /// Whether the robot stands on a `nest`, which is a black ground area.
+    nest_sensor: PlainSensorConfig {
+        /// 1 on a nest; 1 value.
+        "nest_sensor" = Nest: |_| 1,
+    }
+    /// Whether the robot carries something, as the function `react` of a script says.
+    food_sensor: PlainSensorConfig {
+        /// 1 while the robot carries something; 1 value.
+        "food_sensor" = Food: |_| 1,
+    }
+    /// Where the robot is.
+    own_position_sensor: PlainSensorConfig {
+        /// x and y, cm; 2 values.
+        "own_position_sensor" = OwnPosition: |_| 2,
+    }
+    /// Where the robot looks.
+    own_orientation_sensor: PlainSensorConfig {
+        /// Heading, in turns from 0 to 1; 1 value.
+        "own_orientation_sensor" = OwnOrientation: |_| 1,
+    }
+    /// Where the nearest robots are and look.
+    neighborhood_pos_sensor: NeighborhoodSensorConfig {
+        /// x and y, cm, and heading, radians, of the nearest robots; 3 `n_neighbors` values.
+        "neighborhood_pos_sensor" = NeighborhoodPos: |sensor| 3 * sensor.n_neighbors,
     }
 }
 

@@ -19,7 +19,7 @@ const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
 const IGNORED: &str = "Accepted and ignored.";
 
 /// Parts of the schema in the order of a file: each with its heading.
-const PARTS: [(&str, &str); 33] = [
+const PARTS: [(&str, &str); 40] = [
     ("WorldConfig", "world"),
     ("ObjectConfig", "world.objects.NAME"),
     ("LightParams", "params of a light"),
@@ -30,6 +30,7 @@ const PARTS: [(&str, &str); 33] = [
     ("LightSensorConfig", "sensors.light_sensor"),
     ("DistanceSensorConfig", "sensors.distance_sensor"),
     ("GroundSensorConfig", "sensors.ground_sensor"),
+    ("NeighborhoodSensorConfig", "sensors.neighborhood_pos_sensor"),
     ("ActuatorsConfig", "actuators"),
     ("WheelActuatorConfig", "actuators.wheel_actuator"),
     ("WirelessTransmitterConfig", "actuators.wireless_transmitter"),
@@ -42,15 +43,21 @@ const PARTS: [(&str, &str); 33] = [
     ("StimuliInhibitionConfig", "perturbations.stimuli_inhibition"),
     ("TopologyConfig", "topology"),
     ("SensorQuery", "topology.stimuli.NAME.sensor"),
+    ("EncodingConfig", "topology.encoding.NAME"),
+    ("EncodingScheme", "topology.encoding.NAME.scheme"),
+    ("ReceptiveField", "topology.encoding.NAME.receptive_field"),
     ("EnsembleConfig", "topology.ensembles.NAME"),
     ("SynapseGroupConfig", "topology.synapses.NAME"),
     ("SynapseParams", "topology.synapse_params"),
     ("AmpaParams", "topology.synapse_params.AMPA"),
     ("GabaParams", "topology.synapse_params.GABA"),
     ("NmdaParams", "topology.synapse_params.NMDA"),
+    ("LearningConfig", "topology.learning"),
+    ("RewardConfig", "topology.learning.reward"),
     ("DecodingConfig", "topology.decoding.NAME"),
     ("AlgorithmConfig", "algorithm"),
     ("FitnessFunction", "algorithm.fitness_function"),
+    ("FitnessParams", "algorithm.fitness_params"),
     ("PopulationConfig", "algorithm.populations.NAME"),
     ("TaskConfig", "task"),
 ];
@@ -203,7 +210,7 @@ impl Schema {
             "string" => "text".into(),
             "null" => "`null`".into(),
             "array" => format!("list of: {}", self.values(&value["items"])),
-            "object" if value["additionalProperties"]["$ref"].is_string() => {
+            "object" if value["additionalProperties"].is_object() => {
                 format!("names, each with: {}", self.values(&value["additionalProperties"]))
             }
             "object" if value["properties"].is_object() => {

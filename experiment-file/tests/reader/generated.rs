@@ -4,7 +4,7 @@ use std::{env, thread};
 
 use serde_json::json;
 
-use super::generator::{Dice, damage, experiment};
+use super::generator::{Dice, damage, experiment, spiking_experiment};
 use super::{accept, read};
 use sim_core::{Simulation, StepRecord};
 
@@ -83,20 +83,19 @@ fn accepted_files_can_be_simulated() {
     assert!(n_simulated >= 1_000, "{n_simulated} of {n}");
 }
 
-/// Whatever the parameters and genes within their ranges.
+/// Whatever the parameters and genes within their ranges, and whatever is learned.
 #[test]
 fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
-    let (mut n_simulated, mut n_voltages) = (0, 0);
-    for index in 0..n_files() / 2 {
+    let (mut n_simulated, mut n_learning, mut n_encoded, mut n_voltages) = (0, 0, 0, 0);
+    for index in 0.. {
         let mut dice = Dice::new(index);
-        let mut file = experiment(&mut dice);
+        let mut file = spiking_experiment(&mut dice);
         file["algorithm"]["evaluation_steps"] = json!(101);
         let (config, _) = read(&file.to_string()).unwrap();
         let Ok(experiment) = Simulation::compile(&config) else { continue };
-        if !config.topology.neuron_model.is_spiking() {
-            continue;
-        }
         n_simulated += 1;
+        n_learning += u32::from(config.topology.learning.is_some());
+        n_encoded += u32::from(!config.topology.encoding.is_empty());
         let genotype: Vec<f64> =
             (0..experiment.genotype_len()).map(|_| f64::from(u8::from(dice.chance(0.5)))).collect();
         let observe = &mut |step: StepRecord| {
@@ -107,6 +106,36 @@ fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
             }
         };
         experiment.simulate(&genotype, 0, 0, observe).unwrap();
+        if n_simulated == 1_000 {
+            break;
+        }
     }
-    assert!(n_voltages > 100 * n_simulated && n_simulated > 0, "{n_voltages} of {n_simulated}");
+    assert!(n_voltages > 100 * n_simulated, "{n_voltages} of {n_simulated}");
+    assert!(n_learning > 200 && n_encoded > 500, "{n_learning} learn, {n_encoded} encode");
+}
+
+#[test]
+fn no_accepted_network_of_rate_neurons_that_learns_ends_up_in_nan() {
+    let mut n_simulated = 0;
+    for index in 0..1_000 {
+        let mut dice = Dice::new(index);
+        let mut file = experiment(&mut dice);
+        file["algorithm"]["evaluation_steps"] = json!(101);
+        let (config, _) = read(&file.to_string()).unwrap();
+        if config.topology.learning.is_none() || config.topology.neuron_model.is_spiking() {
+            continue;
+        }
+        let Ok(experiment) = Simulation::compile(&config) else { continue };
+        n_simulated += 1;
+        let genotype: Vec<f64> =
+            (0..experiment.genotype_len()).map(|_| f64::from(u8::from(dice.chance(0.5)))).collect();
+        let observe = &mut |step: StepRecord| {
+            for robot in &step.robots {
+                let values = robot.activity.iter().chain(&robot.wheels).chain(&robot.message);
+                assert!(values.into_iter().all(|x| x.is_finite()), "{file}");
+            }
+        };
+        experiment.simulate(&genotype, 0, 0, observe).unwrap();
+    }
+    assert!(n_simulated > 100, "{n_simulated}");
 }

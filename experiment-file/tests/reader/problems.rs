@@ -1,6 +1,6 @@
 //! What a wrong file hears: every problem, where it is, what would be right.
 
-use super::{BASE, edited, refuse};
+use super::{BASE, accept, edited, refuse};
 use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 
@@ -111,15 +111,32 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "synapse_model": "dynamic_synapse""#,
      "line 9: topology.synapse_model: dynamic synapses need neurons that spike"),
     (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonRateCoding"}"#,
-     "line 8: topology.encoding.MSG.scheme: not supported: `PoissonRateCoding`; known: `IdentityEncoding`"),
+     "line 8: topology.encoding.MSG.scheme: encodes into spikes, which `rate_model` neurons do not take; they take `IdentityEncoding`"),
+    (r#"{"scheme": "IdentityEncoding"}"#, r#"{"scheme": "PoissonCoding"}"#,
+     "line 8: topology.encoding.MSG.scheme: unknown name `PoissonCoding`; did you mean `PoissonRateCoding`?"),
     (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "ArgmaxDecoding", "params": {"num_outputs": 3}}"#,
      "line 30: topology.decoding.mode.scheme: not supported: `ArgmaxDecoding`; known: `IdentityDecoding`, `ThresholdDecoding`, `SoftmaxDecoding`, `FirstToSpike`, `RankOrderDecoding`, `LinearPopulationDecoding`"),
-    (r#""sensors": {"wireless_receiver": {}, "#, r#""sensors": {"wireless_receiver": {}, "nest_sensor": {}, "#,
-     "line 55: world.objects.bots.sensors.nest_sensor: not supported"),
+    (r#""sensors": {"wireless_receiver": {}, "#, r#""sensors": {"wireless_receiver": {}, "neighbors_state_sensor": {}, "#,
+     "line 55: world.objects.bots.sensors.neighbors_state_sensor: not supported"),
     (r#""sensor": "light_sensor""#, r#""sensor": "wireless_receiver:n_hops""#,
-     "line 6: topology.stimuli.LIGHT.sensor: not supported: `wireless_receiver:n_hops`; known: `wireless_receiver:msg`, `wireless_receiver:signal`, `wireless_receiver:receiving_direction`, `wireless_receiver:sending_direction`, `wireless_receiver:state`, `light_sensor`, `distance_sensor`, `ground_sensor`"),
+     "line 6: topology.stimuli.LIGHT.sensor: not supported: `wireless_receiver:n_hops`; known: `wireless_receiver:msg`, `wireless_receiver:signal`, `wireless_receiver:receiving_direction`, `wireless_receiver:sending_direction`, `wireless_receiver:state`, `light_sensor`, `distance_sensor`, `ground_sensor`, `food_area_sensor`, `nest_sensor`, `food_sensor`, `own_position_sensor`, `own_orientation_sensor`, `neighborhood_pos_sensor`"),
     (r#""neurons:tau:H""#, r#""encoders:weights:all""#,
-     "line 45: algorithm.populations.neurons.objects[1]: not supported: `encoders:weights`"),
+     "line 45: algorithm.populations.neurons.objects[1]: covers nothing that can evolve"),
+    (r#""neurons:tau:H""#, r#""encoders:weights:LIGTH""#,
+     "line 45: algorithm.populations.neurons.objects[1]: no stimulus is named `LIGTH`; did you mean `LIGHT`?"),
+    (r#""neurons:tau:H""#, r#""learning:coefficients:in""#,
+     "line 45: algorithm.populations.neurons.objects[1]: covers nothing that can evolve"),
+    (r#""neurons:tau:H""#, r#""learning:coefficients:inn""#,
+     "line 45: algorithm.populations.neurons.objects[1]: no synapse group is named `inn`; did you mean `in`?"),
+    // Plasticity.
+    (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "learning": {"synapses": ["in", "aut", "in"]}"#,
+     "line 9: topology.learning.synapses[1]: no synapse group is named `aut`; known: `in`, `out`\n\
+      line 9: topology.learning.synapses[2]: names `in` twice"),
+    (r#""neuron_model": "rate_model""#, r#""neuron_model": "rate_model", "learning": {"A": 2e6, "learning_rate": 2, "reward": {"delay": 0}, "E": 1}"#,
+     "line 9: topology.learning.A: must be between -1000000 and 1000000, is 2e6\n\
+      line 9: topology.learning.learning_rate: must be between 0 and 1, is 2\n\
+      line 9: topology.learning.reward.delay: must be between 1 and 1000, is 0\n\
+      line 9: topology.learning.E: unknown key; known: `learning_rate`, `max_weight`, `A`, `B`, `C`, `D`, `synapses`, `reward`"),
     // Spiking neurons.
     (r#"{"scheme": "ThresholdDecoding"}"#, r#"{"scheme": "FirstToSpike"}"#,
      "line 30: topology.decoding.mode: decodes spikes, which `rate_model` neurons do not have"),
@@ -127,10 +144,14 @@ const MISTAKES: &[(&str, &str, &str)] = &[
      "line 45: algorithm.populations.neurons.objects[1]: covers nothing that can evolve"),
     (r#""neurons:tau:H""#, r#""decoding:weights:modes""#,
      "line 45: algorithm.populations.neurons.objects[1]: no output is named `modes`; did you mean `mode`?"),
-    (r#""controller": null"#, r#""controller": "light_prey_controller""#,
-     "line 63: world.objects.lamp.controller: not supported: `light_prey_controller`; known: `static`, `light_orbit_controller`, `light_rnd_pos_controller`"),
-    (r#""type": "light_source""#, r#""type": "nest""#,
-     "line 61: world.objects.lamp.type: not supported: `nest`; known: `robot`, `light_source`, `ground_area`"),
+    (r#""controller": null"#, r#""controller": "light_pray_controller""#,
+     "line 63: world.objects.lamp.controller: unknown name `light_pray_controller`; did you mean `light_prey_controller`?"),
+    (r#""controller": null"#, r#""controller": "script_controller""#,
+     "line 63: world.objects.lamp.controller: needs a `task` whose `script` has a function `move`"),
+    (r#""fitness_function": "goto_light""#, r#""fitness_function": "goto_light", "fitness_params": {"alpha": 9}"#,
+     "line 41: algorithm.fitness_params.alpha: `goto_light` has no such constant"),
+    (r#""type": "light_source""#, r#""type": "wall""#,
+     "line 61: world.objects.lamp.type: unknown name `wall`; known: `robot`, `light_source`, `ground_area`, `food_area`, `nest`"),
     (r#""wheel_actuator": {}}"#, r#""wheel_actuator": {"min_thresh": 0.1}}"#,
      "line 56: world.objects.bots.actuators.wheel_actuator.min_thresh: must be 0, is 0.1"),
     // Sizes.
@@ -176,7 +197,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""neurons:tau:H""#, r#""neurons:tau:HH""#,
      "line 45: algorithm.populations.neurons.objects[1]: no ensemble is named `HH`; did you mean `H`?"),
     (r#""neurons:tau:H""#, r#""neurons:tau""#,
-     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME`, `synapses:delays:NAME`, `decoders:weights:NAME` or `neurons:PARAMETER:NAME`, with a parameter of the neuron model"),
+     "line 45: algorithm.populations.neurons.objects[1]: expected `synapses:weights:NAME`, `synapses:delays:NAME`, `encoders:weights:NAME`, `decoders:weights:NAME`, `learning:coefficients:NAME` or `neurons:PARAMETER:NAME`, with a parameter of the neuron model"),
     (r#""neurons:tau:H""#, r#""neurons:bias:H""#,
      "line 45: algorithm.populations.neurons.objects[1]: covers the bias of ensemble `H` a second time, after `neurons:bias:all` of population `neurons`"),
     (r#""neurons:tau:H""#, r#""synapses:weights:in""#,
@@ -399,3 +420,58 @@ const EVERYTHING: &[&str] = &[
     "line 58: world.objects.bots.perturbations.stimuli_inhibition.affected_robots: expected a whole number, found 2.5",
     "line 64: world.objects.lamp.initializers.positions.params.values[0]: expected a list of 2 elements, found 3",
 ];
+
+/// The light follower with LIF neurons, its light encoded.
+fn encoded(entry: &str) -> String {
+    let text = include_str!("../../../configs/spiking/light_follower_lif.json");
+    let identity = r#""I5": {"scheme": "IdentityEncoding"}"#;
+    assert!(text.contains(identity));
+    text.replace(identity, &format!(r#""I5": {entry}"#))
+}
+
+#[test]
+fn encoders_say_what_is_wrong_with_their_fields() {
+    for (entry, expected) in [
+        (
+            r#"{"scheme": "LIF_Encoding"}"#,
+            "encoding.I5: no node would ever spike: 1 is its largest current, and a LIF neuron \
+             needs more than 15",
+        ),
+        (
+            r#"{"scheme": "PoissonRateCoding", "receptive_field": {"params": {"max_val": 20000, "sigma": -1}}}"#,
+            "encoding.I5.receptive_field.params.max_val: a rate must be between 0 and 10000, is \
+             20000\nencoding.I5.receptive_field.params.sigma: must be between 0 and 1000000, is -1",
+        ),
+        (
+            r#"{"scheme": "RankOrderCoding", "receptive_field": {"params": {"n_neurons": 4}}}"#,
+            "encoding.I5: 24 nodes cannot be ranked in 20 substeps",
+        ),
+        (
+            r#"{"scheme": "RankOrderCoding", "receptive_field": {"params": {"min_val": 0}}}"#,
+            "encoding.I5.receptive_field.params.min_val: a substep must be between 1 and 20, is 0",
+        ),
+        (
+            r#"{"scheme": "PoissonRateCoding", "receptive_field": {"name": "conic_receptive_field", "params": {"n_neurons": 2, "min_stim": 1, "min_val": 9, "max_val": 3}}}"#,
+            "encoding.I5.receptive_field.params: 1 is not above `min_stim` 1: all nodes would be \
+             the same\nencoding.I5.receptive_field.params.max_val: 3 is below `min_val` 9; \
+             `inverted` turns a field around",
+        ),
+        (
+            r#"{"scheme": "PoissonRateCoding", "receptive_field": {"name": "identity_receptive_field", "params": {"n_neurons": 2}}}"#,
+            "encoding.I5.receptive_field.params.n_neurons: unknown key; none is known here",
+        ),
+        (
+            r#"{"scheme": "PoissonRateCoding", "receptive_field": {"name": "cubic"}}"#,
+            "encoding.I5.receptive_field.name: unknown name `cubic`; known: \
+             `identity_receptive_field`, `gaussian_receptive_field`, `triangular_receptive_field`, \
+             `conic_receptive_field`, `parabolic_receptive_field`, `linear_receptive_field`",
+        ),
+    ] {
+        let expected: Vec<String> =
+            expected.lines().map(|line| format!("line 20: topology.{line}")).collect();
+        assert_eq!(refuse(&encoded(entry)), expected.join("\n"), "{entry}");
+    }
+    let right = r#"{"scheme": "LIF_Encoding", "receptive_field": {"params": {"n_neurons": 3, "max_val": 40}}}"#;
+    let config = accept(&encoded(right));
+    assert_eq!(config.topology.n_sources("I5"), 18);
+}

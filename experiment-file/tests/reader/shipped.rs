@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::accept;
-use experiment_file::{FitnessFunction, NeuronModel};
+use experiment_file::{EncodingScheme, FitnessFunction, NeuronModel};
 
 /// Every shipped file: its stem and its text.
 pub(super) fn shipped() -> Vec<(String, String)> {
@@ -35,7 +35,7 @@ fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
     }
 }
 
-/// Three tasks, each with two neuron models, and with the budget of the rate neurons'.
+/// Three tasks, each with two neuron models, and with trials and population of the rate neurons'.
 #[test]
 fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
     let rate = shipped();
@@ -51,12 +51,33 @@ fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
             assert_eq!(config.topology.neuron_model, model);
             assert_eq!(config.world, expected.world);
             let [ours, theirs] = [&config.algorithm, &expected.algorithm].map(|it| {
-                (it.fitness_function, it.generations, it.population_size, it.evaluation_steps)
+                (it.fitness_function, it.population_size, it.num_evaluations, it.evaluation_steps)
             });
             assert_eq!(ours, theirs);
         }
     }
-    assert_eq!(spiking.len(), 6);
+    assert_eq!(spiking.len(), 8);
+}
+
+/// They differ from their tasks' files in the network alone.
+#[test]
+fn encoders_and_plasticity_are_shipped() {
+    let spiking = spiking();
+    let find = |name: &str| {
+        let (_, text) = spiking.iter().find(|(stem, _)| stem == name).expect(name);
+        accept(text)
+    };
+    for (name, task) in [
+        ("light_follower_lif_encoded", "light_follower_lif"),
+        ("leader_selection_lif_plastic", "leader_selection_lif"),
+    ] {
+        assert_eq!(find(name).world, find(task).world);
+    }
+    let encoded = find("light_follower_lif_encoded").topology;
+    let schemes: Vec<EncodingScheme> = encoded.encoding.values().map(|it| it.scheme).collect();
+    use EncodingScheme::{Lif, PoissonRate, RankOrder};
+    assert_eq!(schemes, [Lif, RankOrder, PoissonRate]);
+    assert!(find("leader_selection_lif_plastic").topology.learning.unwrap().reward.is_some());
 }
 
 #[test]

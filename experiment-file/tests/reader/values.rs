@@ -6,10 +6,53 @@ use super::validator::is_valid;
 use super::{BASE, accept, defaults, edited, read, refuse};
 use evolution::ALGORITHMS;
 use experiment_file::{
-    Activation, ExperimentConfig, InitialRates, Initializer, LightController, LightSourceConfig,
-    NeuronModel, ObjectConfig, OrbitConfig, Pace, RandomTargetsConfig, RobotController,
-    SendingDirection, UncontrollableRotationConfig, WirelessReceiverConfig, json_schema,
+    Activation, AreaController, ExperimentConfig, GaussianField, InitialRates, Initializer,
+    LightController, LightSourceConfig, NeuronModel, ObjectConfig, OrbitConfig, Pace,
+    RandomTargetsConfig, ReceptiveField, RewardConfig, RobotController, SendingDirection,
+    TopologyConfig, UncontrollableRotationConfig, WirelessReceiverConfig, json_schema,
 };
+
+/// An entry of `encoding` for the light of the light follower with LIF neurons, and plasticity.
+fn spiking_with(entry: &str, learning: &str) -> TopologyConfig {
+    let text = include_str!("../../../configs/spiking/light_follower_lif.json")
+        .replace(r#""I5": {"scheme": "IdentityEncoding"}"#, &format!(r#""I5": {entry}"#))
+        .replace(r#""synapse_model""#, &format!(r#""learning": {learning}, "synapse_model""#));
+    accept(&text).topology
+}
+
+#[test]
+fn receptive_fields_have_the_defaults_of_their_scheme() {
+    for (scheme, values) in [("PoissonRateCoding", [0.0, 1.0]), ("RankOrderCoding", [1.0, 20.0])] {
+        let topology = spiking_with(&format!(r#"{{"scheme": "{scheme}"}}"#), "null");
+        assert_eq!(topology.encoding.len(), 1, "the identity is no encoder");
+        let expected = GaussianField {
+            sigma: 6.0,
+            n_neurons: 1,
+            min_stim: 0.0,
+            max_stim: 1.0,
+            min_val: values[0],
+            max_val: values[1],
+            inverted: false,
+        };
+        let field = topology.encoding["I5"].receptive_field;
+        assert_eq!(field, ReceptiveField::Gaussian(expected));
+        assert_eq!((topology.n_sources("I5"), topology.n_sources("I1")), (6, 2));
+        assert_eq!(topology.learning, None);
+    }
+}
+
+#[test]
+fn everything_learns_unless_a_file_says_what() {
+    let identity = r#"{"scheme": "IdentityEncoding"}"#;
+    let topology = spiking_with(identity, "{}");
+    let learning = topology.learning.unwrap();
+    assert!(learning.synapses.iter().eq(topology.synapses.keys()));
+    assert_eq!((learning.learning_rate, learning.max_weight), (1e-4, 1_000.0));
+    assert_eq!((learning.coefficients(), learning.reward), ([1.0, 0.0, 0.0, 0.0], None));
+    let some = spiking_with(identity, r#"{"synapses": "H1-H2", "reward": {}}"#).learning.unwrap();
+    assert_eq!(some.synapses, ["H1-H2"]);
+    assert_eq!(some.reward, Some(RewardConfig { delay: 30, discount: 0.9 }));
+}
 
 #[test]
 fn what_a_file_omits_has_its_documented_default() {
@@ -85,8 +128,13 @@ fn light_controllers_have_three_forms() {
         }
     };
     assert_eq!(controller("null"), LightController::Static {});
-    let random =
-        |every, pace| LightController::LightRndPosController(RandomTargetsConfig { every, pace });
+    let random = |every, pace| {
+        LightController::LightRndPosController(RandomTargetsConfig {
+            every,
+            pace,
+            ..Default::default()
+        })
+    };
     assert_eq!(controller(r#""light_rnd_pos_controller""#), random(50, Pace::Speed(3.0)));
     let params = |params: &str| {
         controller(&format!(r#"{{"name": "light_rnd_pos_controller", "params": {params}}}"#))
@@ -94,6 +142,109 @@ fn light_controllers_have_three_forms() {
     assert_eq!(params(r#"{"every": 90}"#), random(90, Pace::Speed(3.0)));
     assert_eq!(params(r#"{"speed": 1.5}"#), random(50, Pace::Speed(1.5)));
     assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, Pace::Step(0.1)));
+}
+
+/// Keys that were fixed constants: what is given, and that the default is left out.
+#[test]
+fn constants_of_tasks_and_lights_are_keys_with_the_thesis_s_defaults() {
+    let goto_light = r#""fitness_function": "goto_light""#;
+    let params = |params: &str| {
+        let config =
+            accept(&edited(goto_light, &format!("{goto_light}, \"fitness_params\": {params}")));
+        (config.algorithm.fitness_params.near, config.to_canonical_json())
+    };
+    assert_eq!(params("{}").0, 80.0);
+    assert_eq!(params(r#"{"near": 80, "alpha": 15}"#).1, accept(BASE).to_canonical_json());
+    let (near, canonical) = params(r#"{"near": 55.5}"#);
+    assert!(near == 55.5 && canonical.contains(r#""fitness_params":{"near":55.5}"#), "{canonical}");
+    let orbit = |params: &str| {
+        let orbit = format!(r#"{{"name": "light_orbit_controller", "params": {params}}}"#);
+        accept(&edited(r#""controller": null"#, &format!("\"controller\": {orbit}")))
+    };
+    let expected = OrbitConfig { radius: 120.0, ..OrbitConfig::default() };
+    let config = orbit(r#"{"radius": 120}"#);
+    assert_eq!(lamp(&config).controller, LightController::LightOrbitController(expected));
+    assert_eq!(orbit(r#"{"radius": 200}"#).to_canonical_json(), orbit("{}").to_canonical_json());
+    let targets = r#"{"name": "light_rnd_pos_controller", "params": {"square": 90}}"#;
+    let config = accept(&edited(r#""controller": null"#, &format!("\"controller\": {targets}")));
+    let expected = RandomTargetsConfig { square: 90.0, ..Default::default() };
+    assert_eq!(lamp(&config).controller, LightController::LightRndPosController(expected));
+    let config =
+        accept(&edited(r#""controller": null"#, r#""controller": "light_prey_controller""#));
+    assert_eq!(lamp(&config).controller, LightController::LightPreyController {});
+}
+
+#[test]
+fn food_areas_and_nests_are_ground_areas_of_a_colour() {
+    let light = r#""type": "light_source",
+        "num_instances": 1,
+        "controller": null,"#;
+    let goto_light = r#""fitness_function": "goto_light""#;
+    let text = BASE.replace(goto_light, r#""fitness_function": "grouping""#);
+    for (name, color) in [("food_area", "green"), ("nest", "black")] {
+        let area = format!(r#""type": "{name}", "num_instances": 1,"#);
+        let with = |params: &str| text.replace(light, &format!("{area} {params}"));
+        for (params, range) in [("", 150.0), (r#""params": {"range": 40},"#, 40.0)] {
+            let config = accept(&with(params));
+            let ObjectConfig::GroundArea(area) = &config.world.objects["lamp"] else { panic!() };
+            assert_eq!((area.params.range, area.params.color.as_str()), (range, color));
+        }
+        let error = refuse(&with(r#""params": {"color": "red"},"#));
+        assert!(error.contains("lamp.params.color: unknown key"), "{error}");
+    }
+}
+
+#[test]
+fn sensors_of_the_original_have_their_lengths() {
+    let sensors = r#""sensors": {"wireless_receiver": {}, "light_sensor": {}}"#;
+    let stimulus = r#""sensor": "light_sensor""#;
+    for (sensor, params, n) in [
+        ("own_position_sensor", r#"{"range": 100, "noise_sigma": 0}"#, 2),
+        ("own_orientation_sensor", "{}", 1),
+        ("food_sensor", "{}", 1),
+        ("food_area_sensor", "{}", 1),
+        ("nest_sensor", "{}", 1),
+        ("neighborhood_pos_sensor", r#"{"n_neighbors": 4}"#, 12),
+    ] {
+        let mounted = format!(
+            r#""sensors": {{"wireless_receiver": {{}}, "light_sensor": {{}}, "{sensor}": {params}}}"#
+        );
+        let read_it = format!(r#""sensor": "{sensor}""#);
+        let text = BASE.replace(sensors, &mounted).replace(stimulus, &read_it);
+        let error = read(&text.replace(r#""n": 6"#, r#""n": 5"#)).unwrap_err().to_string();
+        assert!(
+            error.contains(&format!("is 5, but the reading of robot `bots` has length {n}")),
+            "{error}"
+        );
+        assert!(read(&text.replace(r#""n": 6"#, &format!("\"n\": {n}"))).is_ok(), "{sensor}");
+    }
+}
+
+/// A script that says whatever there is to say.
+const TASK: &str = r#""task": {"script": {"name": "t.star", "text": "pass"}}, "world": {"#;
+
+#[test]
+fn robots_lights_and_areas_may_be_left_to_the_script() {
+    let with_task = BASE.replace(r#""world": {"#, TASK);
+    let area = r#""type": "ground_area", "num_instances": 1, "controller": "script_controller","#;
+    let light = r#""type": "light_source",
+        "num_instances": 1,
+        "controller": null,"#;
+    for controller in [r#""script_controller""#, r#"{"name": "script_controller"}"#] {
+        let text =
+            with_task.replace(r#""controller": null"#, &format!("\"controller\": {controller}"));
+        assert_eq!(lamp(&accept(&text)).controller, LightController::ScriptController {});
+    }
+    let text = with_task
+        .replace(light, area)
+        .replace(r#""fitness_function": "goto_light""#, r#""fitness_function": "grouping""#);
+    let ObjectConfig::GroundArea(area) = &accept(&text).world.objects["lamp"] else { panic!() };
+    assert_eq!(area.controller, Some(AreaController::ScriptController));
+    let (config, warnings) =
+        read(&with_task.replace("\"neural_controller\"", "\"script_controller\"")).unwrap();
+    assert_eq!(config.robots().next().unwrap().1.controller, RobotController::ScriptController);
+    let warning = warnings.iter().find(|it| it.path == "world.objects.bots.controller").unwrap();
+    assert!(warning.message.ends_with("but nothing of it evolves"), "{}", warning.message);
 }
 
 /// The base experiment with the defaults of the original simulator, and edits of it.
@@ -133,7 +284,7 @@ fn the_semantics_of_the_original_are_other_defaults() {
     let transmitter = bots.actuators.wireless_transmitter.as_ref().unwrap();
     assert_eq!((transmitter.sending_steps, transmitter.initial_frame), (11, true));
     assert_eq!(lamp(&config).params.range, 150.0);
-    let orbit = OrbitConfig { angle_step: 0.013, radius_step: Some(1.0) };
+    let orbit = OrbitConfig { angle_step: 0.013, radius_step: Some(1.0), ..Default::default() };
     assert_eq!(lamp(&config).controller, LightController::LightOrbitController(orbit));
     // The canonical form says it without the word.
     let canonical = config.to_canonical_json();

@@ -24,6 +24,13 @@ pub(crate) struct Antenna {
     pub receiver: Option<Receiver>,
 }
 
+impl Antenna {
+    /// How far it is heard, cm; negative: nowhere.
+    pub fn reach(&self) -> f64 {
+        self.emits_within.unwrap_or(-1.0)
+    }
+}
+
 /// What a receiver is like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Receiver {
@@ -128,13 +135,19 @@ impl Hearing {
                 listeners.push(Listeners::new(robots, receiver, nobody));
             }
         }
-        let reaches = antennas.iter().map(|antenna| antenna.emits_within.unwrap_or(-1.0));
+        let reaches = antennas.iter().map(Antenna::reach);
         Self { listeners, reaches: reaches.collect(), emitters: Emitters::default() }
     }
 
     /// Those that hear.
     pub fn listeners(&self) -> &[Listeners] {
         &self.listeners
+    }
+
+    /// Has robots be heard within so far, cm; negative: not at all.
+    pub fn set_reaches(&mut self, reaches: impl Iterator<Item = f64>) {
+        self.reaches.clear();
+        self.reaches.extend(reaches);
     }
 
     /// Computes everything from who is near whom and from headings.

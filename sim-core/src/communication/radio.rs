@@ -3,7 +3,7 @@
 
 use super::Mode;
 use super::frame::{Ether, FrameOrigin};
-use super::hearing::Hearing;
+use super::hearing::{Antenna, Hearing};
 use super::quantisation::Scratch;
 use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
@@ -18,6 +18,8 @@ use numeric::random::Stream;
 pub(crate) struct Radio {
     ether: Ether,
     hearing: Hearing,
+    /// Who is not heard.
+    failed: Vec<bool>,
     /// Per robot.
     reception: Vec<Stream>,
     /// Per robot.
@@ -40,6 +42,7 @@ impl Radio {
         Self {
             ether,
             hearing: Hearing::new(&world.antennas),
+            failed: vec![false; world.n_robots()],
             reception,
             quantisation,
             u: Vec::new(),
@@ -51,6 +54,19 @@ impl Radio {
     /// Robots have taken their places, moved or turned.
     pub fn listen(&mut self, neighbours: &Neighbours, swarm: &Swarm) {
         self.hearing.update(neighbours, &swarm.headings);
+    }
+
+    /// Those who have failed are not heard. Returns whether this is another set of robots than
+    /// before.
+    pub fn mute(&mut self, world: &World, failed: &[bool]) -> bool {
+        if self.failed == failed {
+            return false;
+        }
+        self.failed.copy_from_slice(failed);
+        let reach =
+            |(antenna, &failed): (&Antenna, &bool)| if failed { -1.0 } else { antenna.reach() };
+        self.hearing.set_reaches(world.antennas.iter().zip(failed).map(reach));
+        true
     }
 
     /// Every receiver takes a frame from the air: one uniformly chosen among the

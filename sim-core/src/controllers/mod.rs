@@ -13,6 +13,9 @@ use numeric::random::Stream;
 /// Decides for all robots of one object of the world, in all trials at once: one
 /// lane per robot and trial.
 pub(crate) trait Controller {
+    /// Takes in what a lane is rewarded with for the step before.
+    fn reward(&mut self, _lane: usize, _reward: f64) {}
+
     /// Takes in one environment step's stimuli, `[input][lane]`.
     fn perceive(&mut self, stimuli: &Lanes);
 
@@ -30,6 +33,15 @@ pub(crate) trait Controller {
     fn voltages(&self) -> Option<Lanes> {
         None
     }
+}
+
+/// Leaves everything to the script, whose plans the trial has.
+pub(crate) struct Scripted;
+
+impl Controller for Scripted {
+    fn perceive(&mut self, _: &Lanes) {}
+
+    fn act(&mut self, _: usize, _: &mut Stream, _: &mut Action<'_>) {}
 }
 
 /// The actions of one robot in one step.

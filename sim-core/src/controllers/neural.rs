@@ -20,15 +20,31 @@ pub(crate) struct NeuralController<'a> {
 }
 
 impl<'a> NeuralController<'a> {
-    /// At rest in every lane.
-    pub fn new(isa: Isa, network: &'a Network, phenotype: &Phenotype, n_lanes: usize) -> Self {
-        let state = NetworkState::new(isa, network, phenotype, n_lanes);
+    /// At rest in every lane. `streams`: what encoders draw from, per lane; none if none
+    /// draws.
+    pub fn new(
+        isa: Isa,
+        network: &'a Network,
+        phenotype: &Phenotype,
+        n_lanes: usize,
+        streams: Vec<Stream>,
+    ) -> Self {
+        let state = NetworkState::new(isa, network, phenotype, n_lanes).drawing_from(streams);
         let decoders = phenotype.decoders.clone();
         Self { state, outputs: &network.outputs, decoders, scratch: Vec::new() }
     }
 }
 
+/// Largest absolute value of a reward, so that no weight overflows.
+const MAX_REWARD: f64 = 1e6;
+
 impl Controller for NeuralController<'_> {
+    fn reward(&mut self, lane: usize, reward: f64) {
+        // A script's fitness may be no number.
+        let reward = if reward.is_nan() { 0.0 } else { reward.clamp(-MAX_REWARD, MAX_REWARD) };
+        self.state.reward(lane, reward as f32);
+    }
+
     fn perceive(&mut self, stimuli: &Lanes) {
         self.state.step(stimuli);
     }

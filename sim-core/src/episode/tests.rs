@@ -260,7 +260,7 @@ fn a_switch_of_topology_draws_new_places_and_new_targets() {
     topologies.dedup();
     assert_eq!(topologies.len(), 3);
     for (k, step) in steps.iter().enumerate() {
-        let border = crate::border::of_swarm(&TORUS, &positions(k), 100.0);
+        let border = crate::border::of_swarm(&TORUS, &positions(k), 100.0, 15.0);
         let right = border.iter().zip(&step.robots).filter(|(at, robot)| **at == (robot.led > 0));
         assert_eq!(step.measures["accuracy"], right.count() as f64 / 20.0, "step {k}");
     }
@@ -306,6 +306,7 @@ fn ground_and_neighbours_reach_the_network() {
     robot.initializers.orientations = Initializer::Fixed { values: vec![vec![0.0]] };
     let area = |color: &str, x: f64| {
         ObjectConfig::GroundArea(GroundAreaConfig {
+            controller: None,
             num_instances: 1,
             initializers: PositionInitializers {
                 positions: Initializer::Fixed { values: vec![vec![x, 100.0]] },

@@ -10,28 +10,31 @@ use experiment_file::FitnessFunction;
 pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     function: FitnessFunction::IdentifyBorderline,
     measures: &["true_positive_rate", "true_negative_rate", "precision", "accuracy"],
-    start: |world| Box::new(IdentifyBorderline::new(world.communication_range())),
+    start: |world, params| {
+        Box::new(IdentifyBorderline::new(world.communication_range(), params.alpha))
+    },
 }];
 
 /// f = TPR * TNR; just TPR if no robot is in the interior.
 #[derive(Debug)]
 pub(super) struct IdentifyBorderline {
     range: f64,
+    alpha: f64,
     /// Who is at the border.
     targets: Vec<bool>,
 }
 
 impl IdentifyBorderline {
-    /// Robots less than `range` apart are connected.
-    pub fn new(range: f64) -> Self {
-        Self { range, targets: Vec::new() }
+    /// Robots less than `range` apart are connected; `alpha` of their alpha shape.
+    pub fn new(range: f64, alpha: f64) -> Self {
+        Self { range, alpha, targets: Vec::new() }
     }
 }
 
 impl Fitness for IdentifyBorderline {
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
         if moment.moved || self.targets.is_empty() {
-            self.targets = border::of_swarm(moment.torus, moment.positions, self.range);
+            self.targets = border::of_swarm(moment.torus, moment.positions, self.range, self.alpha);
         }
         let rates = Rates::new(&self.targets, moment.leds);
         Some(rates.true_positive * rates.true_negative)
@@ -106,7 +109,7 @@ mod tests {
 
     fn fitness(positions: &[Vec2], leds: &[u32]) -> f64 {
         let moment = Moment { positions, leds, ..Moment::EMPTY };
-        IdentifyBorderline::new(100.0).step(&moment).unwrap()
+        IdentifyBorderline::new(100.0, 15.0).step(&moment).unwrap()
     }
 
     #[test]
@@ -125,7 +128,7 @@ mod tests {
 
     #[test]
     fn targets_follow_robots_that_move() {
-        let mut fitness = IdentifyBorderline::new(100.0);
+        let mut fitness = IdentifyBorderline::new(100.0, 15.0);
         let leds = &[1, 1, 1, 1, 0];
         let mut moment = Moment { positions: &SQUARE, leds, ..Moment::EMPTY };
         assert_eq!(fitness.step(&moment), Some(1.0));
@@ -178,6 +181,6 @@ mod tests {
             ("precision", 1.0),
             ("accuracy", 0.6),
         ];
-        assert_eq!(measures(&mut IdentifyBorderline::new(100.0), &moment), expected);
+        assert_eq!(measures(&mut IdentifyBorderline::new(100.0, 15.0), &moment), expected);
     }
 }

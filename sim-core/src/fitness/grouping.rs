@@ -13,7 +13,7 @@ const CROWDED: f64 = 20.0;
 pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     function: FitnessFunction::Grouping,
     measures: &["center_distance"],
-    start: |_| Box::new(Grouping),
+    start: |_, _| Box::new(Grouping),
 }];
 
 /// f = mean clip(1 - distance to centroid / 100, 0, 1), or 0 if two robots are

@@ -14,7 +14,7 @@ const MAX: f64 = 5.0;
 pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     function: FitnessFunction::IdentifyLeader,
     measures: &["leaders", "one_leader"],
-    start: |_| Box::new(IdentifyLeader::default()),
+    start: |_, _| Box::new(IdentifyLeader::default()),
 }];
 
 /// f = min(0.1 c, 5) with exactly one leader, c the number of steps before this

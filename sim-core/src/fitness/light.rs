@@ -5,14 +5,11 @@ use crate::record::Measures;
 use crate::torus::Vec2;
 use experiment_file::FitnessFunction;
 
-/// Distance to the light that counts as near, cm.
-const NEAR: f64 = 80.0;
-
 /// The function of this file.
 pub(super) const DEFINITIONS: &[Definition] = &[Definition {
     function: FitnessFunction::GotoLight,
     measures: MEASURES,
-    start: |_| Box::new(GotoLight),
+    start: |_, params| Box::new(GotoLight { near: params.near }),
 }];
 
 const MEASURES: &[&str] = &[
@@ -24,14 +21,17 @@ const MEASURES: &[&str] = &[
     "center_distance_others",
 ];
 
-/// f = share of robots within 80 cm of a light.
+/// f = share of robots near a light.
 #[derive(Debug)]
-pub(super) struct GotoLight;
+pub(super) struct GotoLight {
+    /// Distance that counts as near, cm.
+    near: f64,
+}
 
 impl Fitness for GotoLight {
     fn step(&mut self, moment: &Moment<'_>) -> Option<f64> {
         let near = moment.positions.iter().map(|&robot| {
-            let near = |&light| moment.torus.distance(robot, light) <= NEAR;
+            let near = |&light| moment.torus.distance(robot, light) <= self.near;
             f64::from(moment.lights.iter().any(near))
         });
         Some(mean(near))
@@ -58,7 +58,7 @@ impl Fitness for GotoLight {
                     distances.fold(f64::INFINITY, f64::min)
                 };
                 measures.insert(light_distance.into(), mean(robots.iter().map(to_light)));
-                let near = |robot| f64::from(to_light(robot) <= NEAR);
+                let near = |robot| f64::from(to_light(robot) <= self.near);
                 measures.insert(near_light.into(), mean(robots.iter().map(near)));
             }
             let to_center = |&robot: &Vec2| torus.distance(robot, centroid);
@@ -72,6 +72,11 @@ mod tests {
     use super::*;
     use crate::fitness::measures;
 
+    /// The function of experiment D.
+    fn goto_light() -> GotoLight {
+        GotoLight { near: 80.0 }
+    }
+
     #[test]
     fn fitness_is_the_share_of_robots_near_the_light() {
         let light = [Vec2::new(990.0, 500.0)];
@@ -82,8 +87,9 @@ mod tests {
             Vec2::new(500.0, 500.0),
         ];
         let moment = Moment { positions: &positions, lights: &light, ..Moment::EMPTY };
-        assert_eq!(GotoLight.step(&moment), Some(0.5));
-        assert_eq!(GotoLight.step(&Moment { lights: &[], ..moment }), Some(0.0));
+        assert_eq!(goto_light().step(&moment), Some(0.5));
+        assert_eq!(goto_light().step(&Moment { lights: &[], ..moment }), Some(0.0));
+        assert_eq!(GotoLight { near: 81.0 }.step(&moment), Some(0.75));
     }
 
     #[test]
@@ -103,10 +109,10 @@ mod tests {
             ("near_light_others", 1.0),
             ("center_distance_others", 30.0),
         ];
-        assert_eq!(measures(&mut GotoLight, &moment), expected);
+        assert_eq!(measures(&mut goto_light(), &moment), expected);
         let far = Moment { lights: &[Vec2::new(940.0, 0.0)], ..moment };
-        assert_eq!(measures(&mut GotoLight, &far)[4], ("near_light_others", 0.5));
+        assert_eq!(measures(&mut goto_light(), &far)[4], ("near_light_others", 0.5));
         let blind = Moment { photosensitive: &[false; 3], lights: &[], ..moment };
-        assert_eq!(measures(&mut GotoLight, &blind), [("center_distance_others", 20.0)]);
+        assert_eq!(measures(&mut goto_light(), &blind), [("center_distance_others", 20.0)]);
     }
 }

@@ -14,7 +14,7 @@ use crate::record::Measures;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
-use experiment_file::FitnessFunction;
+use experiment_file::{FitnessFunction, FitnessParams};
 
 /// What a fitness function sees of a step: the robots that are evaluated, as
 /// they acted and after they moved, and the lights before they move.
@@ -82,7 +82,7 @@ pub(crate) struct Definition {
     /// All measures that it may give, in their order.
     pub measures: &'static [&'static str],
     /// Itself at the start of a trial.
-    pub start: fn(&World) -> Box<dyn Fitness>,
+    pub start: fn(&World, &FitnessParams) -> Box<dyn Fitness>,
 }
 
 /// The definition of a fitness function; none of the script's.

@@ -12,12 +12,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         function: FitnessFunction::OrientationConsensus,
         measures: &["misalignment", "turning"],
-        start: |_| Box::new(OrientationConsensus),
+        start: |_, _| Box::new(OrientationConsensus),
     },
     Definition {
         function: FitnessFunction::Alignment,
         measures: &["misalignment", "turning"],
-        start: |_| Box::new(Alignment),
+        start: |_, _| Box::new(Alignment),
     },
 ];
 

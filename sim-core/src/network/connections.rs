@@ -16,6 +16,8 @@ pub(crate) enum Source {
     Input(usize),
     /// Index of a neuron.
     Neuron(usize),
+    /// Node of an encoder, among those of all encoders.
+    Encoded(usize),
 }
 
 /// One synapse.
@@ -34,6 +36,8 @@ pub(crate) struct SynapseGroup {
     pub synapses: Range<usize>,
     /// Whether the genotype may hold its weights.
     pub trainable: bool,
+    /// Whether its weights change while robots live.
+    pub is_plastic: bool,
     /// What its spikes release; none of static synapses.
     pub transmitter: Option<Neurotransmitter>,
 }
@@ -55,7 +59,10 @@ pub(super) fn draw(
         let first = synapses.len();
         for pre_name in &group.pre {
             let sources: Vec<Source> = match (stimuli.get(pre_name), ensembles.get(pre_name)) {
-                (Some(stimulus), _) => stimulus.inputs.clone().map(Source::Input).collect(),
+                (Some(stimulus), _) => match &stimulus.encoder {
+                    None => stimulus.inputs.clone().map(Source::Input).collect(),
+                    Some(encoder) => encoder.nodes.clone().map(Source::Encoded).collect(),
+                },
                 (None, Some(ensemble)) => ensemble.neurons.clone().map(Source::Neuron).collect(),
                 (None, None) => {
                     problems.add(path(), format!("no stimulus or ensemble is named {pre_name:?}"));
@@ -75,7 +82,9 @@ pub(super) fn draw(
         }
         let synapses = first..synapses.len();
         let (trainable, transmitter) = (group.trainable, group.transmitter);
-        let group = SynapseGroup { synapses, trainable, transmitter };
+        let is_plastic =
+            config.learning.as_ref().is_some_and(|it| it.synapses.contains(group_name));
+        let group = SynapseGroup { synapses, trainable, is_plastic, transmitter };
         groups.insert(group_name.clone(), group);
     }
     (groups, synapses)

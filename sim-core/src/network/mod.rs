@@ -16,8 +16,8 @@ use connections::{Synapse, SynapseGroup};
 use decoding::Output;
 use dynamics::Wiring;
 use experiment_file::{
-    Activation, InitialRates, NamedMap, NeuronModel, NeuronParameter, SensorQuery, SynapseParams,
-    TopologyConfig,
+    Activation, EncodingConfig, EncodingScheme, InitialRates, LearningConfig, NamedMap,
+    NeuronModel, NeuronParameter, SensorQuery, SynapseParams, TopologyConfig,
 };
 pub(crate) use phenotype::Phenotype;
 
@@ -38,6 +38,8 @@ pub(crate) struct Network {
     pub motor_tau: Option<f64>,
     /// Receptors of dynamic synapses; none of static ones.
     pub receptors: Option<SynapseParams>,
+    /// How weights change while robots live; none: they do not.
+    pub learning: Option<LearningConfig>,
     /// Inputs by name, in the order of their rows.
     pub stimuli: IndexMap<String, Stimulus>,
     /// Neurons by name of their ensemble, in their order.
@@ -60,6 +62,19 @@ pub(crate) struct Stimulus {
     pub inputs: Range<usize>,
     /// The reading that it carries.
     pub sensor: SensorQuery,
+    /// What makes spikes of it; none: it acts as it is.
+    pub encoder: Option<Encoder>,
+}
+
+/// How a stimulus becomes spikes.
+#[derive(Debug, Clone)]
+pub(crate) struct Encoder {
+    /// Its nodes among those of all encoders.
+    pub nodes: Range<usize>,
+    /// How values become spikes.
+    pub config: EncodingConfig,
+    /// Number of weights of its receptive field.
+    pub n_weights: usize,
 }
 
 /// A named group of neurons.
@@ -85,11 +100,17 @@ impl Ensemble {
 impl Network {
     /// Draws the connections; notes names that nothing has.
     pub fn compile(config: &TopologyConfig, problems: &mut Problems) -> Self {
-        let mut n_inputs = 0;
+        let (mut n_inputs, mut n_encoded) = (0, 0);
         let stimuli = config.stimuli.iter().map(|(name, stimulus)| {
             let inputs = n_inputs..n_inputs + stimulus.n as usize;
             n_inputs = inputs.end;
-            (name.clone(), Stimulus { inputs, sensor: stimulus.sensor })
+            let encoder = config.encoding.get(name).map(|&encoding| {
+                let nodes = n_encoded..n_encoded + config.n_sources(name) as usize;
+                n_encoded = nodes.end;
+                let n_weights = encoding.receptive_field.n_weights(stimulus.n) as usize;
+                Encoder { nodes, config: encoding, n_weights }
+            });
+            (name.clone(), Stimulus { inputs, sensor: stimulus.sensor, encoder })
         });
         let stimuli: IndexMap<_, _> = stimuli.collect();
         let mut n_neurons = 0;
@@ -115,6 +136,7 @@ impl Network {
             initial_rates: config.initial_rates,
             motor_tau: config.motor_tau,
             receptors: config.synapse_params,
+            learning: config.learning.clone(),
             stimuli,
             ensembles,
             groups,
@@ -126,13 +148,34 @@ impl Network {
 
     /// The order in which its neurons and synapses are computed.
     pub fn wiring(&self) -> &Wiring {
-        let new = || Wiring::new(self.model, &self.ensembles, &self.groups, &self.synapses);
+        let new = || {
+            let n_encoded = self.n_encoded();
+            Wiring::new(self.model, &self.ensembles, n_encoded, &self.groups, &self.synapses)
+        };
         self.wiring.get_or_init(new)
     }
 
-    /// Axonal delays: one per neuron with dynamic synapses.
+    /// Axonal delays: one per neuron and node of an encoder, with dynamic synapses.
     pub fn n_delays(&self) -> usize {
-        if self.receptors.is_some() { self.n_neurons() } else { 0 }
+        if self.receptors.is_some() { self.n_neurons() + self.n_encoded() } else { 0 }
+    }
+
+    /// Encoders, in the order of their nodes, with the inputs that they encode.
+    pub fn encoders(&self) -> impl Iterator<Item = (Range<usize>, &Encoder)> {
+        let stimuli = self.stimuli.values();
+        stimuli.filter_map(|it| Some((it.inputs.clone(), it.encoder.as_ref()?)))
+    }
+
+    /// Nodes of all encoders.
+    pub fn n_encoded(&self) -> usize {
+        self.encoders().last().map_or(0, |(_, encoder)| encoder.nodes.end)
+    }
+
+    /// Nodes that draw a random number in every substep.
+    pub fn n_drawing(&self) -> usize {
+        let poisson = |encoder: &&Encoder| encoder.config.scheme == EncodingScheme::PoissonRate;
+        let drawing = self.encoders().map(|(_, encoder)| encoder).filter(poisson);
+        drawing.map(|encoder| encoder.nodes.len()).sum()
     }
 
     /// Number of neurons.

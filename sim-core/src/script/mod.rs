@@ -1,18 +1,24 @@
 //! The task that an experiment brings as a script: compiled once, executed in every trial.
-//! `names` is what scripts can name, `view` what they see and change.
+//! `names` is what scripts can name, `view` what they see, `change` what they change.
 
+mod change;
 mod names;
 mod view;
 
+pub(crate) use change::May;
+use change::Plan;
 pub(crate) use view::View;
 
-use experiment_file::ScriptConfig;
-use numeric::random::Stream;
-use task_script::{FunctionId, Limits, Program, Script, ScriptError, Value};
+use experiment_file::{RobotController, ScriptConfig};
+use numeric::random::{Purpose, Stream};
+use task_script::{FunctionId, Limits, Object, Program, Script, ScriptError, Value};
 
+use crate::objects::{Site, StaticObjects};
 use crate::problems::Problems;
 use crate::record::{MeasureName, Measures};
-use view::Kept;
+use crate::torus::Vec2;
+use crate::world::{RobotGroup, World};
+use view::{Kept, Kind};
 
 /// Largest absolute value that a function may return: sums and squares of it are finite.
 const LARGEST: f64 = 1e100;
@@ -23,7 +29,8 @@ const MEMORY: usize = 256 << 10;
 const MEMORY_PER_ROBOT: usize = 4 << 10;
 
 /// The functions that a script may have, with their arguments.
-const FUNCTIONS: [(&str, usize); 3] = [("fitness", 1), ("final", 1), ("measures", 1)];
+const FUNCTIONS: [(&str, usize); 6] =
+    [("fitness", 1), ("final", 1), ("measures", 1), ("control", 1), ("move", 1), ("react", 1)];
 
 /// A script as far as it is the same for all trials.
 #[derive(Debug)]
@@ -33,6 +40,12 @@ pub(crate) struct ScriptTask {
     /// Fitness of the whole episode.
     last: Option<FunctionId>,
     measures: Option<FunctionId>,
+    /// What a robot does.
+    control: Option<FunctionId>,
+    /// Where a light or ground area goes.
+    move_: Option<FunctionId>,
+    /// What happens to robots, lights and areas.
+    react: Option<FunctionId>,
     /// The names that `measures` gives.
     measure_names: Vec<MeasureName>,
 }
@@ -75,7 +88,36 @@ impl ScriptTask {
             let known = FUNCTIONS.map(|(name, _)| format!("`{name}`")).join(", ");
             wrong(format!("{}: has none of the functions {known}", config.name));
         }
-        is_right.then_some(Self { fitness, last, measures, measure_names, program })
+        let [control, move_, react] = ["control", "move", "react"].map(function);
+        is_right.then_some(Self {
+            fitness,
+            last,
+            measures,
+            control,
+            move_,
+            react,
+            measure_names,
+            program,
+        })
+    }
+
+    /// Reports what the world leaves to a script that has no function for it.
+    pub fn check(&self, file: &str, world: &World, problems: &mut Problems) {
+        let mut needs = |function: Option<FunctionId>, name: &str, site: &Site| {
+            if function.is_none() {
+                let object = &site.name;
+                let message = format!(
+                    "{file}: has no function `{name}`, to which `world.objects.{object}.controller` \
+                     leaves what `{object}` does"
+                );
+                problems.add(PATH, message);
+            }
+        };
+        let robots = world.groups.iter();
+        let scripted = |group: &&RobotGroup| group.controller == RobotController::ScriptController;
+        robots.filter(scripted).for_each(|group| needs(self.control, "control", &group.site));
+        let things = world.lights.iter().chain(&world.areas).filter(|things| things.by_script);
+        things.for_each(|things| needs(self.move_, "move", &things.site));
     }
 
     /// Whether the script computes fitness.
@@ -98,18 +140,140 @@ pub(crate) struct ScriptRun<'a> {
     task: &'a ScriptTask,
     script: Script,
     kept: Kept,
+    /// Robots that it decides for, by their numbers.
+    actors: Vec<Actor>,
+    /// Lights, then ground areas that it moves.
+    movers: Vec<Mover>,
+}
+
+/// A robot whose actions the script decides.
+#[derive(Debug)]
+struct Actor {
+    robot: usize,
+    plan: Plan,
+    stream: Stream,
+}
+
+/// A light or ground area that the script moves.
+#[derive(Debug)]
+struct Mover {
+    thing: Object,
+    stream: Stream,
+    /// Where it goes.
+    target: Option<Vec2>,
 }
 
 impl<'a> ScriptRun<'a> {
-    /// At the start of a trial; `stream` is what the script draws from.
+    /// At the start of a trial; `stream` gives what the script draws from.
     pub fn start(
         task: &'a ScriptTask,
-        stream: Stream,
-        n_robots: usize,
+        world: &World,
+        stream: impl Fn(Purpose, usize) -> Stream,
     ) -> Result<Self, ScriptError> {
-        let limits = Limits { work: WORK, memory: MEMORY + MEMORY_PER_ROBOT * n_robots };
-        let script = task.program.start(limits, &mut view::Nothing)?;
-        Ok(Self { task, script, kept: Kept::new(stream) })
+        let memory = MEMORY + MEMORY_PER_ROBOT * world.n_robots();
+        let script = task.program.start(Limits { work: WORK, memory }, &mut view::Nothing)?;
+        let actor = |robot| Actor {
+            robot,
+            plan: Plan::new(world.message_len),
+            stream: stream(Purpose::Control, robot),
+        };
+        let movers = |objects: &[StaticObjects], kind: Kind, purpose: Purpose| {
+            let objects = objects.iter().filter(|objects| objects.by_script);
+            let members = objects.flat_map(|objects| objects.members.clone());
+            let mover = |number| Mover {
+                thing: Object { kind: kind as u8, index: number as u32 },
+                stream: stream(purpose, number),
+                target: None,
+            };
+            members.map(mover).collect::<Vec<_>>()
+        };
+        let mut moved = movers(&world.lights, Kind::Light, Purpose::LightMovement);
+        moved.extend(movers(&world.areas, Kind::Area, Purpose::AreaMovement));
+        let actors = world.scripted_robots().map(actor).collect();
+        Ok(Self {
+            kept: Kept::new(stream(Purpose::Script, 0)),
+            task,
+            script,
+            actors,
+            movers: moved,
+        })
+    }
+
+    /// What the script has a robot do in this step; none if it does not decide for it.
+    pub fn plan(&self, robot: usize) -> Option<&Plan> {
+        let found = self.actors.binary_search_by_key(&robot, |actor| actor.robot);
+        found.ok().map(|place| &self.actors[place].plan)
+    }
+
+    /// Decides what robots do in this step, all from what they did in the last one. The calls
+    /// share the work of one.
+    pub fn control(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
+        let Self { task, script, kept, actors, .. } = self;
+        let Some(function) = task.control else { return Ok(()) };
+        script.refill();
+        for Actor { robot, plan, stream } in actors {
+            plan.reset();
+            let mut view = view.again(May::Act { robot: *robot, plan, stream });
+            view.kept = Some(kept);
+            let argument = [view::thing(Kind::Robot, *robot)];
+            let called = script.call_again(&task.program, function, &argument, &mut view);
+            let returned = called.and_then(|value| match value {
+                Value::Nothing => Ok(()),
+                value => Err(task.program.problem(
+                    function,
+                    format!(
+                        "returns a {}; a robot acts by what is assigned, such as `robot.left = 0.5`",
+                        value.kind()
+                    ),
+                )),
+            });
+            returned.map_err(|error| about(error, &format!("robot {robot}")))?;
+        }
+        Ok(())
+    }
+
+    /// Moves lights and ground areas, each from where all of them were. The calls share the
+    /// work of one.
+    pub fn move_things(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
+        let Self { task, script, kept, movers, .. } = self;
+        let Some(function) = task.move_ else { return Ok(()) };
+        script.refill();
+        for Mover { thing, stream, target } in movers.iter_mut() {
+            let mut view = view.again(May::Move { thing: *thing, stream });
+            view.kept = Some(kept);
+            let argument = [Value::Object(*thing)];
+            let called = script.call_again(&task.program, function, &argument, &mut view);
+            let moved = called.and_then(|value| match value {
+                Value::Nothing => Ok(None),
+                value => view.point(&value).map(Some).map_err(|message| {
+                    let message = format!("returns no place and not None: {message}");
+                    task.program.problem(function, message)
+                }),
+            });
+            let what = if Kind::of(*thing) == Kind::Light { "light" } else { "area" };
+            *target = moved.map_err(|error| about(error, &format!("{what} {}", thing.index)))?;
+        }
+        for Mover { thing, target, .. } in movers {
+            let things = match Kind::of(*thing) {
+                Kind::Light => &mut *view.lights,
+                _ => &mut *view.areas,
+            };
+            things[thing.index as usize] = target.take().unwrap_or(things[thing.index as usize]);
+        }
+        Ok(())
+    }
+
+    /// What happens to robots, lights and areas after they acted.
+    pub fn react(&mut self, mut view: View<'_>) -> Result<(), ScriptError> {
+        let Some(function) = self.task.react else { return Ok(()) };
+        let view = view.again(May::React);
+        match self.call(function, |_, _| Ok(view::WORLD), view)? {
+            Value::Nothing => Ok(()),
+            value => {
+                let message = format!("returns a {}; it changes things instead", value.kind());
+                Err(self.task.program.problem(function, message))
+            }
+        }
     }
 
     fn call<'s>(
@@ -177,6 +341,12 @@ impl<'a> ScriptRun<'a> {
             None => Err(problem(format!("returns a {}, not a number", value.kind()))),
         }
     }
+}
+
+/// An error, with what the script was called for.
+fn about(mut error: ScriptError, what: &str) -> ScriptError {
+    error.message = format!("{}, for {what}", error.message);
+    error
 }
 
 #[cfg(test)]

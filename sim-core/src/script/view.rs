@@ -4,15 +4,18 @@
 use std::f64::consts::PI;
 use std::rc::Rc;
 
+use experiment_file::suggestion;
 use numeric::random::Stream;
 use task_script::{Host, Meter, Name, Object, Value};
 
+use super::change::May;
 use super::names::Named;
 use crate::border;
 use crate::communication::Mode;
-use crate::objects::StaticObjects;
+use crate::objects::{StaticObjects, Switches};
 use crate::swarm::Swarm;
 use crate::torus::{Vec2, wrap_angle};
+use crate::trial::Group;
 use crate::world::World;
 
 /// The only thing of its kind.
@@ -21,7 +24,7 @@ pub(super) const WORLD: Value = Value::Object(Object { kind: Kind::World as u8, 
 /// Kinds of things.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-enum Kind {
+pub(super) enum Kind {
     World,
     Robot,
     Light,
@@ -29,7 +32,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(object: Object) -> Self {
+    pub fn of(object: Object) -> Self {
         match object.kind {
             1 => Self::Robot,
             2 => Self::Light,
@@ -38,7 +41,7 @@ impl Kind {
         }
     }
 
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::World => "the world",
             Self::Robot => "a robot",
@@ -48,16 +51,9 @@ impl Kind {
     }
 }
 
-/// What a call may change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum May {
-    /// Nothing but `state`.
-    Look,
-}
-
 /// What a script keeps from step to step.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(crate) struct Kept {
     stream: Stream,
     /// Lists of things that are always the same.
     lists: Vec<(Named, Value)>,
@@ -77,27 +73,35 @@ pub(crate) struct View<'a> {
     pub swarm: &'a mut Swarm,
     pub lights: &'a mut [Vec2],
     pub areas: &'a mut [Vec2],
+    pub switches: &'a mut Switches,
+    /// What robots sense, group by group.
+    pub groups: &'a [Group],
     /// Environment step, from 0.
     pub step: u32,
     /// Steps of the episode.
     pub n_steps: u32,
-    pub may: May,
+    pub may: May<'a>,
     /// Set by the caller of the script.
-    pub(super) kept: Option<&'a mut Kept>,
+    pub kept: Option<&'a mut Kept>,
 }
 
 type Answer = Result<Value, String>;
 
 impl<'a> View<'a> {
-    /// A view that changes nothing.
-    pub fn new(
-        world: &'a World,
-        swarm: &'a mut Swarm,
-        lights: &'a mut [Vec2],
-        areas: &'a mut [Vec2],
-        [step, n_steps]: [u32; 2],
-    ) -> Self {
-        Self { world, swarm, lights, areas, step, n_steps, may: May::Look, kept: None }
+    /// The same step for another call, which may change what `may` says.
+    pub fn again<'b>(&'b mut self, may: May<'b>) -> View<'b> {
+        View {
+            world: self.world,
+            swarm: self.swarm,
+            lights: self.lights,
+            areas: self.areas,
+            switches: self.switches,
+            groups: self.groups,
+            step: self.step,
+            n_steps: self.n_steps,
+            may,
+            kept: None,
+        }
     }
 
     fn kept(&mut self) -> Result<&mut Kept, String> {
@@ -153,7 +157,7 @@ impl<'a> View<'a> {
     }
 
     /// A thing's position, or the point `(x, y)`, in the torus.
-    fn point(&self, value: &Value) -> Result<Vec2, String> {
+    pub(super) fn point(&self, value: &Value) -> Result<Vec2, String> {
         match value {
             Value::Object(object) => self.position(*object),
             Value::List(list) if list.len() == 2 => {
@@ -220,14 +224,54 @@ impl<'a> View<'a> {
                 None => Value::Nothing,
             },
             Named::SeesLight => Value::Bool(swarm.photosensitive[robot]),
+            Named::Failed => Value::Bool(swarm.failed[robot]),
+            Named::Carries => Value::Bool(swarm.carries[robot]),
             Named::Group => {
-                let groups = &self.world.groups;
-                let group = groups.iter().find(|group| group.robots.contains(&robot));
-                let name = group.map_or("", |group| group.site.name.as_str());
-                Value::text(name, meter)?
+                let group = &self.world.groups[self.world.group_of(robot)];
+                Value::text(&group.site.name, meter)?
             }
             _ => return Err(no_such(Kind::Robot, name)),
         })
+    }
+
+    /// A reading of a robot's sensors at the start of the step, zeros where it is inhibited.
+    fn sense(&self, robot: usize, reading: &Value, meter: &Rc<Meter>) -> Answer {
+        let Some(name) = reading.as_text() else {
+            return Err(format!(
+                "`sense` takes the name of a reading, such as \"light_sensor\", not a {}",
+                reading.kind()
+            ));
+        };
+        let number = self.world.group_of(robot);
+        let (group, Group { senses, perturbations, .. }) =
+            (&self.world.groups[number], &self.groups[number]);
+        let Some(&reading) = group.readings.iter().find(|(query, _)| query.name() == name) else {
+            let known: Vec<&str> = group.readings.iter().map(|(query, _)| query.name()).collect();
+            let (name, group) = (shortened(name), &group.site.name);
+            let suggestion = suggestion(&name, &known);
+            return Err(format!("robots of `{group}` have no reading `{name}`; {suggestion}"));
+        };
+        let index = robot - group.robots.start;
+        let values = if perturbations.inhibits(index, reading.0) {
+            vec![0.0; reading.1]
+        } else {
+            senses.reading(reading, &group.robots, index, self.swarm)
+        };
+        meter.work(values.len() / 4)?;
+        Value::list(values.into_iter().map(Value::Float).collect(), meter)
+    }
+
+    /// The stream of the thing that the script decides for.
+    fn own_stream(&mut self, object: Object) -> Result<&mut Stream, String> {
+        match &mut self.may {
+            May::Act { robot, stream, .. }
+                if Kind::of(object) == Kind::Robot && *robot == object.index as usize =>
+            {
+                Ok(stream)
+            }
+            May::Move { thing, stream } if *thing == object => Ok(stream),
+            _ => Err("draws for itself in `control` or `move` only; elsewhere `world` does".into()),
+        }
     }
 
     /// Robots within reach of a thing or point, but not the thing itself.
@@ -272,7 +316,9 @@ impl<'a> View<'a> {
                 let evaluated = self.world.evaluated();
                 meter.work(evaluated.len() * evaluated.len() / 16)?;
                 let positions = &self.swarm.positions[evaluated.clone()];
-                let border = border::of_swarm(&torus, positions, self.world.communication_range());
+                let World { alpha, .. } = self.world;
+                let range = self.world.communication_range();
+                let border = border::of_swarm(&torus, positions, range, *alpha);
                 let robots = evaluated.zip(border).filter(|(_, is)| *is);
                 let robots = robots.map(|(robot, _)| thing(Kind::Robot, robot));
                 Value::list(robots.collect(), meter)?
@@ -297,6 +343,11 @@ impl<'a> View<'a> {
                 let arguments = [itself, other.clone()];
                 self.call_world(name, &arguments, meter)
             }
+            (Named::Random, []) => Ok(Value::Float(self.own_stream(object)?.uniform())),
+            (Named::Normal, []) => Ok(Value::Float(self.own_stream(object)?.normal())),
+            (Named::Sense, [reading]) if kind == Kind::Robot => {
+                self.sense(object.index as usize, reading, meter)
+            }
             (Named::Neighbours, [range]) => self.neighbours(&itself, number(range)?, meter),
             (Named::Bearing, [other]) if kind == Kind::Robot => {
                 let way = self.world.torus.displacement(self.position(object)?, self.point(other)?);
@@ -314,6 +365,11 @@ impl Host for View<'_> {
         match (Named::numbered(name), kind) {
             (Named::State, _) => self.state(object, meter),
             (name, Kind::World) => self.of_world(name, meter),
+            (Named::World, _) => Ok(WORLD),
+            (Named::On, Kind::Light) => {
+                Ok(Value::Bool(self.switches.lights[object.index as usize]))
+            }
+            (Named::On, Kind::Area) => Ok(Value::Bool(self.switches.areas[object.index as usize])),
             (Named::X, _) => Ok(Value::Float(self.position(object)?.x)),
             (Named::Y, _) => Ok(Value::Float(self.position(object)?.y)),
             (name, Kind::Robot) => self.of_robot(object.index as usize, name, meter),
@@ -325,15 +381,8 @@ impl Host for View<'_> {
         }
     }
 
-    fn set(&mut self, object: Object, name: Name, _: Value) -> Result<(), String> {
-        let name = Named::numbered(name).name();
-        let kind = Kind::of(object).name();
-        match self.may {
-            May::Look => Err(format!(
-                "`{name}` of {kind} cannot be changed here; what is to be remembered goes into \
-                 `state`, a dict"
-            )),
-        }
+    fn set(&mut self, object: Object, name: Name, value: Value) -> Result<(), String> {
+        self.change(object, Named::numbered(name), &value)
     }
 
     fn call(
@@ -370,7 +419,7 @@ impl Host for Nothing {
 
 const OUTSIDE: &str = "there is no world outside functions";
 
-fn thing(kind: Kind, number: usize) -> Value {
+pub(super) fn thing(kind: Kind, number: usize) -> Value {
     Value::Object(Object { kind: kind as u8, index: number as u32 })
 }
 
@@ -378,7 +427,7 @@ fn pair(point: Vec2, meter: &Rc<Meter>) -> Answer {
     Value::tuple(vec![Value::Float(point.x), Value::Float(point.y)], meter)
 }
 
-fn number(value: &Value) -> Result<f64, String> {
+pub(super) fn number(value: &Value) -> Result<f64, String> {
     value.number().ok_or_else(|| format!("expected a number, not a {}", value.kind()))
 }
 
@@ -388,4 +437,9 @@ fn no_such(kind: Kind, name: Named) -> String {
 
 fn wrong_call(kind: Kind, name: Named, arguments: &[Value]) -> String {
     format!("{} has no `{}` of {} arguments", kind.name(), name.name(), arguments.len())
+}
+
+/// A name of the script's, fit for a message.
+fn shortened(name: &str) -> String {
+    name.chars().take(40).map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -58,6 +58,8 @@ mod tests {
 
     use super::*;
     use crate::neighbours::Neighbours;
+    use crate::objects::Switches;
+    use crate::swarm::Swarm;
     use crate::torus::{Torus, Vec2};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
@@ -78,7 +80,15 @@ mod tests {
         let mut readings = vec![7.0; 4];
         let from = Viewpoint { robot: 1, position: own, heading: 0.0 };
         let neighbours = &neighbours;
-        let surroundings = Surroundings { torus: &TORUS, neighbours, lights: &[], areas: &[] };
+        let switches = &Switches { lights: Vec::new(), areas: Vec::new() };
+        let surroundings = Surroundings {
+            torus: &TORUS,
+            swarm: &Swarm::new(Vec::new(), Vec::new(), 0),
+            neighbours,
+            lights: &[],
+            areas: &[],
+            switches,
+        };
         sensor.sense(from, &surroundings, &mut readings);
         readings
     }

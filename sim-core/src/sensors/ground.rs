@@ -2,7 +2,6 @@
 
 use super::{Noise, Sensor, Surroundings, Viewpoint};
 use crate::objects::StaticObjects;
-use experiment_file::GroundSensorConfig;
 
 /// A ground sensor and the areas that it can see. Its reading is 1 on an area,
 /// else 0.
@@ -13,9 +12,9 @@ pub(crate) struct GroundSensor {
 }
 
 impl GroundSensor {
-    /// As configured, for those of `areas` that have its colour.
-    pub fn new(config: &GroundSensorConfig, areas: &[StaticObjects]) -> Self {
-        Self { areas: StaticObjects::of_color(areas, &config.color).collect() }
+    /// For those of `areas` that have its colour.
+    pub fn new(color: &str, areas: &[StaticObjects]) -> Self {
+        Self { areas: StaticObjects::of_color(areas, color).collect() }
     }
 }
 
@@ -29,9 +28,10 @@ impl Sensor for GroundSensor {
     }
 
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
-        let Surroundings { torus, areas, .. } = surroundings;
-        let stands_on =
-            |&(area, radius): &(usize, f64)| torus.distance(from.position, areas[area]) <= radius;
+        let Surroundings { torus, areas, switches, .. } = surroundings;
+        let stands_on = |&(area, radius): &(usize, f64)| {
+            switches.areas[area] && torus.distance(from.position, areas[area]) <= radius
+        };
         reading[0] = f64::from(self.areas.iter().any(stands_on));
     }
 }
@@ -40,6 +40,8 @@ impl Sensor for GroundSensor {
 mod tests {
     use super::*;
     use crate::neighbours::Neighbours;
+    use crate::objects::Switches;
+    use crate::swarm::Swarm;
     use crate::torus::{Torus, Vec2};
 
     #[test]
@@ -48,16 +50,27 @@ mod tests {
         let areas = [Vec2::new(0.0, 0.0), Vec2::new(500.0, 500.0)];
         let sensor = GroundSensor { areas: vec![(0, 100.0)] };
         let neighbours = &Neighbours::new(0.0, 1);
-        let surroundings = Surroundings { torus: &torus, neighbours, lights: &[], areas: &areas };
-        let sense = |x, y| {
+        let sense_with = |switches: &Switches, x, y| {
+            let surroundings = Surroundings {
+                torus: &torus,
+                swarm: &Swarm::new(Vec::new(), Vec::new(), 0),
+                neighbours,
+                lights: &[],
+                areas: &areas,
+                switches,
+            };
             let from = Viewpoint { robot: 0, position: Vec2::new(x, y), heading: 0.0 };
             let mut reading = [7.0];
             sensor.sense(from, &surroundings, &mut reading);
             reading[0]
         };
+        let on = Switches { lights: Vec::new(), areas: vec![true; 2] };
+        let sense = |x, y| sense_with(&on, x, y);
         assert_eq!(sense(60.0, 920.0), 1.0);
         assert_eq!(sense(0.0, 100.0), 1.0);
         assert_eq!(sense(0.0, 101.0), 0.0);
         assert_eq!(sense(500.0, 500.0), 0.0);
+        let off = Switches { areas: vec![false, true], ..on.clone() };
+        assert_eq!(sense_with(&off, 60.0, 920.0), 0.0);
     }
 }

@@ -43,7 +43,8 @@ impl Sensor for LightSensor {
 
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         reading.fill(0.0);
-        for &(light, reach) in &self.lights {
+        let is_on = |&&(light, _): &&(usize, f64)| surroundings.switches.lights[light];
+        for &(light, reach) in self.lights.iter().filter(is_on) {
             let away = surroundings.torus.displacement(from.position, surroundings.lights[light]);
             let rho = away.norm();
             if rho <= reach {
@@ -62,6 +63,8 @@ mod tests {
 
     use super::*;
     use crate::neighbours::Neighbours;
+    use crate::objects::Switches;
+    use crate::swarm::Swarm;
     use crate::torus::{Torus, Vec2};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
@@ -80,7 +83,15 @@ mod tests {
         };
         let from = Viewpoint { robot: 0, position: Vec2::new(5.0, 5.0), heading };
         let neighbours = &Neighbours::new(0.0, 1);
-        let surroundings = Surroundings { torus: &TORUS, neighbours, lights, areas: &[] };
+        let switches = &Switches { lights: vec![true; lights.len()], areas: Vec::new() };
+        let surroundings = Surroundings {
+            torus: &TORUS,
+            swarm: &Swarm::new(Vec::new(), Vec::new(), 0),
+            neighbours,
+            lights,
+            areas: &[],
+            switches,
+        };
         let mut readings = vec![7.0; 4];
         sensor.sense(from, &surroundings, &mut readings);
         readings

@@ -7,6 +7,8 @@
 mod distance;
 mod ground;
 mod light;
+mod neighborhood;
+mod own;
 
 use std::fmt::Debug;
 use std::ops::{Range, RangeInclusive};
@@ -15,9 +17,11 @@ use std::sync::Arc;
 use distance::DistanceSensor;
 use ground::GroundSensor;
 use light::LightSensor;
+use neighborhood::NeighborhoodSensor;
+use own::{FoodSensor, OwnOrientationSensor, OwnPositionSensor};
 
 use crate::neighbours::Neighbours;
-use crate::objects::StaticObjects;
+use crate::objects::{StaticObjects, Switches};
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2, angular_difference, sector_angle};
 use experiment_file::{SensorQuery, SensorsConfig};
@@ -116,8 +120,18 @@ pub(crate) fn mount(
     areas: &[StaticObjects],
 ) -> Vec<MountedSensor> {
     // What frames a receiver takes is the radio's business.
-    let SensorsConfig { wireless_receiver: _, light_sensor, distance_sensor, ground_sensor } =
-        config;
+    let SensorsConfig {
+        wireless_receiver: _,
+        light_sensor,
+        distance_sensor,
+        ground_sensor,
+        food_area_sensor,
+        nest_sensor,
+        food_sensor,
+        own_position_sensor,
+        own_orientation_sensor,
+        neighborhood_pos_sensor,
+    } = config;
     let mut mounted = Vec::new();
     let mut mount = |query, sensor: Arc<dyn Sensor>| mounted.push(MountedSensor { query, sensor });
     if let Some(config) = light_sensor {
@@ -127,7 +141,25 @@ pub(crate) fn mount(
         mount(SensorQuery::Distance, Arc::new(DistanceSensor::new(config)));
     }
     if let Some(config) = ground_sensor {
-        mount(SensorQuery::Ground, Arc::new(GroundSensor::new(config, areas)));
+        mount(SensorQuery::Ground, Arc::new(GroundSensor::new(&config.color, areas)));
+    }
+    if food_area_sensor.is_some() {
+        mount(SensorQuery::FoodArea, Arc::new(GroundSensor::new("green", areas)));
+    }
+    if nest_sensor.is_some() {
+        mount(SensorQuery::Nest, Arc::new(GroundSensor::new("black", areas)));
+    }
+    if food_sensor.is_some() {
+        mount(SensorQuery::Food, Arc::new(FoodSensor));
+    }
+    if own_position_sensor.is_some() {
+        mount(SensorQuery::OwnPosition, Arc::new(OwnPositionSensor));
+    }
+    if own_orientation_sensor.is_some() {
+        mount(SensorQuery::OwnOrientation, Arc::new(OwnOrientationSensor));
+    }
+    if let Some(config) = neighborhood_pos_sensor {
+        mount(SensorQuery::NeighborhoodPos, Arc::new(NeighborhoodSensor::new(config)));
     }
     mounted
 }
@@ -137,12 +169,16 @@ pub(crate) fn mount(
 pub(crate) struct Surroundings<'a> {
     /// The plane.
     pub torus: &'a Torus,
+    /// The robots.
+    pub swarm: &'a Swarm,
     /// Who is near whom, within the largest [`Sensor::robots_within`] at least.
     pub neighbours: &'a Neighbours,
     /// Positions of all lights.
     pub lights: &'a [Vec2],
     /// Centres of all ground areas.
     pub areas: &'a [Vec2],
+    /// Which lights and areas are on.
+    pub switches: &'a Switches,
 }
 
 /// How what a robot perceives fades with distance and angle.

@@ -3,6 +3,7 @@
 mod borderline;
 mod genotypes;
 mod leaders;
+mod learning;
 mod movers;
 mod semantics;
 mod sensors;

@@ -67,7 +67,8 @@ fn keys_of_lights_and_of_what_sees_them_agree() {
     (sensor.decay_rho, sensor.noise_variance) = (0.005, 0.0);
     let orbit: Change = |config| {
         if let ObjectConfig::LightSource(light) = &mut config.world.objects["light_red"] {
-            let orbit = OrbitConfig { angle_step: 0.013, radius_step: Some(1.0) };
+            let orbit =
+                OrbitConfig { angle_step: 0.013, radius_step: Some(1.0), ..Default::default() };
             light.controller = LightController::LightOrbitController(orbit);
         }
     };

@@ -3,8 +3,9 @@
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PositionInitializers, RandomTargetsConfig,
-    SensorQuery, StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
+    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PlainSensorConfig, PositionInitializers,
+    RandomTargetsConfig, SensorQuery, StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig,
+    WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -50,6 +51,7 @@ fn all_sensors() -> ExperimentConfig {
     }
     let area = |color: &str, range, center| {
         ObjectConfig::GroundArea(GroundAreaConfig {
+            controller: None,
             num_instances: 2,
             initializers: PositionInitializers {
                 positions: Initializer::RandomCircumference { radius: 50.0, center },
@@ -77,7 +79,11 @@ fn light(
 }
 
 fn random_targets(every: u32, pace: Pace) -> LightController {
-    LightController::LightRndPosController(RandomTargetsConfig { every, pace })
+    LightController::LightRndPosController(RandomTargetsConfig {
+        every,
+        pace,
+        ..Default::default()
+    })
 }
 
 fn fitness(episodes: &[Episode]) -> Vec<f64> {
@@ -105,6 +111,22 @@ fn every_sensor_agrees_with_and_without_noise() {
 }
 
 #[test]
+fn food_areas_and_nests_are_sensed_as_ground_areas_of_their_colours() {
+    let mut config = all_sensors();
+    let ground = fitness(&assert_varied_agreement(&config));
+    let sensors = &mut swarm_mut(&mut config).sensors;
+    sensors.nest_sensor = Some(PlainSensorConfig {});
+    sensors.food_area_sensor = Some(PlainSensorConfig {});
+    for (sensor, color) in [(SensorQuery::Nest, "black"), (SensorQuery::FoodArea, "green")] {
+        config.topology.stimuli["I7"].sensor = sensor;
+        if let ObjectConfig::GroundArea(area) = &mut config.world.objects["black"] {
+            area.params.color = color.into();
+        }
+        assert_eq!(fitness(&assert_varied_agreement(&config)), ground, "{color}");
+    }
+}
+
+#[test]
 fn lights_on_every_path_agree() {
     let mut config = all_sensors();
     config.algorithm.evaluation_steps = 80;
@@ -126,6 +148,7 @@ fn lights_on_every_path_agree() {
 fn robots_near_a_light_on_every_path_agree() {
     for controller in [
         LightController::Static {},
+        LightController::LightPreyController {},
         LightController::LightOrbitController(OrbitConfig::default()),
         random_targets(30, Pace::Step(0.05)),
         random_targets(30, Pace::Speed(4.0)),

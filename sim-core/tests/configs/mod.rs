@@ -204,6 +204,8 @@ fn topology(stimuli: &[(&str, u32, SensorQuery)], motor: Motor) -> TopologyConfi
         motor_tau: None,
         synapse_model: SynapseModel::Static,
         synapse_params: None,
+        encoding: NamedMap::new(),
+        learning: None,
         stimuli: stimuli
             .iter()
             .map(|&(name, n, sensor)| (name.to_owned(), StimulusConfig { n, sensor }))
@@ -250,6 +252,7 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
         evaluation_steps,
         num_evaluations: 5,
         fitness_function,
+        fitness_params: FitnessParams::default(),
         target_fitness: None,
         champion_every: 10,
         champion_trials: 50,

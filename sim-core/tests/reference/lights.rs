@@ -7,9 +7,6 @@ use numeric::random::Stream;
 
 use super::torus::{Torus, Vector, norm};
 
-const ORBIT_RADIUS_CM: f64 = 200.0;
-const TARGET_SQUARE_CM: f64 = 200.0;
-
 /// A light and the state of what moves it.
 pub struct Light<'a> {
     config: &'a LightSourceConfig,
@@ -18,6 +15,8 @@ pub struct Light<'a> {
     angle: f64,
     sense: f64,
     target: Vector,
+    direction: Vector,
+    is_caught: bool,
     stream: Stream,
 }
 
@@ -36,6 +35,8 @@ impl<'a> Light<'a> {
             angle: torus.bearing(torus.centre(), position),
             sense: 1.0,
             target: position,
+            direction: [0.5_f64.sqrt(); 2],
+            is_caught: false,
             stream,
         }
     }
@@ -45,10 +46,30 @@ impl<'a> Light<'a> {
     }
 
     /// Movement at the end of step `k`.
-    pub fn advance(&mut self, k: u32, torus: Torus) {
+    pub fn advance(&mut self, k: u32, torus: Torus, robots: &[Vector]) {
         let centre = torus.centre();
         match self.config.controller {
             LightController::Static {} => {}
+            // The original's prey.
+            LightController::LightPreyController {} => {
+                let ways = robots.iter().map(|&robot| torus.displacement(self.position, robot));
+                let ways: Vec<Vector> = ways.filter(|&way| norm(way) < 150.0).collect();
+                let weights: Vec<f64> = ways.iter().map(|&way| 150.0 - norm(way)).collect();
+                let towards = [0, 1].map(|axis| {
+                    weights.iter().zip(&ways).map(|(weight, way)| weight * way[axis]).sum::<f64>()
+                });
+                if norm(towards) > 0.0 {
+                    self.direction = towards.map(|component| -component / norm(towards));
+                }
+                if !self.is_caught {
+                    self.position = torus.wrap([
+                        self.position[0] + 3.0 * self.direction[0],
+                        self.position[1] + 3.0 * self.direction[1],
+                    ]);
+                }
+                self.is_caught |= ways.iter().any(|&way| norm(way) < 30.0);
+            }
+            LightController::ScriptController {} => panic!("no equation is given"),
             // Eq. 5.7-5.8
             LightController::LightOrbitController(orbit) => {
                 if self.stream.uniform() < 0.01 {
@@ -56,8 +77,8 @@ impl<'a> Light<'a> {
                 }
                 self.angle += self.sense * orbit.angle_step;
                 match orbit.radius_step {
-                    None => self.radius += (ORBIT_RADIUS_CM - self.radius) / 50.0,
-                    Some(step) => self.radius = (self.radius + step).min(ORBIT_RADIUS_CM),
+                    None => self.radius += (orbit.radius - self.radius) / 50.0,
+                    Some(step) => self.radius = (self.radius + step).min(orbit.radius),
                 }
                 self.position = torus.wrap([
                     centre[0] + self.radius * self.angle.cos(),
@@ -67,10 +88,8 @@ impl<'a> Light<'a> {
             // Section 6.4
             LightController::LightRndPosController(config) => {
                 if k.is_multiple_of(config.every) {
-                    let x = centre[0] - TARGET_SQUARE_CM / 2.0
-                        + TARGET_SQUARE_CM * self.stream.uniform();
-                    let y = centre[1] - TARGET_SQUARE_CM / 2.0
-                        + TARGET_SQUARE_CM * self.stream.uniform();
+                    let x = centre[0] - config.square / 2.0 + config.square * self.stream.uniform();
+                    let y = centre[1] - config.square / 2.0 + config.square * self.stream.uniform();
                     self.target = torus.wrap([x, y]);
                 }
                 let way = torus.displacement(self.position, self.target);
@@ -106,9 +125,9 @@ fn an_orbiting_light_spirals_outwards_from_the_centre() {
     let stream = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
     let mut light = Light::new(&config, torus.centre(), torus, stream);
     for k in 0..300 {
-        light.advance(k, torus);
+        light.advance(k, torus, &[]);
     }
-    let radius = ORBIT_RADIUS_CM * (1.0 - 0.98f64.powi(300));
+    let radius = OrbitConfig::default().radius * (1.0 - 0.98f64.powi(300));
     assert!((torus.distance(torus.centre(), light.position) - radius).abs() < 1e-9);
     assert!(light.angle.abs() < 300.0 * 0.01 + 1e-9 && light.angle.abs() < PI);
 }

@@ -12,8 +12,11 @@
 mod actuators;
 mod alpha_shape;
 mod communication;
+mod controller;
+mod encoding;
 mod fitness;
 mod initializers;
+mod learning;
 mod lights;
 mod network;
 mod perturbations;

@@ -4,12 +4,12 @@
 use std::ops::Range;
 
 use experiment_file::{
-    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, InitialRates, Neurotransmitter,
-    SynapseSelector, TopologyConfig,
+    Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, GroupSelector, InitialRates,
+    Neurotransmitter, StimulusSelector, SynapseSelector, TopologyConfig,
 };
 use numeric::random::{Purpose, Stream};
 
-use super::spiking;
+use super::{encoding, spiking};
 
 /// What a gene encodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,8 +20,12 @@ pub enum Gene {
     Neuron(&'static str, usize),
     /// Of an output: weight of its decoding.
     Decoder(usize, usize),
-    /// Delay of the neuron of this number.
+    /// Delay of the neuron of this number; after the neurons come the sources of stimuli.
     Delay(usize),
+    /// Of an encoder: weight of its receptive field.
+    Encoder(usize, usize),
+    /// Of a group of synapses: A, B, C or D.
+    Coefficient(usize, usize),
 }
 
 /// A gene with its bounds.
@@ -47,11 +51,11 @@ struct Synapse {
     post: usize,
 }
 
-/// Numbers of the inputs of a stimulus, if there is one of this name.
+/// Numbers of what synapses can start from in a stimulus, if there is one of this name.
 fn inputs_of(topology: &TopologyConfig, name: &str) -> Option<Range<usize>> {
     let mut start = 0;
-    for (stimulus, config) in &topology.stimuli {
-        let end = start + config.n as usize;
+    for stimulus in topology.stimuli.keys() {
+        let end = start + topology.n_sources(stimulus) as usize;
         if stimulus == name {
             return Some(start..end);
         }
@@ -139,8 +143,31 @@ fn bounded_genes(config: &ExperimentConfig, synapses: &[Synapse]) -> Vec<Bounded
                     neurons.map(|neuron| Gene::Neuron(parameter, neuron)).collect()
                 }
                 GenotypeQuery::Delays(selector) => {
-                    ensembles(topology, selector).map(Gene::Delay).collect()
+                    axons(topology, selector).into_iter().map(Gene::Delay).collect()
                 }
+                GenotypeQuery::Learning(selector) => {
+                    let learning = topology.learning.as_ref().expect("something learns");
+                    let groups = topology.synapses.keys().enumerate();
+                    let selected = groups.filter(|(_, name)| {
+                        learning.synapses.contains(name)
+                            && match selector {
+                                GroupSelector::All => true,
+                                GroupSelector::Named(selected) => selected == *name,
+                            }
+                    });
+                    selected
+                        .flat_map(|(group, _)| (0..4).map(move |i| Gene::Coefficient(group, i)))
+                        .collect()
+                }
+                GenotypeQuery::Encoders(selector) => encoding::n_weights(topology)
+                    .into_iter()
+                    .enumerate()
+                    .filter(|(_, (name, _))| match selector {
+                        StimulusSelector::All => true,
+                        StimulusSelector::Named(selected) => selected == name,
+                    })
+                    .flat_map(|(encoder, (_, n))| (0..n).map(move |w| Gene::Encoder(encoder, w)))
+                    .collect(),
                 GenotypeQuery::Decoders(selector) => spiking::decoders(topology, selector)
                     .into_iter()
                     .flat_map(|(output, n)| (0..n).map(move |w| Gene::Decoder(output, w)))
@@ -161,6 +188,24 @@ fn ensembles(topology: &TopologyConfig, selector: &EnsembleSelector) -> Range<us
     }
 }
 
+/// What has a delay: neurons, then sources of encoded stimuli.
+fn axons(topology: &TopologyConfig, selector: &EnsembleSelector) -> Vec<usize> {
+    let n = n_neurons(topology);
+    let of_stimulus = |name: &str| {
+        let inputs = inputs_of(topology, name).expect("the stimulus has inputs");
+        (n + inputs.start..n + inputs.end).collect::<Vec<_>>()
+    };
+    match selector {
+        EnsembleSelector::All => {
+            let encoded =
+                topology.stimuli.keys().filter(|name| topology.encoding.contains_key(*name));
+            (0..n).chain(encoded.flat_map(|name| of_stimulus(name))).collect()
+        }
+        EnsembleSelector::Named(name) if topology.encoding.contains_key(name) => of_stimulus(name),
+        EnsembleSelector::Named(_) => ensembles(topology, selector).collect(),
+    }
+}
+
 /// What each gene of the experiment's genotypes encodes.
 pub fn genes(config: &ExperimentConfig) -> Vec<Gene> {
     bounded_genes(config, &synapses(&config.topology)).iter().map(|bounded| bounded.gene).collect()
@@ -170,22 +215,59 @@ fn n_neurons(topology: &TopologyConfig) -> usize {
     topology.ensembles.values().map(|ensemble| ensemble.n as usize).sum()
 }
 
-fn n_inputs(topology: &TopologyConfig) -> usize {
-    topology.stimuli.values().map(|stimulus| stimulus.n as usize).sum()
+/// What synapses can start from in all stimuli.
+pub fn n_inputs(topology: &TopologyConfig) -> usize {
+    topology.stimuli.keys().map(|stimulus| topology.n_sources(stimulus) as usize).sum()
+}
+
+/// Weights, row = postsynaptic neuron.
+#[derive(Clone)]
+pub struct Matrices {
+    /// N x N
+    pub w_neurons: Vec<Vec<f64>>,
+    /// N x I
+    pub w_inputs: Vec<Vec<f64>>,
+    /// N x (N + I), of the synapses whose transmitter opens AMPA, GABA and NMDA receptors.
+    pub w_receptors: [Vec<Vec<f64>>; 3],
+}
+
+/// Where a synapse is.
+pub struct Ends {
+    pub group: String,
+    pub group_idx: usize,
+    /// A neuron, or N + a source of stimuli.
+    pub pre: usize,
+    pub post: usize,
+}
+
+/// Where each synapse is.
+pub fn ends(topology: &TopologyConfig) -> Vec<Ends> {
+    let of_synapse = |synapse: Synapse| Ends {
+        group: synapse.group,
+        group_idx: synapse.group_idx,
+        pre: match synapse.pre {
+            Pre::Input(input) => n_neurons(topology) + input,
+            Pre::Neuron(neuron) => neuron,
+        },
+        post: synapse.post,
+    };
+    synapses(topology).into_iter().map(of_synapse).collect()
 }
 
 /// What a genotype encodes.
 pub struct Decoded {
-    /// N x N, row = postsynaptic neuron.
-    pub w_neurons: Vec<Vec<f64>>,
-    /// N x I, row = postsynaptic neuron.
-    pub w_inputs: Vec<Vec<f64>>,
+    /// By number of the synapse.
+    pub weights: Vec<f64>,
+    /// The same.
+    pub matrices: Matrices,
+    /// By number of the group: A, B, C and D of plasticity.
+    pub coefficients: Vec<[f64; 4]>,
     /// Parameters of neurons: name, neuron, number within the bounds.
     pub neurons: Vec<(&'static str, usize, f64)>,
-    /// N x N, of the synapses whose transmitter opens AMPA, GABA and NMDA receptors.
-    pub w_receptors: [Vec<Vec<f64>>; 3],
-    /// Neuron and number within the bounds.
+    /// Neuron, or N + source, and number within the bounds.
     pub delays: Vec<(usize, f64)>,
+    /// Weights of receptive fields: encoder, number, value.
+    pub encoders: Vec<(usize, usize, f64)>,
     /// Weights of decodings: output, number, value.
     pub decoders: Vec<(usize, usize, f64)>,
 }
@@ -199,45 +281,67 @@ pub fn decode_genes(config: &ExperimentConfig, genotype: &[f64]) -> Decoded {
     assert_eq!(genotype.len(), genes.len(), "length of the genotype");
     let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
     let (mut neurons, mut decoders, mut delays) = (Vec::new(), Vec::new(), Vec::new());
+    let mut encoders = Vec::new();
+    let coefficients = topology.learning.as_ref().map_or([0.0; 4], |it| [it.a, it.b, it.c, it.d]);
+    let mut coefficients = vec![coefficients; topology.synapses.len()];
     for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
         let value = x * (max - min) + min;
         match *gene {
             Gene::Weight(synapse) => weights[synapse] = Some(value),
             Gene::Neuron(name, neuron) => neurons.push((name, neuron, value)),
             Gene::Delay(neuron) => delays.push((neuron, value)),
+            Gene::Coefficient(group, index) => coefficients[group][index] = value,
+            Gene::Encoder(encoder, weight) => encoders.push((encoder, weight, value)),
             Gene::Decoder(output, weight) => decoders.push((output, weight, value)),
         }
     }
-    let n = n_neurons(topology);
-    let mut w_neurons = vec![vec![0.0; n]; n];
-    let mut w_receptors = [(); 3].map(|()| vec![vec![0.0; n]; n]);
-    let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
     let mut fixed_weights: Vec<Stream> = (0..topology.synapses.len() as u64)
         .map(|group| Stream::new(topology.seed, 0, 0, Purpose::FixedWeights, group))
         .collect();
-    for (synapse, weight) in synapses.iter().zip(weights) {
-        let weight =
-            weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform());
-        match synapse.pre {
-            Pre::Input(input) => w_inputs[synapse.post][input] = weight,
+    let fill = |(synapse, weight): (&Synapse, Option<f64>)| {
+        weight.unwrap_or_else(|| -1.0 + 2.0 * fixed_weights[synapse.group_idx].uniform())
+    };
+    let weights: Vec<f64> = synapses.iter().zip(weights).map(fill).collect();
+    let matrices = matrices(topology, &weights);
+    Decoded { weights, matrices, coefficients, neurons, delays, encoders, decoders }
+}
+
+/// The weights of all synapses as matrices.
+pub fn matrices(topology: &TopologyConfig, weights: &[f64]) -> Matrices {
+    let n = n_neurons(topology);
+    let mut w_neurons = vec![vec![0.0; n]; n];
+    let mut w_receptors = [(); 3].map(|()| vec![vec![0.0; n + n_inputs(topology)]; n]);
+    let mut w_inputs = vec![vec![0.0; n_inputs(topology)]; n];
+    for (synapse, &weight) in synapses(topology).iter().zip(weights) {
+        let transmitter = topology.synapses[synapse.group_idx].transmitter;
+        let opened: &[usize] = match transmitter {
+            None => &[],
+            Some(Neurotransmitter::Ampa) => &[0],
+            Some(Neurotransmitter::Gaba) => &[1],
+            Some(Neurotransmitter::AmpaNmda) => &[0, 2],
+        };
+        let axon = match synapse.pre {
+            Pre::Input(input) => {
+                if opened.is_empty() || !topology.encoding.contains_key(&synapse.pre_name) {
+                    w_inputs[synapse.post][input] = weight;
+                    continue;
+                }
+                n + input
+            }
             Pre::Neuron(neuron) => {
                 w_neurons[synapse.post][neuron] = weight;
-                let opened: &[usize] = match topology.synapses[synapse.group_idx].transmitter {
-                    None => &[],
-                    Some(Neurotransmitter::Ampa) => &[0],
-                    Some(Neurotransmitter::Gaba) => &[1],
-                    Some(Neurotransmitter::AmpaNmda) => &[0, 2],
-                };
-                for &receptor in opened {
-                    w_receptors[receptor][synapse.post][neuron] = weight;
-                }
+                neuron
             }
+        };
+        for &receptor in opened {
+            w_receptors[receptor][synapse.post][axon] = weight;
         }
     }
-    Decoded { w_neurons, w_inputs, neurons, w_receptors, delays, decoders }
+    Matrices { w_neurons, w_inputs, w_receptors }
 }
 
 /// The phenotype: N neurons, I inputs.
+#[derive(Clone)]
 pub struct Network {
     dt: f64,
     time_scale: u32,
@@ -258,7 +362,8 @@ impl Network {
     /// no query covers keeps its default; such weights are drawn from U(-1, 1).
     pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
         let topology = &config.topology;
-        let Decoded { w_neurons, w_inputs, neurons, .. } = decode_genes(config, genotype);
+        let Decoded { matrices, neurons, .. } = decode_genes(config, genotype);
+        let Matrices { w_neurons, w_inputs, .. } = matrices;
 
         let mut tau = Vec::new();
         let mut gain = Vec::new();
@@ -305,6 +410,10 @@ impl Network {
 
     pub fn n_neurons(&self) -> usize {
         self.tau.len()
+    }
+
+    pub fn set_weights(&mut self, matrices: Matrices) {
+        (self.w_neurons, self.w_inputs) = (matrices.w_neurons, matrices.w_inputs);
     }
 
     /// u = F(g * (v + beta)), or F(g * v + beta)

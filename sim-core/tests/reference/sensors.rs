@@ -1,7 +1,7 @@
 //! The sensors of section 3.2.2. Each returns its readings without knowing who
 //! asks for them.
 
-use experiment_file::{DistanceSensorConfig, GroundSensorConfig, LightSensorConfig, SensorQuery};
+use experiment_file::{DistanceSensorConfig, LightSensorConfig, SensorQuery};
 use numeric::random::Stream;
 
 use super::communication::Reception;
@@ -17,6 +17,12 @@ pub struct Readings {
     pub light: Vec<f64>,
     pub distance: Vec<f64>,
     pub ground: f64,
+    pub food_area: f64,
+    pub nest: f64,
+    /// (x, y), cm.
+    pub position: Vector,
+    /// In turns.
+    pub orientation: f64,
 }
 
 impl Readings {
@@ -38,6 +44,13 @@ impl Readings {
             SensorQuery::Light => self.light.clone(),
             SensorQuery::Distance => self.distance.clone(),
             SensorQuery::Ground => vec![self.ground],
+            SensorQuery::FoodArea => vec![self.food_area],
+            SensorQuery::Nest => vec![self.nest],
+            SensorQuery::OwnPosition => self.position.to_vec(),
+            SensorQuery::OwnOrientation => vec![self.orientation],
+            // Nothing but a script has robots carry anything.
+            SensorQuery::Food => vec![0.0],
+            SensorQuery::NeighborhoodPos => panic!("no equation is given"),
         }
     }
 }
@@ -101,16 +114,10 @@ pub fn distance(
     readings
 }
 
-/// 1 on an area of the sensor's colour, else 0.
-pub fn ground(
-    config: &GroundSensorConfig,
-    position: Vector,
-    areas: &[Area<'_>],
-    torus: Torus,
-) -> f64 {
+/// 1 on an area of a colour, else 0.
+pub fn ground(color: &str, position: Vector, areas: &[Area<'_>], torus: Torus) -> f64 {
     let stands_on = |area: &Area<'_>| {
-        area.params.color == config.color
-            && torus.distance(position, area.position) <= area.params.range
+        area.params.color == color && torus.distance(position, area.position) <= area.params.range
     };
     if areas.iter().any(stands_on) { 1.0 } else { 0.0 }
 }

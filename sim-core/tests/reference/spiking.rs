@@ -8,27 +8,25 @@ use experiment_file::{
 use numeric::random::{Purpose, Stream};
 
 use super::actuators::Actions;
-use super::network::{Decoded, decode_genes, neurons_of};
+use super::encoding::{Encoder, EncoderState, encoders as encoders_of};
+use super::network::{Decoded, Matrices, decode_genes, neurons_of};
 
 /// The phenotype: N neurons, I inputs.
+#[derive(Clone)]
 pub struct SpikingNetwork {
     model: NeuronModel,
     dt: f64,
     time_scale: u32,
-    /// N x N, row = postsynaptic neuron.
-    w_neurons: Vec<Vec<f64>>,
-    /// N x I, row = postsynaptic neuron.
-    w_inputs: Vec<Vec<f64>>,
+    matrices: Matrices,
     /// Per neuron.
     params: Vec<NamedMap<f64>>,
     /// Per output.
     decoders: Vec<Vec<f64>>,
     /// Of dynamic synapses.
     receptors: Option<SynapseParams>,
-    /// N x N for AMPA, GABA and NMDA.
-    w_receptors: [Vec<Vec<f64>>; 3],
-    /// Per neuron, substeps.
+    /// Per neuron, and then per source of stimuli: substeps.
     delays: Vec<usize>,
+    encoders: Vec<Encoder>,
 }
 
 /// What a robot's network remembers, per neuron.
@@ -37,8 +35,14 @@ pub struct SpikingState {
     /// v and what else the model has.
     neurons: Vec<[f64; 3]>,
     spikes: Vec<bool>,
-    /// The spikes of all substeps so far, of dynamic synapses.
+    /// The spikes of all substeps so far of neurons and sources of stimuli, of dynamic
+    /// synapses.
     history: Vec<Vec<bool>>,
+    /// None of rate neurons.
+    encoders: Option<EncoderState>,
+    /// After a step, of neurons and sources of stimuli: the share of substeps with a spike, or
+    /// the mean value.
+    pub activities: Vec<f64>,
     /// s_ampa, s_gaba, x, s_nmda
     open: Vec<[f64; 4]>,
     /// x and a of the linear population decoding.
@@ -80,7 +84,7 @@ impl SpikingNetwork {
     /// Decodes a genotype.
     pub fn decode(config: &ExperimentConfig, genotype: &[f64]) -> Self {
         let topology = &config.topology;
-        let Decoded { w_neurons, w_inputs, neurons, w_receptors, delays, decoders: covered } =
+        let Decoded { matrices, neurons, delays, encoders, decoders: covered, .. } =
             decode_genes(config, genotype);
         let of_ensembles = topology.ensembles.values();
         let mut params: Vec<NamedMap<f64>> =
@@ -100,6 +104,13 @@ impl SpikingNetwork {
         }
         let mut stream = Stream::new(topology.seed, 0, 0, Purpose::Connections, 1 << 32);
         let mut all_delays: Vec<usize> = params.iter().map(|_| 1 + stream.below(9)).collect();
+        for name in topology.stimuli.keys() {
+            let is_encoded = topology.encoding.contains_key(name);
+            all_delays.extend(
+                (0..topology.n_sources(name))
+                    .map(|_| if is_encoded { 1 + stream.below(9) } else { 1 }),
+            );
+        }
         for (neuron, delay) in delays {
             all_delays[neuron] = delay.round() as usize;
         }
@@ -111,18 +122,21 @@ impl SpikingNetwork {
             model,
             dt,
             time_scale,
-            w_neurons,
-            w_inputs,
+            matrices,
             params,
             decoders,
             receptors,
-            w_receptors,
             delays,
+            encoders: encoders_of(topology, &encoders),
         }
     }
 
-    /// Before the first step.
-    pub fn rest(&self) -> SpikingState {
+    pub fn set_weights(&mut self, matrices: Matrices) {
+        self.matrices = matrices;
+    }
+
+    /// Before the first step; encoders draw from the stream.
+    pub fn rest(&self, stream: Stream) -> SpikingState {
         let start = |p: &NamedMap<f64>| match self.model {
             NeuronModel::Rate => panic!("rate neurons do not spike"),
             NeuronModel::Lif | NeuronModel::ExpLif => [p["v_rest"], 0.0, 0.0],
@@ -136,7 +150,13 @@ impl SpikingNetwork {
             neurons: self.params.iter().map(start).collect(),
             spikes: vec![false; self.params.len()],
             history: Vec::new(),
-            open: vec![[0.0; 4]; self.params.len()],
+            open: vec![[0.0; 4]; self.delays.len()],
+            activities: Vec::new(),
+            encoders: Some(EncoderState::new(
+                &self.encoders,
+                self.delays.len() - self.params.len(),
+                stream,
+            )),
             filters: vec![[0.0; 2]; self.params.len()],
         }
     }
@@ -150,19 +170,23 @@ impl SpikingNetwork {
         msg_length: usize,
     ) -> Actions {
         let n = self.params.len();
+        let mut sums = vec![0.0; self.delays.len()];
         let mut window = Window { counts: vec![0.0; n], first: vec![self.time_scale; n] };
         for substep in 0..self.time_scale {
             let s: Vec<f64> = state.spikes.iter().map(|&s| if s { 1.0 } else { 0.0 }).collect();
+            let encoders = state.encoders.as_mut().expect("spiking neurons have encoders");
+            let (inputs, encoded) = encoders.encode(&self.encoders, phi, substep, self.time_scale);
+            sums[n..].iter_mut().zip(&inputs).for_each(|(sum, input)| *sum += input);
             if let Some(params) = &self.receptors {
-                state.history.push(state.spikes.clone());
+                state.history.push([&state.spikes[..], &encoded].concat());
                 self.release(params, state);
             }
             for i in 0..n {
                 let from_neurons = match &self.receptors {
-                    None => dot(&self.w_neurons[i], &s),
+                    None => dot(&self.matrices.w_neurons[i], &s),
                     Some(params) => self.receive(params, state, i),
                 };
-                let current = from_neurons + dot(&self.w_inputs[i], phi);
+                let current = from_neurons + dot(&self.matrices.w_inputs[i], &inputs);
                 let (next, spiked) =
                     neuron(self.model, &self.params[i], state.neurons[i], current, self.dt);
                 state.neurons[i] = next;
@@ -176,6 +200,8 @@ impl SpikingNetwork {
                 }
             }
         }
+        sums[..n].copy_from_slice(&window.counts);
+        state.activities = sums.iter().map(|sum| sum / f64::from(self.time_scale)).collect();
         self.act(topology, state, &window, msg_length)
     }
 
@@ -198,7 +224,7 @@ impl SpikingNetwork {
         let v = state.neurons[i][0];
         let flow = |receptor: usize, variable: usize| {
             let s: Vec<f64> = state.open.iter().map(|open| open[variable]).collect();
-            dot(&self.w_receptors[receptor][i], &s)
+            dot(&self.matrices.w_receptors[receptor][i], &s)
         };
         ampa.gain * flow(0, 0) * ampa.reversal.map_or(1.0, |e| e - v)
             + gaba.gain * flow(1, 1) * gaba.reversal.map_or(-1.0, |e| e - v)

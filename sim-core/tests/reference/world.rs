@@ -8,13 +8,14 @@ use numeric::random::{Purpose, Stream};
 
 use super::actuators::{self, Actions};
 use super::communication::{Frame, Reception, quantise, receive};
+use super::controller::Controller;
 use super::fitness;
 use super::initializers::{headings, positions};
+use super::learning::Learner;
 use super::lights::Light;
-use super::network::Network;
 use super::perturbations::{SoleLeader, affected_robots, inhibits, rotation};
 use super::sensors::{self, Readings};
-use super::spiking::{SpikingNetwork, SpikingState};
+use super::spiking::SpikingState;
 use super::torus::{Torus, Vector};
 use super::witness::Witness;
 
@@ -24,6 +25,9 @@ pub struct Robot<'a> {
     object_idx: usize,
     pub position: Vector,
     pub heading: f64,
+    /// Its weights change if it learns.
+    network: Controller,
+    learner: Option<Learner<'a>>,
     /// State of the network, of rate neurons.
     pub v: Vec<f64>,
     /// State of the network, of spiking neurons.
@@ -77,33 +81,10 @@ pub struct Area<'a> {
     pub params: &'a GroundAreaParams,
 }
 
-/// The network that all robots have.
-enum Controller {
-    Rate(Network),
-    Spiking(SpikingNetwork),
-}
-
-impl Controller {
-    fn n_rate_neurons(&self) -> usize {
-        match self {
-            Self::Rate(network) => network.n_neurons(),
-            Self::Spiking(_) => 0,
-        }
-    }
-
-    fn rest(&self) -> SpikingState {
-        match self {
-            Self::Rate(_) => SpikingState::default(),
-            Self::Spiking(network) => network.rest(),
-        }
-    }
-}
-
 /// One trial of one genotype, step by step.
 pub struct Simulation<'a> {
     config: &'a ExperimentConfig,
     torus: Torus,
-    network: Controller,
     pub robots: Vec<Robot<'a>>,
     lights: Vec<Light<'a>>,
     areas: Vec<Area<'a>>,
@@ -123,14 +104,10 @@ impl<'a> Simulation<'a> {
         trial: u32,
     ) -> Self {
         let world = &config.world;
+        let network = Controller::decode(config, genotype);
         let mut simulation = Self {
             config,
             torus: Torus { width: world.width, height: world.height },
-            network: if config.topology.neuron_model.is_spiking() {
-                Controller::Spiking(SpikingNetwork::decode(config, genotype))
-            } else {
-                Controller::Rate(Network::decode(config, genotype))
-            },
             robots: Vec::new(),
             lights: Vec::new(),
             areas: Vec::new(),
@@ -146,7 +123,7 @@ impl<'a> Simulation<'a> {
             simulation.position_streams.push(stream(Purpose::Positions, object_idx));
             match object {
                 ObjectConfig::Robot(robots) => {
-                    simulation.place_robots(robots, object_idx, &stream);
+                    simulation.place_robots(robots, object_idx, &network, genotype, &stream);
                 }
                 ObjectConfig::LightSource(lights) => {
                     let initializer = &lights.initializers.positions;
@@ -159,7 +136,9 @@ impl<'a> Simulation<'a> {
                     }
                 }
                 ObjectConfig::GroundArea(areas) => {
-                    let GroundAreaConfig { num_instances, initializers, params } = areas;
+                    let GroundAreaConfig { num_instances, controller, initializers, params } =
+                        areas;
+                    assert_eq!(*controller, None, "no equation is given");
                     let drawn = simulation.draw_positions(
                         object_idx,
                         &initializers.positions,
@@ -178,6 +157,8 @@ impl<'a> Simulation<'a> {
         &mut self,
         config: &'a RobotConfig,
         object_idx: usize,
+        network: &Controller,
+        genotype: &[f64],
         stream: &dyn Fn(Purpose, usize) -> Stream,
     ) {
         assert_eq!(config.controller, RobotController::NeuralController, "no equation is given");
@@ -207,8 +188,10 @@ impl<'a> Simulation<'a> {
                 object_idx,
                 position: positions[i],
                 heading: headings[i],
-                v: vec![0.0; self.network.n_rate_neurons()],
-                spiking: self.network.rest(),
+                network: network.clone(),
+                learner: Learner::new(self.config, genotype),
+                v: vec![0.0; network.n_rate_neurons()],
+                spiking: network.rest(stream(Purpose::Encoding, number)),
                 send: true,
                 led: 0,
                 wheels: [0.0, 0.0],
@@ -259,8 +242,12 @@ impl<'a> Simulation<'a> {
         if fitness != 0.0 {
             self.witness.n_rewarded += 1;
         }
+        for learner in self.robots.iter_mut().filter_map(|robot| robot.learner.as_mut()) {
+            learner.reward(fitness);
+        }
+        let robots: Vec<_> = self.robots.iter().map(|robot| robot.position).collect();
         for light in &mut self.lights {
-            light.advance(self.k, self.torus);
+            light.advance(self.k, self.torus, &robots);
         }
         self.k += 1;
         fitness
@@ -304,17 +291,27 @@ impl<'a> Simulation<'a> {
         let distance = sensors.distance_sensor.as_ref().map_or(vec![], |config| {
             sensors::distance(config, i, &self.robots, self.torus, &mut noise)
         });
-        let ground = sensors
-            .ground_sensor
-            .as_ref()
-            .map_or(0.0, |config| sensors::ground(config, robot.position, &self.areas, self.torus));
+        let on = |color: &str| sensors::ground(color, robot.position, &self.areas, self.torus);
+        let ground = sensors.ground_sensor.as_ref().map_or(0.0, |config| on(&config.color));
+        let (food_area, nest) = (on("green"), on("black"));
+        let (position, orientation) = (robot.position, robot.heading / std::f64::consts::TAU);
         let state = if robot.send { 1.0 } else { 0.0 };
         self.robots[i].noise = noise;
         let n_not_zero = |values: &[f64]| values.iter().filter(|&&value| value != 0.0).count();
         self.witness.n_light += n_not_zero(&light);
         self.witness.n_distance += n_not_zero(&distance);
         self.witness.n_ground += n_not_zero(&[ground]);
-        Readings { reception, state, light, distance, ground }
+        Readings {
+            reception,
+            state,
+            light,
+            distance,
+            ground,
+            food_area,
+            nest,
+            position,
+            orientation,
+        }
     }
 
     /// Eq. 3.8: the stimuli in their order, after `stimuli_inhibition`.
@@ -343,13 +340,24 @@ impl<'a> Simulation<'a> {
         let robot = &mut self.robots[i];
         let msg_length = robot.msg_length();
         let topology = &self.config.topology;
-        let mut actions = match &self.network {
+        if let Some(learner) = &mut robot.learner {
+            let weights = learner.learn();
+            robot.network.set_weights(weights);
+        }
+        let mut actions = match &robot.network {
             Controller::Rate(network) => {
                 let u = network.step(&mut robot.v, phi, self.k == 0);
+                if let Some(learner) = &mut robot.learner {
+                    learner.remember([&u[..], phi].concat());
+                }
                 actuators::decode(topology, &u, msg_length, &mut robot.decoding)
             }
             Controller::Spiking(network) => {
-                network.step(topology, &mut robot.spiking, phi, msg_length)
+                let actions = network.step(topology, &mut robot.spiking, phi, msg_length);
+                if let Some(learner) = &mut robot.learner {
+                    learner.remember(robot.spiking.activities.clone());
+                }
+                actions
             }
         };
         if let Some(transmitter) = &robot.config.actuators.wireless_transmitter

@@ -84,7 +84,7 @@ impl Replay {
     /// Simulates the episode.
     pub fn simulate(episode: &Episode<'_>) -> Result<Self, ReplayError> {
         let Episode { simulation, genotype, trial_set, trial, .. } = *episode;
-        let mut scene = Scene::new(episode);
+        let scene = Scene::new(episode);
         let per_robot: usize = ROBOT_COLUMNS.iter().map(|it| (it.n_components)(&scene)).sum();
         let n_values = scene.steps as usize * scene.n_robots * per_robot;
         if n_values > VALUES_MAX {
@@ -92,9 +92,6 @@ impl Replay {
         }
         let mut columns = Columns::new(&scene);
         let summary = simulation.simulate(genotype, trial_set, trial, &mut |step| {
-            if step.step == 0 {
-                scene.place_areas(&step.areas);
-            }
             columns.record(&scene, &step);
         })?;
         Ok(Self { scene, summary, columns: columns.into_vec() })
@@ -124,6 +121,7 @@ struct Columns {
     /// As [`ROBOT_COLUMNS`].
     robots: Vec<Column>,
     lights: [Column; 2],
+    areas: [Column; 2],
     fitness: Column,
     measures: Column,
     /// Scratch: a robot's values.
@@ -138,9 +136,11 @@ impl Columns {
             Column::new(column.name, column.form, n_rows, n_steps)
         };
         let light = |name| Column::new(name, Form::Position, scene.lights.len(), n_steps);
+        let area = |name| Column::new(name, Form::Position, scene.areas.len(), n_steps);
         Self {
             robots: ROBOT_COLUMNS.iter().map(of_robots).collect(),
             lights: [light("light_x"), light("light_y")],
+            areas: [area("area_x"), area("area_y")],
             fitness: Column::new("fitness", Form::Real, 1, n_steps),
             measures: Column::new("measures", Form::Real, scene.measure_names.len(), n_steps),
             values: Vec::new(),
@@ -159,10 +159,13 @@ impl Columns {
                 }
             }
         }
-        let [x, y] = &mut self.lights;
-        for (light, position) in record.lights.iter().enumerate() {
-            x.set(light, step, position.x);
-            y.set(light, step, position.y);
+        for ([x, y], positions) in
+            [(&mut self.lights, &record.lights), (&mut self.areas, &record.areas)]
+        {
+            for (index, position) in positions.iter().enumerate() {
+                x.set(index, step, position.x);
+                y.set(index, step, position.y);
+            }
         }
         self.fitness.set(0, step, record.fitness.unwrap_or(f64::NAN));
         for (row, name) in scene.measure_names.iter().enumerate() {
@@ -172,8 +175,8 @@ impl Columns {
     }
 
     fn into_vec(self) -> Vec<Column> {
-        let Self { mut robots, lights, fitness, measures, .. } = self;
-        robots.extend(lights.into_iter().chain([fitness, measures]));
+        let Self { mut robots, lights, areas, fitness, measures, .. } = self;
+        robots.extend(lights.into_iter().chain(areas).chain([fitness, measures]));
         robots
     }
 }

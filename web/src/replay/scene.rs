@@ -2,7 +2,7 @@
 
 use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController, SensorQuery};
 use serde::Serialize;
-use sim_core::{MeasureName, TrialSet, Vec2};
+use sim_core::{MeasureName, TrialSet};
 
 use super::Episode;
 
@@ -30,7 +30,7 @@ pub struct Scene {
     pub n_neurons: usize,
     ensembles: Vec<Rows>,
     pub lights: Vec<Disc>,
-    areas: Vec<Disc>,
+    pub areas: Vec<Disc>,
     pub measure_names: Vec<MeasureName>,
 }
 
@@ -65,13 +65,10 @@ pub struct Disc {
     color: String,
     /// cm
     range: f64,
-    /// Where it is, if it does not move.
-    x: Option<f64>,
-    y: Option<f64>,
 }
 
 impl Scene {
-    /// The scene of an episode, its ground areas not placed yet.
+    /// The scene of an episode.
     pub fn new(episode: &Episode<'_>) -> Self {
         let config = episode.config;
         let robots: Vec<Robots> =
@@ -80,7 +77,7 @@ impl Scene {
         let message_len = config.robots().filter_map(|(_, robot)| message_len(robot)).max();
         let discs = |of: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
             let kinds = config.world.objects.values().filter_map(of);
-            let disc = |range, color: &str| Disc { color: color.into(), range, x: None, y: None };
+            let disc = |range, color: &str| Disc { color: color.into(), range };
             kinds.flat_map(|(n, range, color)| (0..n).map(move |_| disc(range, color))).collect()
         };
         Self {
@@ -115,13 +112,6 @@ impl Scene {
                 _ => None,
             }),
             measure_names: episode.simulation.measure_names().to_vec(),
-        }
-    }
-
-    /// The ground areas are where they stay.
-    pub fn place_areas(&mut self, positions: &[Vec2]) {
-        for (area, position) in self.areas.iter_mut().zip(positions) {
-            (area.x, area.y) = (Some(position.x), Some(position.y));
         }
     }
 }

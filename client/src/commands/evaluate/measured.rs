@@ -109,10 +109,26 @@ fn checked(
     let is_whole = |(number, trial): (u32, &MeasuredTrial)| {
         trial.trial == number && trial.values.len() == n_values
     };
-    if trials.len() != n_trials as usize || n_values == 0 || !(0..).zip(&trials).all(is_whole) {
+    // A script may measure nothing; an answer without a task has no steps.
+    if trials.len() != n_trials as usize || steps == 0 || !(0..).zip(&trials).all(is_whole) {
         return Err(Error::Internal("the coordinator's answer is incomplete".into()));
     }
     let trials =
         trials.into_iter().map(|MeasuredTrial { fitness, values, .. }| Trial { fitness, values });
     Ok(Measured { metrics, n_steps: steps as usize, trials: trials.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_task_without_measures_is_whole_and_an_answer_without_a_task_is_not() {
+        let trial = |trial| MeasuredTrial { trial, fitness: 0.5, ..MeasuredTrial::default() };
+        let task = || MeasuredTask { steps: 3, ..MeasuredTask::default() };
+        let measured = checked(Some(task()), vec![trial(0), trial(1)], 2).unwrap();
+        assert_eq!((measured.n_steps, measured.trials.len()), (3, 2));
+        assert!(checked(Some(task()), vec![trial(0)], 2).is_err());
+        assert!(checked(None, vec![trial(0), trial(1)], 2).is_err());
+    }
 }

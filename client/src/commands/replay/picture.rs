@@ -233,7 +233,19 @@ fn draw<'a>(
         let ahead = |length: f64, at: i32, share: f64| at + (length * share).round() as i32;
         let nose = (ahead(1.8 * radius, x, cos), ahead(1.8 * radius, y, -sin));
         area.draw(&PathElement::new([(x, y), nose], INK.stroke_width(3)))?;
-        area.draw(&Circle::new((x, y), radius, color.filled()))?;
+        let opacity = if robot.failed { 0.4 } else { 1.0 };
+        area.draw(&Circle::new((x, y), radius, color.mix(opacity).filled()))?;
+        if robot.failed {
+            // Crossed out.
+            let arm = radius.round() as i32;
+            for slope in [-arm, arm] {
+                let ends = [(x - arm, y - slope), (x + arm, y + slope)];
+                area.draw(&PathElement::new(ends, INK.stroke_width(2)))?;
+            }
+        }
+        if robot.carries {
+            area.draw(&Circle::new((x, y), 0.5 * radius, TARGET.filled()))?;
+        }
         if robot.mode == Mode::Relay {
             area.draw(&Circle::new((x, y), radius, RELAY.stroke_width(2)))?;
         }

@@ -100,6 +100,8 @@ impl<W: io::Write> Rows<W> {
                     let sensor = robot.sensors.light_sensor.iter();
                     sensor.map(|sensor| ("light_sensor", sensor.n_sectors)).collect()
                 }
+                // What it asks for is its own business.
+                RobotController::ScriptController => Vec::new(),
             };
             let inputs = inputs.iter().flat_map(|(name, n)| (0..*n).map(move |i| (name, i)));
             let inputs = inputs.map(|(name, i)| stimuli.insert_full(format!("{name}_{i}")).0);

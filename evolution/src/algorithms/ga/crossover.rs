@@ -35,8 +35,8 @@ const SBX_INDEX: f64 = 0.5;
 /// Chooses among the variants of [`Crossover`], in their order.
 pub const OPERATOR: Parameter = Parameter::one_of(
     "crossover_operator",
-    &["blxalpha", "uniform", "onepoint", "multipoint", "simulated_binary"],
-    &["combination", "pcx"],
+    &["blxalpha", "uniform", "onepoint", "multipoint", "simulated_binary", "combination"],
+    &["pcx"],
     "How two parents yield two children",
 );
 /// How far BLX-alpha reaches beyond the parents.
@@ -46,7 +46,8 @@ impl Crossover {
     /// As configured.
     pub fn new(params: &AlgorithmParams) -> Self {
         match params.name(&OPERATOR).as_str() {
-            "blxalpha" => Self::BlxAlpha { alpha: params.number(&ALPHA) },
+            // Two names of one operator in the original.
+            "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.number(&ALPHA) },
             "uniform" => Self::Uniform,
             "onepoint" => Self::OnePoint,
             "multipoint" => Self::MultiPoint,

@@ -64,6 +64,7 @@ impl Described for Ga {
             mutation::OPERATOR,
             MUTATION_PROB,
             mutation::SIGMA,
+            mutation::CATEGORIES,
             NUM_ELITE,
         ],
     };

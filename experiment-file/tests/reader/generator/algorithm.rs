@@ -19,6 +19,9 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
         tasks.push("goto_light");
     }
     let queries = network.queries(dice);
+    // Coefficients of learning are more genes than algorithms with a full matrix take.
+    let learns = queries.iter().any(|(query, _)| query.starts_with("learning:"));
+    let name = if learns && ["xNES", "CMA-ES"].contains(&name) { "sep-CMA-ES" } else { name };
     let n_populations = dice.die(queries.len().min(3));
     let mut populations = json!({});
     for i in 0..n_populations {

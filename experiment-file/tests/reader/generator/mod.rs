@@ -2,6 +2,8 @@
 //! combinations that are right, and ways to damage them.
 
 mod algorithm;
+mod encoding;
+mod learning;
 mod network;
 mod world;
 
@@ -61,8 +63,18 @@ fn insert(object: &mut Value, key: &str, value: Value) {
 
 /// An experiment file that is right.
 pub(super) fn experiment(dice: &mut Dice) -> Value {
+    let share_of_spiking = 0.4;
+    experiment_with(dice, share_of_spiking)
+}
+
+/// An experiment file that is right, with spiking neurons.
+pub(super) fn spiking_experiment(dice: &mut Dice) -> Value {
+    experiment_with(dice, 1.0)
+}
+
+fn experiment_with(dice: &mut Dice, share_of_spiking: f64) -> Value {
     let robot = Robot::new(dice);
-    let network = Network::new(dice, &robot);
+    let network = Network::new(dice, &robot, share_of_spiking);
     let semantics = json!(dice.pick(&["thesis", "original"]));
     let mut file = object(
         dice,

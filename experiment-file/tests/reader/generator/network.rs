@@ -3,14 +3,20 @@
 use experiment_file::NeuronModel;
 use serde_json::{Value, json};
 
+use super::learning::learning;
 use super::world::Robot;
-use super::{Dice, insert, object};
+use super::{Dice, encoding, insert, object};
 
 /// A generated topology, and what queries have to know of it.
 pub(super) struct Network {
     pub(super) topology: Value,
     model: NeuronModel,
     is_dynamic: bool,
+    /// Stimuli with an encoder, and those of them whose receptive field has weights.
+    encoded: Vec<String>,
+    linear: Vec<String>,
+    /// Groups of synapses that are plastic.
+    plastic: Vec<String>,
     /// Outputs whose decoding has weights.
     weighted: Vec<String>,
     ensembles: Vec<String>,
@@ -22,15 +28,21 @@ pub(super) struct Network {
 }
 
 impl Network {
-    pub(super) fn new(dice: &mut Dice, robot: &Robot) -> Self {
+    pub(super) fn new(dice: &mut Dice, robot: &Robot, share_of_spiking: f64) -> Self {
         let spiking = NeuronModel::ALL.into_iter().filter(|model| model.is_spiking());
         let spiking: Vec<NeuronModel> = spiking.collect();
-        let model =
-            if dice.chance(0.4) { spiking[dice.below(spiking.len())] } else { NeuronModel::Rate };
+        let model = if dice.chance(share_of_spiking) {
+            spiking[dice.below(spiking.len())]
+        } else {
+            NeuronModel::Rate
+        };
         let mut network = Self {
             topology: json!({}),
             model,
             is_dynamic: model.is_spiking() && dice.chance(0.5),
+            encoded: Vec::new(),
+            linear: Vec::new(),
+            plastic: Vec::new(),
             weighted: Vec::new(),
             ensembles: Vec::new(),
             motor: Vec::new(),
@@ -40,10 +52,22 @@ impl Network {
         };
         let mut stimuli = json!({});
         let mut encoding = json!({});
+        let time_scale = dice.die(30);
         for i in 0..dice.die(4) {
             let (sensor, n) = robot.readings[dice.below(robot.readings.len())];
-            insert(&mut stimuli, &format!("I{i}"), json!({"n": n, "sensor": sensor}));
-            insert(&mut encoding, &format!("I{i}"), json!({"scheme": "IdentityEncoding"}));
+            let name = format!("I{i}");
+            insert(&mut stimuli, &name, json!({"n": n, "sensor": sensor}));
+            let entry = if model.is_spiking() && dice.chance(0.6) {
+                network.encoded.push(name.clone());
+                let entry = encoding::entry(dice, n, time_scale);
+                if entry["receptive_field"]["name"] == "linear_receptive_field" {
+                    network.linear.push(name.clone());
+                }
+                entry
+            } else {
+                json!({"scheme": "IdentityEncoding"})
+            };
+            insert(&mut encoding, &name, entry);
         }
         let mut ensembles = json!({});
         for i in 0..dice.die(3) {
@@ -52,10 +76,13 @@ impl Network {
         }
         let outputs = network.outputs(dice, robot, &mut ensembles);
         let synapses = network.synapses(dice, &stimuli);
-        let (seed, time_scale) = (dice.below(1 << 20), dice.die(30));
-        let common =
-            [("time_scale", json!(time_scale)), ("seed", json!(seed)), ("encoding", encoding)];
-        network.topology = object(dice, common);
+        let groups: Vec<String> = synapses.as_object().unwrap().keys().cloned().collect();
+        let seed = dice.below(1 << 20);
+        network.topology = object(dice, [("seed", json!(seed))]);
+        insert(&mut network.topology, "time_scale", json!(time_scale));
+        if model.is_spiking() || dice.chance(0.5) {
+            insert(&mut network.topology, "encoding", encoding);
+        }
         if network.is_dynamic {
             insert(&mut network.topology, "synapse_model", json!("dynamic_synapse"));
             let params = receptors(dice);
@@ -86,6 +113,11 @@ impl Network {
         };
         for (key, value) in of_model.as_object().unwrap() {
             insert(&mut network.topology, key, value.clone());
+        }
+        if dice.chance(0.3) {
+            let (learning, plastic) = learning(dice, &groups);
+            insert(&mut network.topology, "learning", learning);
+            network.plastic = plastic;
         }
         let [outputs, decoding] = outputs;
         for (key, value) in [
@@ -289,9 +321,32 @@ impl Network {
             queries.extend(named);
         }
         if self.is_dynamic {
-            let delays = dice.some(&self.ensembles);
+            let delays = dice.some(&[&self.ensembles[..], &self.encoded].concat());
             queries.extend(
                 delays.into_iter().map(|name| (format!("synapses:delays:{name}"), [1.0, 9.0])),
+            );
+        }
+        if !self.plastic.is_empty() {
+            let groups = match dice.below(3) {
+                0 => vec!["all".to_owned()],
+                1 => dice.some(&self.plastic),
+                _ => Vec::new(),
+            };
+            queries.extend(
+                groups
+                    .into_iter()
+                    .map(|name| (format!("learning:coefficients:{name}"), [-1e6, 1e6])),
+            );
+        }
+        if !self.linear.is_empty() {
+            let stimuli = match dice.below(3) {
+                0 => vec!["all".to_owned()],
+                1 => dice.some(&self.linear),
+                _ => Vec::new(),
+            };
+            let part = dice.pick(&["encoders", "encoding"]);
+            queries.extend(
+                stimuli.into_iter().map(|name| (format!("{part}:weights:{name}"), [-50.0, 50.0])),
             );
         }
         if !self.weighted.is_empty() {

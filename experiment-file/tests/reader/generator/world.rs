@@ -210,19 +210,24 @@ impl Robot {
 
 fn light(dice: &mut Dice) -> Value {
     let n = dice.die(3);
-    let controller = match dice.below(5) {
+    let controller = match dice.below(6) {
         0 => json!(null),
         1 => {
             let radius_step = if dice.chance(0.5) { json!(null) } else { json!(0.5) };
-            let params = object(dice, [("angle_step", json!(0.02)), ("radius_step", radius_step)]);
+            let params = object(
+                dice,
+                [("angle_step", json!(0.02)), ("radius_step", radius_step), ("radius", json!(150))],
+            );
             json!({"name": "light_orbit_controller", "params": params})
         }
         2 => json!("light_rnd_pos_controller"),
         3 => json!({"name": "static"}),
+        4 => json!("light_prey_controller"),
         _ => {
             let pace = dice.pick(&["speed", "step"]);
             let value = dice.number(0.0, 1.0);
-            let params = object(dice, [("every", json!(n * 10)), (pace, value)]);
+            let params =
+                object(dice, [("every", json!(n * 10)), ("square", json!(90)), (pace, value)]);
             json!({"name": "light_rnd_pos_controller", "params": params})
         }
     };

@@ -5,6 +5,7 @@
 
 mod aligned;
 mod ctrnn;
+mod learning;
 mod spiking;
 
 use std::fmt;
@@ -14,17 +15,17 @@ use indexmap::IndexMap;
 use super::connections::{Synapse, SynapseGroup};
 use super::{Ensemble, Network, Phenotype};
 use crate::lanes::Lanes;
-use ctrnn::Ctrnn;
+use ctrnn::{Ctrnn, PlasticCtrnn};
 use experiment_file::NeuronModel;
 use numeric::Isa;
+use numeric::random::Stream;
 
 /// The neurons of a network with their synapses, by one model, and their state in
 /// every lane. An implementation must give a lane the same bits whatever its place,
 /// its neighbours and the instruction set.
 pub(crate) trait Dynamics: fmt::Debug {
     /// Advances by one environment step, which is `Network::n_substeps` substeps.
-    /// `stimuli` are held: `[input][lane]`.
-    fn step(&mut self, stimuli: &Lanes);
+    fn step(&mut self, inputs: Inputs<'_>);
 
     /// Writes the activities that outputs decode: `[neuron][lane]`.
     fn write_activity(&self, activity: &mut Lanes);
@@ -37,6 +38,18 @@ pub(crate) trait Dynamics: fmt::Debug {
     fn write_voltages(&self, _voltages: &mut Lanes) -> bool {
         false
     }
+}
+
+/// What a network gets in an environment step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Inputs<'a> {
+    /// Held for all substeps, `[input][lane]`.
+    pub stimuli: &'a Lanes,
+    /// Uniform random numbers, substep by substep one for each of `Network::n_drawing` nodes,
+    /// `[draw][lane]`.
+    pub draws: &'a Lanes,
+    /// Reward of the step before, one row; none if nothing learns.
+    pub rewards: &'a Lanes,
 }
 
 /// What the spikes of the neurons that outputs decode leave behind in an environment step,
@@ -61,10 +74,12 @@ pub(crate) enum Wiring {
 }
 
 impl Wiring {
-    /// Of the neurons of some ensembles and the synapses that join them.
+    /// Of the neurons of some ensembles, the nodes of encoders, and the synapses that join
+    /// them.
     pub fn new(
         model: NeuronModel,
         ensembles: &IndexMap<String, Ensemble>,
+        n_encoded: usize,
         groups: &IndexMap<String, SynapseGroup>,
         synapses: &[Synapse],
     ) -> Self {
@@ -76,7 +91,7 @@ impl Wiring {
             | NeuronModel::Izhikevich
             | NeuronModel::MorrisLecar => {
                 let n_neurons = ensembles.values().last().map_or(0, |last| last.neurons.end);
-                Self::Spiking(spiking::Wiring::new(n_neurons, groups, synapses))
+                Self::Spiking(spiking::Wiring::new(n_neurons, n_encoded, groups, synapses))
             }
         }
     }
@@ -91,6 +106,12 @@ pub(crate) struct NetworkState {
     activity: Lanes,
     /// None of rate neurons.
     window: Option<SpikeWindow>,
+    /// What encoders draw from, per lane.
+    streams: Vec<Stream>,
+    /// What they drew for this environment step, `[draw][lane]`.
+    draws: Lanes,
+    /// The last rewards, one row; none if nothing learns.
+    rewards: Lanes,
 }
 
 impl NetworkState {
@@ -105,12 +126,34 @@ impl NetworkState {
             first: rows(),
             filtered: rows(),
         });
-        Self { dynamics, n_lanes, activity, window }
+        let mut draws = Lanes::new(network.n_drawing() * network.n_substeps as usize, n_lanes);
+        let rewards = Lanes::new(usize::from(network.learning.is_some()), n_lanes);
+        // Nothing spikes in lanes without a robot.
+        (0..draws.n_rows()).for_each(|draw| draws.row_mut(draw).fill(1.0));
+        Self { dynamics, n_lanes, activity, window, streams: Vec::new(), draws, rewards }
+    }
+
+    /// The same with a stream of random numbers per lane, for encoders that draw.
+    pub fn drawing_from(self, streams: Vec<Stream>) -> Self {
+        Self { streams, ..self }
+    }
+
+    /// What a lane is rewarded with for the step before; 0 if nobody says.
+    pub fn reward(&mut self, lane: usize, reward: f32) {
+        if self.rewards.n_rows() > 0 {
+            self.rewards.set(0, lane, reward);
+        }
     }
 
     /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
     pub fn step(&mut self, stimuli: &Lanes) {
-        self.dynamics.step(stimuli);
+        for (lane, stream) in self.streams.iter_mut().enumerate() {
+            for draw in 0..self.draws.n_rows() {
+                self.draws.set(draw, lane, stream.uniform() as f32);
+            }
+        }
+        let (draws, rewards) = (&self.draws, &self.rewards);
+        self.dynamics.step(Inputs { stimuli, draws, rewards });
         self.dynamics.write_activity(&mut self.activity);
         if let Some(window) = &mut self.window {
             self.dynamics.write_window(window);
@@ -144,6 +187,9 @@ fn compile(
     n_lanes: usize,
 ) -> Box<dyn Dynamics> {
     match network.wiring() {
+        Wiring::Rate(_) if network.learning.is_some() => {
+            Box::new(PlasticCtrnn::new(isa, network, phenotype, n_lanes))
+        }
         Wiring::Rate(wiring) => Box::new(Ctrnn::new(isa, network, wiring, phenotype, n_lanes)),
         Wiring::Spiking(wiring) => spiking::compile(isa, network, wiring, phenotype, n_lanes),
     }

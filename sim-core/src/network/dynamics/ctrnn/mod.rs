@@ -17,20 +17,23 @@
 //! of lanes are computed by [`chunk`], in blocks of neurons that share the loads of
 //! presynaptic activities. Lanes that are left over are computed by [`remainder`], to
 //! the same bits. Two neurons share a division; which ones is a matter of the network's
-//! structure alone.
+//! structure alone. Networks whose weights change while robots live are computed by
+//! [`plastic`], where every lane has its own weights.
 
 mod chunk;
 mod kernel;
+mod plastic;
 mod remainder;
 mod squash;
 mod wiring;
 
-use super::Dynamics;
+use super::{Dynamics, Inputs};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
 use chunk::Chunk;
 use kernel::Kernel;
 use numeric::Isa;
+pub(super) use plastic::PlasticCtrnn;
 use remainder::{Bundles, Remainder};
 pub(super) use wiring::Wiring;
 
@@ -93,7 +96,7 @@ impl Ctrnn {
 }
 
 impl Dynamics for Ctrnn {
-    fn step(&mut self, stimuli: &Lanes) {
+    fn step(&mut self, Inputs { stimuli, .. }: Inputs<'_>) {
         for chunk in &mut self.chunks {
             chunk.advance(&self.kernel, stimuli, self.isa);
         }

@@ -36,6 +36,7 @@ fn reference(network: &Network, phenotype: &Phenotype, stimuli: &[f64], v: &mut 
                 * match synapse.pre {
                     Source::Input(input) => stimuli[input],
                     Source::Neuron(neuron) => u[neuron],
+                    Source::Encoded(_) => unreachable!("rate neurons take no spikes"),
                 };
         }
         for i in 0..v.len() {

@@ -78,6 +78,8 @@ impl Wiring {
             let same = match synapse.pre {
                 Source::Neuron(pre) => recurrent.entry(rows[pre]),
                 Source::Input(pre) => afferent.entry(pre),
+                // The reader sees to it that only spiking neurons take spikes.
+                Source::Encoded(_) => continue,
             };
             same.or_default().push(number);
         }

@@ -57,7 +57,14 @@ fn neuron(model: NeuronModel, parameters: &Value) -> (Network, Phenotype) {
     let neurons = model.spec().parameters.iter().map(|it| (it.name, value(it.name))).collect();
     (
         network,
-        Phenotype { weights: vec![1.0], neurons, delays: Vec::new(), decoders: vec![vec![1.0]] },
+        Phenotype {
+            weights: vec![1.0],
+            neurons,
+            delays: Vec::new(),
+            encoders: Vec::new(),
+            learning: Vec::new(),
+            decoders: vec![vec![1.0]],
+        },
     )
 }
 
@@ -121,6 +128,7 @@ fn dynamic_synapses_work_as_in_brian2() {
     let weights = network.synapses.iter().map(|synapse| match synapse.pre {
         Source::Input(input) => f64::from(u8::from(input == synapse.post)),
         Source::Neuron(pre) => matrix[synapse.post][pre],
+        Source::Encoded(_) => unreachable!("stimuli are currents"),
     });
     let weights = weights.collect();
     let parameters = &fixture["parameters"];
@@ -128,7 +136,15 @@ fn dynamic_synapses_work_as_in_brian2() {
     let specified = NeuronModel::Lif.spec().parameters.iter();
     let neurons = specified.map(|it| (it.name, value(it.name))).collect();
     let delays = numbers(&fixture["delays"]).collect();
-    let phenotype = Phenotype { weights, neurons, delays, decoders: vec![vec![1.0; 2]] };
+    let decoders = vec![vec![1.0; 2]];
+    let phenotype = Phenotype {
+        weights,
+        neurons,
+        delays,
+        encoders: Vec::new(),
+        learning: Vec::new(),
+        decoders,
+    };
 
     let mut state = NetworkState::new(Isa::best(), &network, &phenotype, 1);
     let mut stimuli = Lanes::new(4, 1);

@@ -2,9 +2,11 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::super::SpikeWindow;
 use super::super::aligned::Aligned;
-use super::kernel::Kernel;
+use super::super::learning::Memory;
+use super::super::{Inputs, SpikeWindow};
+use super::encoding::EncoderState;
+use super::kernel::{Kernel, weight};
 use super::model::Model;
 use super::receptors::ReceptorState;
 use crate::lanes::Lanes;
@@ -23,9 +25,10 @@ pub(super) struct Chunk {
     n_lanes: usize,
     /// `[neuron][variable][lane]`
     state: Aligned,
-    /// 1 where a neuron spiked in the last substep, else 0: `[neuron][lane]`.
+    /// 1 where a neuron spiked in the last substep, or a node of an encoder in this one, else
+    /// 0: `[neuron, then node][lane]`.
     spikes: Aligned,
-    /// The neurons that spiked in any lane in the last substep, ascending.
+    /// The neurons and nodes of which that is true in any lane, ascending.
     active: Vec<usize>,
     /// What stimuli add to the current, `[neuron][lane]`.
     drive: Aligned,
@@ -33,7 +36,10 @@ pub(super) struct Chunk {
     current: Aligned,
     /// Of dynamic synapses.
     receptors: Option<ReceptorState>,
-    /// Spikes in the environment step, `[neuron][lane]`.
+    encoders: EncoderState,
+    /// Weights that change; none if they are shared.
+    memory: Option<Memory>,
+    /// Spikes in the environment step, `[neuron, then node][lane]`.
     counts: Aligned,
     /// Of motor neurons: the substep of the first spike, x and a of the filter,
     /// `[motor neuron][variable][lane]`.
@@ -50,18 +56,20 @@ impl Chunk {
     ) -> Self {
         let n_lanes = width * isa.vector_len();
         let rows = |n: usize| Aligned::new(n * n_lanes);
-        let n_neurons = kernel.n_neurons();
+        let (n_neurons, n_sources) = (kernel.n_neurons(), kernel.n_sources());
         let mut chunk = Self {
             first_lane,
             width,
             n_lanes,
             state: rows(n_neurons * Z),
-            spikes: rows(n_neurons),
-            active: Vec::with_capacity(n_neurons),
+            spikes: rows(n_sources),
+            active: Vec::with_capacity(n_sources),
             drive: rows(n_neurons),
             current: rows(n_neurons),
-            receptors: kernel.receptors.as_ref().map(|_| ReceptorState::new(n_neurons, n_lanes)),
-            counts: rows(n_neurons),
+            receptors: kernel.receptors.as_ref().map(|_| ReceptorState::new(n_sources, n_lanes)),
+            encoders: EncoderState::new(&kernel.encoders, n_lanes),
+            memory: kernel.rule.as_ref().map(|rule| Memory::new(rule, n_lanes)),
+            counts: rows(n_sources),
             motor: rows(kernel.motor.len() * 3),
         };
         let starts = kernel.starts.iter().flatten();
@@ -74,16 +82,19 @@ impl Chunk {
         chunk
     }
 
-    /// Advances by one environment step, `stimuli` being held: `[input][lane]`.
+    /// Advances by one environment step.
     pub fn advance<M: Model<C, Z>, const C: usize, const Z: usize>(
         &mut self,
         kernel: &Kernel<M, C, Z>,
-        stimuli: &Lanes,
+        inputs: Inputs<'_>,
         isa: Isa,
     ) {
         match self.width {
-            1 => isa.run(Work::<M, C, Z, 1> { kernel, chunk: self, stimuli }),
-            2 => isa.run(Work::<M, C, Z, 2> { kernel, chunk: self, stimuli }),
+            1 if kernel.rule.is_some() => {
+                isa.run(Work::<M, C, Z, 1, true> { kernel, chunk: self, inputs });
+            }
+            1 => isa.run(Work::<M, C, Z, 1, false> { kernel, chunk: self, inputs }),
+            2 => isa.run(Work::<M, C, Z, 2, false> { kernel, chunk: self, inputs }),
             width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
@@ -95,7 +106,8 @@ impl Chunk {
         activity: &mut Lanes,
     ) {
         let n_substeps = kernel.n_substeps as f32;
-        for (neuron, counts) in self.counts.values().chunks_exact(self.n_lanes).enumerate() {
+        let counts = self.counts.values().chunks_exact(self.n_lanes).take(kernel.n_neurons());
+        for (neuron, counts) in counts.enumerate() {
             let row = &mut activity.row_mut(neuron)[self.first_lane..][..self.n_lanes];
             for (share, count) in row.iter_mut().zip(counts) {
                 *share = count / n_substeps;
@@ -133,26 +145,37 @@ impl Chunk {
     }
 }
 
-/// An environment step of a chunk of W vectors per row.
-struct Work<'a, M, const C: usize, const Z: usize, const W: usize> {
+/// An environment step of a chunk of W vectors per row; with PLASTIC, weights change.
+struct Work<'a, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool> {
     kernel: &'a Kernel<M, C, Z>,
     chunk: &'a mut Chunk,
-    stimuli: &'a Lanes,
+    inputs: Inputs<'a>,
 }
 
-impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
-    for Work<'_, M, C, Z, W>
+impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool> WithSimd
+    for Work<'_, M, C, Z, W, PLASTIC>
 {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { kernel, chunk, stimuli } = self;
-        perceive::<S, M, C, Z, W>(simd, kernel, chunk, stimuli);
+        let Self { kernel, chunk, inputs } = self;
+        if PLASTIC && let (Some(rule), Some(memory)) = (&kernel.rule, &mut chunk.memory) {
+            let rewards = &inputs.rewards.row(0)[chunk.first_lane..][..chunk.n_lanes];
+            rule.learn::<S, W>(simd, memory, rewards);
+        }
+        perceive::<S, M, C, Z, W, PLASTIC>(simd, kernel, chunk, inputs.stimuli);
         for substep in 0..kernel.n_substeps {
-            propagate::<S, M, C, Z, W>(simd, kernel, chunk);
+            if kernel.encoders.n_nodes() > 0 {
+                encode::<S, M, C, Z, W>(simd, kernel, chunk, inputs.draws, substep);
+            }
+            propagate::<S, M, C, Z, W, PLASTIC>(simd, kernel, chunk);
             integrate::<S, M, C, Z, W>(simd, kernel, chunk);
             listen::<S, M, C, Z, W>(simd, kernel, chunk, substep);
+        }
+        if PLASTIC && let (Some(rule), Some(memory)) = (&kernel.rule, &mut chunk.memory) {
+            let share = 1.0 / kernel.n_substeps as f32;
+            rule.remember(memory, chunk.counts.values(), share, inputs.stimuli, chunk.first_lane);
         }
     }
 }
@@ -162,7 +185,7 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
 
 /// What the stimuli of this environment step add to currents; nothing has spiked in it.
 #[inline(always)]
-fn perceive<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+fn perceive<S: Simd, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
     simd: S,
     kernel: &Kernel<M, C, Z>,
     chunk: &mut Chunk,
@@ -170,23 +193,57 @@ fn perceive<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
 ) {
     let n_lanes = W * S::F32_LANES;
     let drives = rows_mut::<S, W>(chunk.drive.values_mut());
+    let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
+    let plastic = rows::<S, W>(plastic);
     for (neuron, drive) in drives.iter_mut().enumerate() {
         let mut sum = [simd.splat_f32s(0.0); W];
-        for &(input, weight) in kernel.afferent.of(neuron) {
+        let numbers = kernel.afferent.numbers_of(neuron);
+        for (&(input, shared), &number) in kernel.afferent.of(neuron).iter().zip(numbers) {
+            let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
             let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
             accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
         }
         *drive = sum;
     }
+    let lanes = chunk.first_lane..chunk.first_lane + n_lanes;
+    kernel.encoders.perceive::<S, W>(simd, &mut chunk.encoders, stimuli, lanes);
     chunk.counts.values_mut().fill(0.0);
     for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
         rows[..n_lanes].fill(kernel.n_substeps as f32);
     }
 }
 
+/// The spikes of the nodes of encoders.
+#[inline(always)]
+fn encode<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+    simd: S,
+    kernel: &Kernel<M, C, Z>,
+    chunk: &mut Chunk,
+    draws: &Lanes,
+    substep: u32,
+) {
+    let lanes = chunk.first_lane..chunk.first_lane + W * S::F32_LANES;
+    let n_neurons = kernel.n_neurons();
+    let spikes = &mut rows_mut::<S, W>(chunk.spikes.values_mut())[n_neurons..];
+    kernel.encoders.encode::<S, W>(simd, &mut chunk.encoders, draws, lanes, substep, spikes);
+    let none = simd.splat_f32s(0.5);
+    let counts = &mut rows_mut::<S, W>(chunk.counts.values_mut())[n_neurons..];
+    for ((node, spikes), counts) in spikes.iter().enumerate().zip(counts) {
+        let mut is_active = false;
+        for (&spike, count) in spikes.iter().zip(counts) {
+            *count = simd.add_f32s(*count, spike);
+            let spiked = simd.greater_than_f32s(spike, none);
+            is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
+        }
+        if is_active {
+            chunk.active.push(n_neurons + node);
+        }
+    }
+}
+
 /// The current of every neuron, from the spikes of the substep before.
 #[inline(always)]
-fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
     simd: S,
     kernel: &Kernel<M, C, Z>,
     chunk: &mut Chunk,
@@ -194,14 +251,18 @@ fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
     chunk.current.values_mut().copy_from_slice(chunk.drive.values());
     let currents = rows_mut::<S, W>(chunk.current.values_mut());
     let spikes = rows::<S, W>(chunk.spikes.values());
+    let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
+    let plastic = rows::<S, W>(plastic);
     for &pre in &chunk.active {
-        for &(post, weight) in kernel.outgoing.of(pre) {
+        let numbers = kernel.outgoing.numbers_of(pre);
+        for (&(post, shared), &number) in kernel.outgoing.of(pre).iter().zip(numbers) {
+            let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
             accumulate(simd, &mut currents[post], weight, &spikes[pre]);
         }
     }
     if let (Some(receptors), Some(held)) = (&kernel.receptors, &mut chunk.receptors) {
         let states = rows::<S, W>(chunk.state.values()).as_chunks::<Z>().0;
-        receptors.propagate::<S, Z, W>(simd, held, spikes, states, currents);
+        receptors.propagate::<S, Z, W, PLASTIC>(simd, plastic, held, spikes, states, currents);
     }
 }
 
@@ -280,12 +341,11 @@ fn listen<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
 fn accumulate<S: Simd, const W: usize>(
     simd: S,
     sum: &mut [S::f32s; W],
-    weight: f32,
+    weight: [S::f32s; W],
     values: &[S::f32s; W],
 ) {
-    let weight = simd.splat_f32s(weight);
-    for (sum, value) in sum.iter_mut().zip(values) {
-        *sum = simd.mul_add_f32s(weight, *value, *sum);
+    for vector in 0..W {
+        sum[vector] = simd.mul_add_f32s(weight[vector], values[vector], sum[vector]);
     }
 }
 

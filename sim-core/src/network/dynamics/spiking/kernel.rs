@@ -3,6 +3,10 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
+use pulp::Simd;
+
+use super::super::learning::Rule;
+use super::encoding::Encoders;
 use super::model::Model;
 use super::receptors::Receptors;
 use super::wiring::{Grouped, Wiring};
@@ -16,12 +20,16 @@ pub(super) struct Kernel<M, const C: usize, const Z: usize> {
     pub constants: Vec<[f32; C]>,
     /// Per neuron.
     pub starts: Vec<[f32; Z]>,
-    /// Synapses from stimuli, by postsynaptic neuron.
+    /// Makes spikes of stimuli.
+    pub encoders: Encoders,
+    /// Synapses from stimuli that act as they are, by postsynaptic neuron.
     pub afferent: Weighted,
-    /// Static synapses between neurons, by presynaptic neuron.
+    /// Static synapses from what spikes, by presynaptic side: neurons, then nodes of encoders.
     pub outgoing: Weighted,
-    /// Dynamic synapses between neurons; none if they are static.
+    /// Dynamic synapses from what spikes; none if they are static.
     pub receptors: Option<Receptors>,
+    /// How weights change while robots live; none: they do not.
+    pub rule: Option<Rule>,
     /// Neurons that outputs decode, ascending.
     pub motor: Vec<usize>,
     /// What decoders filter spikes with.
@@ -35,6 +43,8 @@ pub(super) struct Weighted {
     groups: Vec<Range<usize>>,
     /// The side that the group does not have in common, and the weight.
     members: Vec<(usize, f32)>,
+    /// The number of each synapse.
+    numbers: Vec<usize>,
 }
 
 /// x = 1 on a spike, else x *= `retention`; a += `rise` x (1 - a) - `decay` a.
@@ -72,20 +82,29 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Kernel<M, C, Z> {
             n_substeps: network.n_substeps,
             constants: constants.collect(),
             starts: starts.collect(),
+            encoders: Encoders::compile(network, phenotype),
             afferent: Weighted::new(&wiring.afferent, phenotype),
             outgoing: Weighted::new(&wiring.outgoing, phenotype),
             receptors: network
                 .receptors
                 .map(|params| Receptors::new(params, wiring, phenotype, network.dt)),
+            rule: Rule::compile(network, phenotype),
             motor: motor.flat_map(|ensemble| ensemble.neurons.clone()).collect(),
             filter: Filter::new(network.dt),
             model: PhantomData,
         }
     }
+}
 
+impl<M, const C: usize, const Z: usize> Kernel<M, C, Z> {
     /// Number of neurons.
     pub fn n_neurons(&self) -> usize {
         self.constants.len()
+    }
+
+    /// What spikes: neurons and nodes of encoders.
+    pub fn n_sources(&self) -> usize {
+        self.n_neurons() + self.encoders.n_nodes()
     }
 }
 
@@ -93,7 +112,8 @@ impl Weighted {
     pub fn new(grouped: &Grouped, phenotype: &Phenotype) -> Self {
         let weight = |number: usize| phenotype.weights[number] as f32;
         let members = grouped.members.iter().map(|member| (member.other, weight(member.synapse)));
-        Self { groups: grouped.groups.clone(), members: members.collect() }
+        let numbers = grouped.members.iter().map(|member| member.synapse).collect();
+        Self { groups: grouped.groups.clone(), members: members.collect(), numbers }
     }
 
     /// Synapses of a group.
@@ -101,4 +121,22 @@ impl Weighted {
     pub fn of(&self, group: usize) -> &[(usize, f32)] {
         &self.members[self.groups[group].clone()]
     }
+
+    /// Numbers of the synapses of a group.
+    #[inline(always)]
+    pub fn numbers_of(&self, group: usize) -> &[usize] {
+        &self.numbers[self.groups[group].clone()]
+    }
+}
+
+/// The weight of a synapse in W vectors of lanes: what all lanes share, or with PLASTIC what
+/// each has now, `[synapse]`.
+#[inline(always)]
+pub(super) fn weight<S: Simd, const W: usize, const PLASTIC: bool>(
+    simd: S,
+    shared: f32,
+    number: usize,
+    plastic: &[[S::f32s; W]],
+) -> [S::f32s; W] {
+    if PLASTIC { plastic[number] } else { [simd.splat_f32s(shared); W] }
 }

@@ -1,6 +1,7 @@
 //! Networks of spiking neurons, by synchronous Euler steps (section 4.1 of the thesis):
 //! in every substep, each neuron takes the current I = W s of the spikes s of the substep
-//! before, and W_I phi of the stimuli, which are held for an environment step.
+//! before, and W_I phi of the stimuli, which are held for an environment step. Stimuli with
+//! an encoder act by spikes of its nodes instead, those of the same substep.
 //! `docs/neurons.md` has the models.
 //!
 //! It is computed in f32; constants are computed in f64 and rounded once. All lanes share
@@ -10,6 +11,7 @@
 
 mod adex;
 mod chunk;
+mod encoding;
 mod exp_lif;
 mod functions;
 mod izhikevich;
@@ -20,7 +22,7 @@ mod morris_lecar;
 mod receptors;
 mod wiring;
 
-use super::{Dynamics, SpikeWindow};
+use super::{Dynamics, Inputs, SpikeWindow};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
 use chunk::Chunk;
@@ -72,8 +74,10 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
         let kernel = Kernel::compile(network, wiring, phenotype);
         let vector_len = isa.vector_len();
         let n_vectors = n_lanes.div_ceil(vector_len);
-        let chunks = (0..n_vectors).step_by(chunk::MAX_WIDTH).map(|first| {
-            let width = chunk::MAX_WIDTH.min(n_vectors - first);
+        // Weights of their own take most of what a chunk of lanes holds.
+        let max_width = if kernel.rule.is_some() { 1 } else { chunk::MAX_WIDTH };
+        let chunks = (0..n_vectors).step_by(max_width).map(|first| {
+            let width = max_width.min(n_vectors - first);
             Chunk::new(&kernel, first * vector_len, width, isa)
         });
         let chunks = chunks.collect();
@@ -82,9 +86,9 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
 }
 
 impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, Z> {
-    fn step(&mut self, stimuli: &Lanes) {
+    fn step(&mut self, inputs: Inputs<'_>) {
         for chunk in &mut self.chunks {
-            chunk.advance(&self.kernel, stimuli, self.isa);
+            chunk.advance(&self.kernel, inputs, self.isa);
         }
     }
 

@@ -13,7 +13,7 @@ use pulp::Simd;
 
 use super::super::aligned::Aligned;
 use super::functions::exp;
-use super::kernel::Weighted;
+use super::kernel::{Weighted, weight};
 use super::wiring::Wiring;
 use crate::network::Phenotype;
 use experiment_file::{SynapseParams, limits};
@@ -26,7 +26,7 @@ const N_SLOTS: usize = *limits::DELAYS.end() as usize;
 /// Dynamic synapses with the values of a genotype.
 #[derive(Debug)]
 pub(super) struct Receptors {
-    /// Per neuron, substeps.
+    /// Per axon, those of neurons and then those of nodes of encoders: substeps.
     delays: Vec<usize>,
     /// By postsynaptic neuron, one for each receptor.
     incoming: [Weighted; 3],
@@ -46,9 +46,9 @@ pub(super) struct Receptors {
 pub(super) struct ReceptorState {
     /// Substeps until now.
     clock: usize,
-    /// Spikes of the last substeps, `[slot][neuron][lane]`.
+    /// Spikes of the last substeps, `[slot][axon][lane]`.
     history: Aligned,
-    /// `[neuron][variable][lane]`
+    /// `[axon][variable][lane]`
     open: Aligned,
 }
 
@@ -75,31 +75,33 @@ impl Receptors {
         }
     }
 
-    /// Adds to the currents of a substep. `spikes`: of the substep before. `states`: of the
-    /// neurons, their first variable v.
+    /// Adds to the currents of a substep. `spikes`: of neurons in the substep before, and of
+    /// nodes of encoders. `states`: of the neurons, their first variable v. `weights`: of
+    /// plastic synapses, by their number.
     #[inline(always)]
-    pub fn propagate<S: Simd, const Z: usize, const W: usize>(
+    pub fn propagate<S: Simd, const Z: usize, const W: usize, const PLASTIC: bool>(
         &self,
         simd: S,
+        weights: &[[S::f32s; W]],
         held: &mut ReceptorState,
         spikes: &[[S::f32s; W]],
         states: &[[[S::f32s; W]; Z]],
         currents: &mut [[S::f32s; W]],
     ) {
-        let n_neurons = spikes.len();
+        let n_axons = spikes.len();
         let history: &mut [[S::f32s; W]] =
             S::as_mut_simd_f32s(held.history.values_mut()).0.as_chunks_mut().0;
-        let slot = |age: usize| (held.clock + N_SLOTS - age) % N_SLOTS * n_neurons;
-        history[slot(0)..][..n_neurons].copy_from_slice(spikes);
+        let slot = |age: usize| (held.clock + N_SLOTS - age) % N_SLOTS * n_axons;
+        history[slot(0)..][..n_axons].copy_from_slice(spikes);
         let open: &mut [[S::f32s; W]] =
             S::as_mut_simd_f32s(held.open.values_mut()).0.as_chunks_mut().0;
         let open = open.as_chunks_mut::<N_VARIABLES>().0;
         let one = simd.splat_f32s(1.0);
         let [left_ampa, left_gaba, left_x] = self.retention.map(|left| simd.splat_f32s(left));
         let (rise, decay) = (simd.splat_f32s(self.rise), simd.splat_f32s(self.decay));
-        for (neuron, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
+        for (axon, [ampa, gaba, x, nmda]) in open.iter_mut().enumerate() {
             // A delay of 1 is that of a static synapse.
-            let arrived = &history[slot(self.delays[neuron] - 1) + neuron];
+            let arrived = &history[slot(self.delays[axon] - 1) + axon];
             for vector in 0..W {
                 let spiked = simd.equal_f32s(arrived[vector], one);
                 let closed = simd.mul_f32s(ampa[vector], left_ampa);
@@ -127,11 +129,11 @@ impl Receptors {
                 // s_ampa, s_gaba, s_nmda: x is between the last two.
                 let variable = receptor + usize::from(receptor == 2);
                 let mut sum = [simd.splat_f32s(0.0); W];
-                for &(pre, weight) in synapses {
-                    let weight = simd.splat_f32s(weight);
+                for (&(pre, shared), &number) in synapses.iter().zip(incoming.numbers_of(neuron)) {
+                    let weight = weight::<S, W, PLASTIC>(simd, shared, number, weights);
                     for vector in 0..W {
                         let s = open[pre][variable][vector];
-                        sum[vector] = simd.mul_add_f32s(weight, s, sum[vector]);
+                        sum[vector] = simd.mul_add_f32s(weight[vector], s, sum[vector]);
                     }
                 }
                 let gain = simd.splat_f32s(gain);
@@ -156,8 +158,8 @@ impl Receptors {
 
 impl ReceptorState {
     /// All closed, nothing on its way.
-    pub fn new(n_neurons: usize, n_lanes: usize) -> Self {
-        let rows = |n: usize| Aligned::new(n * n_neurons * n_lanes);
+    pub fn new(n_axons: usize, n_lanes: usize) -> Self {
+        let rows = |n: usize| Aligned::new(n * n_axons * n_lanes);
         Self { clock: 0, history: rows(N_SLOTS), open: rows(N_VARIABLES) }
     }
 }

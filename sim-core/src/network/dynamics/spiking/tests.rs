@@ -6,9 +6,11 @@ use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::testing::{experiment_a_spiking, genotype};
 use experiment_file::{
-    ExperimentConfig, NeuronModel, Neurotransmitter, SynapseModel, SynapseParams,
+    EncodingConfig, EncodingScheme, ExperimentConfig, GaussianField, LinearField, NeuronModel,
+    Neurotransmitter, ReceptiveField, SlopedField, SynapseModel, SynapseParams,
 };
 use numeric::Isa;
+use numeric::random::{Purpose, Stream};
 
 const MODELS: [NeuronModel; 5] = [
     NeuronModel::Lif,
@@ -28,8 +30,8 @@ fn compiled(config: &ExperimentConfig) -> (Network, Phenotype) {
     (network, phenotype)
 }
 
-/// Networks of each model, and one with dynamic synapses, substep by substep or in steps
-/// of several.
+/// Networks of each model, one with dynamic synapses and one with encoders, too, substep by
+/// substep or in steps of several.
 fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
     let networks = MODELS.into_iter().map(|model| {
         let mut config = experiment_a_spiking(model);
@@ -44,7 +46,52 @@ fn networks(time_scale: u32) -> Vec<(Network, Phenotype)> {
         let transmitters = [Neurotransmitter::AmpaNmda, Neurotransmitter::Gaba];
         group.transmitter = Some(transmitters[index % 2]);
     }
-    networks.chain([compiled(&config)]).collect()
+    let dynamic = compiled(&config);
+    encode(&mut config);
+    networks.chain([dynamic, compiled(&config)]).collect()
+}
+
+/// An encoder of each scheme, before it a field of each kind.
+fn encode(config: &mut ExperimentConfig) {
+    let values = [0.0, 3_000.0];
+    let gaussian = GaussianField {
+        sigma: 6.0,
+        n_neurons: 3,
+        min_stim: 0.0,
+        max_stim: 1.0,
+        min_val: 5.0,
+        max_val: 40.0,
+        inverted: false,
+    };
+    let parabolic = SlopedField {
+        slope: 2.0,
+        n_neurons: 2,
+        min_stim: 0.0,
+        max_stim: 1.0,
+        min_val: values[0],
+        max_val: values[1],
+        inverted: true,
+    };
+    let linear = ReceptiveField::Linear(LinearField { n_neurons: 3 });
+    for (name, scheme, receptive_field) in [
+        ("I1", EncodingScheme::Lif, ReceptiveField::Gaussian(gaussian)),
+        ("I2", EncodingScheme::PoissonRate, ReceptiveField::Parabolic(parabolic)),
+        ("I3", EncodingScheme::RankOrder, linear),
+    ] {
+        let encoding = EncodingConfig { scheme, receptive_field };
+        config.topology.encoding.insert(name.to_owned(), encoding);
+    }
+}
+
+/// The state of a network in some lanes, each of which has a stream of its own.
+fn start(
+    (network, phenotype): &(Network, Phenotype),
+    isa: Isa,
+    lanes: std::ops::Range<usize>,
+) -> NetworkState {
+    let stream = |lane: usize| Stream::new(0, 0, 0, Purpose::Encoding, lane as u64);
+    NetworkState::new(isa, network, phenotype, lanes.len())
+        .drawing_from(lanes.map(stream).collect())
 }
 
 fn stimulus(step: usize, lane: usize, input: usize) -> f64 {
@@ -64,12 +111,12 @@ fn stimuli(step: usize, lanes: std::ops::Range<usize>) -> Lanes {
 
 /// Activities and voltages of one lane after some steps with the given lanes.
 fn bits(
-    (network, phenotype): &(Network, Phenotype),
+    network: &(Network, Phenotype),
     isa: Isa,
     lanes: std::ops::Range<usize>,
     lane: usize,
 ) -> Vec<u32> {
-    let mut state = NetworkState::new(isa, network, phenotype, lanes.len());
+    let mut state = start(network, isa, lanes.clone());
     let mut bits = Vec::new();
     for step in 0..3 {
         state.step(&stimuli(step, lanes.clone()));

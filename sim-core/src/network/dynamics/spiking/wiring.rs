@@ -13,10 +13,10 @@ use experiment_file::Neurotransmitter;
 pub(crate) struct Wiring {
     /// Synapses from stimuli, by postsynaptic neuron; a neuron's ascend by their input.
     pub afferent: Grouped,
-    /// Static synapses between neurons, by presynaptic neuron.
+    /// Static synapses from what spikes, by presynaptic side: neurons, then nodes of encoders.
     pub outgoing: Grouped,
-    /// Dynamic synapses between neurons that open a receptor, by postsynaptic neuron, one
-    /// of each [`Receptor`].
+    /// Dynamic synapses from what spikes that open a receptor, by postsynaptic neuron, one of
+    /// each [`Receptor`].
     pub receptive: [Grouped; 3],
 }
 
@@ -40,16 +40,18 @@ pub(crate) struct Grouped {
 /// A synapse in its group.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Member {
-    /// The side that the group does not have in common: an input or a neuron.
+    /// The side that the group does not have in common: an input, or a neuron, or after the
+    /// last neuron a node of an encoder.
     pub other: usize,
     /// Number of the synapse.
     pub synapse: usize,
 }
 
 impl Wiring {
-    /// Orders the synapses of `n_neurons` neurons.
+    /// Orders the synapses of `n_neurons` neurons and `n_encoded` nodes of encoders.
     pub fn new(
         n_neurons: usize,
+        n_encoded: usize,
         groups: &IndexMap<String, SynapseGroup>,
         synapses: &[Synapse],
     ) -> Self {
@@ -59,21 +61,24 @@ impl Wiring {
         }
         let mut receptive = [(); 3].map(|()| vec![Vec::new(); n_neurons]);
         let mut afferent = vec![Vec::new(); n_neurons];
-        let mut outgoing = vec![Vec::new(); n_neurons];
+        let mut outgoing = vec![Vec::new(); n_neurons + n_encoded];
         for (number, &Synapse { pre, post }) in synapses.iter().enumerate() {
-            match pre {
+            let pre = match pre {
                 Source::Input(input) => {
                     afferent[post].push(Member { other: input, synapse: number });
+                    continue;
                 }
-                Source::Neuron(pre) => match transmitters[number] {
-                    None => outgoing[pre].push(Member { other: post, synapse: number }),
-                    Some(transmitter) => {
-                        for &receptor in opened_by(transmitter) {
-                            let member = Member { other: pre, synapse: number };
-                            receptive[receptor as usize][post].push(member);
-                        }
+                Source::Neuron(neuron) => neuron,
+                Source::Encoded(node) => n_neurons + node,
+            };
+            match transmitters[number] {
+                None => outgoing[pre].push(Member { other: post, synapse: number }),
+                Some(transmitter) => {
+                    for &receptor in opened_by(transmitter) {
+                        let member = Member { other: pre, synapse: number };
+                        receptive[receptor as usize][post].push(member);
                     }
-                },
+                }
             }
         }
         Self {

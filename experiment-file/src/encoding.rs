@@ -1,0 +1,259 @@
+//! How stimuli become spikes: encoders, and the receptive fields before them.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::{limits, schema};
+
+/// How a stimulus becomes spikes: each of its values passes a receptive field, whose nodes
+/// spike. Of spiking neurons only.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, transform = schema::optional("receptive_field"))]
+pub struct EncodingConfig {
+    /// How a node's value becomes spikes.
+    pub scheme: EncodingScheme,
+    /// How values of the stimulus become values of nodes; default
+    /// `gaussian_receptive_field`.
+    pub receptive_field: ReceptiveField,
+}
+
+/// How the value x of a node becomes spikes; a substep counts as 1 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum EncodingScheme {
+    /// A LIF neuron with its default parameters gets x as its current: it spikes above 15.
+    #[serde(rename = "LIF_Encoding")]
+    Lif,
+    /// Survival s -= 0.001 (x / 10) s per substep; a spike with probability 1 - s, then
+    /// s = 1. x is within 0 and 10,000.
+    #[serde(rename = "PoissonRateCoding")]
+    PoissonRate,
+    /// One spike per environment step, in substep x rounded down, the first being 1.
+    #[serde(rename = "RankOrderCoding")]
+    RankOrder,
+}
+
+/// How the values s of a stimulus become values of nodes. All but the identity and the
+/// linear field have `n_neurons` nodes per value; d is from s to the node's centre.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "name", content = "params")]
+#[schemars(deny_unknown_fields, transform = receptive_fields)]
+pub enum ReceptiveField {
+    /// s itself, one node per value.
+    #[serde(rename = "identity_receptive_field")]
+    Identity {},
+    /// exp(-sigma d^2)
+    #[serde(rename = "gaussian_receptive_field")]
+    Gaussian(GaussianField),
+    /// 1 - slope |d|, at least 0
+    #[serde(rename = "triangular_receptive_field")]
+    Triangular(SlopedField),
+    /// 1 - slope |d|, at least 0
+    #[serde(rename = "conic_receptive_field")]
+    Conic(SlopedField),
+    /// 1 - slope d^2, at least 0
+    #[serde(rename = "parabolic_receptive_field")]
+    Parabolic(SlopedField),
+    /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values; weights
+    /// can evolve (`encoders:weights`).
+    #[serde(rename = "linear_receptive_field")]
+    Linear(LinearField),
+}
+
+macro_rules! radial_field {
+    ($(#[$about:meta])* $name:ident, $(#[$meta:meta])* $steepness:ident = $default:literal,
+     $keys:literal) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+        #[schemars(deny_unknown_fields, transform = schema::optional($keys))]
+        pub struct $name {
+            $(#[$meta])*
+            #[schemars(range(min = 0, max = limits::STEEPNESS), extend("default" = $default))]
+            pub $steepness: f64,
+            /// Nodes per value; default 1.
+            #[schemars(range(min = 1, max = limits::FIELD_NODES), extend("default" = 1))]
+            pub n_neurons: u32,
+            /// Centre of the first node; default 0.
+            #[schemars(
+                range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE),
+                extend("default" = 0)
+            )]
+            pub min_stim: f64,
+            /// Centre of the last node, if there are two or more; the others are evenly
+            /// between; default 1.
+            #[schemars(
+                range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE),
+                extend("default" = 1)
+            )]
+            pub max_stim: f64,
+            /// Value of a node far from its centre; default 0, of `RankOrderCoding` 1.
+            #[schemars(range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE))]
+            pub min_val: f64,
+            /// Value of a node at its centre; default 1, of `RankOrderCoding` `time_scale`.
+            #[schemars(range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE))]
+            pub max_val: f64,
+            /// Whether `min_val` is at the centre and `max_val` far from it; default false.
+            #[schemars(extend("default" = false))]
+            pub inverted: bool,
+        }
+    };
+}
+
+radial_field!(
+    /// A field that falls like a bell.
+    GaussianField,
+    /// Factor of d^2; default 6.
+    sigma = 6.0,
+    "sigma, n_neurons, min_stim, max_stim, min_val, max_val, inverted"
+);
+
+radial_field!(
+    /// A field that falls to zero at a finite distance.
+    SlopedField,
+    /// Factor of the distance, or of its square; default 5.
+    slope = 5.0,
+    "slope, n_neurons, min_stim, max_stim, min_val, max_val, inverted"
+);
+
+/// A field whose weights can evolve. A weight that no query covers is exp(-|i - c|), with i
+/// the number of the value, and centres c evenly from 0 to their number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields, transform = schema::optional("n_neurons"))]
+pub struct LinearField {
+    /// Nodes of the stimulus; default 1.
+    #[schemars(range(min = 1, max = limits::FIELD_NODES), extend("default" = 1))]
+    pub n_neurons: u32,
+}
+
+/// What fields with centres have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadialField {
+    /// Value at a distance d from the centre, between 0 and 1.
+    pub shape: RadialShape,
+    /// `sigma` or `slope`.
+    pub steepness: f64,
+    /// Nodes per value.
+    pub n_neurons: u32,
+    /// First and last centre.
+    pub centres: [f64; 2],
+    /// Values for 0 and 1 of the shape, before `inverted`.
+    pub values: [f64; 2],
+    /// Whether 1 - the shape counts.
+    pub inverted: bool,
+}
+
+/// Value of a field at a distance d from its centre, k being its steepness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RadialShape {
+    /// exp(-k d^2)
+    Bell,
+    /// max(1 - k |d|, 0)
+    Cone,
+    /// max(1 - k d^2, 0)
+    Parabola,
+}
+
+impl RadialField {
+    /// Centre of a node among those of a value.
+    pub fn centre(&self, node: u32) -> f64 {
+        let [first, last] = self.centres;
+        let n_gaps = f64::from(self.n_neurons.max(2) - 1);
+        first + (last - first) * f64::from(node) / n_gaps
+    }
+}
+
+impl ReceptiveField {
+    /// The field as one with centres; none of the identity and the linear field.
+    pub fn radial(&self) -> Option<RadialField> {
+        let (shape, field) = match *self {
+            Self::Identity {} | Self::Linear(_) => return None,
+            Self::Gaussian(field) => return Some(field.radial()),
+            Self::Triangular(field) | Self::Conic(field) => (RadialShape::Cone, field),
+            Self::Parabolic(field) => (RadialShape::Parabola, field),
+        };
+        Some(field.radial(shape))
+    }
+
+    /// Nodes of a stimulus of `n` values.
+    pub fn n_nodes(&self, n: u32) -> u32 {
+        match self {
+            Self::Identity {} => n,
+            Self::Linear(field) => field.n_neurons,
+            _ => n * self.radial().map_or(1, |field| field.n_neurons),
+        }
+    }
+
+    /// Weights that can evolve, for a stimulus of `n` values, node by node.
+    pub fn n_weights(&self, n: u32) -> u32 {
+        match self {
+            Self::Linear(field) => field.n_neurons * n,
+            _ => 0,
+        }
+    }
+}
+
+impl GaussianField {
+    fn radial(self) -> RadialField {
+        let Self { sigma, n_neurons, min_stim, max_stim, min_val, max_val, inverted } = self;
+        RadialField {
+            shape: RadialShape::Bell,
+            steepness: sigma,
+            n_neurons,
+            centres: [min_stim, max_stim],
+            values: [min_val, max_val],
+            inverted,
+        }
+    }
+}
+
+impl SlopedField {
+    fn radial(self, shape: RadialShape) -> RadialField {
+        let Self { slope, n_neurons, min_stim, max_stim, min_val, max_val, inverted } = self;
+        RadialField {
+            shape,
+            steepness: slope,
+            n_neurons,
+            centres: [min_stim, max_stim],
+            values: [min_val, max_val],
+            inverted,
+        }
+    }
+}
+
+impl LinearField {
+    /// Weight of a value in a node's sum, of `n` values, where no gene gives one.
+    pub fn default_weight(&self, node: u32, value: u32, n: u32) -> f64 {
+        let n_gaps = f64::from(self.n_neurons.max(2) - 1);
+        let centre = f64::from(n) * f64::from(node) / n_gaps;
+        libm::exp(-libm::fabs(f64::from(value) - centre))
+    }
+}
+
+/// Every parameter has a default, and so has the name: the Gaussian field.
+fn receptive_fields(schema: &mut Schema) {
+    let variants = schema.get_mut("oneOf").and_then(Value::as_array_mut);
+    for variant in variants.into_iter().flatten() {
+        let is_default = variant["properties"]["name"]["const"] == "gaussian_receptive_field";
+        variant["required"] = if is_default { json!([]) } else { json!(["name"]) };
+    }
+}
+
+/// An entry of `encoding`: an encoder; or none, the stimulus as it is.
+pub(super) fn entries(generator: &mut SchemaGenerator) -> Schema {
+    let encoder = generator.subschema_for::<EncodingConfig>();
+    json_schema!({
+        "type": "object",
+        "additionalProperties": {"anyOf": [
+            encoder,
+            {
+                "type": "object",
+                "properties": {
+                    "scheme": {"const": "IdentityEncoding"},
+                    "receptive_field": {"description": "Accepted and ignored."},
+                },
+                "required": ["scheme"],
+                "additionalProperties": false,
+            },
+        ]},
+    })
+}

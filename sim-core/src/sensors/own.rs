@@ -1,0 +1,96 @@
+//! What a robot knows of itself: where it is, where it looks, whether it carries something.
+
+use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
+
+use super::{Noise, Sensor, Surroundings, Viewpoint};
+
+/// Position: x and y, cm.
+#[derive(Debug, Clone)]
+pub(crate) struct OwnPositionSensor;
+
+impl Sensor for OwnPositionSensor {
+    fn reading_len(&self) -> usize {
+        2
+    }
+
+    fn value_range(&self) -> RangeInclusive<f64> {
+        0.0..=f64::MAX
+    }
+
+    fn noise(&self) -> Noise {
+        Noise::NONE
+    }
+
+    fn sense(&self, from: Viewpoint, _: &Surroundings<'_>, reading: &mut [f64]) {
+        (reading[0], reading[1]) = (from.position.x, from.position.y);
+    }
+}
+
+/// Heading, in turns: \[0, 1).
+#[derive(Debug, Clone)]
+pub(crate) struct OwnOrientationSensor;
+
+impl Sensor for OwnOrientationSensor {
+    fn reading_len(&self) -> usize {
+        1
+    }
+
+    fn noise(&self) -> Noise {
+        Noise::NONE
+    }
+
+    fn sense(&self, from: Viewpoint, _: &Surroundings<'_>, reading: &mut [f64]) {
+        reading[0] = from.heading / TAU;
+    }
+}
+
+/// 1 if the robot carries something, else 0.
+#[derive(Debug, Clone)]
+pub(crate) struct FoodSensor;
+
+impl Sensor for FoodSensor {
+    fn reading_len(&self) -> usize {
+        1
+    }
+
+    fn noise(&self) -> Noise {
+        Noise::NONE
+    }
+
+    fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
+        reading[0] = f64::from(surroundings.swarm.carries[from.robot]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::neighbours::Neighbours;
+    use crate::objects::Switches;
+    use crate::swarm::Swarm;
+    use crate::torus::{Torus, Vec2};
+
+    #[test]
+    fn a_robot_knows_itself() {
+        let torus = &Torus { width: 1000.0, height: 800.0 };
+        let (position, heading) = (Vec2::new(730.0, 20.0), 0.75 * TAU);
+        let mut swarm = Swarm::new(vec![Vec2::default(), position], vec![0.0, heading], 0);
+        swarm.carries[1] = true;
+        let neighbours = &Neighbours::new(0.0, 2);
+        let switches = &Switches { lights: Vec::new(), areas: Vec::new() };
+        let swarm = &swarm;
+        let surroundings =
+            Surroundings { torus, swarm, neighbours, lights: &[], areas: &[], switches };
+        let read = |sensor: &dyn Sensor, robot: usize| {
+            let (position, heading) = (swarm.positions[robot], swarm.headings[robot]);
+            let mut reading = vec![7.0; sensor.reading_len()];
+            sensor.sense(Viewpoint { robot, position, heading }, &surroundings, &mut reading);
+            assert!(reading.iter().all(|value| sensor.value_range().contains(value)));
+            reading
+        };
+        assert_eq!(read(&OwnPositionSensor, 1), [730.0, 20.0]);
+        assert_eq!(read(&OwnOrientationSensor, 1), [0.75]);
+        assert_eq!((read(&FoodSensor, 0), read(&FoodSensor, 1)), (vec![0.0], vec![1.0]));
+    }
+}
