@@ -267,7 +267,7 @@ choose_base_images
 
 # Ports that are free, and a profile that builds fast: an optimised build takes three times as
 # long, and everything else in the images is the same.
-export SWARM_PORT=0 SWARM_TLS_PORT=0 PROFILE=dev WORKER_CPUS=1
+export SWARM_PORT=0 SWARM_TLS_PORT=0 PROFILE=${PROFILE:-dev} WORKER_CPUS=1
 mkdir "$work/docker" "$work/configs"
 cp docker/make-*.sh "$work/docker/"
 sed "s/\"generations\": 60/\"generations\": $GENERATIONS/" configs/quickstart.json > "$work/configs/experiment.json"

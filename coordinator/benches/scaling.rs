@@ -9,7 +9,7 @@ mod simulated_fleet;
 use std::time::{Duration, Instant};
 
 use coordinator::{
-    engine::{Batch, Command, Engine, EngineConfig, Introduction, ItemResult},
+    engine::{Batch, Command, Engine, EngineConfig, Introduction, ItemResult, NamePattern},
     ids::{ExperimentId, JobId},
     priority::Priority,
 };
@@ -141,9 +141,18 @@ fn throughput() -> f64 {
     for worker in 0..10_000 {
         let name = format!("worker-{worker}");
         let version = String::new();
-        engine.on_worker_joined(started, Introduction { name, version, n_slots: 1, process: None });
+        engine.on_worker_joined(
+            started,
+            Introduction {
+                name,
+                version,
+                n_slots: 1,
+                experiments: NamePattern::default(),
+                process: None,
+            },
+        );
     }
-    engine.on_job_started(EXPERIMENT, "spec".into(), Priority::default());
+    engine.on_job_started(EXPERIMENT, "name".into(), "spec".into(), Priority::default());
     let genotypes = population(100_000);
     let started = Instant::now();
     let mut now = started;

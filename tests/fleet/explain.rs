@@ -238,6 +238,21 @@ async fn a_worker_that_was_lost_waits_for_as_long_as_is_said_and_no_longer() {
     assert_undisturbed(&coordinator, id);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn an_experiment_that_no_connected_worker_takes_says_so() {
+    let coordinator = CoordinatorProcess::start();
+    let id = submit(&coordinator);
+    let hello = Hello { name: "reserved".to_owned(), experiments: "alice-*".to_owned(), ..hello() };
+    let reserved = HandWorker::connect(&coordinator.url(), hello).await.unwrap();
+    let finding = wait_for_finding(&coordinator, id, "taken_by_none", "1 worker would be free");
+    let workers = carry_out(&coordinator, step(&finding, 0)).stdout;
+    assert!(workers.contains("alice-*"), "{workers}");
+    let _worker = AdvisedWorker::start(&coordinator, step(&finding, 1));
+    wait_for_end_of_finding(&coordinator, id, "taken_by_none");
+    assert_undisturbed(&coordinator, id);
+    reserved.hang_up().await;
+}
+
 /// The process of a coordinator's referee.
 fn referee_of(coordinator: &CoordinatorProcess) -> u32 {
     let processes = fs::read_dir("/proc").unwrap().flatten();

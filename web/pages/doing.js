@@ -8,7 +8,7 @@ export function whatItDoes(it) {
   const parts = [];
   for (const trouble of it.troubles) parts.push(element("p", { className: "bad" }, trouble));
   if (it.workers_available === 0) {
-    parts.push(element("p", { className: "bad" }, it.workers ? "No connected worker is given work." : "No worker is connected: start one with `worker`."));
+    parts.push(element("p", { className: "bad" }, it.workers_of_others ? `No worker takes it: ${counted(it.workers_of_others, "worker")} of other experiments.` : it.workers ? "No connected worker is given work." : "No worker is connected: start one with `worker`."));
   }
   if (it.round) {
     const { generation, kind, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;

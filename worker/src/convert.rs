@@ -168,6 +168,7 @@ pub(crate) fn hello(config: &WorkerConfig, process_id: u64) -> v1::WorkRequest {
         slots: u32::try_from(config.slots).expect("slots are checked to be at most SLOTS_MAX"),
         version: env!("CARGO_PKG_VERSION").into(),
         process_id,
+        experiments: config.experiments.clone(),
     }))
 }
 

@@ -43,6 +43,10 @@ pub struct WorkerConfig {
     /// Number of items computed at the same time, each on a thread of its own,
     /// 1 to [`SLOTS_MAX`].
     pub slots: usize,
+    /// The experiments whose items it takes: a pattern of their names, up to
+    /// [`WORKER_NAME_LEN_MAX`] bytes, in which `*` stands for any text and `?` for one
+    /// character. Empty: all.
+    pub experiments: String,
     /// Upper bound of the random delay before the first reconnection; it doubles
     /// with every further one that fails.
     pub retry_delay_min: Duration,
@@ -65,6 +69,7 @@ impl WorkerConfig {
             coordinator: coordinator.into(),
             name: name.into(),
             slots,
+            experiments: String::new(),
             retry_delay_min: Duration::from_millis(250),
             retry_delay_max: Duration::from_secs(10),
             credentials: Credentials::default(),
@@ -86,6 +91,9 @@ pub enum WorkerError {
     /// A name that the protocol cannot carry. Fix the input.
     #[error("a worker's name has 1 to {WORKER_NAME_LEN_MAX} bytes, this one has {0}")]
     Name(usize),
+    /// A pattern that the protocol cannot carry. Fix the input.
+    #[error("a pattern of experiments has at most {WORKER_NAME_LEN_MAX} bytes, this one has {0}")]
+    Experiments(usize),
     /// A number of slots that the protocol does not allow. Fix the input.
     #[error("a worker has 1 to {SLOTS_MAX} slots, not {0}")]
     Slots(usize),
@@ -140,7 +148,14 @@ pub enum WorkerError {
 impl WorkerError {
     /// Whether the configuration is at fault.
     pub fn is_input(&self) -> bool {
-        matches!(self, Self::Link(_) | Self::Name(_) | Self::Slots(_) | Self::SessionFile { .. })
+        matches!(
+            self,
+            Self::Link(_)
+                | Self::Name(_)
+                | Self::Experiments(_)
+                | Self::Slots(_)
+                | Self::SessionFile { .. }
+        )
     }
 }
 
@@ -264,6 +279,9 @@ fn session_file(config: &WorkerConfig) -> Result<Option<SessionFile>, WorkerErro
 fn link(config: &WorkerConfig) -> Result<Link, WorkerError> {
     if !(1..=WORKER_NAME_LEN_MAX).contains(&config.name.len()) {
         return Err(WorkerError::Name(config.name.len()));
+    }
+    if config.experiments.len() > WORKER_NAME_LEN_MAX {
+        return Err(WorkerError::Experiments(config.experiments.len()));
     }
     if !(1..=SLOTS_MAX as usize).contains(&config.slots) {
         return Err(WorkerError::Slots(config.slots));

@@ -52,6 +52,10 @@ struct Args {
     /// Number of items computed at the same time [default: the number of cores]
     #[arg(long)]
     slots: Option<usize>,
+    /// Take only experiments whose name matches: `*` stands for any text, `?` for one
+    /// character, as in 'alice-*' [default: all]
+    #[arg(long, value_name = "PATTERN", default_value = "", hide_default_value = true)]
+    experiments: String,
     /// Vector instructions: portable, avx2, avx512 or neon. They change the speed and no
     /// bit of the results [default: the fastest that this processor has]
     #[arg(long, env = "SWARM_ISA", value_name = "LEVEL")]
@@ -115,6 +119,7 @@ async fn main() -> ExitCode {
     let isa = args.isa.unwrap_or_else(Isa::best);
     let config = WorkerConfig {
         credentials,
+        experiments: args.experiments,
         isa,
         session_file: args.session_file,
         ..WorkerConfig::new(args.coordinator, name, slots)

@@ -15,7 +15,7 @@ use crate::{
     text,
 };
 
-const CSV_KEYS: [&str; 12] = [
+const CSV_KEYS: [&str; 13] = [
     "id",
     "name",
     "version",
@@ -28,6 +28,7 @@ const CSV_KEYS: [&str; 12] = [
     "draining",
     "distrusted",
     "waits",
+    "experiments",
 ];
 
 /// A connected worker, as JSON and CSV have it.
@@ -45,6 +46,7 @@ struct Record<'a> {
     draining: bool,
     distrusted: Option<&'a str>,
     waits: Option<&'a str>,
+    experiments: Option<&'a str>,
 }
 
 impl<'a> From<&'a Worker> for Record<'a> {
@@ -62,6 +64,7 @@ impl<'a> From<&'a Worker> for Record<'a> {
             draining: worker.draining,
             distrusted: Some(&*worker.distrusted).filter(|reason| !reason.is_empty()),
             waits: Some(&*worker.waits).filter(|reason| !reason.is_empty()),
+            experiments: Some(&*worker.experiments).filter(|pattern| !pattern.is_empty()),
         }
     }
 }
@@ -72,7 +75,8 @@ impl<'a> From<&'a Worker> for Record<'a> {
 /// `items` is the number of items assigned to a worker. `--output wide` has the reasons
 /// of the two states in which a worker gets none. `waiting`: it returned nothing, or its
 /// word is in doubt; that passes by itself. `quarantine`: it returned what is proved
-/// wrong, and stays there, restarts included, until it is readmitted.
+/// wrong, and stays there, restarts included, until it is readmitted. `takes`: the
+/// experiments whose items it computes, as `worker --experiments` says.
 #[derive(Debug, Args)]
 pub struct WorkersArgs {
     /// Let this worker out of quarantine: it gets items again.
@@ -116,6 +120,7 @@ fn table(workers: &[Worker], now_ms: u64) -> Table {
         Column::new("connected").wide(),
         Column::new("state").painted(state_style),
         Column::text("reason").wide(),
+        Column::text("takes").wide(),
     ]);
     for worker in workers {
         let or_dash = |text: &str| if text.is_empty() { "-".to_owned() } else { text.to_owned() };
@@ -131,6 +136,11 @@ fn table(workers: &[Worker], now_ms: u64) -> Table {
             clock::ago(worker.connected_at_ms, now_ms),
             state(worker).to_owned(),
             or_dash(if worker.distrusted.is_empty() { &worker.waits } else { &worker.distrusted }),
+            if worker.experiments.is_empty() {
+                "all".to_owned()
+            } else {
+                worker.experiments.clone()
+            },
         ]);
     }
     table

@@ -87,6 +87,7 @@ impl EvaluationOrder {
             measures: simulation.measure_names().iter().map(ToString::to_string).collect(),
             n_steps: simulation.n_steps(),
             evaluation: Evaluation {
+                name: config.name.as_str().into(),
                 spec,
                 batch: Batch::measures(genotype, n_trials, n_values),
                 priority,

@@ -62,7 +62,7 @@ impl FitnessOrder {
         }
         let spec: Arc<str> = config.to_canonical_json().into();
         let batch = Batch::fitness(trial_set, genotypes.into(), n_trials);
-        Ok(Evaluation { spec, batch, priority })
+        Ok(Evaluation { name: config.name.as_str().into(), spec, batch, priority })
     }
 }
 

@@ -27,6 +27,7 @@ struct Situation {
     reason: String,
     has_workers: bool,
     has_workers_available: bool,
+    has_workers_of_others: bool,
     /// The workers that are given nothing, and why.
     withheld: Vec<(String, String)>,
     has_store_trouble: bool,
@@ -57,6 +58,7 @@ impl Situation {
             reason: experiment.reason.clone(),
             has_workers: activity.n_workers > 0,
             has_workers_available: activity.n_workers_available > 0,
+            has_workers_of_others: activity.n_workers_of_others > 0,
             withheld: withheld.map(|it| (it.name.clone(), it.reason.clone())).collect(),
             has_store_trouble: store_trouble.is_some(),
             is_short_of_memory: shortage.is_some(),

@@ -291,8 +291,8 @@ impl Driver {
         use runs::Command;
         let now = clock::now();
         match command {
-            Command::StartJob { job, spec, priority, is_paused } => {
-                self.engine.on_job_started(job, spec, priority);
+            Command::StartJob { job, name, spec, priority, is_paused } => {
+                self.engine.on_job_started(job, name, spec, priority);
                 if is_paused {
                     self.engine.on_job_paused(now, job);
                 }

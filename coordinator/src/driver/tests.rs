@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::{
-    engine::{Introduction, ItemResult},
+    engine::{Introduction, ItemResult, NamePattern},
     ids::WorkerId,
     referee::RefereeProgram,
     store::{ExperimentRecord, Store},
@@ -51,6 +51,7 @@ impl Rig {
             name: "w".to_owned(),
             version: String::new(),
             n_slots: 1000,
+            experiments: NamePattern::default(),
             process: None,
         };
         driver.on_event(DriverEvent::WorkerJoined { introduction, link, reply });
@@ -131,6 +132,7 @@ async fn a_client_that_cancels_is_told_when_the_end_is_stored() {
 async fn an_evaluation_whose_client_has_gone_is_dropped() {
     let mut rig = Rig::new().await;
     let evaluation = Box::new(Evaluation {
+        name: "quickstart".into(),
         spec: "{}".into(),
         batch: engine::Batch::measures(vec![0.5], 1, 1),
         priority: crate::priority::Priority::default(),

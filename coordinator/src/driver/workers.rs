@@ -26,7 +26,7 @@ impl Driver {
         link: WorkerLink,
         reply: oneshot::Sender<WorkerId>,
     ) {
-        let Introduction { name, version, n_slots, .. } = introduction.clone();
+        let Introduction { name, version, n_slots, experiments, .. } = introduction.clone();
         let id = self.engine.on_worker_joined(clock::now(), introduction);
         // The worker is welcomed before it is sent work: commands are carried out
         // after this.
@@ -35,7 +35,7 @@ impl Driver {
         self.fleet_news.send_modify(|count| *count += 1);
         let fleet = self.engine.fleet_size();
         info!(
-            worker = %id, name, version, slots = n_slots,
+            worker = %id, name, version, slots = n_slots, %experiments,
             workers = fleet.n_workers, total_slots = fleet.n_slots,
             "worker joined"
         );

@@ -6,7 +6,7 @@ use sim_core::TrialSet;
 
 use crate::ids::{JobId, WorkerId};
 
-use super::{Engine, batch::BatchInProgress};
+use super::{Engine, batch::BatchInProgress, worker::Worker};
 
 /// What a job is doing, and which workers could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -16,8 +16,10 @@ pub struct JobActivity {
     pub batch: Option<BatchActivity>,
     /// Connected workers.
     pub n_workers: usize,
-    /// Those that are given work.
+    /// Those that are given the job's items.
     pub n_workers_available: usize,
+    /// Those that would be given items, but do not take the job's.
+    pub n_workers_of_others: usize,
     /// Those that are given nothing, but for the ones that are leaving.
     pub withheld: Vec<WithheldWorker>,
     /// What the referee is asked about the job.
@@ -90,12 +92,17 @@ pub struct HeldItems {
 impl Engine {
     /// What a job is doing; without a batch if the engine does not know it.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
-        let batch = self.jobs.get(&id).and_then(|work| work.batch.as_ref());
+        let work = self.jobs.get(&id);
+        let batch = work.and_then(|work| work.batch.as_ref());
+        let usable = self.workers.values().filter(|worker| worker.is_usable());
+        let (takers, others): (Vec<&Worker>, Vec<&Worker>) =
+            usable.partition(|worker| work.is_none_or(|work| worker.takes(work)));
         let rivals = self.jobs.iter().filter(|(other, work)| **other != id && work.is_ready());
         JobActivity {
             batch: batch.map(|batch| self.batch_activity(now, id, batch)),
             n_workers: self.workers.len(),
-            n_workers_available: self.workers.values().filter(|worker| worker.is_usable()).count(),
+            n_workers_available: takers.len(),
+            n_workers_of_others: others.len(),
             withheld: self.withheld(now),
             questions: self.questions.of(id).map(|(_, question)| question.activity()).collect(),
             rivals: rivals.map(|(&other, _)| other).collect(),

@@ -107,15 +107,20 @@ impl Engine {
     }
 
     /// The job whose item is next, the worker that gets it, and where it is. A job whose
-    /// next item waits for a free slot ends the search: if later jobs were served ahead, no
-    /// slot would become free.
+    /// next item waits for a free slot keeps later jobs from being served ahead: no slot would
+    /// become free. They get slots that are idle, which are those of workers that do not take
+    /// the job.
     fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
-        let available = &self.load_index.available;
-        let &(load, _, first) = available.first()?;
+        if self.load_index.available.is_empty() {
+            return None;
+        }
+        let mut is_awaited = false;
         for &(_, id) in &self.ready_queue {
             let Some(batch) = &self.jobs[&id].batch else { continue };
+            let mut takers = self.takers(&self.jobs[&id]).peekable();
+            let Some(&(load, first)) = takers.peek() else { continue };
             if !batch.audits.is_empty() {
-                let mut workers = available.iter().map(|&(.., worker)| worker);
+                let mut workers = self.takers(&self.jobs[&id]).map(|(_, worker)| worker);
                 let may = |id: &WorkerId| {
                     batch.audits.has_clear_for(self.workers[id].name(), &self.doubted)
                 };
@@ -124,18 +129,30 @@ impl Engine {
                 }
             }
             if batch.has_suspects() {
-                let idle = available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
-                let mut workers = idle.map(|&(.., worker)| worker);
+                let idle = takers.take_while(|(load, _)| *load < FULL_LOAD);
+                let mut workers = idle.map(|(_, worker)| worker);
                 if let Some(worker) = workers.find(|id| !self.workers[id].has_suspect()) {
                     return Some((id, worker, Source::Suspects));
                 }
             }
             if batch.n_queued() > 0 {
-                let may_have = load < FULL_LOAD || self.hands_out_ahead(id);
-                return may_have.then_some((id, first, Source::Queue));
+                if load < FULL_LOAD || (!is_awaited && self.hands_out_ahead(id)) {
+                    return Some((id, first, Source::Queue));
+                }
+                if !self.has_idle_slot() {
+                    return None;
+                }
+                is_awaited = true;
             }
         }
         None
+    }
+
+    /// The workers with credit that take a job's items, the least loaded first, each with its
+    /// rank.
+    fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
+        let available = self.load_index.available.iter().map(|&(load, _, id)| (load, id));
+        available.filter(|(_, id)| self.workers[id].takes(work))
     }
 
     /// Slots among which a job's items are divided: the jobs in the ready queue get
@@ -178,8 +195,11 @@ impl Engine {
             self.load_index.backlogged.iter().rev().take(N_LOOKED_AT).find_map(|&(_, holder)| {
                 let worker = &self.workers[&holder];
                 let mut waiting = worker.in_flight.iter().rev().take(worker.n_waiting());
-                let (&assignment_id, _) =
-                    waiting.find(|(_, a)| !a.is_audit && a.expected > now + MOVING_COST)?;
+                let (&assignment_id, _) = waiting.find(|(_, a)| {
+                    !a.is_audit
+                        && a.expected > now + MOVING_COST
+                        && self.idle_taker(&self.jobs[&a.job], |_| true).is_some()
+                })?;
                 Some((holder, assignment_id))
             });
         let Some((holder, assignment_id)) = candidate else { return false };
@@ -191,16 +211,17 @@ impl Engine {
     /// Gives work that is being computed to idle slots, too; whether there was any
     /// for which that is worth it.
     fn duplicate(&mut self, now: Instant) -> bool {
-        let Some(idle) = self.idle_worker(|_| true) else { return false };
-        let pace = self.workers[&idle].pace;
         let candidate = self.jobs.iter().find_map(|(&id, work)| {
+            let idle = self.idle_taker(work, |_| true)?;
+            let pace = self.workers[&idle].pace;
             let copy = work.slowest(now, self.load_index.n_idle_slots, pace, &self.workers)?;
             Some((id, copy))
         });
         let Some((job, Slow { key, item, n_parts })) = candidate else { return false };
         let other = |engine: &Self, item: &Item| {
-            let batch = engine.jobs[&job].batch.as_ref();
-            engine.idle_worker(|id| batch.is_some_and(|batch| !batch.is_holder(id, item)))
+            let work = &engine.jobs[&job];
+            let batch = work.batch.as_ref();
+            engine.idle_taker(work, |id| batch.is_some_and(|batch| !batch.is_holder(id, item)))
         };
         if other(self, &item).is_none() {
             return false;
@@ -218,9 +239,14 @@ impl Engine {
         true
     }
 
-    fn idle_worker(&self, is_suitable: impl Fn(WorkerId) -> bool) -> Option<WorkerId> {
-        let idle = self.load_index.available.iter().take_while(|(load, ..)| *load < FULL_LOAD);
-        idle.map(|&(.., id)| id).find(|&id| is_suitable(id))
+    /// The least loaded worker with an idle slot that takes a job's items and is suitable.
+    pub(super) fn idle_taker(
+        &self,
+        work: &JobWork,
+        is_suitable: impl Fn(WorkerId) -> bool,
+    ) -> Option<WorkerId> {
+        let idle = self.takers(work).take_while(|&(load, _)| load < FULL_LOAD);
+        idle.map(|(_, id)| id).find(|&id| is_suitable(id))
     }
 
     /// Assigns an item to a worker.

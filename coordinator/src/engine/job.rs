@@ -18,6 +18,8 @@ const UNKNOWN_TRIAL: Duration = Duration::from_millis(10);
 /// A job that has not ended.
 #[derive(Debug)]
 pub struct JobWork {
+    /// Its experiment's name, by which workers take it or leave it.
+    pub name: Arc<str>,
     /// Opaque to the engine; every worker gets it once.
     pub spec: Arc<str>,
     /// Whether it waits to be resumed.
@@ -42,8 +44,9 @@ pub struct JobWork {
 
 impl JobWork {
     /// A job without a batch.
-    pub fn new(spec: Arc<str>, priority: Priority) -> Self {
+    pub fn new(name: Arc<str>, spec: Arc<str>, priority: Priority) -> Self {
         Self {
+            name,
             spec,
             is_paused: false,
             batch: None,

@@ -13,6 +13,8 @@ use sim_core::{Output, TrialSet};
 use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
 use evolution::{Genotype, Population};
 
+use super::NamePattern;
+
 /// What a job wants computed at once: every genotype on every trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch {
@@ -238,7 +240,7 @@ pub struct EvaluatedBatch {
 }
 
 /// Who a worker says it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Introduction {
     /// What it calls itself.
     pub name: String,
@@ -246,6 +248,8 @@ pub struct Introduction {
     pub version: String,
     /// Items it computes at the same time.
     pub n_slots: usize,
+    /// The experiments that it takes.
+    pub experiments: NamePattern,
     /// Its process; the same when it comes back after its stream broke.
     pub process: Option<NonZeroU64>,
 }
@@ -261,6 +265,8 @@ pub struct WorkerStatus {
     pub version: String,
     /// Items it computes at the same time.
     pub n_slots: usize,
+    /// The experiments that it takes.
+    pub experiments: NamePattern,
     /// Assignments that it has not answered.
     pub n_in_flight: usize,
     /// Results per second of about the last minute.

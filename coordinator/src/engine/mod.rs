@@ -12,6 +12,7 @@
 //! The rules:
 //! - A worker holds one assignment per slot, and as many ahead as it computes in
 //!   some tens of milliseconds.
+//! - A worker takes the jobs that its pattern of names matches; usually all.
 //! - Jobs with items to hand out share the workers' time in proportion to their
 //!   priorities, by stride scheduling (Waldspurger & Weihl, "Stride Scheduling:
 //!   Deterministic Proportional-Share Resource Management", MIT/LCS/TM-528, 1995):
@@ -49,6 +50,7 @@ mod known_results;
 mod load_index;
 mod losses;
 mod messages;
+mod name_pattern;
 mod quarantine;
 mod questions;
 mod results;
@@ -86,6 +88,7 @@ pub use messages::{
     Assignment, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
     SharedGenotype, WorkerStatus,
 };
+pub use name_pattern::NamePattern;
 use quarantine::Quarantine;
 use questions::Questions;
 use results::NoResult;
@@ -201,9 +204,26 @@ impl Engine {
         worker.is_on_probation = rest.is_some();
         worker.resting_until = rest.filter(|&until| until > now && self.has_usable_worker());
         self.load_index.add(id, &worker);
+        self.take_up_stranded(&worker);
         self.workers.insert(id, worker);
         self.assign(now);
         id
+    }
+
+    /// Jobs that only this worker takes, beside others that are there already, have saved up
+    /// no time meanwhile.
+    fn take_up_stranded(&mut self, joining: &Worker) {
+        if self.workers.is_empty() {
+            return;
+        }
+        let waiting = self.ready_queue.iter().filter(|(_, id)| {
+            let work = &self.jobs[id];
+            joining.takes(work) && !self.workers.values().any(|worker| worker.takes(work))
+        });
+        for (virtual_time, id) in waiting.copied().collect::<Vec<_>>() {
+            self.ready_queue.remove(&(virtual_time, id));
+            self.make_ready(id);
+        }
     }
 
     /// A worker's stream has ended. Its items go to others; returns their number.
@@ -238,9 +258,16 @@ impl Engine {
         self.assign(now);
     }
 
-    /// A job exists. `spec`: what workers need beside its items.
-    pub fn on_job_started(&mut self, id: JobId, spec: Arc<str>, priority: Priority) {
-        self.jobs.insert(id, JobWork::new(spec, priority));
+    /// A job exists. `name`: which workers take it, by their patterns. `spec`: what workers
+    /// need beside its items.
+    pub fn on_job_started(
+        &mut self,
+        id: JobId,
+        name: Arc<str>,
+        spec: Arc<str>,
+        priority: Priority,
+    ) {
+        self.jobs.insert(id, JobWork::new(name, spec, priority));
     }
 
     /// A job wants a batch computed. It has no other meanwhile.
@@ -512,9 +539,10 @@ impl Engine {
         let has_queued = |work: &&JobWork| {
             work.is_ready() && work.batch.as_ref().is_some_and(|batch| batch.n_queued() > 0)
         };
+        let is_neglected = |work: &JobWork| self.idle_taker(work, |_| true).is_some();
         assert!(
-            !self.has_idle_slot() || self.jobs.values().find(has_queued).is_none(),
-            "no work waits while a slot is idle"
+            !self.jobs.values().filter(has_queued).any(is_neglected),
+            "no work waits while a slot is idle whose worker takes it"
         );
         assert!(self.outgoing.is_empty(), "everything is sent");
         let n_slots: usize = self.workers.values().map(Worker::n_slots).sum();

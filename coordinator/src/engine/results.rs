@@ -332,10 +332,13 @@ impl Engine {
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
-        let is_awaited = now < self.auditors_seen + AUDITOR_GRACE;
-        let workers = &self.workers;
+        let is_in_grace = now < self.auditors_seen + AUDITOR_GRACE;
+        let (workers, job) = (&self.workers, &*work);
         let has_auditor = |batch: &BatchInProgress| {
-            let mut auditors = workers.values().filter(|worker| worker.may_audit());
+            // Of a fleet that is divided among experiments, auditors that have been seen may be
+            // another's.
+            let is_awaited = is_in_grace && workers.values().all(|worker| worker.takes(job));
+            let mut auditors = workers.values().filter(|it| it.may_audit() && it.takes(job));
             is_awaited || auditors.any(|worker| batch.audits.has_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {

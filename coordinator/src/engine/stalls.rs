@@ -57,7 +57,8 @@ impl Engine {
         let takes = work.expected(oldest.item.trials.len(), worker.pace)?;
         let first = work.batch.as_ref()?.computed_by(&oldest.item);
         let mut others = self.workers.iter().filter(|&(&other, _)| other != id);
-        let may_audit = |other: &Worker| other.is_usable() && Some(other.name()) != first;
+        let may_audit =
+            |other: &Worker| other.is_usable() && other.takes(work) && Some(other.name()) != first;
         let (times, more) = if oldest.is_audit && !others.any(|(_, other)| may_audit(other)) {
             PATIENCE_WITH_AUDITOR
         } else {

@@ -11,7 +11,7 @@ use swarm_proto::ITEMS_PER_SLOT_MAX;
 
 use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
 
-use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, item::Item};
+use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, item::Item, job::JobWork};
 
 /// A worker is given so much work ahead, so that it computes while results and
 /// new items travel: longer than a round trip and the coordinator's own delays.
@@ -116,6 +116,11 @@ impl Worker {
     /// Items it computes at the same time.
     pub fn n_slots(&self) -> usize {
         self.introduction.n_slots
+    }
+
+    /// Whether it takes items of this job.
+    pub fn takes(&self, job: &JobWork) -> bool {
+        self.introduction.experiments.matches(&job.name)
     }
 
     /// Whether it may be given items now.
@@ -230,13 +235,14 @@ impl Worker {
 
     /// What people see of it.
     pub fn status(&self, id: WorkerId, now: Instant) -> WorkerStatus {
-        let Introduction { name, version, n_slots, .. } = self.introduction.clone();
+        let Introduction { name, version, n_slots, experiments, .. } = self.introduction.clone();
         let (results_per_s, idle_share) = self.time.recent(now);
         WorkerStatus {
             id,
             name,
             version,
             n_slots,
+            experiments,
             n_in_flight: self.in_flight.len(),
             results_per_s,
             idle_share,

@@ -136,6 +136,7 @@ pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
         draining: worker.is_draining,
         distrusted: worker.quarantined.unwrap_or_default(),
         waits: worker.waits.unwrap_or_default(),
+        experiments: worker.experiments.to_string(),
     }
 }
 

@@ -25,6 +25,7 @@ pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
         round: activity.batch.and_then(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
+        workers_of_others: activity.n_workers_of_others as u32,
         withheld: activity.withheld.into_iter().map(withheld).collect(),
         questions: activity.questions.into_iter().map(question).collect(),
         rivals: rivals.map(|id| id.0).collect(),

@@ -23,7 +23,7 @@ use tracing::warn;
 use crate::{
     clock,
     driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
-    engine::Introduction,
+    engine::{Introduction, NamePattern},
     ids::WorkerId,
     limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
     server::listener::Peer,
@@ -83,6 +83,7 @@ impl WorkerService for Workers {
             name: printable(&hello.name),
             version: printable(&hello.version),
             n_slots,
+            experiments: NamePattern::new(&printable(&hello.experiments)),
             process: NonZeroU64::new(hello.process_id),
         };
         let joined = DriverEvent::WorkerJoined { introduction, link, reply };
@@ -164,9 +165,11 @@ fn check_hello(hello: &Hello) -> Result<(), Status> {
             "name is longer than {WORKER_NAME_LEN_MAX} bytes"
         )));
     }
-    if hello.version.len() > WORKER_NAME_LEN_MAX {
-        let message = format!("version is longer than {WORKER_NAME_LEN_MAX} bytes");
-        return Err(Status::invalid_argument(message));
+    for (what, text) in [("version", &hello.version), ("experiments", &hello.experiments)] {
+        if text.len() > WORKER_NAME_LEN_MAX {
+            let message = format!("{what} is longer than {WORKER_NAME_LEN_MAX} bytes");
+            return Err(Status::invalid_argument(message));
+        }
     }
     Ok(())
 }

@@ -10,6 +10,8 @@ use super::{Command, Runs};
 /// Genotypes to be evaluated; everything about them has been checked.
 #[derive(Debug)]
 pub struct Evaluation {
+    /// The experiment's name.
+    pub name: Arc<str>,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
     /// What is to be evaluated.
@@ -21,12 +23,12 @@ pub struct Evaluation {
 impl Runs {
     /// A client wants genotypes evaluated. Returns what the evaluation is called.
     pub fn on_evaluation_requested(&mut self, evaluation: Evaluation) -> EvaluationId {
-        let Evaluation { spec, batch, priority } = evaluation;
+        let Evaluation { name, spec, batch, priority } = evaluation;
         self.n_evaluations += 1;
         let id = EvaluationId(self.n_evaluations);
         self.evaluations.insert(id);
         self.commands.extend([
-            Command::StartJob { job: id.into(), spec, priority, is_paused: false },
+            Command::StartJob { job: id.into(), name, spec, priority, is_paused: false },
             Command::Evaluate { job: id.into(), batch },
         ]);
         id

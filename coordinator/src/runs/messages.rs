@@ -21,6 +21,8 @@ pub enum Command {
     StartJob {
         /// The job.
         job: JobId,
+        /// Its experiment's name.
+        name: Arc<str>,
         /// The canonical configuration, for workers.
         spec: Arc<str>,
         /// Its share of the fleet.

@@ -109,9 +109,11 @@ impl Runs {
             return;
         }
         self.n_begun += 1;
+        let name = config.name.as_str().into();
         let run = Run::new(config, self.n_begun, latest, memory);
         let former = self.runs.insert(id, run);
-        self.commands.push_back(Command::StartJob { job: id.into(), spec, priority, is_paused });
+        let job = id.into();
+        self.commands.push_back(Command::StartJob { job, name, spec, priority, is_paused });
         self.apply_former_requests(id, former);
         self.load_what_fits();
         self.report_shortage(id);

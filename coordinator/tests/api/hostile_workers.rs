@@ -428,15 +428,19 @@ async fn fitness_that_overflows_or_is_not_a_number_is_ranked_last_and_survived()
 #[tokio::test]
 async fn slots_are_within_bounds_and_names_too() {
     let stage = Stage::start().await;
-    for (slots, name, expected) in [
-        (0, "w".to_owned(), Code::InvalidArgument),
-        (4097, "w".to_owned(), Code::InvalidArgument),
-        (u32::MAX, "w".to_owned(), Code::InvalidArgument),
-        (1, "w".repeat(129), Code::InvalidArgument),
-        (4096, "w".repeat(128), Code::Ok),
+    for (slots, name_len, pattern_len, expected) in [
+        (0, 1, 0, Code::InvalidArgument),
+        (4097, 1, 0, Code::InvalidArgument),
+        (u32::MAX, 1, 0, Code::InvalidArgument),
+        (1, 129, 0, Code::InvalidArgument),
+        (1, 1, 129, Code::InvalidArgument),
+        (4096, 128, 128, Code::Ok),
     ] {
+        let (name, experiments) = ("w".repeat(name_len), "*".repeat(pattern_len));
         let mut worker = stage.worker().await;
-        worker.say(work_request::Message::Hello(Hello { slots, name, ..hello() })).await;
+        worker
+            .say(work_request::Message::Hello(Hello { slots, name, experiments, ..hello() }))
+            .await;
         let code = worker.inbox().await.map_or_else(|status| status.code(), |_| Code::Ok);
         assert_eq!(code, expected);
     }

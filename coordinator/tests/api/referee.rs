@@ -76,7 +76,11 @@ struct Traced {
 impl Traced {
     fn new(idle_time: Duration) -> Self {
         let directory = tempfile::tempdir().unwrap();
-        let line = format!("echo $$ > {}; exec $0 referee", pid_file(directory.path()).display());
+        // Under `nohup`, and behind `&`, tests and what they start would ignore signals.
+        let line = format!(
+            "echo $$ > {}; exec env --default-signal $0 referee",
+            pid_file(directory.path()).display()
+        );
         Self { referee: Referee::new(shell(&line), idle_time), directory }
     }
 

@@ -123,6 +123,7 @@ fn explanation(it: ExplainExperimentResponse) -> Value {
         })),
         "workers": it.workers,
         "workers_available": it.workers_available,
+        "workers_of_others": it.workers_of_others,
         "rivals": it.rivals,
         "withheld": it.withheld.iter().map(|it| json!([it.worker_name, it.reason]))
             .collect::<Vec<_>>(),

@@ -36,6 +36,7 @@ pub enum Kind {
     Memory,
     NoWorkers,
     NoWorkersAvailable,
+    TakenByNone,
     Quarantine,
     WorkersWaiting,
     Referee,
@@ -70,11 +71,11 @@ impl Finding {
     fn is_stall(&self, held_ms: u64) -> bool {
         use Kind::{
             Audits, Barrier, Incompatible, Memory, NoWorkers, NoWorkersAvailable, Paused, Queued,
-            RefereeTrouble, StoreTrouble,
+            RefereeTrouble, StoreTrouble, TakenByNone,
         };
         match self.kind {
             Paused | Incompatible | StoreTrouble | Memory | NoWorkers | NoWorkersAvailable
-            | RefereeTrouble | Audits => true,
+            | TakenByNone | RefereeTrouble | Audits => true,
             // Others are computed meanwhile.
             Queued => held_ms == 0,
             Barrier => held_ms >= STALL_MS,
@@ -143,7 +144,7 @@ pub fn findings(
         findings.push(finding(Kind::Memory, what, steps));
         return findings;
     }
-    findings.extend(of_workers(answer, address));
+    findings.extend(of_workers(experiment, answer, address));
     findings.extend(of_withheld(answer));
     findings.extend(of_questions(answer));
     match &answer.round {
@@ -156,10 +157,24 @@ pub fn findings(
     findings
 }
 
-fn of_workers(answer: &ExplainExperimentResponse, address: &str) -> Option<Finding> {
+fn of_workers(
+    experiment: &Experiment,
+    answer: &ExplainExperimentResponse,
+    address: &str,
+) -> Option<Finding> {
     let start = format!("start some: worker --coordinator {address}");
     if answer.workers == 0 {
         return Some(finding(Kind::NoWorkers, "no worker is connected", [start]));
+    }
+    if answer.workers_available == 0 && answer.workers_of_others > 0 {
+        let workers = text::counted(answer.workers_of_others.into(), "worker");
+        let what = format!(
+            "no worker takes it: {workers} would be free, but only for experiments of other names \
+             than {}",
+            experiment.name
+        );
+        let steps = ["see for which: swarmctl workers --output wide".to_owned(), start];
+        return Some(finding(Kind::TakenByNone, what, steps));
     }
     if answer.workers_available == 0 {
         let workers = text::counted(answer.workers.into(), "connected worker");
@@ -389,6 +404,8 @@ mod tests {
         assert_eq!(kinds(running(), &nobody)[0], Kind::NoWorkers);
         let leaving = ExplainExperimentResponse { workers_available: 0, ..healthy() };
         assert_eq!(kinds(running(), &leaving)[0], Kind::NoWorkersAvailable);
+        let divided = ExplainExperimentResponse { workers_of_others: 1, ..leaving };
+        assert_eq!(kinds(running(), &divided)[0], Kind::TakenByNone);
         let shared = ExplainExperimentResponse { rivals: vec![4], ..healthy() };
         assert_eq!(kinds(running(), &shared), [Kind::Queued]);
         let full = ExplainExperimentResponse { store_trouble: "disk".into(), ..healthy() };

@@ -285,6 +285,7 @@ fn changes_are_written_one_after_the_other() {
 fn an_abandoned_evaluation_is_dropped_and_a_finished_one_answered() {
     let mut runs = Runs::new(u64::MAX);
     let evaluation = || Evaluation {
+        name: "quickstart".into(),
         spec: "{}".into(),
         batch: Batch::measures(vec![0.5], 1, 2),
         priority: crate::priority::Priority::default(),

@@ -2,6 +2,7 @@
 //! twice, nothing grows without bound, whatever happens to the workers.
 
 mod by_hand;
+mod divided;
 mod evaluations;
 mod timeline;
 mod trouble;

@@ -16,7 +16,7 @@ use std::{
 use coordinator::{
     engine::{
         Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
-        JobActivity, TimelineEntry, WorkerStatus,
+        JobActivity, NamePattern, TimelineEntry, WorkerStatus,
     },
     ids::{AssignmentId, JobId, QuestionId, WorkerId},
     priority::Priority,
@@ -247,12 +247,20 @@ impl SimulatedFleet {
         self.connect(introduction, 1.0, Conduct::Honest, true)
     }
 
+    /// The same for a worker that takes only experiments whose name matches.
+    pub fn join_for(&mut self, experiments: &str, speed: f64) -> WorkerId {
+        let experiments = NamePattern::new(experiments);
+        let introduction = Introduction { experiments, ..self.introduction(1) };
+        self.connect(introduction, speed, Conduct::Honest, false)
+    }
+
     fn introduction(&mut self, n_slots: usize) -> Introduction {
         self.n_processes += 1;
         Introduction {
             name: format!("worker-{}", self.n_processes),
             version: "simulated".to_owned(),
             n_slots,
+            experiments: NamePattern::default(),
             process: NonZeroU64::new(self.n_processes),
         }
     }
@@ -387,7 +395,8 @@ impl SimulatedFleet {
 
     pub fn submit(&mut self, id: JobId, weight: u32) {
         let priority = Priority::new(weight).expect("within bounds");
-        self.engine.on_job_started(id, "spec".into(), priority);
+        let name = id.to_string().replace(' ', "-").into();
+        self.engine.on_job_started(id, name, "spec".into(), priority);
     }
 
     pub fn ask(&mut self, id: JobId, generation: u64, population_size: usize, n_trials: u32) {
