@@ -69,6 +69,7 @@ class Episodes:
     n_inputs: int
     message_len: int
     def stimuli(self) -> NDArray[np.float32]: ...
+    def set_stimuli(self, stimuli: NDArray[np.float32]) -> None: ...
     def step(
         self,
         wheels: _Floats,

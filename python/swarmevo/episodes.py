@@ -77,6 +77,16 @@ class Episodes:
         stimuli = self._core.stimuli()
         return stimuli.reshape(self.n_trials, len(self.agents), self.n_inputs)
 
+    @stimuli.setter
+    def stimuli(self, stimuli: ArrayLike) -> None:
+        """Has the agents get this instead in this step: what :meth:`decide` sees. Radios still relay what
+        they heard; what is set for inputs that an agent has not does not matter."""
+        values = np.ascontiguousarray(stimuli, dtype=np.float32)
+        shape = (self.n_trials, len(self.agents), self.n_inputs)
+        if values.shape != shape:
+            raise ValueError(f"stimuli are an array {list(shape)}, not {list(values.shape)}")
+        self._core.set_stimuli(values.reshape(-1))
+
     def idle(self) -> Actions:
         """Actions of agents that stand, with the LED off, and send zeros."""
         shape = (self.n_trials, len(self.agents))

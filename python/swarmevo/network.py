@@ -43,26 +43,43 @@ class Network:
         """``[N, I]``: weight of each synapse from an input, 0 where there is none."""
         self.weights: NDArray[np.float64] = np.zeros((len(neurons), len(neurons)))
         """``[N, N]``: ``weights[post, pre]``, 0 where there is no synapse."""
+        self.nodes: list[str] = [
+            f"{it['name']}_node_{i}"
+            for it in description["stimuli"]
+            for i in range(it.get("encoder", {}).get("n_nodes", 0))
+        ]
+        """Names of the E nodes of encoders, which spike: ``STIMULUS_node_0`` and so on."""
+        self.node_weights: NDArray[np.float64] = np.zeros((len(neurons), len(self.nodes)))
+        """``[N, E]``: weight of each synapse from a node of an encoder."""
         for synapse in description["synapses"]:
             pre = synapse["pre"]
             if "input" in pre:
                 self.input_weights[synapse["post"], pre["input"]] += synapse["weight"]
+            elif "node" in pre:
+                self.node_weights[synapse["post"], pre["node"]] += synapse["weight"]
             else:
                 self.weights[synapse["post"], pre["neuron"]] += synapse["weight"]
 
     def to_networkx(self) -> networkx.MultiDiGraph:
-        """A graph with a node per input and neuron, under their names, and an edge per
-        synapse with ``weight``, ``group`` (its name in the file) and ``trainable``."""
+        """A graph with a node per input, node of an encoder and neuron, under their names, and an
+        edge per synapse with ``weight``, ``group`` (its name in the file) and ``trainable``."""
         import networkx
 
         graph: networkx.MultiDiGraph = networkx.MultiDiGraph()
         for name in self.inputs:
             graph.add_node(name, kind="input")
+        for name in self.nodes:
+            graph.add_node(name, kind="node")
         for i, name in enumerate(self.neurons):
             graph.add_node(name, kind="neuron", **self.description["neurons"][i])
         for synapse in self.description["synapses"]:
             pre = synapse["pre"]
-            source = self.inputs[pre["input"]] if "input" in pre else self.neurons[pre["neuron"]]
+            if "input" in pre:
+                source = self.inputs[pre["input"]]
+            elif "node" in pre:
+                source = self.nodes[pre["node"]]
+            else:
+                source = self.neurons[pre["neuron"]]
             rest = {key: synapse[key] for key in synapse if key not in ("pre", "post")}
             graph.add_edge(source, self.neurons[synapse["post"]], **rest)
         return graph

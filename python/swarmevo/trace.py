@@ -70,7 +70,7 @@ class Trace:
     lights: Floats
     """``[T, steps, L, 2]``: positions of lights during the step, cm."""
     areas: Floats
-    """``[T, A, 2]``: positions of ground areas, cm."""
+    """``[T, A, 2]``: positions of ground areas at the start, cm."""
 
     def __init__(
         self,

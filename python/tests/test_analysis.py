@@ -165,14 +165,15 @@ def test_a_genotypes_network_alone_does_what_it_did_in_the_swarm(quickstart, gen
 
 
 def test_a_report_says_which_inputs_matter_and_is_the_same_file_twice(quickstart, genotypes, tmp_path):
-    path = analysis.report(quickstart, genotypes[0], tmp_path / "once", trials=4)
+    path = analysis.report(quickstart, genotypes[0], tmp_path / "once", trials=2)
     page = path.read_text()
-    for heading in ("Which inputs matter", "Under other conditions", "What is said", "Who informs whom", "The network alone"):
+    headings = ("How it does it", "Which inputs matter", "Under other conditions", "What is said", "Who informs whom")
+    for heading in (*headings, "What each part of the network is worth", "The network alone"):
         assert heading in page
     assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
         "http://creativecommons.org", ""
     ), "it needs no network"
-    again = analysis.report(quickstart, genotypes[0], tmp_path / "again", trials=4)
+    again = analysis.report(quickstart, genotypes[0], tmp_path / "again", trials=2)
     assert again.read_text() == page
     with open(tmp_path / "once" / "inputs.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -182,6 +183,7 @@ def test_a_report_says_which_inputs_matter_and_is_the_same_file_twice(quickstart
 def test_an_input_that_is_absent_already_changes_not_a_bit(tmp_path):
     config = json.loads((PROJECT / "configs/leader_selection_snes.json").read_text())
     champion = json.loads((PROJECT / "results/champions/leader_selection_snes-0.json").read_text())
+    config["algorithm"]["evaluation_steps"] = 60
     config["world"]["objects"]["robotA"]["perturbations"] = {
         "stimuli_inhibition": {"stimuli": "wireless_receiver:state", "affected_robots": "all"}
     }
@@ -214,44 +216,3 @@ def test_affected_robots_stay_the_same_share_of_a_swarm():
     (robots,) = (config for what, value, config in _conditions(experiment.to_dict()) if (what, value) == ("robots", 20))
     inhibited = robots["world"]["objects"]["robotA"]["perturbations"]["stimuli_inhibition"]
     assert (inhibited if isinstance(inhibited, dict) else inhibited[0])["affected_robots"] == 16
-
-
-@pytest.fixture(scope="module")
-def leader():
-    """Experiment A and its champion."""
-    champion = json.loads((PROJECT / "results/champions/leader_selection_snes-0.json").read_text())
-    return swarmevo.Experiment.from_file(PROJECT / "configs/leader_selection_snes.json"), champion["genotype"]
-
-
-def test_what_a_leader_says_moves_others_and_what_relays_would_say_does_not(leader):
-    found = analysis.influence(*leader, [40, 45], trials=4)
-    assert found.said.any() and not found.said.all()
-    assert (found.reached[~found.said] == 0).all(), "a message that is not sent has no influence"
-    assert (found.reached[found.said] > 0).any()
-    assert found.reached.max() <= 9
-
-
-def test_a_message_that_nobody_senses_has_no_influence_at_all(leader):
-    experiment, genotype = leader
-    config = experiment.to_dict()
-    config["world"]["objects"]["robotA"]["perturbations"] = {
-        "stimuli_inhibition": {"stimuli": "wireless_receiver:msg", "affected_robots": "all"}
-    }
-    found = analysis.influence(swarmevo.Experiment.from_dict(config), genotype, [5, 40], trials=4)
-    assert found.said.any()
-    assert not found.reached.any() and not found.leds.any() and not found.fitness.any()
-
-
-def test_a_message_replaced_by_itself_changes_nothing_and_a_wrong_step_is_refused(leader):
-    experiment, genotype = leader
-    trace = experiment.simulate(genotype, swarmevo.TrialSet.evaluation(), trials=1)
-    (sender, *_) = np.flatnonzero(trace.sends[0, 40])
-    episodes = experiment.episodes(swarmevo.TrialSet.evaluation(), trials=1)
-    episodes.load(genotype)
-    while episodes.n_steps_done < 40:
-        episodes.step(episodes.decide())
-    itself = episodes.decide().messages[0, sender]
-    found = analysis.influence(experiment, genotype, [40], replace=itself, agents=[sender], trials=1)
-    assert not found.said.any() and not found.reached.any()
-    with pytest.raises(ValueError, match="steps from 0 to 298"):
-        analysis.influence(experiment, genotype, [299], trials=1)

@@ -4,6 +4,8 @@ Arrays have the axes of :class:`swarmevo.Trace`: trials, steps, robots. Rows of 
 each other, so that every error and every level of chance here is one over trials, never over rows.
 """
 
+from .ablation import Lesion, ablation, synapse_genes
+from .border import alpha_shape, border
 from .channel import (
     ChannelUse,
     Symbols,
@@ -11,20 +13,27 @@ from .channel import (
     heard,
     informants,
     listening,
+    sectors_heard,
     signalling,
     speaker_consistency,
     symbols,
 )
-from .counterfactual import Influence, influence
+from .continuation import Bifurcation, Branch, continuation
+from .counterfactual import Attention, Influence, attention, influence
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
 from .generalisation import Condition, generalisation
 from .information import Dependence, codes, dependence, discretise, entropy, mutual_information
 from .proportions import Proportion, conditional, proportion
 from .report import report
+from .settling import Settled, settled
+from .spread import Spread, spread
+from .states import Components, components_of_states
+from .variants import variant
 
 __all__ = [
-    "CTRNN", "ChannelUse", "Condition", "Dependence", "Equilibrium", "Influence", "LimitCycle", "Proportion", "Symbols",
-    "channel_use", "codes", "conditional", "dependence", "discretise", "entropy", "generalisation", "heard", "influence",
-    "informants", "listening", "mutual_information", "proportion", "report", "signalling",
-    "speaker_consistency", "symbols",
+    "Attention", "Bifurcation", "Branch", "CTRNN", "ChannelUse", "Components", "Condition", "Dependence", "Equilibrium",
+    "Influence", "Lesion", "LimitCycle", "Proportion", "Settled", "Spread", "Symbols", "ablation", "alpha_shape", "attention",
+    "border", "channel_use", "codes", "components_of_states", "conditional", "continuation", "dependence", "discretise",
+    "entropy", "generalisation", "heard", "influence", "informants", "listening", "mutual_information", "proportion",
+    "report", "sectors_heard", "settled", "signalling", "speaker_consistency", "spread", "symbols", "synapse_genes", "variant",
 ]

@@ -138,3 +138,17 @@ def informants(trace: Trace, first: int = FIRST) -> NDArray[np.float64]:
     totals = counts.sum(axis=1, keepdims=True)
     return np.asarray(counts / np.maximum(totals, 1))
 
+
+
+def sectors_heard(trace: Trace, window: int = 10) -> Codes:
+    """``[T, steps, R]``: from how many sectors of its receiver a robot heard something within the last
+    ``window`` steps, this one included: how the thesis counts neighbours (Fig. 6.19). Steps before the
+    window is full are counted as far as there are any."""
+    sectors = np.asarray(trace.frame_sectors)
+    found = np.zeros(sectors.shape, dtype=np.int64)
+    for sector in range(int(sectors.max(initial=-1)) + 1):
+        times = np.cumsum(sectors == sector, axis=1)
+        before = np.zeros_like(times)
+        before[:, window:] = times[:, :-window]
+        found += times > before
+    return found

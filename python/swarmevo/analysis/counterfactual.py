@@ -2,12 +2,13 @@
 
 Every draw of noise has an address, so that an episode in which one message is another one shares all
 draws with the episode as it was: what differs afterwards was caused by that message, exactly, without
-estimates. It is the causal influence of communication of Lowe et al. (2019), for a single message.
+estimates. It is the causal influence of communication of Lowe et al. (2019), for a single message; the same
+is asked of what a single robot senses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, Union
 
@@ -57,32 +58,134 @@ def influence(
     ``replace``: the message instead, ``[M]`` or one number for all its values; ``"freeze"``, what the
     agent would have said in the step before; ``"permute"``, what the next agent says.
     """
-    where = TrialSet.evaluation() if trial_set is None else trial_set
-    episodes = experiment.episodes(where, trials=trials)
-    chosen = list(range(len(episodes.agents))) if agents is None else list(agents)
-    times = list(steps)
-    if not times or min(times) < 0 or max(times) + 1 >= experiment.n_steps:
-        raise ValueError(f"steps from 0 to {experiment.n_steps - 2}, which have a step after them: {times}")
-    if episodes.message_len == 0:
+    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window)
+    if case.message_len == 0:
         raise ValueError("agents without radio have no messages")
-    shape = (trials, len(times), len(chosen))
-    said, reached, leds = np.zeros(shape, bool), np.zeros(shape, int), np.zeros(shape, int)
-    fitness = np.zeros(shape)
-    real = _Course(experiment.n_steps)
-    real.run(episodes, genotype)
-    for k, step in enumerate(times):
-        for a, agent in enumerate(chosen):
-            if not 0 <= agent < len(episodes.agents):
-                raise ValueError(f"agents are numbered from 0 to {len(episodes.agents) - 1}, not {agent}")
-            course = _Course(min(experiment.n_steps, step + 1 + window))
-            said[:, k, a] = course.run(experiment.episodes(where, trials=trials), genotype, (step, agent, replace))
-            others = [i for i in range(len(episodes.agents)) if i != agent]
-            after = slice(step + 1, course.end)
-            otherwise = course.differs(real, after)[:, :, others]
-            reached[:, k, a] = otherwise.any(axis=0).sum(axis=-1)
-            leds[:, k, a] = (course.leds[after] != real.leds[after])[:, :, others].sum(axis=(0, 2))
-            fitness[:, k, a] = course.worth(after) - real.worth(after)
-    return Influence(times, [episodes.agents[agent] for agent in chosen], said, reached, leds, fitness)
+    said, reached, leds = (np.zeros(case.shape, kind) for kind in (bool, int, int))
+    fitness = np.zeros(case.shape)
+    for place, step, agent in case.places():
+        course = case.run(_Said(step, agent, replace))
+        said[place] = course.changed
+        after = slice(step + 1, course.end)
+        others = case.others(agent)
+        reached[place] = course.differs(case.real, after)[:, :, others].any(axis=0).sum(axis=-1)
+        leds[place] = course.other_leds(case.real, after)[:, :, others].sum(axis=(0, 2))
+        fitness[place] = course.worth(after) - case.real.worth(after)
+    return Influence(case.steps, case.robots, said, reached, leds, fitness)
+
+
+@dataclass(frozen=True)
+class Attention:
+    """What single things that were sensed did. Axes: T trials, K steps, A agents that sensed them."""
+
+    steps: list[int]
+    """``[K]``: the steps from which on they were replaced."""
+    agents: list[int]
+    """``[A]``: the robots that sensed them, by their numbers among all robots."""
+    sensed: NDArray[np.bool_]
+    """``[T, K, A]``: whether there was anything to replace: the replacement is something else."""
+    heeded: NDArray[np.bool_]
+    """``[T, K, A]``: whether the robot itself did anything otherwise, by a bit, from that step on."""
+    leds: NDArray[np.int64]
+    """``[T, K, A]``: in how many steps its own LED was otherwise."""
+    reached: NDArray[np.int64]
+    """``[T, K, A]``: how many other agents did anything otherwise."""
+    fitness: NDArray[np.float64]
+    """``[T, K, A]``: mean fitness of these steps minus what it was; 0 where no step counts."""
+
+
+def attention(
+    experiment: Experiment,
+    genotype: ArrayLike,
+    steps: Iterable[int],
+    *,
+    sensor: str = "wireless_receiver",
+    replace: Replacement = 0.0,
+    lasting: int = 1,
+    agents: Iterable[int] | None = None,
+    trials: int = 20,
+    trial_set: AnyTrialSet | None = None,
+    window: int = 10,
+) -> Attention:
+    """Replaces what one agent senses, once for each of ``steps`` and of ``agents`` (indices among the
+    agents; all if absent), and looks at that step and the ``window`` after it: the hearer's side of
+    :func:`influence`. Its radio still relays what it heard.
+
+    ``sensor``: ``wireless_receiver`` for all inputs from the radio, ``wireless_receiver:msg`` for one of them,
+    or another sensor of the network. ``replace``: a number, or the values ``[C]`` of these C inputs;
+    ``"freeze"``, what they were in the step before; ``"permute"``, what the next agent senses.
+    ``lasting``: for how many steps, within the window.
+    """
+    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window)
+    columns = input_columns(experiment, sensor)
+    if not 1 <= lasting <= window + 1:
+        raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
+    sensed, heeded = np.zeros(case.shape, bool), np.zeros(case.shape, bool)
+    leds, reached = np.zeros(case.shape, int), np.zeros(case.shape, int)
+    fitness = np.zeros(case.shape)
+    for place, step, agent in case.places():
+        course = case.run(_Sensed(step, agent, columns, replace, lasting))
+        sensed[place] = course.changed
+        since = slice(step, course.end)
+        otherwise = np.asarray(course.differs(case.real, since).any(axis=0))
+        heeded[place] = otherwise[:, agent]
+        leds[place] = course.other_leds(case.real, since)[:, :, agent].sum(axis=0)
+        reached[place] = otherwise[:, case.others(agent)].sum(axis=-1)
+        fitness[place] = course.worth(since) - case.real.worth(since)
+    return Attention(case.steps, case.robots, sensed, heeded, leds, reached, fitness)
+
+
+def input_columns(experiment: Experiment, sensor: str) -> list[int]:
+    """The inputs of a network that a sensor, or one of its readings, feeds."""
+    stimuli = [it for it in experiment.to_dict()["topology"]["stimuli"].values() for _ in range(it["n"])]
+    names = [it["sensor"] for it in stimuli]
+    found = [i for i, name in enumerate(names) if name == sensor or name.startswith(f"{sensor}:")]
+    if not found:
+        raise ValueError(f"no input comes from {sensor!r}; there are {', '.join(dict.fromkeys(names))}")
+    return found
+
+
+class _Case:
+    """Which counterfactuals are asked for, and the episodes as they were."""
+
+    def __init__(
+        self, experiment: Experiment, genotype: ArrayLike, steps: Iterable[int], agents: Iterable[int] | None,
+        trials: int, trial_set: AnyTrialSet | None, window: int,
+    ) -> None:
+        self._experiment, self._genotype = experiment, genotype
+        self._trials, self._window = trials, window
+        self._where = TrialSet.evaluation() if trial_set is None else trial_set
+        episodes = self._episodes()
+        self.message_len = episodes.message_len
+        self.steps = list(steps)
+        self._n_agents = len(episodes.agents)
+        self._chosen = list(range(self._n_agents)) if agents is None else list(agents)
+        if not self.steps or min(self.steps) < 0 or max(self.steps) + 1 >= experiment.n_steps:
+            raise ValueError(f"steps from 0 to {experiment.n_steps - 2}, which have a step after them: {self.steps}")
+        wrong = [agent for agent in self._chosen if not 0 <= agent < self._n_agents]
+        if wrong:
+            raise ValueError(f"agents are numbered from 0 to {self._n_agents - 1}, not {', '.join(map(str, wrong))}")
+        self.robots = [episodes.agents[agent] for agent in self._chosen]
+        self.shape = (trials, len(self.steps), len(self._chosen))
+        self.real = _Course(experiment.n_steps)
+        self.real.run(episodes, genotype)
+
+    def places(self) -> Iterator[tuple[tuple[slice, int, int], int, int]]:
+        """Where the results of a step and an agent belong."""
+        for k, step in enumerate(self.steps):
+            for a, agent in enumerate(self._chosen):
+                yield (slice(None), k, a), step, agent
+
+    def run(self, change: _Said | _Sensed) -> _Course:
+        course = _Course(min(self._experiment.n_steps, change.step + 1 + self._window))
+        course.run(self._episodes(), self._genotype, change)
+        return course
+
+    def others(self, agent: int) -> list[int]:
+        return [i for i in range(self._n_agents) if i != agent]
+
+    def _episodes(self) -> Episodes:
+        return self._experiment.episodes(self._where, trials=self._trials)
 
 
 class _Course:
@@ -93,33 +196,19 @@ class _Course:
         self._actions: list[Actions] = []
         self._fitness: list[NDArray[np.float64]] = []
 
-    def run(
-        self, episodes: Episodes, genotype: ArrayLike, change: tuple[int, int, Replacement] | None = None
-    ) -> NDArray[np.bool_]:
-        """Runs them; returns in which trials ``change`` (step, agent, message) changed anything."""
+    def run(self, episodes: Episodes, genotype: ArrayLike, change: _Said | _Sensed | None = None) -> None:
+        """Runs them. ``changed`` is then in which trials ``change`` changed anything, ``[T]``."""
         episodes.load(genotype)
-        changed = np.zeros(episodes.n_trials, bool)
+        self.changed = np.zeros(episodes.n_trials, bool)
         for step in range(self.end):
+            if isinstance(change, _Sensed):
+                self.changed |= change.stimulate(episodes, step)
             actions = episodes.decide()
             self._actions.append(actions)
-            if change is not None and change[0] == step:
-                _, agent, replacement = change
-                messages = actions.messages.copy()
-                messages[:, agent] = self._instead(messages, agent, replacement)
-                changed = actions.sends[:, agent] & (messages[:, agent] != actions.messages[:, agent]).any(axis=-1)
-                actions = Actions(actions.wheels, actions.leds, actions.sends, messages)
+            if isinstance(change, _Said) and change.step == step:
+                actions, self.changed = change.instead(self._actions)
             self._fitness.append(episodes.step(actions))
         self.leds = np.stack([it.leds for it in self._actions])
-        return changed
-
-    def _instead(self, messages: NDArray[np.float64], agent: int, replacement: Replacement) -> NDArray[np.float64]:
-        if isinstance(replacement, str):
-            if replacement == "freeze":
-                return self._actions[max(0, len(self._actions) - 2)].messages[:, agent]
-            if replacement == "permute":
-                return messages[:, (agent + 1) % messages.shape[1]]
-            raise ValueError(f'replace is a message, "freeze" or "permute", not {replacement!r}')
-        return np.broadcast_to(np.asarray(replacement, dtype=np.float64), messages[:, agent].shape)
 
     def differs(self, other: _Course, steps: slice) -> NDArray[np.bool_]:
         """``[steps, T, A]``: who does anything otherwise."""
@@ -132,7 +221,65 @@ class _Course:
             for mine, its in pairs
         ])
 
+    def other_leds(self, other: _Course, steps: slice) -> NDArray[np.bool_]:
+        """``[steps, T, A]``: whose LED is otherwise."""
+        return np.asarray(self.leds[steps] != other.leds[steps])
+
     def worth(self, steps: slice) -> NDArray[np.float64]:
         values = np.stack(self._fitness[steps])
         counts = ~np.isnan(values)
         return np.asarray(np.where(counts, values, 0).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
+
+
+@dataclass(frozen=True)
+class _Said:
+    """Another message of one agent in one step."""
+
+    step: int
+    agent: int
+    replacement: Replacement
+
+    def instead(self, course: list[Actions]) -> tuple[Actions, NDArray[np.bool_]]:
+        """The last step's actions with it, and in which trials it is another one."""
+        actions, before = course[-1], course[max(0, len(course) - 2)]
+        messages = actions.messages.copy()
+        messages[:, self.agent] = _instead(self.replacement, self.agent, actions.messages, before.messages)
+        differs = (messages[:, self.agent] != actions.messages[:, self.agent]).any(axis=-1)
+        return Actions(actions.wheels, actions.leds, actions.sends, messages), actions.sends[:, self.agent] & differs
+
+
+class _Sensed:
+    """Other inputs of one agent, from one step on."""
+
+    def __init__(self, step: int, agent: int, columns: list[int], replacement: Replacement, lasting: int) -> None:
+        self.step = step
+        self._agent, self._columns, self._replacement, self._lasting = agent, columns, replacement, lasting
+        self._before: NDArray[np.float64] | None = None
+
+    def stimulate(self, episodes: Episodes, step: int) -> NDArray[np.bool_]:
+        """Has the agent sense it, if it is time; returns in which trials it is something else."""
+        if not self.step - 1 <= step < self.step + self._lasting:
+            return np.zeros(episodes.n_trials, bool)
+        stimuli = episodes.stimuli
+        values = stimuli[..., self._columns].astype(np.float64)
+        if self._before is None:
+            self._before = values
+        if step < self.step:
+            return np.zeros(episodes.n_trials, bool)
+        changed = stimuli.copy()
+        changed[:, self._agent, self._columns] = _instead(self._replacement, self._agent, values, self._before)
+        episodes.stimuli = changed
+        return np.asarray((changed != stimuli)[:, self._agent, self._columns].any(axis=-1))
+
+
+def _instead(
+    replacement: Replacement, agent: int, values: NDArray[np.float64], before: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What an agent has instead of its ``values`` ``[T, A, C]``, ``[T, C]``; ``before``: a step before."""
+    if isinstance(replacement, str):
+        if replacement == "freeze":
+            return before[:, agent]
+        if replacement == "permute":
+            return values[:, (agent + 1) % values.shape[1]]
+        raise ValueError(f'replace is a number, values, "freeze" or "permute", not {replacement!r}')
+    return np.broadcast_to(np.asarray(replacement, dtype=np.float64), values[:, agent].shape)

@@ -74,6 +74,8 @@ class CTRNN:
         if unknown or len(self.activations) != n or len(self.input_weights) != n:
             raise ValueError(f"{n} neurons, with activations of {sorted(_ACTIVATIONS)}: {sorted(unknown)}")
 
+        self._of = {name: np.flatnonzero(np.array(self.activations) == name) for name in dict.fromkeys(self.activations)}
+
     @classmethod
     def of(cls, network: Network) -> CTRNN:
         """The dynamics of a genotype's network, ``experiment.network(genotype)``."""
@@ -126,7 +128,7 @@ class CTRNN:
             if not it.success or np.abs(self.derivative(it.x, phi)).max() > 1e-8:
                 continue
             if all(np.abs(self.rates(it.x) - known.rates).max() > _NEAR for known in found):
-                found.append(self._equilibrium(it.x))
+                found.append(self.equilibrium(it.x))
         return sorted(found, key=lambda it: it.eigenvalues[0].real)
 
     def attractor(
@@ -148,8 +150,8 @@ class CTRNN:
         settings = {"method": "LSODA", "rtol": 1e-9, "atol": 1e-10}
         there = solve_ivp(flow, (0, time), begin, **settings).y[:, -1]
         rest = root(self.derivative, there, args=(phi,), jac=lambda v, _: self.jacobian(v), tol=1e-12)
-        if rest.success and np.abs(rest.x - there).max() < 1e-4 and self._equilibrium(rest.x).is_stable:
-            return self._equilibrium(rest.x)
+        if rest.success and np.abs(rest.x - there).max() < 1e-4 and self.equilibrium(rest.x).is_stable:
+            return self.equilibrium(rest.x)
         # A section through the neuron that moves most: it comes back to the same point.
         span = solve_ivp(flow, (0, time), there, dense_output=True, **settings)
         course = span.sol(np.linspace(0, time, 8000))
@@ -183,15 +185,16 @@ class CTRNN:
                 start = it.voltages
         return found
 
-    def _equilibrium(self, voltages: Floats) -> Equilibrium:
+    def equilibrium(self, voltages: Floats) -> Equilibrium:
+        """What a state ``[N]`` at which dv/dt is 0 is like."""
         values = np.linalg.eigvals(self.jacobian(voltages)).astype(np.complex128)
         return Equilibrium(voltages, self.rates(voltages), values[np.argsort(-values.real)])
 
     def _apply(self, voltages: Floats, derivative: int) -> Floats:
         z = self.gain * (voltages + self.bias)
         result = np.empty_like(z)
-        for i, name in enumerate(self.activations):
-            result[..., i] = _ACTIVATIONS[name][derivative](z[..., i])
+        for name, neurons in self._of.items():
+            result[..., neurons] = _ACTIVATIONS[name][derivative](z[..., neurons])
         return result
 
 

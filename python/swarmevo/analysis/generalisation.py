@@ -14,11 +14,10 @@ from ..errors import ExperimentError
 from ..experiment import Experiment
 from ..fleet import Client
 from ..trials import TrialSet
+from .variants import Config, evolved_robots, resize
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
 """Trials that no run gets to, and that a fleet computes, too: the same bits there and here."""
-
-Config = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -62,18 +61,18 @@ def generalisation(
 
 def _conditions(config: Config) -> Iterator[tuple[str, float, Config]]:
     yield "", np.nan, config
-    robots = _robots(config)
+    robots = evolved_robots(config)
     for factor in (0.5, 1.5, 2, 3, 5):
         n = round(robots["num_instances"] * factor)
         changed = deepcopy(config)
-        _resize(_robots(changed), n)
+        resize(evolved_robots(changed), n)
         yield "robots", n, changed
     for what, keys in _SCALED.items():
         there = [(key, value) for key in keys if (value := _find(robots, key))]
         for factor in (0.5, 0.75, 1.5, 2) if there else ():
             changed = deepcopy(config)
             for (*path, key), value in there:
-                place = _robots(changed)
+                place = evolved_robots(changed)
                 for name in path:
                     place = place[name]
                 place[key] = value * factor
@@ -90,20 +89,6 @@ _SCALED = {
     "reach of the light sensor, cm": (("sensors", "light_sensor", "range"),),
     "step of the wheels, s": (("actuators", "wheel_actuator", "step_duration"),),
 }
-
-
-def _robots(config: Config) -> Config:
-    robots: Config = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
-    return robots
-
-
-def _resize(robots: Config, n: int) -> None:
-    """Another number of robots, with the same share of affected ones."""
-    was, robots["num_instances"] = robots["num_instances"], n
-    for perturbation in robots.get("perturbations", {}).values():
-        for it in perturbation if isinstance(perturbation, list) else [perturbation]:
-            if isinstance(it.get("affected_robots"), int):
-                it["affected_robots"] = (2 * it["affected_robots"] * n + was) // (2 * was)
 
 
 def _find(robots: Config, path: tuple[str, ...]) -> float | None:

@@ -44,12 +44,17 @@ class Page:
         """What a reader has to know to read what is above."""
         self._body.append(f'<p class="note">{html.escape(text)}</p>')
 
-    def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-        """A table, also written to ``NAME.csv``."""
+    def sentences(self, name: str, sentences: Sequence[str]) -> None:
+        """A list, also written to ``NAME.txt``."""
+        (self.directory / f"{name}.txt").write_text("\n".join(sentences) + "\n", encoding="utf-8")
+        self._body.append(f"<ul>{''.join(f'<li>{html.escape(it)}</li>' for it in sentences)}</ul>")
+
+    def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[object]], shown: int | None = None) -> None:
+        """A table, also written to ``NAME.csv``; the page has its first ``shown`` rows, all if absent."""
         cells = [[_text(cell) for cell in row] for row in rows]
         with open(self.directory / f"{name}.csv", "w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([list(head), *cells])
-        lines = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in cells]
+        lines = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in cells[:shown]]
         heads = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
         body = "".join(f"<tr>{line}</tr>" for line in lines)
         self._body.append(f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>")

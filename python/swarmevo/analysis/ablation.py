@@ -1,0 +1,128 @@
+"""What parts of a network are worth: its fitness without them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..experiment import Experiment
+from ..fleet import Client
+from ..network import Network
+from .generalisation import TRIALS_OF
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Parts = Literal["neurons", "inputs", "synapses", "groups"]
+
+
+@dataclass(frozen=True)
+class Lesion:
+    """A part of a network, and the fitness without it."""
+
+    part: str
+    """Its name, such as ``H1_3``, or ``H1_3 > OUT_LED_0`` of a synapse."""
+    weights: Floats
+    """Of the synapses that it takes away."""
+    fitness: float
+    """Mean over the trials without it."""
+    change: float
+    """Mean over the trials of fitness without it minus fitness with it, in the same world and noise."""
+    ci95: tuple[float, float]
+    """Change ± 1.96 standard errors over trials."""
+    is_same: bool
+    """Whether not a bit of the fitness of any trial changes: it is not used."""
+
+
+def ablation(
+    experiment: Experiment,
+    genotype: ArrayLike,
+    parts: Parts = "neurons",
+    *,
+    trials: int = 50,
+    client: Client | None = None,
+) -> list[Lesion]:
+    """Fitness of a genotype ``[d]`` without each of its network's ``parts``, those first that it misses most.
+
+    A part is taken away by weights of 0, exactly: of a synapse; of all synapses from a neuron or from an
+    input, which then tells no other neuron anything (an output's own value still moves the robot); or of
+    a group of synapses of the experiment file. All noise stays as it was, so that the change is that of the
+    part (Meyes et al. 2019 review such experiments); effects of several parts do not add up.
+
+    In trials that had no part in evolution, here or on the fleet of ``client``. Raises ``ValueError``
+    if weights of a part are not the genotype's, or have no gene that gives 0.
+    """
+    genes = np.asarray(genotype, np.float64)
+    network = experiment.network(genes)
+    named = _parts(network, parts)
+    where, zero = synapse_genes(experiment)
+    fixed = sorted({name for name, synapses in named if (where[synapses] < 0).any() or np.isnan(zero[synapses]).any()})
+    if fixed:
+        raise ValueError(f"weights that no gene sets to 0: {', '.join(fixed)}; their range has to contain 0")
+    genotypes = np.tile(genes, (1 + len(named), 1))
+    for row, (_, synapses) in zip(genotypes[1:], named):
+        row[where[synapses]] = zero[synapses]
+    evaluate = experiment.evaluate if client is None else lambda *it, **of: client.evaluate(experiment, *it, **of)
+    fitness = np.asarray(evaluate(genotypes, TRIALS_OF, trials=trials), np.float64)
+    weights = np.array([it["weight"] for it in network.description["synapses"]])
+    found = [_lesion(name, weights[synapses], without, fitness[0]) for (name, synapses), without in zip(named, fitness[1:])]
+    return sorted(found, key=lambda it: it.change)
+
+
+def synapse_genes(experiment: Experiment) -> tuple[Ints, Floats]:
+    """For each of the S synapses of ``experiment.network(...).description``, the number of the gene that
+    is its weight ``[S]``, -1 if none is, and the value of that gene with which the weight is 0 ``[S]``, NaN
+    if none is."""
+
+    def weights(genotype: Floats) -> Floats:
+        return np.array([it["weight"] for it in experiment.network(genotype).description["synapses"]])
+
+    d = experiment.n_genes
+    # A weight is low + gene * span: both ends, and a genotype whose genes all differ, say which gene.
+    low, high = weights(np.zeros(d)), weights(np.ones(d))
+    span = high - low
+    is_gene = span != 0
+    places = np.where(is_gene, (weights(np.arange(d) / d) - low) / np.where(is_gene, span, 1) * d, -1)
+    where = np.where(is_gene, np.round(places), -1).astype(np.int64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = np.where(is_gene & (low * high <= 0), -low / span, np.nan)
+    silent = np.full(d, 0.5)
+    silent[where[~np.isnan(zero)]] = zero[~np.isnan(zero)]
+    zero[weights(silent) != 0] = np.nan
+    return where, zero
+
+
+def _parts(network: Network, parts: Parts) -> list[tuple[str, Ints]]:
+    """Names, and the numbers of the synapses that each takes away."""
+    synapses = network.description["synapses"]
+    sources = [_source(network, it["pre"]) for it in synapses]
+    if parts == "synapses":
+        names = [f"{source} > {network.neurons[it['post']]}" for source, it in zip(sources, synapses)]
+        return [(name, np.array([i])) for i, name in enumerate(names)]
+    if parts == "groups":
+        labels = [it["group"] for it in synapses]
+        return _grouped(labels, dict.fromkeys(labels))
+    if parts in ("neurons", "inputs"):
+        return _grouped(sources, network.neurons if parts == "neurons" else network.inputs)
+    raise ValueError(f"parts are neurons, inputs, synapses or groups, not {parts!r}")
+
+
+def _grouped(labels: list[str], names: Iterable[str]) -> list[tuple[str, Ints]]:
+    of = np.array(labels)
+    found = [(name, np.flatnonzero(of == name)) for name in names]
+    return [(name, synapses) for name, synapses in found if len(synapses)]
+
+
+def _source(network: Network, pre: dict[str, int]) -> str:
+    return network.inputs[pre["input"]] if "input" in pre else network.neurons[pre["neuron"]]
+
+
+def _lesion(name: str, weights: Floats, without: Floats, intact: Floats) -> Lesion:
+    changes = without - intact
+    change = float(changes.mean())
+    error = 1.96 * float(changes.std(ddof=1) / np.sqrt(len(changes))) if len(changes) > 1 else float("nan")
+    is_same = bool(np.array_equal(without, intact))
+    return Lesion(name, weights, float(without.mean()), change, (change - error, change + error), is_same)

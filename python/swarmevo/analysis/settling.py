@@ -1,0 +1,56 @@
+"""Where a network settles under the inputs that occur in episodes, while they are held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..experiment import Experiment
+from ..trace import Trace
+from .channel import FIRST
+from .ctrnn import CTRNN, Equilibrium, LimitCycle
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What the network does alone, from a state of zeros, under one input that is held."""
+
+    inputs: Floats
+    """``[I]``, rounded to 0.1."""
+    share: float
+    """Of robots and steps that have it."""
+    attractor: Equilibrium | LimitCycle | None
+    """Where its state goes; None if, after 100 of the slowest time constants, it neither rests nor goes round."""
+    outputs: dict[str, tuple[float, float]]
+    """Least and largest rate of each neuron of an output there."""
+
+
+def settled(experiment: Experiment, genotype: Floats, trace: Trace, most: int = 6) -> list[Settled]:
+    """For the ``most`` inputs that come most often from step 10 on; nothing for networks of other
+    neurons than ``rate_model``."""
+    network = experiment.network(genotype)
+    if network.description["neuron_model"] != "rate_model":
+        return []
+    alone = CTRNN.of(network)
+    ensembles = {it["ensemble"] for it in experiment.to_dict()["topology"]["outputs"].values()}
+    motors = [i for i, ensemble in enumerate(network.ensembles) if ensemble in ensembles]
+    found = []
+    for inputs, share in zip(*_frequent_inputs(trace, len(network.inputs), most)):
+        it = alone.attractor(inputs, time=100 * float(alone.tau.max()))
+        rates = np.empty((0, len(network.neurons))) if it is None else np.atleast_2d(it.rates)
+        outputs = {network.neurons[i]: (float(rates[:, i].min()), float(rates[:, i].max())) for i in motors if len(rates)}
+        found.append(Settled(inputs, float(share), it, outputs))
+    return found
+
+
+def _frequent_inputs(trace: Trace, n_inputs: int, most: int) -> tuple[Floats, Floats]:
+    """The inputs ``[most, I]`` that come most often, and their shares."""
+    active = ~np.isnan(trace.activities[0, 0, :, 0])
+    stimuli = trace.stimuli[:, FIRST:, active, :n_inputs].reshape(-1, n_inputs).astype(np.float64)
+    distinct, counts = np.unique(stimuli.round(1) + 0.0, axis=0, return_counts=True)
+    order = np.argsort(-counts, kind="stable")[:most]
+    return distinct[order], counts[order] / counts.sum()

@@ -1,0 +1,65 @@
+"""The same experiment with something changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..experiment import Experiment
+
+Config = dict[str, Any]
+
+
+def variant(
+    experiment: Experiment,
+    *,
+    robots: int | None = None,
+    steps: int | None = None,
+    without: str | None = None,
+    perturbations: Config | None = None,
+) -> Experiment:
+    """The experiment with another number of ``robots`` (and the same share of affected ones), of
+    ``steps``, with an input that is 0 (``without``: a sensor, such as ``wireless_receiver:msg``), and
+    with other ``perturbations`` than those of the file. What is absent stays as it is.
+
+    Conditions with the same number of robots have the same worlds and the same noise.
+    """
+    config = experiment.to_dict()
+    evolved = evolved_robots(config)
+    if robots is not None:
+        resize(evolved, robots)
+    if steps is not None:
+        config["algorithm"]["evaluation_steps"] = steps
+    if perturbations is not None:
+        evolved["perturbations"] = perturbations
+    if without is not None:
+        for name in _with_a_network(config):
+            inhibit(config["world"]["objects"][name], without)
+    return Experiment.from_dict(config, experiment.name)
+
+
+def evolved_robots(config: Config) -> Config:
+    """The object of the file whose genotypes evolve."""
+    robots: Config = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
+    return robots
+
+
+def resize(robots: Config, n: int) -> None:
+    """Another number of robots, with the same share of affected ones."""
+    was, robots["num_instances"] = robots["num_instances"], n
+    for perturbation in robots.get("perturbations", {}).values():
+        for it in perturbation if isinstance(perturbation, list) else [perturbation]:
+            if isinstance(it.get("affected_robots"), int):
+                it["affected_robots"] = (2 * it["affected_robots"] * n + was) // (2 * was)
+
+
+def inhibit(robots: Config, sensor: str) -> None:
+    """Makes one input of these robots 0, beside those that are 0 already."""
+    perturbations = robots.setdefault("perturbations", {})
+    before = perturbations.get("stimuli_inhibition", [])
+    before = before if isinstance(before, list) else [before]
+    perturbations["stimuli_inhibition"] = [*before, {"stimuli": sensor, "affected_robots": "all"}]
+
+
+def _with_a_network(config: Config) -> list[str]:
+    objects = config["world"]["objects"].items()
+    return [name for name, it in objects if it["type"] == "robot" and it.get("controller") == "neural_controller"]
