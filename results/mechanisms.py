@@ -4,7 +4,7 @@
     results/mechanisms.py [DIRECTORY]    champions in it; results/ by default
 
 Every champion is simulated in 20 trials that had no part in its evolution; steps 0 to 9, in which
-robots are made to send, do not count. A robot acts on the stimuli of the same row of the trace.
+robots are made to send, count for negotiations only. A robot acts on the stimuli of the same row of the trace.
 Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
@@ -80,6 +80,24 @@ def leds(rows, frequent):
     conditional("symbol sent", lambda row: name(row) if row["mode"] == "send" else None, is_lit, rows)
 
 
+def negotiations(rows):
+    """Of each trial, how long it takes until a robot is the only leader for ten steps, and whether
+    before that all LEDs went off again."""
+    lit = defaultdict(lambda: defaultdict(list))
+    for row in rows:
+        lit[row["trial"]][int(row["step"])].extend([row["robot"]] if is_lit(row) else [])
+    settled, silent = [], 0
+    for of in lit.values():
+        term = lambda step: len(of[step]) == 1 and all(of.get(step + i) == of[step] for i in range(10))
+        first = next((step for step in sorted(of) if term(step)), None)
+        if first is not None:
+            settled.append(first)
+            claimed = next(step for step in sorted(of) if of[step])
+            silent += any(not of[step] for step in range(claimed, first))
+    when = f", from step {statistics.median(settled):.0f} on (median), {max(settled)} at the latest" if settled else ""
+    print(f"one leader for ten steps in {len(settled)} of {len(lit)} trials{when}; in {silent} of them all LEDs had gone off before\n")
+
+
 def neighbours(rows):
     """Fig. 6.19: the LED by the number of sectors from which frames came within the window."""
     heard = defaultdict(list)
@@ -130,9 +148,44 @@ def alignment(rows, stimuli):
           [[name, *(f"{100 * of[s] / sum(of.values()):.1f} %" for s in frequent)] for name, of in sorted(symbols.items())])
 
 
+def signals(rows, config):
+    """The strength of frames, compared with what section 3.3.2 has in its place: the distance sensor's
+    reading of that sector, the largest over all robots within 60 cm, here with the receiver's decay."""
+    robot = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
+    receiver, sides = robot["sensors"]["wireless_receiver"], (config["world"]["width"], config["world"]["height"])
+    swarms = defaultdict(dict)
+    for row in rows:
+        heading = float(row["heading_rad"])
+        swarms[row["trial"], int(row["step"])][row["robot"]] = (float(row["x_cm"]), float(row["y_cm"]), heading)
+    differences = []
+    for row in rows:
+        # Rows have positions after the step, robots hear from those before it.
+        swarm = swarms.get((row["trial"], int(row["step"]) - 1))
+        if swarm is None or row["frame_sector"] == "":
+            continue
+        x, y, heading = swarm[row["robot"]]
+        sector = heading + 2 * math.pi * int(row["frame_sector"]) / receiver["n_sectors"]
+        reading = 0.0
+        for other, (other_x, other_y, _) in swarm.items():
+            away = [math.remainder(way, side) for way, side in zip((other_x - x, other_y - y), sides)]
+            if other != row["robot"] and math.hypot(*away) <= 60:
+                off = abs(math.remainder(math.atan2(away[1], away[0]) - sector, 2 * math.pi))
+                strength = math.exp(-receiver["decay_rho"] * math.hypot(*away) - receiver["decay_phi"] * off)
+                reading = max(reading, strength)
+        differences.append(reading - float(row["frame_signal"]))
+    share = lambda of: f"{100 * sum(map(of, differences)) / len(differences):.1f} %"
+    print(f"distance sensor instead of the frame's strength: higher in {share(lambda it: it > 1e-6)} of frames, "
+          f"lower in {share(lambda it: it < -1e-6)}, different by {statistics.fmean(map(abs, differences)):.4f} on average\n")
+
+
 def following(rows, stimuli):
     """Fig. 6.37: the difference of the wheels, left minus right, by where light and frames are."""
     light = sorted(key for key in rows[0] if key.startswith(f"stimulus_{stimuli['light_sensor']}_"))
+    sees = lambda row: "sees the light" if any(float(row[key]) > 0 for key in light) else "does not"
+    modes = Counter((sees(row), row["mode"]) for row in rows)
+    table(["robot", "sends", "relays"],
+          [[who, *(f"{100 * modes[who, mode] / sum(modes[who, it] for it in ('send', 'relay')):.1f} %" for mode in ("send", "relay"))]
+           for who in ("sees the light", "does not")])
     by_light, by_frame, blind, speed = defaultdict(list), defaultdict(list), [], []
     for row in rows:
         turn = float(row["wheel_left"]) - float(row["wheel_right"])
@@ -158,7 +211,7 @@ def simulated(path, config):
                    "--trace-columns", "targets", "--generation", "1000000", "--trials", str(TRIALS)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         with open(trace, newline="") as file:
-            return [row for row in csv.DictReader(file) if int(row["step"]) >= 10]
+            return list(csv.DictReader(file))
 
 
 def main():
@@ -169,17 +222,20 @@ def main():
         if not config.exists():
             continue  # a task of another folder
         stimuli = {of["sensor"].rpartition(":")[2]: key for key, of in json.loads(config.read_text())["topology"]["stimuli"].items()}
-        rows = simulated(path, config)
+        all_rows = simulated(path, config)
+        rows = [row for row in all_rows if int(row["step"]) >= 10]
         print(f"## {path.stem}\n")
         frequent = senders(rows)
         if name.startswith("leader_selection"):
             leds(rows, frequent)
+            negotiations(all_rows)
         elif name.startswith("borderline"):
             neighbours(rows)
         elif name.startswith("orientation_consensus"):
             alignment(rows, stimuli)
         elif name.startswith("light_follower"):
             following(rows, stimuli)
+            signals(rows, json.loads(config.read_text()))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ RESULTS = Path(__file__).resolve().parent
 LAST = 50
 MEANS = (0.1, 0.3, 0.5, 0.7, 1.0)
 BESTS = (0.5, 1.0)
+ENDS = (50, 100, 150, 200, 250, 300)
 STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 700, 1000)
 
 
@@ -73,6 +74,24 @@ def runs(folder):
     )
 
 
+def models(folder):
+    """Neuron models on the same task, with the same algorithm and budget."""
+    rows = []
+    for task in ("leader_selection", "borderline", "light_follower"):
+        for model, ending in (("CTRNN", "snes"), ("LIF", "lif"), ("AdEx", "adex")):
+            paths = sorted((folder / "histories").glob(f"{task}_{ending}-*.csv"))
+            means = [[float(it["mean"]) for it in read_csv(path)] for path in paths]
+            seeds = ", ".join(path.stem.rsplit("-", 1)[1] for path in paths)
+            until = lambda end: " ".join(
+                number(statistics.fmean(run[end - 10 : end]), 2) for run in means if len(run) >= end
+            )
+            if paths:
+                rows.append([task, model, seeds, *map(until, ENDS)])
+    if any(row[1] != "CTRNN" for row in rows):
+        print("## Neuron models: mean fitness over the ten generations before, one per seed\n")
+        table(["task", "neurons", "seeds", *(f"generation {end}" for end in ENDS)], rows)
+
+
 def evaluation(folder):
     print(f"## Evaluation of {folder.name}\n")
     trials = defaultdict(lambda: defaultdict(list))
@@ -80,12 +99,14 @@ def evaluation(folder):
         if row["time_mean"]:
             trials[row["condition"]][row["metric"]].append((float(row["time_mean"]), row["end"]))
     metrics = sorted({metric for of in trials.values() for metric in of})
-    print("Mean over trials of the mean over time; in brackets the median.\n")
-    cell = lambda values: values and f"{statistics.fmean(values):.3f} [{statistics.median(values):.3f}]"
-    table(
+    means = lambda cell: table(
         ["condition", *metrics],
         [[name, *(cell([mean for mean, _ in of[metric]]) for metric in metrics)] for name, of in trials.items()],
     )
+    print("Mean over trials of the mean over time; in brackets the median.\n")
+    means(lambda values: values and f"{statistics.fmean(values):.3f} [{statistics.median(values):.3f}]")
+    print("Of the same, the quartiles.\n")
+    means(quartiles)
     if "true_positive_rate" in metrics:
         errors(folder, trials)
     if "near_light_photosensitive" in metrics:
@@ -102,6 +123,13 @@ def evaluation(folder):
         at = lambda step: of[max(known for known in of if known <= step)]
         rows.append([metric, condition, *(at(step) for step in shown)])
     table(["measure", "condition", *shown], rows)
+
+
+def quartiles(values):
+    if len(values) < 2:
+        return ""
+    first, _, third = statistics.quantiles(values, n=4, method="inclusive")
+    return f"{first:.3f} to {third:.3f}"
 
 
 def errors(folder, trials):
@@ -129,7 +157,8 @@ def errors(folder, trials):
 
 
 def lost_lights(folder):
-    """Trials in which those that see the light are near it for less than half of the time."""
+    """Trials in which those that see the light are near it for less than half of the time, and those
+    in which only the others are."""
     near = defaultdict(dict)
     for row in read_csv(folder / "trials.csv"):
         if row["metric"].startswith("near_light_"):
@@ -139,13 +168,15 @@ def lost_lights(folder):
         lost = trial["near_light_photosensitive"] < 0.5
         rows[condition][lost].append(trial["near_light_others"])
     mean = lambda values: f"{statistics.fmean(values):.3f}" if values else ""
-    table(["condition", "trials that lose the light", "others near it in these", "in the rest"],
-          [[name, f"{len(lost)} of {len(lost) + len(kept)}", mean(lost), mean(kept)] for name, (kept, lost) in rows.items()])
+    behind = lambda kept: sum(near < 0.5 for near in kept)
+    table(["condition", "trials that lose the light", "others near it in these", "in the rest", "trials in which only the others lose it"],
+          [[name, f"{len(lost)} of {len(lost) + len(kept)}", mean(lost), mean(kept), behind(kept)] for name, (kept, lost) in rows.items()])
 
 
 def main():
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else RESULTS
     runs(folder)
+    models(folder)
     for path in sorted((folder / "evaluations").glob("*")):
         evaluation(path)
 
