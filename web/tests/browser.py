@@ -14,10 +14,12 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 import urllib.request
 
@@ -68,6 +70,8 @@ class Fleet:
         # The line before tells that it listens for clients.
         for line in self.coordinator.stderr:
             if "pages are served" in line:
+                # Who writes into a pipe that is full waits for its reader.
+                threading.Thread(target=self.coordinator.stderr.read, daemon=True).start()
                 return
         raise AssertionError("the coordinator does not start")
 
@@ -75,8 +79,9 @@ class Fleet:
         return self.start("worker", "--coordinator", self.url, "--name", name, "--slots", "1")
 
     def start(self, program, *args):
+        stderr = subprocess.PIPE if program == "coordinator" else subprocess.DEVNULL
         process = subprocess.Popen(
-            [PROGRAMS / program, *args], env=self.environment, stderr=subprocess.PIPE, text=True
+            [PROGRAMS / program, *args], env=self.environment, stderr=stderr, text=True
         )
         self.processes.append(process)
         return process
@@ -97,7 +102,6 @@ class Fleet:
         for process in self.processes:
             process.kill()
             process.wait()
-            process.stderr.close()
         self.directory.cleanup()
 
 
@@ -346,7 +350,21 @@ class Live(BrowserTest):
         self.wait_for_text("main", "1 quickstart")
         self.find(".fleet-timeline[data-assignments]")
         self.picture("timeline")
-        workers[1].kill()
+        left, right = workers
+        left.terminate()
+        left.wait()
+        # Alone and stopped, it holds what nobody else computes.
+        right.send_signal(signal.SIGSTOP)
+        held = """return fetch('/api/timeline').then((it) => it.json()).then(({ workers, assignments }) =>
+            assignments.filter((it) => it[8] === 'unanswered' && workers[it[0]][1] === 'right').map((it) => it.slice(2, 5)))"""
+        looks = [[], []]
+
+        def holds_the_same_at_two_looks():
+            looks.append(self.script(held))
+            return looks[-1] and looks[-1] == looks[-2]
+
+        self.wait(holds_the_same_at_two_looks, "the last worker holds nothing")
+        right.kill()
         self.wait_for_text(".broken", "right: lost with its worker, experiment 1, generation")
         self.picture("timeline-lost")
         self.narrow()
