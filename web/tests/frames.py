@@ -1,0 +1,101 @@
+"""How many frames of a replay are drawn per second, in headless Chromium, and where the time goes.
+
+    target/python/bin/python web/tests/frames.py target/debug [--profile]
+
+The argument is the folder with swarmctl. Trails, who hears whom and the reach of all radios are
+shown while 50 and 500 robots play. With --profile it also prints the
+functions that took most time. Without a graphics card, all is drawn by the processor. With
+SWARM_SCREENSHOTS=DIR step 60 is pictured there.
+"""
+
+import collections
+import json
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+import unittest
+
+IS_PROFILED = "--profile" in sys.argv and not sys.argv.remove("--profile")
+
+from browser import CONFIG, PROGRAMS, BrowserTest
+
+ROOT = CONFIG.parents[1]
+N_ROBOTS = [50, 500]
+SECONDS = 6
+STEPS = 200
+
+# The time of every frame, and what scripts took of it, ms.
+COUNTER = """
+    const ask = requestAnimationFrame.bind(window);
+    window.frames_drawn = [];
+    window.requestAnimationFrame = (call) => ask((now) => {
+        const begin = performance.now();
+        call(now);
+        window.frames_drawn.push([now, performance.now() - begin]);
+    });
+"""
+
+
+class Frames(BrowserTest):
+    def swarm(self, directory, n_robots):
+        """A file with robots that drive in all of their world, and hear each other."""
+        config = json.loads((ROOT / "configs/light_follower_snes.json").read_text())
+        robots = config["world"]["objects"]["robotA"]
+        robots["num_instances"] = n_robots
+        robots["initializers"]["positions"]["params"].update(low=0, high=1000)
+        file, html = (directory / f"{n_robots}.{end}" for end in ("json", "html"))
+        file.write_text(json.dumps(config))
+        command = ["replay", "--config", file, "--genotype", ROOT / "results/champions/light_follower_snes-0.json"]
+        subprocess.run([PROGRAMS / "swarmctl", *command, "--steps", str(STEPS), "--to", html], check=True, capture_output=True)
+        return html
+
+    def play(self, n_robots, html):
+        self.browser.get(f"{html.as_uri()}#step=60")
+        self.wait_for_text(".episode", f"{n_robots} robots")
+        self.find("#show-reach").click()
+        self.picture(f"frames-{n_robots}")
+        self.browser.get("about:blank")
+        self.browser.get(f"{html.as_uri()}#step=0")
+        self.find("#show-reach").click()
+        # So slow that it does not end before it was measured.
+        self.assertLess(SECONDS * 20, STEPS)
+        if IS_PROFILED:
+            self.browser.execute_cdp_cmd("Profiler.enable", {})
+            self.browser.execute_cdp_cmd("Profiler.start", {})
+        self.find("#play").click()
+        elapsed = "(frames_drawn.length && frames_drawn.at(-1)[0] - frames_drawn[0][0])"
+        self.wait(lambda: self.script(f"return {elapsed} > {1000 * SECONDS}"), "it does not play")
+        frames = self.script("return frames_drawn")
+        if IS_PROFILED:
+            self.print_profile(self.browser.execute_cdp_cmd("Profiler.stop", {})["profile"])
+        intervals = [after[0] - before[0] for before, after in zip(frames, frames[1:])]
+        late = statistics.quantiles(intervals, n=20)[-1]
+        drawing = statistics.mean(took for _, took in frames)
+        print(
+            f"{n_robots:4} robots  {1000 / statistics.mean(intervals):5.1f} frames/s, 95 % of frames within "
+            f"{late:.1f} ms, scripts take {drawing:.1f} ms of a frame"
+        )
+
+    def print_profile(self, profile):
+        """Functions by the time that they took themselves."""
+        names = {}
+        for node in profile["nodes"]:
+            frame = node["callFrame"]
+            names[node["id"]] = f"{frame['functionName'] or '(anonymous)'}:{frame['lineNumber'] + 1}"
+        times = collections.Counter()
+        for node, took in zip(profile["samples"], profile["timeDeltas"]):
+            times[names[node]] += took
+        for name, took in times.most_common(16):
+            print(f"      {took / sum(times.values()):6.1%}  {name}")
+
+    def runTest(self):
+        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNTER})
+        with tempfile.TemporaryDirectory() as directory:
+            for n_robots in N_ROBOTS:
+                self.play(n_robots, self.swarm(pathlib.Path(directory), n_robots))
+
+
+if __name__ == "__main__":
+    unittest.main()
