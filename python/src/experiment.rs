@@ -112,7 +112,7 @@ impl Experiment {
         let recordings = compute(py, range.len(), n_threads, |index, _| {
             let mut recording = Recording::default();
             let trial = range.start + index as u32;
-            let mut observe = |step| recording.add(&step, &self.simulation);
+            let mut observe = |step: &_| recording.add(step, &self.simulation);
             let summary = self.simulation.simulate(&genotype, set, trial, &mut observe)?;
             recording.end(&summary);
             Ok(Some(recording))

@@ -159,15 +159,17 @@ impl<'a> GroupController<'a> {
         }
     }
 
-    /// Adds the stimuli of the first trial's robots, and the activity of their neurons.
+    /// Fills in the stimuli of the first trial's robots, and the activity of their neurons.
     fn record(&self, record: &mut StepRecord) {
-        let values = |lanes: &Lanes, lane| lanes.column(lane).map(f64::from).collect();
-        let voltages = self.controller.voltages();
+        let refill = |list: &mut Vec<f64>, lanes: Option<&Lanes>, lane| {
+            list.clear();
+            list.extend(lanes.into_iter().flat_map(|lanes| lanes.column(lane)).map(f64::from));
+        };
+        let (activity, voltages) = (self.controller.activity(), self.controller.voltages());
         for (lane, robot) in record.robots[self.robots.clone()].iter_mut().enumerate() {
-            robot.stimuli = values(&self.stimuli, lane);
-            let activity = self.controller.activity();
-            robot.activity = activity.map_or_else(Vec::new, |activity| values(activity, lane));
-            robot.voltages = voltages.as_ref().map_or_else(Vec::new, |lanes| values(lanes, lane));
+            refill(&mut robot.stimuli, Some(&self.stimuli), lane);
+            refill(&mut robot.activity, activity, lane);
+            refill(&mut robot.voltages, voltages.as_ref(), lane);
         }
     }
 }

@@ -29,7 +29,7 @@ pub struct EpisodeSummary {
 }
 
 /// One environment step of a trial.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct StepRecord {
     /// From 0.
     pub step: u32,
@@ -47,7 +47,7 @@ pub struct StepRecord {
 }
 
 /// One robot in one step.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RobotRecord {
     /// Position at the end of the step, cm.
     pub position: Vec2,

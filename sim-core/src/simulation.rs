@@ -237,14 +237,14 @@ impl Simulation {
     }
 
     /// Simulates the episode of one trial and shows each of its steps to
-    /// `observe`. Watching changes nothing: the fitness is
+    /// `observe`, in a record that the next step overwrites. Watching changes nothing: the fitness is
     /// [`evaluate`](Self::evaluate)'s, bit for bit.
     pub fn simulate(
         &self,
         genotype: &[f64],
         trial_set: impl Into<TrialSet>,
         trial: u32,
-        observe: &mut dyn FnMut(StepRecord),
+        observe: &mut dyn FnMut(&StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         let trials = trial..trial.saturating_add(1);
@@ -335,8 +335,8 @@ mod tests {
             assert_eq!(row[0].to_bits(), fitness[trial].to_bits());
         }
         assert_eq!(measure(31..33), together[31 * n_values..33 * n_values]);
-        let mut watched = Vec::new();
-        let observe = &mut |step: StepRecord| watched.extend(step.measures.into_values());
+        let mut watched = Vec::<f64>::new();
+        let observe = &mut |step: &StepRecord| watched.extend(step.measures.values());
         simulation.simulate(&genotype, trial_set, 31, observe).unwrap();
         assert_eq!(watched, together[31 * n_values + 1..32 * n_values]);
         let stopped = simulation.measure_while(&genotype, trial_set, 0..1, &|| false);
@@ -349,7 +349,7 @@ mod tests {
         let genotype = genotype(simulation.genotype_len(), 2);
         let start = |trial_set: TrialSet| {
             let mut positions = Vec::new();
-            let observe = &mut |step: StepRecord| {
+            let observe = &mut |step: &StepRecord| {
                 positions.extend(step.robots.iter().map(|robot| robot.position));
             };
             simulation.simulate(&genotype, trial_set, 0, observe).unwrap();

@@ -87,30 +87,26 @@ impl Swarm {
         }
     }
 
-    /// What there is to see of a robot, except what its controller and the task know.
-    pub fn record(&self, robot: usize) -> RobotRecord {
-        RobotRecord {
-            position: self.positions[robot],
-            heading: self.headings[robot],
-            stimuli: Vec::new(),
-            activity: Vec::new(),
-            voltages: Vec::new(),
-            received: self.received[robot].as_ref().map(|received| ReceivedFrame {
-                emitter: received.emitter,
-                originator: received.origin.originator,
-                hops: received.origin.hops,
-                sector: received.sector,
-                signal: received.signal(),
-            }),
-            received_message: self.received_messages[self.message_range(robot)].to_vec(),
-            wheels: self.wheels[robot],
-            led: self.leds[robot],
-            mode: self.modes[robot],
-            message: self.messages[self.message_range(robot)].to_vec(),
-            failed: self.failed[robot],
-            carries: self.carries[robot],
-            target: None,
-        }
+    /// Fills in what there is to see of a robot, except what its controller and the task know.
+    pub fn record(&self, robot: usize, record: &mut RobotRecord) {
+        let message = self.message_range(robot);
+        record.position = self.positions[robot];
+        record.heading = self.headings[robot];
+        record.received = self.received[robot].as_ref().map(|received| ReceivedFrame {
+            emitter: received.emitter,
+            originator: received.origin.originator,
+            hops: received.origin.hops,
+            sector: received.sector,
+            signal: received.signal(),
+        });
+        refill(&mut record.received_message, &self.received_messages[message.clone()]);
+        record.wheels = self.wheels[robot];
+        record.led = self.leds[robot];
+        record.mode = self.modes[robot];
+        refill(&mut record.message, &self.messages[message]);
+        record.failed = self.failed[robot];
+        record.carries = self.carries[robot];
+        record.target = None;
     }
 
     /// Place of a robot's message in `messages` and `received_messages`.
@@ -141,4 +137,10 @@ impl Swarm {
         action.message.fill(0.0);
         action
     }
+}
+
+/// Puts values into a list that has room for them already.
+fn refill(list: &mut Vec<f64>, values: &[f64]) {
+    list.clear();
+    list.extend_from_slice(values);
 }

@@ -11,7 +11,7 @@ use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
 use crate::objects::{Site, StaticObjects, Switches};
 use crate::perturbations::Perturbations;
-use crate::record::{Measures, StepRecord};
+use crate::record::{Measures, RobotRecord, StepRecord};
 use crate::script::{May, ScriptRun, View};
 use crate::senses::Senses;
 use crate::sensors::Surroundings;
@@ -387,28 +387,38 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// Measures of the step that was scored last.
-    pub fn measures(&mut self, step: u32) -> Result<Measures, EvaluateError> {
-        let mut measures = Measures::new();
+    /// Fills in the measures of the step that was scored last.
+    pub fn measure(&mut self, step: u32, measures: &mut Measures) -> Result<(), EvaluateError> {
+        measures.clear();
         if let Some(fitness) = &self.fitness {
             let moment = Moment::new(self.world, &self.swarm, &self.lights, step);
-            fitness.measure(&moment, &mut measures);
+            fitness.measure(&moment, measures);
         }
-        self.run_script(step, |script, view| script.measure(view, &mut measures))?;
-        Ok(measures)
+        self.run_script(step, |script, view| script.measure(view, measures))?;
+        Ok(())
     }
 
-    /// The step that was scored last, without what controllers keep.
-    pub fn record(&mut self, step: u32, fitness: Option<f64>) -> Result<StepRecord, EvaluateError> {
-        let measures = self.measures(step)?;
-        let robots = (0..self.world.n_robots()).map(|robot| self.swarm.record(robot));
-        let mut robots: Vec<_> = robots.collect();
+    /// Fills in the step that was scored last, without what controllers keep.
+    pub fn record(
+        &mut self,
+        step: u32,
+        fitness: Option<f64>,
+        record: &mut StepRecord,
+    ) -> Result<(), EvaluateError> {
+        let StepRecord { step: number, fitness: of_step, measures, robots, lights, areas } = record;
+        (*number, *of_step) = (step, fitness);
+        self.measure(step, measures)?;
+        robots.resize_with(self.world.n_robots(), RobotRecord::default);
+        for (robot, record) in robots.iter_mut().enumerate() {
+            self.swarm.record(robot, record);
+        }
         let targets = self.fitness.as_ref().map_or(&[][..], |fitness| fitness.targets());
         for (robot, target) in self.world.evaluated().zip(targets) {
             robots[robot].target = Some(*target);
         }
-        let (lights, areas) = (self.lights.clone(), self.areas.clone());
-        Ok(StepRecord { step, fitness, measures, robots, lights, areas })
+        lights.clone_from(&self.lights);
+        areas.clone_from(&self.areas);
+        Ok(())
     }
 
     /// Fitness of the episode: the mean over the steps that count, 0 without any, unless the

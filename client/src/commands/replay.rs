@@ -136,7 +136,7 @@ fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error
     let mut steps = Vec::new();
     let Episode { config, simulation, genotype, trial_set, trial, name } = *episode;
     simulation
-        .simulate(genotype, trial_set, trial, &mut |step| steps.push(step))
+        .simulate(genotype, trial_set, trial, &mut |step| steps.push(step.clone()))
         .map_err(|error| Error::Input(format!("{name}: {error}")))?;
     picture::png(config, &steps, moments)
 }

@@ -39,8 +39,8 @@ pub async fn simulate(
     };
     let mut trials = Vec::new();
     for trial in 0..compiled.config.algorithm.num_evaluations {
-        let observe: &mut dyn FnMut(_) = match &mut trace {
-            Some(trace) => &mut |record| trace.record(trial, &record),
+        let observe: &mut dyn FnMut(&_) = match &mut trace {
+            Some(trace) => &mut |record| trace.record(trial, record),
             None => &mut |_| {},
         };
         let simulated = compiled.experiment.simulate(&genotype.genes, generation, trial, observe);

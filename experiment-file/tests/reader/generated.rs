@@ -98,7 +98,7 @@ fn no_accepted_network_of_spiking_neurons_ends_up_in_nan() {
         n_encoded += u32::from(!config.topology.encoding.is_empty());
         let genotype: Vec<f64> =
             (0..experiment.genotype_len()).map(|_| f64::from(u8::from(dice.chance(0.5)))).collect();
-        let observe = &mut |step: StepRecord| {
+        let observe = &mut |step: &StepRecord| {
             for robot in &step.robots {
                 assert!(robot.voltages.iter().all(|v| v.is_finite()), "{file}");
                 assert!(robot.wheels.iter().chain(&robot.message).all(|x| x.is_finite()), "{file}");
@@ -129,7 +129,7 @@ fn no_accepted_network_of_rate_neurons_that_learns_ends_up_in_nan() {
         n_simulated += 1;
         let genotype: Vec<f64> =
             (0..experiment.genotype_len()).map(|_| f64::from(u8::from(dice.chance(0.5)))).collect();
-        let observe = &mut |step: StepRecord| {
+        let observe = &mut |step: &StepRecord| {
             for robot in &step.robots {
                 let values = robot.activity.iter().chain(&robot.wheels).chain(&robot.message);
                 assert!(values.into_iter().all(|x| x.is_finite()), "{file}");

@@ -3,7 +3,7 @@
 use indexmap::IndexMap;
 
 use super::GroupController;
-use crate::record::{EpisodeSummary, MeasureName, StepRecord};
+use crate::record::{EpisodeSummary, MeasureName, Measures, StepRecord};
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::Trial;
 
@@ -53,6 +53,8 @@ impl Recorder for FitnessOnly {
 #[derive(Debug)]
 pub(crate) struct AllMeasures<'a> {
     names: &'a [MeasureName],
+    /// Of the latest step.
+    measures: Measures,
     /// Numbers per episode.
     n_values: usize,
     /// `[episode][value]`, the fitness first.
@@ -64,11 +66,7 @@ impl<'a> AllMeasures<'a> {
     pub fn new(simulation: &'a Simulation, n_episodes: usize) -> Self {
         let n_values = simulation.values_per_trial();
         let values = vec![f64::NAN; n_episodes * n_values];
-        Self { names: simulation.measure_names(), n_values, values }
-    }
-
-    fn row(&mut self, episode: usize) -> &mut [f64] {
-        &mut self.values[episode * self.n_values..][..self.n_values]
+        Self { names: simulation.measure_names(), measures: Measures::new(), n_values, values }
     }
 }
 
@@ -81,23 +79,24 @@ impl Recorder for AllMeasures<'_> {
         _: &[GroupController<'_>],
         _: Option<f64>,
     ) -> Result<(), EvaluateError> {
-        let measures = trial.measures(step)?;
-        let names = self.names;
-        let start = 1 + step as usize * names.len();
-        for (value, name) in self.row(episode)[start..].iter_mut().zip(names) {
-            *value = measures.get(name).copied().unwrap_or(f64::NAN);
+        trial.measure(step, &mut self.measures)?;
+        let start = episode * self.n_values + 1 + step as usize * self.names.len();
+        for (value, name) in self.values[start..].iter_mut().zip(self.names) {
+            *value = self.measures.get(name).copied().unwrap_or(f64::NAN);
         }
         Ok(())
     }
 
     fn end(&mut self, episode: usize, trial: &Trial<'_>) {
-        self.row(episode)[0] = trial.fitness();
+        self.values[episode * self.n_values] = trial.fitness();
     }
 }
 
-/// Hands a record of every step of one episode to a function.
+/// Shows every step of one episode to a function.
 pub(crate) struct Viewer<'a> {
-    observe: &'a mut dyn FnMut(StepRecord),
+    observe: &'a mut dyn FnMut(&StepRecord),
+    /// The latest step. Filled again in each, since its lists are as long in all of them.
+    record: StepRecord,
     /// Per measure its sum, and over how many steps.
     sums: IndexMap<MeasureName, (f64, u32)>,
     fitness: f64,
@@ -105,8 +104,8 @@ pub(crate) struct Viewer<'a> {
 
 impl<'a> Viewer<'a> {
     /// Before the first step.
-    pub fn new(observe: &'a mut dyn FnMut(StepRecord)) -> Self {
-        Self { observe, sums: IndexMap::new(), fitness: 0.0 }
+    pub fn new(observe: &'a mut dyn FnMut(&StepRecord)) -> Self {
+        Self { observe, record: StepRecord::default(), sums: IndexMap::new(), fitness: 0.0 }
     }
 
     /// The whole episode.
@@ -125,16 +124,16 @@ impl Recorder for Viewer<'_> {
         controllers: &[GroupController<'_>],
         fitness: Option<f64>,
     ) -> Result<(), EvaluateError> {
-        let mut record = trial.record(step, fitness)?;
+        trial.record(step, fitness, &mut self.record)?;
         for controller in controllers {
-            controller.record(&mut record);
+            controller.record(&mut self.record);
         }
-        for (name, value) in &record.measures {
+        for (name, value) in &self.record.measures {
             let (sum, n) = self.sums.entry(name.clone()).or_default();
             *sum += value;
             *n += 1;
         }
-        (self.observe)(record);
+        (self.observe)(&self.record);
         Ok(())
     }
 

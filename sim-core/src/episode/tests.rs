@@ -24,7 +24,8 @@ fn watch(config: &ExperimentConfig, seed: u64, trial: u32) -> (Vec<StepRecord>, 
     let simulation = Simulation::compile(config).unwrap();
     let genotype = genotype(simulation.genotype_len(), seed);
     let mut steps = Vec::new();
-    let summary = simulation.simulate(&genotype, 0, trial, &mut |step| steps.push(step)).unwrap();
+    let summary =
+        simulation.simulate(&genotype, 0, trial, &mut |step| steps.push(step.clone())).unwrap();
     assert_eq!(steps.len(), config.algorithm.evaluation_steps as usize);
     (steps, summary)
 }
@@ -104,7 +105,7 @@ fn everything_is_finite_and_in_range() {
         let simulation = Simulation::compile(&config).unwrap();
         let d = simulation.genotype_len();
         for genes in [vec![0.0; d], vec![1.0; d], genotype(d, 9)] {
-            let mut check = |step: StepRecord| {
+            let mut check = |step: &StepRecord| {
                 for robot in &step.robots {
                     assert!((0.0..1000.0).contains(&robot.position.x));
                     assert!((0.0..1000.0).contains(&robot.position.y));

@@ -140,7 +140,7 @@ fn a_script_measures_beside_a_built_in_fitness() {
     assert_eq!(simulation.measure_names(), ["leaders", "one_leader", "half"]);
     let genotype = vec![0.5; simulation.genotype_len()];
     let mut halves = Vec::new();
-    let observe = &mut |step: crate::StepRecord| halves.push(step.measures["half"]);
+    let observe = &mut |step: &crate::StepRecord| halves.push(step.measures["half"]);
     simulation.simulate(&genotype, TrialSet::Evaluation, 0, observe).unwrap();
     assert_eq!(halves[..3], [0.0, 0.5, 1.0]);
 }

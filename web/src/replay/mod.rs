@@ -92,7 +92,7 @@ impl Replay {
         }
         let mut columns = Columns::new(&scene);
         let summary = simulation.simulate(genotype, trial_set, trial, &mut |step| {
-            columns.record(&scene, &step);
+            columns.record(&scene, step);
         })?;
         Ok(Self { scene, summary, columns: columns.into_vec() })
     }

@@ -75,7 +75,8 @@ fn a_replay_has_every_step_of_every_robot_as_it_is_simulated() {
     };
     let (header, body) = unpack(&Replay::simulate(&episode).unwrap().encode());
     let mut steps = Vec::new();
-    let summary = simulation.simulate(&genotype, 3, 1, &mut |step| steps.push(step)).unwrap();
+    let summary =
+        simulation.simulate(&genotype, 3, 1, &mut |step| steps.push(step.clone())).unwrap();
     assert_eq!(header["fitness"].as_f64().unwrap().to_bits(), summary.fitness.to_bits());
     assert_eq!((steps.len(), steps[0].robots.len()), (40, 5));
     let column = |name: &str| values(&header, &body, name);

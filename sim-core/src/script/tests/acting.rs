@@ -40,7 +40,7 @@ fn watch(config: &ExperimentConfig) -> Vec<StepRecord> {
     let simulation = Simulation::compile(config).unwrap();
     let genotype = genotype(simulation.genotype_len(), 1);
     let mut steps = Vec::new();
-    let observe = &mut |step| steps.push(step);
+    let observe = &mut |step: &StepRecord| steps.push(step.clone());
     simulation.simulate(&genotype, TrialSet::Evaluation, 0, observe).unwrap();
     steps
 }

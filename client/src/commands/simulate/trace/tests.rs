@@ -23,9 +23,9 @@ fn trace(config: &ExperimentConfig) -> (Vec<Vec<String>>, Vec<StepRecord>) {
     let experiment = Simulation::compile(config).unwrap();
     let genotype = vec![0.6; experiment.genotype_len()];
     let (mut rows, mut records) = (Rows::new(Vec::new(), config, ALL), Vec::new());
-    let mut observe = |record| {
-        rows.write(4, &record).unwrap();
-        records.push(record);
+    let mut observe = |record: &StepRecord| {
+        rows.write(4, record).unwrap();
+        records.push(record.clone());
     };
     experiment.simulate(&genotype, 0, 0, &mut observe).unwrap();
     let text = String::from_utf8(rows.out).unwrap();
@@ -112,7 +112,7 @@ fn a_failure_is_reported_at_the_end() {
         let mut trace = Trace::create(full, &config, &[]).unwrap();
         let experiment = Simulation::compile(&config).unwrap();
         let genotype = vec![0.5; experiment.genotype_len()];
-        experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, &record)).unwrap();
+        experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, record)).unwrap();
         assert!(trace.finish().unwrap_err().to_string().starts_with("cannot write /dev/full: "));
     }
 }
