@@ -86,6 +86,8 @@ export class Player {
     return element("span", { className: "legend" },
       has("led") ? item("led-on", "LED on") : null,
       has("relays") ? item("relays", "relays") : null,
+      has("carries") ? item("carries", "carries") : null,
+      has("failed") ? item("failed", "failed") : null,
       episode.has_targets ? item("target", "should shine") : null);
   }
 

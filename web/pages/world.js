@@ -258,11 +258,19 @@ export class World {
         context.moveTo(sx, sy);
         context.lineTo(sx + 1.75 * radius * ux, sy + 1.75 * radius * uy);
         context.stroke();
+        const hasFailed = episode.whole("failed", robot, view.step) > 0;
+        context.globalAlpha = hasFailed ? 0.4 : 1;
         context.fillStyle = colors.led(led);
         disc(context, sx, sy, radius).fill();
+        context.globalAlpha = 1;
         context.strokeStyle = relays ? colors.relay : colors["robot-edge"];
         context.lineWidth = relays ? 2 : 1;
         context.stroke();
+        if (episode.whole("carries", robot, view.step) > 0) {
+          context.fillStyle = colors.target;
+          disc(context, sx, sy, 0.55 * radius).fill();
+        }
+        if (hasFailed) cross(context, sx, sy, radius, colors.ink);
         if (target > 0) ring(context, sx, sy, 1.55 * radius, colors.target, [3, 3]);
         if (robot === view.robot) ring(context, sx, sy, 2.1 * radius, colors.accent, []);
         if (view.numbers && radius >= 6) this.drawNumber(context, sx, sy, robot, led);
@@ -310,6 +318,18 @@ function ring(context, x, y, radius, style, dash) {
   context.setLineDash(dash);
   disc(context, x, y, radius).stroke();
   context.setLineDash([]);
+}
+
+/** Crosses out what is at a place. */
+function cross(context, x, y, radius, style) {
+  context.strokeStyle = style;
+  context.lineWidth = 2;
+  context.beginPath();
+  for (const slope of [-radius, radius]) {
+    context.moveTo(x - radius, y - slope);
+    context.lineTo(x + radius, y + slope);
+  }
+  context.stroke();
 }
 
 /** A glow that fades with the distance, in any colour that a file names. */

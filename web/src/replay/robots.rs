@@ -56,6 +56,8 @@ pub const ROBOT_COLUMNS: &[RobotColumn] = &[
         n_components: |scene| scene.message_len,
         read: |robot, out| out.extend(&robot.received_message),
     },
+    one("carries", NUMBER, |robot, out| out.push(robot.carries.into())),
+    one("failed", NUMBER, |robot, out| out.push(robot.failed.into())),
     one("target", NUMBER, |robot, out| out.push(robot.target.map_or(-1.0, f64::from))),
     RobotColumn {
         name: "stimuli",

@@ -128,3 +128,37 @@ fn what_a_browser_cannot_hold_is_refused() {
     let error = Replay::simulate(&episode).unwrap_err().to_string();
     assert!(error.ends_with("simulate fewer steps or robots"), "{error}");
 }
+
+#[test]
+fn a_replay_says_who_carries_something_and_who_has_failed() {
+    let config = quickstart();
+    let simulation = Simulation::compile(&config).unwrap();
+    let genotype = vec![0.6; simulation.genotype_len()];
+    let (trial_set, name) = (TrialSet::Evaluation, "");
+    let episode = Episode {
+        config: &config,
+        simulation: &simulation,
+        genotype: &genotype,
+        name,
+        trial_set,
+        trial: 0,
+    };
+    let scene = Scene::new(&episode);
+    let mut columns = Columns::new(&scene);
+    let simulated = simulation.simulate(&genotype, trial_set, 0, &mut |step| {
+        let mut step = step.clone();
+        // As a script may say.
+        step.robots[1].carries = step.step == 7;
+        step.robots[3].failed = step.step >= 39;
+        columns.record(&scene, &step);
+    });
+    let replay = Replay { scene, summary: simulated.unwrap(), columns: columns.into_vec() };
+    let (header, body) = unpack(&replay.encode());
+    let marked = |name: &str| {
+        let values = values(&header, &body, name);
+        let marked = (0..values.len()).filter(|&at| values[at] > 0.0);
+        marked.map(|at| (at / 40, at % 40)).collect::<Vec<_>>()
+    };
+    assert_eq!(marked("carries"), [(1, 7)]);
+    assert_eq!(marked("failed"), [(3, 39)]);
+}
