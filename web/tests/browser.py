@@ -40,6 +40,7 @@ if not (CHROMIUM and DRIVER):
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support import expected_conditions
 from selenium.webdriver.support.wait import WebDriverWait
 
 # Only what hangs takes so long.
@@ -209,6 +210,18 @@ class Pages(BrowserTest):
         self.wait_for_text("h1", "Individual 0 of generation 0 of experiment 1")
         # It plays by itself.
         self.wait_for_text("#step", "step 99 of 100")
+
+    def test_a_chart_zooms(self):
+        self.open("/experiment/1")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        chart = self.find(".chart svg")
+        labels = lambda: self.script("return document.querySelector('.chart svg').textContent")
+        whole = labels()
+        drag = webdriver.ActionChains(self.browser).move_to_element_with_offset(chart, -100, 0)
+        drag.click_and_hold().move_by_offset(150, 0).release().perform()
+        self.wait(lambda: labels() != whole, "nothing is seen of dragging")
+        webdriver.ActionChains(self.browser).double_click(chart).perform()
+        self.wait(lambda: labels() == whole, "a double click does not show all")
 
     def test_the_best_of_each_generation_are_on_top_if_wished(self):
         self.open("/experiment/1")
@@ -404,6 +417,69 @@ class Live(BrowserTest):
         self.wait_for_text(".state", "paused")
         self.find("#do-resume").click()
         self.wait_for_text(".state", "running")
+
+    def test_an_experiment_gets_weight_is_forked_and_cancelled_once_that_is_confirmed(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        fleet.start_worker()
+        fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
+        self.browser.get(fleet.pages + "/experiment/1")
+        kept = lambda: json.loads(urllib.request.urlopen(fleet.pages + "/api/experiments/1", timeout=DEADLINE).read())["experiment"]
+
+        def answer(button, text=None):
+            self.find(f"#do-{button}")
+            # Buttons are made anew as the run goes on.
+            self.wait(lambda: self.script(f"const it = document.querySelector('#do-{button}'); if (it) setTimeout(() => it.click()); return !!it"), button)
+            alert = WebDriverWait(self.browser, DEADLINE, 0.05).until(expected_conditions.alert_is_present())
+            if text is None:
+                alert.dismiss()
+                return
+            if text:
+                alert.send_keys(text)
+            alert.accept()
+
+        answer("priority")
+        answer("priority", "7")
+        self.wait(lambda: kept()["priority"] == 7, "it has no other weight")
+        answer("cancel")
+        self.assertEqual(kept()["state"], "running")
+        answer("cancel", "")
+        self.wait_for_text(".state", "cancelled")
+        answer("fork")
+        answer("fork", "1")
+        self.wait(lambda: self.browser.current_url.endswith("/experiment/2"), "no fork is shown")
+        self.wait_for_text("main", "quickstart")
+
+    def test_a_newcomer_sees_the_first_swarm_and_the_last(self):
+        directory = tempfile.TemporaryDirectory()
+        self.addCleanup(directory.cleanup)
+        command = [PROGRAMS / "swarmctl", "run", CONFIG, "--web", "--data-dir", directory.name]
+        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(lambda: (run.kill(), run.wait()))
+        address = next(line for line in run.stderr if "open in a browser: " in line).split()[-1]
+        threading.Thread(target=run.stderr.read, daemon=True).start()
+        self.browser.get(address)
+        self.find("tr[data-id='1'] a").click()
+        n_generations = lambda: int(self.script("return document.querySelector('.chart')?.dataset.generations ?? 0"))
+        self.wait(lambda: 0 < n_generations() < 60, "no curve rises")
+        self.wait_for_text(".state", "completed")
+        self.wait(lambda: n_generations() == 60, "generations are missing")
+        experiment = self.browser.current_url
+        seen = []
+        for generation in [0, 59]:
+            self.browser.get(experiment)
+            canvas = self.find(".heat-map canvas")
+            self.wait(lambda: canvas.size["height"] > 100, "the map is empty")
+            self.script("document.querySelector('.heat-map').scrollIntoView()")
+            wide = self.script("return Math.floor(document.querySelector('.heat-map .scroller').clientWidth / 60)")
+            x, y = int((generation + 0.5) * wide), 5
+            webdriver.ActionChains(self.browser).move_to_element_with_offset(
+                canvas, x - canvas.size["width"] // 2, y - canvas.size["height"] // 2
+            ).click().perform()
+            self.wait_for_text("h1", f"Individual 0 of generation {generation} of experiment 1")
+            self.wait_for_text("#step", "step 99 of 100")
+            seen.append(self.text("#result b"))
+        self.assertNotEqual(*seen)
 
     def test_the_token_is_asked_for_once(self):
         self.expected_complaints = ["401 (Unauthorized)"]
