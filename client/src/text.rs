@@ -121,8 +121,9 @@ pub fn identical(submitted: &Experiment, identical: u64, reuse: bool) -> Option<
             format!("experiment {id} is of the same file, seed and version, and is used again")
         }),
         id => Some(format!(
-            "experiment {id} is of the same file, seed and version, so it has the same results; \
-             `--reuse` answers with it once it has completed"
+            "experiment {id} is of the same file, seed and version as experiment {}, so it has the \
+             same results; `--reuse` answers with it once it has completed",
+            submitted.id
         )),
     }
 }

@@ -82,8 +82,8 @@ async fn subject(
     if let Some(address) = args.address() {
         if args.genotype.is_some() || args.experiment.is_some() {
             return Err(Error::Input(format!(
-                "`{address}` names a genotype; --genotype and --experiment go with an experiment \
-                 file"
+                "no file `{address}` exists, and the address of a genotype stands alone; --genotype \
+                 and --experiment go with an experiment file"
             )));
         }
         let archive = Archive::open(settings, args.data_dir.as_deref())?;

@@ -9,7 +9,7 @@ use experiment_file::limits;
 use super::trace::ExtraColumns;
 use crate::{
     address::NamedAddress,
-    args::{IsaArgs, SeedArg, StepsArg, Subject, whole},
+    args::{IsaArgs, SeedArg, StepsArg, whole},
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
 };
@@ -98,14 +98,9 @@ impl SimulateArgs {
     }
 
     /// The address of whom to simulate, if the subject is not a file.
-    /// A name alone is that of a file.
     pub fn address(&self) -> Option<NamedAddress> {
-        let text = self.subject.to_str()?;
-        let address: Option<NamedAddress> = text.parse().ok();
-        let is_address = |it: &NamedAddress| {
-            matches!(it.experiment, Subject::Experiment(_)) || text.contains('@')
-        };
-        address.filter(is_address).filter(|_| !self.subject.exists())
+        let address = self.subject.to_str()?.parse().ok();
+        address.filter(|_| !self.subject.exists())
     }
 
     /// Reads the experiment file.
