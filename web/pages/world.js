@@ -144,31 +144,45 @@ export class World {
     });
   }
 
-  /** How far robots are heard: all, or the one that is followed. */
+  /** How far robots are heard: all, or the one that is followed. The circles of the others are
+   *  one path: to fill each of 500 takes longer than a frame may. */
   drawReach(context) {
-    const { camera, colors, episode, view } = this;
+    const { colors, episode, view } = this;
     context.strokeStyle = colors.accent;
     context.fillStyle = colors.accent;
-    for (let robot = 0; robot < episode.n_robots; robot++) {
-      if (!view.reach && robot !== view.robot) continue;
-      const radius = episode.reach(robot) * camera.scale;
-      if (radius === 0) continue;
-      const { x, y } = this.poses[robot];
-      camera.eachImage(x, y, radius, (sx, sy) => {
-        disc(context, sx, sy, radius);
-        context.globalAlpha = robot === view.robot ? 0.07 : 0.025;
-        context.fill();
-        context.globalAlpha = robot === view.robot ? 0.55 : 0.18;
-        context.stroke();
-      });
+    if (view.reach) {
+      context.beginPath();
+      for (let robot = 0; robot < episode.n_robots; robot++) if (robot !== view.robot) this.addReach(context, robot);
+      context.globalAlpha = 0.18;
+      context.stroke();
+    }
+    if (view.robot !== null) {
+      context.beginPath();
+      this.addReach(context, view.robot);
+      context.globalAlpha = 0.07;
+      context.fill();
+      context.globalAlpha = 0.55;
+      context.stroke();
     }
     context.globalAlpha = 1;
+  }
+
+  addReach(context, robot) {
+    const { camera, episode } = this;
+    const radius = episode.reach(robot) * camera.scale;
+    if (radius === 0) return;
+    const { x, y } = this.poses[robot];
+    camera.eachImage(x, y, radius, (sx, sy) => {
+      context.moveTo(sx + radius, sy);
+      context.arc(sx, sy, radius, 0, 2 * Math.PI);
+    });
   }
 
   drawTrails(context) {
     const { camera, colors, episode, view } = this;
     const first = Math.max(0, view.step - TRAIL);
-    context.lineWidth = 1.5;
+    // A wider line takes several times as long to draw.
+    context.lineWidth = 1;
     context.strokeStyle = colors.trail;
     for (let robot = 0; robot < episode.n_robots; robot++) {
       if (!episode.moves[robot]) continue;
@@ -351,7 +365,8 @@ function arrow(context, x, y, dx, dy, radius, head, label) {
   const [startX, startY] = [x + ux * radius, y + uy * radius];
   const [endX, endY] = [x + dx - ux * (radius + 3), y + dy - uy * (radius + 3)];
   const [midX, midY] = [x + dx / 2 - uy * bend, y + dy / 2 + ux * bend];
-  context.lineWidth = 1.6;
+  // Those that fade are thin, which takes less time to draw.
+  context.lineWidth = head > 0 ? 1.6 : 1;
   context.beginPath();
   context.moveTo(startX, startY);
   context.quadraticCurveTo(midX, midY, endX, endY);

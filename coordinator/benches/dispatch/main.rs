@@ -156,7 +156,8 @@ async fn generation_ms(file: &str) -> GenerationParts {
 /// without pages and with 50 of them, by turns.
 async fn beside_pages_ms() -> (Vec<f64>, Vec<f64>) {
     const N_BEFORE: u64 = 10_000;
-    const STRETCH: u64 = 100;
+    // Some four seconds: pages look every two.
+    const STRETCH: u64 = 1_200;
     let coordinator = CoordinatorProcess::start();
     let workers = InstantWorkers::start(&coordinator, 2, 8);
     coordinator.submit(&experiment(SNES, 100, FOREVER)).await;
