@@ -2,172 +2,29 @@
 
     python web/tests/browser.py target/debug
 
-The argument is the folder with coordinator, worker and swarmctl. Without Chromium and its
-driver the tests are skipped, with a line that says so. With SWARM_SCREENSHOTS=DIR, pages
-that were tested are also pictured there.
+The argument is the folder with coordinator, worker and swarmctl; `harness.py` says what else there
+is. Without Chromium and its driver the tests are skipped, with a line that says so.
 """
 
 import csv
 import http.client
 import json
-import os
 import pathlib
 import re
-import shutil
 import signal
-import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import unittest
 import urllib.request
 
-PROGRAMS = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else "target/debug").resolve()
-CONFIG = pathlib.Path(__file__).parents[2] / "configs/quickstart.json"
-CLIENT_TOKEN = "client-token-0123456789abcdef0123"
-WORKER_TOKEN = "worker-token-0123456789abcdef0123"
-CHROMIUM = shutil.which("chromium")
-DRIVER = shutil.which("chromedriver")
-
-if not (CHROMIUM and DRIVER):
-    print(
-        "SKIPPED, but can be installed: no Chromium, so that pages are not tested; "
-        "apt-get install chromium chromium-driver"
-    )
-    sys.exit(0)
+from harness import CLIENT_TOKEN, CONFIG, DEADLINE, PROGRAMS, WORKER_TOKEN, BrowserTest, Fleet
 
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support import expected_conditions
 from selenium.webdriver.support.wait import WebDriverWait
-
-# Only what hangs takes so long.
-DEADLINE = 120
-
-
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
-
-
-class Fleet:
-    """A coordinator with pages, and a worker."""
-
-    def __init__(self, *args, environment=None):
-        self.directory = tempfile.TemporaryDirectory()
-        self.ports = free_port(), free_port()
-        self.args = args
-        self.environment = dict(os.environ, **(environment or {}))
-        self.processes = []
-        self.start_coordinator()
-
-    def start_coordinator(self):
-        listen, pages = (f"127.0.0.1:{port}" for port in self.ports)
-        command = ["coordinator", "--listen", listen, "--web-listen", pages]
-        self.coordinator = self.start(*command, "--data-dir", self.directory.name, *self.args)
-        # The line before tells that it listens for clients.
-        for line in self.coordinator.stderr:
-            if "pages are served" in line:
-                # Who writes into a pipe that is full waits for its reader.
-                threading.Thread(target=self.coordinator.stderr.read, daemon=True).start()
-                return
-        raise AssertionError("the coordinator does not start")
-
-    def start_worker(self, name="w"):
-        return self.start("worker", "--coordinator", self.url, "--name", name, "--slots", "1")
-
-    def start(self, program, *args):
-        stderr = subprocess.PIPE if program == "coordinator" else subprocess.DEVNULL
-        process = subprocess.Popen(
-            [PROGRAMS / program, *args], env=self.environment, stderr=stderr, text=True
-        )
-        self.processes.append(process)
-        return process
-
-    @property
-    def url(self):
-        return f"http://127.0.0.1:{self.ports[0]}"
-
-    @property
-    def pages(self):
-        return f"http://127.0.0.1:{self.ports[1]}"
-
-    def swarmctl(self, *args):
-        command = [PROGRAMS / "swarmctl", "--coordinator", self.url, "--output", "json", *args]
-        return subprocess.run(command, check=True, text=True, capture_output=True).stdout
-
-    def stop(self):
-        for process in self.processes:
-            process.kill()
-            process.wait()
-        self.directory.cleanup()
-
-
-class BrowserTest(unittest.TestCase):
-    """A browser of its own for each test, whose console and requests are looked at."""
-
-    is_dark = False
-    # What a test provokes on purpose, such as a refused login.
-    expected_complaints = ()
-
-    def setUp(self):
-        options = webdriver.ChromeOptions()
-        options.binary_location = CHROMIUM
-        for argument in ["--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"]:
-            options.add_argument(argument)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        self.browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-        self.addCleanup(self.browser.quit)
-        self.prefer("dark" if self.is_dark else "light")
-
-    def tearDown(self):
-        complaints = [
-            entry["message"]
-            for entry in self.browser.get_log("browser")
-            if entry["level"] in ("SEVERE", "WARNING")
-            and not any(part in entry["message"] for part in self.expected_complaints)
-        ]
-        self.assertEqual(complaints, [], "the console has errors")
-        for entry in self.browser.get_log("performance"):
-            message = json.loads(entry["message"])["message"]
-            if message["method"] == "Network.requestWillBeSent":
-                url = message["params"]["request"]["url"]
-                is_ours = url.startswith(("http://127.0.0.1:", "https://127.0.0.1:", "file://", "data:", "blob:", "chrome:"))
-                self.assertTrue(is_ours, f"a request to another host: {url}")
-
-    def prefer(self, scheme):
-        features = [{"name": "prefers-color-scheme", "value": scheme}]
-        self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-
-    def narrow(self):
-        size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
-        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-
-    def wait(self, condition, what):
-        return WebDriverWait(self.browser, DEADLINE, 0.05).until(lambda _: condition(), what)
-
-    def find(self, selector):
-        return self.wait(
-            lambda: next(iter(self.browser.find_elements(By.CSS_SELECTOR, selector)), None),
-            f"no {selector}",
-        )
-
-    def text(self, selector):
-        return self.find(selector).text
-
-    def wait_for_text(self, selector, part):
-        self.wait(lambda: part in self.script(f"return document.querySelector({selector!r})?.textContent ?? ''"), f"{selector} never says {part!r}")
-
-    def script(self, text):
-        return self.browser.execute_script(text)
-
-    def picture(self, name):
-        directory = os.environ.get("SWARM_SCREENSHOTS")
-        if directory:
-            self.browser.save_screenshot(str(pathlib.Path(directory) / f"{name}.png"))
 
 
 class Pages(BrowserTest):

@@ -19,7 +19,7 @@ import unittest
 
 IS_PROFILED = "--profile" in sys.argv and not sys.argv.remove("--profile")
 
-from browser import CONFIG, PROGRAMS, BrowserTest
+from harness import CONFIG, PROGRAMS, BrowserTest
 
 ROOT = CONFIG.parents[1]
 N_ROBOTS = [50, 500]

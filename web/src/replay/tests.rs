@@ -107,6 +107,16 @@ fn a_replay_has_every_step_of_every_robot_as_it_is_simulated() {
     assert!(n_heard > 0);
 }
 
+/// The first trial of an evaluation.
+fn evaluated<'a>(
+    config: &'a ExperimentConfig,
+    simulation: &'a Simulation,
+    genotype: &'a [f64],
+) -> Episode<'a> {
+    let (trial_set, name) = (TrialSet::Evaluation, "");
+    Episode { config, simulation, genotype, name, trial_set, trial: 0 }
+}
+
 #[test]
 fn what_a_browser_cannot_hold_is_refused() {
     let mut config = quickstart();
@@ -116,15 +126,7 @@ fn what_a_browser_cannot_hold_is_refused() {
     }
     let simulation = Simulation::compile(&config).unwrap();
     let genotype = vec![0.5; simulation.genotype_len()];
-    let (trial_set, name) = (TrialSet::Evaluation, "");
-    let episode = Episode {
-        config: &config,
-        simulation: &simulation,
-        genotype: &genotype,
-        name,
-        trial_set,
-        trial: 0,
-    };
+    let episode = evaluated(&config, &simulation, &genotype);
     let error = Replay::simulate(&episode).unwrap_err().to_string();
     assert!(error.ends_with("simulate fewer steps or robots"), "{error}");
 }
@@ -134,18 +136,10 @@ fn a_replay_says_who_carries_something_and_who_has_failed() {
     let config = quickstart();
     let simulation = Simulation::compile(&config).unwrap();
     let genotype = vec![0.6; simulation.genotype_len()];
-    let (trial_set, name) = (TrialSet::Evaluation, "");
-    let episode = Episode {
-        config: &config,
-        simulation: &simulation,
-        genotype: &genotype,
-        name,
-        trial_set,
-        trial: 0,
-    };
+    let episode = evaluated(&config, &simulation, &genotype);
     let scene = Scene::new(&episode);
     let mut columns = Columns::new(&scene);
-    let simulated = simulation.simulate(&genotype, trial_set, 0, &mut |step| {
+    let simulated = simulation.simulate(&genotype, episode.trial_set, 0, &mut |step| {
         let mut step = step.clone();
         // As a script may say.
         step.robots[1].carries = step.step == 7;
