@@ -230,16 +230,22 @@ fn episodes(isa: Isa) {
     compare("A with LIF neurons", &spiking_a(NeuronModel::Lif, SynapseModel::Static), isa);
 }
 
-/// Swarms of different sizes and one density.
+/// Swarms of different sizes and one density, beside ten robots.
 fn sizes(isa: Isa) {
-    println!("\nsizes ({isa}): robots that stand (A) and robots that move (D)");
-    header();
+    const SIZES: [u32; 6] = [10, 20, 50, 200, 1_000, 10_000];
+    println!("\nsizes ({isa}), us/robot-step: robots that stand (A) and robots that move (D)");
+    println!("{:25} {}", "robots", SIZES.map(|n| format!("{n:>8}")).concat());
     for mut config in [experiment_a(), experiment_d()] {
-        for n in [10, 20, 50, 200, 1000] {
+        config.algorithm.evaluation_steps = 100;
+        let mut swarms = SIZES.map(|n| {
             resize(&mut config, n);
-            config.algorithm.evaluation_steps = 100;
-            compare(&format!("{} ({n} robots)", config.name), &config, isa);
-        }
+            Evaluations::new(&config, isa)
+        });
+        let mut measurements =
+            swarms.each_mut().map(|swarm| move || swarm.seconds_per_robot_step());
+        let times = medians(measurements.each_mut().map(|it| it as &mut dyn FnMut() -> f64));
+        println!("{:25} {}", config.name, times.map(|time| format!("{:8.3}", time * 1e6)).concat());
+        println!("{:25} {}", "", times.map(|time| format!("{:7.2}x", time / times[0])).concat());
     }
 }
 
@@ -311,35 +317,51 @@ fn header() {
 }
 
 fn compare(name: &str, config: &ExperimentConfig, isa: Isa) {
-    let simulation = compile(config, isa);
-    let genotypes: Vec<Vec<f64>> = (0..8).map(|seed| genotype(config, seed)).collect();
+    let mut evaluations = Evaluations::new(config, isa);
+    let reference_genotype = genotype(config, 0);
     let n_robots = n_robots(config);
-    let robot_steps = f64::from(n_robots * config.algorithm.evaluation_steps * N_TRIALS);
     let mut short = config.clone();
     short.algorithm.evaluation_steps =
         (REFERENCE_ROBOT_STEPS / n_robots).clamp(3, config.algorithm.evaluation_steps);
-    let mut turn = 0;
-    let [simulation, reference] = medians([
-        &mut || {
-            seconds_per(|| {
-                turn += 1;
-                let genotype = &genotypes[turn % genotypes.len()];
-                black_box(simulation.evaluate(genotype, 0, 0..N_TRIALS).expect("it is valid"))
-            }) / robot_steps
-        },
-        &mut || {
+    let [simulation, reference] =
+        medians([&mut || evaluations.seconds_per_robot_step(), &mut || {
             let start = Instant::now();
-            black_box(reference::run(&short, &genotypes[0], 0, 0));
+            black_box(reference::run(&short, &reference_genotype, 0, 0));
             let steps = n_robots * short.algorithm.evaluation_steps;
             start.elapsed().as_secs_f64() / f64::from(steps)
-        },
-    ]);
+        }]);
     println!(
         "{name:20} {:16.3} {:16.1} {:9.1}x",
         simulation * 1e6,
         reference * 1e6,
         reference / simulation,
     );
+}
+
+/// Evaluations of several random genotypes, one after the other.
+struct Evaluations {
+    simulation: Simulation,
+    genotypes: Vec<Vec<f64>>,
+    robot_steps: f64,
+    turn: usize,
+}
+
+impl Evaluations {
+    fn new(config: &ExperimentConfig, isa: Isa) -> Self {
+        let robot_steps =
+            f64::from(n_robots(config) * config.algorithm.evaluation_steps * N_TRIALS);
+        let genotypes = (0..8).map(|seed| genotype(config, seed)).collect();
+        Self { simulation: compile(config, isa), genotypes, robot_steps, turn: 0 }
+    }
+
+    fn seconds_per_robot_step(&mut self) -> f64 {
+        let Self { simulation, genotypes, robot_steps, turn } = self;
+        seconds_per(|| {
+            *turn += 1;
+            let genotype = &genotypes[*turn % genotypes.len()];
+            black_box(simulation.evaluate(genotype, 0, 0..N_TRIALS).expect("it is valid"))
+        }) / *robot_steps
+    }
 }
 
 /// The naive network of one robot in the naive world, whose own cost hardly counts.

@@ -163,7 +163,9 @@ impl<'a> GroupController<'a> {
     fn record(&self, record: &mut StepRecord) {
         let refill = |list: &mut Vec<f64>, lanes: Option<&Lanes>, lane| {
             list.clear();
-            list.extend(lanes.into_iter().flat_map(|lanes| lanes.column(lane)).map(f64::from));
+            if let Some(lanes) = lanes {
+                list.extend(lanes.column(lane).map(f64::from));
+            }
         };
         let (activity, voltages) = (self.controller.activity(), self.controller.voltages());
         for (lane, robot) in record.robots[self.robots.clone()].iter_mut().enumerate() {

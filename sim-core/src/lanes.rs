@@ -44,7 +44,8 @@ impl Lanes {
 
     /// The values of one lane, row by row.
     pub fn column(&self, lane: usize) -> impl Iterator<Item = f32> {
-        self.values.iter().skip(lane).step_by(self.row_len.max(1)).copied()
+        // An iterator that knows its length, so that lists grow once.
+        self.values.chunks_exact(self.row_len.max(1)).map(move |row| row[lane])
     }
 
     /// Sets one value.

@@ -15,8 +15,10 @@ const MAX_WITHOUT_GRID: usize = 64;
 /// Robots whose neighbours are found, and then located, together: few enough for what is noted of
 /// them to stay in the cache.
 const N_ROBOTS_AT_ONCE: usize = 128;
+/// Cells per robot, at most: all of them are gone through in every step, however few are occupied.
+const MAX_CELLS_PER_ROBOT: usize = 16;
 /// Cells per axis, at most: memory, not speed.
-const MAX_CELLS: usize = 256;
+const MAX_CELLS: usize = 512;
 
 /// A robot as another one has it nearby.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,7 +174,7 @@ impl WithSimd for Search<'_> {
             let from = positions[robot];
             let near = Near { torus, reach_squared, robot: robot as u32, from, first };
             if has_grid {
-                for cells in grid.around(torus, from) {
+                for cells in grid.around(from) {
                     n_found = near.search(&grid.robots, cells, found, n_found);
                 }
             } else {
@@ -287,38 +289,47 @@ impl Placed {
 struct Grid {
     n_columns: usize,
     n_rows: usize,
+    columns_per_cm: f64,
+    rows_per_cm: f64,
     /// The first robot of each cell, row by row, and the end.
-    first: Vec<usize>,
+    first: Vec<u32>,
     robots: Placed,
+    /// Scratch: the cell of each robot.
+    cells: Vec<u32>,
 }
 
 impl Grid {
     /// Sorts robots into cells no shorter than `reach`. False if there are so few cells
     /// that left and right neighbours are the same.
     fn sort(&mut self, torus: &Torus, reach: f64, positions: &[Vec2]) -> bool {
-        (self.n_columns, self.n_rows) = (n_cells(torus.width, reach), n_cells(torus.height, reach));
+        let n = |extent| n_cells(extent, reach, positions.len());
+        (self.n_columns, self.n_rows) = (n(torus.width), n(torus.height));
         if self.n_columns < 3 || self.n_rows < 3 {
             return false;
         }
-        let mut first = std::mem::take(&mut self.first);
-        first.clear();
-        first.resize(self.n_columns * self.n_rows + 1, 0);
-        for &position in positions {
-            first[self.cell(torus, position)] += 1;
+        self.columns_per_cm = self.n_columns as f64 / torus.width;
+        self.rows_per_cm = self.n_rows as f64 / torus.height;
+        let mut cells = std::mem::take(&mut self.cells);
+        cells.clear();
+        cells.extend(positions.iter().map(|&position| self.cell(position)));
+        self.first.clear();
+        self.first.resize(self.n_columns * self.n_rows + 1, 0);
+        for &cell in &cells {
+            self.first[cell as usize] += 1;
         }
         let mut n = 0;
-        for first in &mut first {
+        for first in &mut self.first {
             n += *first;
             *first = n;
         }
         self.robots.resize(positions.len());
         // Backwards, so that every cell's robots come in their order.
-        for (robot, &position) in positions.iter().enumerate().rev() {
-            let place = &mut first[self.cell(torus, position)];
+        for (robot, (&position, &cell)) in positions.iter().zip(&cells).enumerate().rev() {
+            let place = &mut self.first[cell as usize];
             *place -= 1;
-            self.robots.set(*place, robot, position);
+            self.robots.set(*place as usize, robot, position);
         }
-        self.first = first;
+        self.cells = cells;
         true
     }
 
@@ -332,8 +343,8 @@ impl Grid {
 
     /// Where the robots in the cells around a position are.
     #[inline(always)]
-    fn around(&self, torus: &Torus, position: Vec2) -> [Range<usize>; 6] {
-        let (column, row) = self.column_and_row(torus, position);
+    fn around(&self, position: Vec2) -> [Range<usize>; 6] {
+        let (column, row) = self.column_and_row(position);
         // Neighbouring cells of a row are neighbours in memory, but for the seam.
         let last = self.n_columns - 1;
         let (middle, beyond) = match column {
@@ -345,7 +356,7 @@ impl Grid {
         let below = if row + 1 == self.n_rows { 0 } else { row + 1 };
         let robots = |row: usize, columns: &Range<usize>| {
             let first = &self.first[row * self.n_columns..];
-            first[columns.start]..first[columns.end]
+            first[columns.start] as usize..first[columns.end] as usize
         };
         [
             robots(above, &middle),
@@ -357,22 +368,23 @@ impl Grid {
         ]
     }
 
-    fn cell(&self, torus: &Torus, position: Vec2) -> usize {
-        let (column, row) = self.column_and_row(torus, position);
-        row * self.n_columns + column
+    fn cell(&self, position: Vec2) -> u32 {
+        let (column, row) = self.column_and_row(position);
+        (row * self.n_columns + column) as u32
     }
 
-    fn column_and_row(&self, torus: &Torus, position: Vec2) -> (usize, usize) {
-        let column = (position.x / torus.width * self.n_columns as f64) as usize;
-        let row = (position.y / torus.height * self.n_rows as f64) as usize;
+    fn column_and_row(&self, position: Vec2) -> (usize, usize) {
+        let column = (position.x * self.columns_per_cm) as usize;
+        let row = (position.y * self.rows_per_cm) as usize;
         (column.min(self.n_columns - 1), row.min(self.n_rows - 1))
     }
 }
 
 /// Number of cells along an axis, none shorter than `reach`.
-fn n_cells(extent: f64, reach: f64) -> usize {
+fn n_cells(extent: f64, reach: f64, n_robots: usize) -> usize {
+    let most = (MAX_CELLS_PER_ROBOT * n_robots).isqrt().min(MAX_CELLS);
     // Rounding must not make a cell shorter than the reach.
-    ((extent / reach * (1.0 - 1e-9)) as usize).min(MAX_CELLS)
+    ((extent / reach * (1.0 - 1e-9)) as usize).min(most)
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ pub struct Stepper<'a> {
     trials: Vec<Trial<'a>>,
     groups: Vec<Group<'a>>,
     n_agents: usize,
+    /// Who emits nothing in this step, `[trial][agent]`.
+    silent: Vec<bool>,
     step: u32,
 }
 
@@ -145,7 +147,8 @@ impl<'a> Stepper<'a> {
             Group { index, robots: group.robots.clone(), stimuli, n_inputs, decider }
         });
         let groups = groups.collect();
-        let mut this = Self { simulation, trials, groups, n_agents, step: 0 };
+        let silent = vec![false; trials.len() * n_agents];
+        let mut this = Self { simulation, trials, groups, n_agents, silent, step: 0 };
         this.sense()?;
         Ok(this)
     }
@@ -185,7 +188,7 @@ impl<'a> Stepper<'a> {
 
     /// Has the agents get something else in this step, `[trial][agent][input]`: what
     /// [`decide`](Self::decide) sees. Radios still relay what they heard. Values of inputs that an
-    /// agent has not do not matter.
+    /// agent has not do not matter, and those of inhibited ones are zero.
     pub fn set_stimuli(&mut self, stimuli: &[f32]) -> Result<(), StepError> {
         let width = self.n_inputs();
         let lanes = self.lanes_of_agents();
@@ -212,7 +215,30 @@ impl<'a> Stepper<'a> {
                 group.stimuli.set(input, lane, value);
             }
         }
+        for (index, trial) in self.trials.iter().enumerate() {
+            for group in &mut self.groups {
+                trial.inhibit(group.index, index * group.robots.len(), &mut group.stimuli);
+            }
+        }
         Ok(())
+    }
+
+    /// Has agents, `[trial][agent]`, emit nothing in this step, neither their own message nor a
+    /// frame that they relay: the next strongest are heard instead.
+    pub fn silence(&mut self, silent: &[bool]) -> Result<(), StepError> {
+        let (expected, actual) = (self.silent.len(), silent.len());
+        if expected != actual {
+            return Err(StepError::Length { what: "silent or not", expected, actual });
+        }
+        self.silent.copy_from_slice(silent);
+        Ok(())
+    }
+
+    /// Whether agents sent their own message in the step before, `[trial][agent]`: what their
+    /// actions said, but for the first steps and for perturbations.
+    pub fn sent(&self) -> Vec<bool> {
+        let agents = self.agents();
+        self.trials.iter().flat_map(|trial| agents.iter().map(|&it| trial.has_sent(it))).collect()
     }
 
     /// The network of a genotype, at rest, for as many trials.
@@ -290,6 +316,13 @@ impl<'a> Stepper<'a> {
             Ok(fitness)
         });
         let fitness = fitness.collect::<Result<_, EvaluateError>>()?;
+        let agents = self.agents();
+        for (index, trial) in self.trials.iter_mut().enumerate() {
+            let silent = &self.silent[index * n_agents..][..n_agents];
+            let robots = agents.iter().zip(silent).filter(|(_, silent)| **silent);
+            trial.silence(robots.map(|(robot, _)| *robot));
+        }
+        self.silent.fill(false);
         self.step += 1;
         if self.step < self.simulation.n_steps {
             self.sense()?;
@@ -360,128 +393,4 @@ impl<'a> Stepper<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{experiment_a, experiment_a_spiking, genotype};
-    use experiment_file::{
-        EncodingConfig, EncodingScheme, ExperimentConfig, GenotypeQuery, LearningConfig,
-        LinearField, NeuronModel, ReceptiveField, RewardConfig, StimulusSelector,
-    };
-
-    /// Leader selection with LIF neurons that learn, of which one stimulus has spikes drawn at
-    /// random.
-    fn experiment_a_plastic() -> ExperimentConfig {
-        let mut config = experiment_a_spiking(NeuronModel::Lif);
-        let receptive_field = ReceptiveField::Linear(LinearField { n_neurons: 3 });
-        let encoding = EncodingConfig { scheme: EncodingScheme::PoissonRate, receptive_field };
-        config.topology.encoding.insert("I1".to_owned(), encoding);
-        config.topology.learning = Some(LearningConfig {
-            learning_rate: 1.0,
-            max_weight: 300.0,
-            a: 500.0,
-            b: 0.0,
-            c: -20.0,
-            d: 0.0,
-            synapses: vec!["I1-H1".to_owned(), "H1-H1".to_owned()],
-            reward: Some(RewardConfig { delay: 5, discount: 0.9 }),
-        });
-        let population = &mut config.algorithm.populations[0];
-        population.objects.push(GenotypeQuery::Encoders(StimulusSelector::All));
-        population.min_vals.push(0.0);
-        population.max_vals.push(5_000.0);
-        config
-    }
-
-    #[test]
-    fn stepping_with_the_network_of_a_genotype_gives_the_bits_of_its_simulation() {
-        for config in [experiment_a(), experiment_a_plastic()] {
-            assert_stepping_gives_the_bits(&Simulation::compile(&config).unwrap());
-        }
-    }
-
-    fn assert_stepping_gives_the_bits(simulation: &Simulation) {
-        let genotype = genotype(simulation.genotype_len(), 3);
-        let trial_set = TrialSet::Generation(4);
-        let mut stepper = Stepper::new(simulation, trial_set, 2..5).unwrap();
-        let mut policy = stepper.policy(&genotype).unwrap();
-        let (mut fitness, mut stimuli) = (Vec::new(), Vec::new());
-        for _ in 0..simulation.n_steps() {
-            stimuli.push(stepper.stimuli());
-            let actions = stepper.decide(&mut policy);
-            fitness.push(stepper.step(&actions).unwrap());
-        }
-        assert_eq!(stepper.fitness(), simulation.evaluate(&genotype, trial_set, 2..5).unwrap());
-        let width = stepper.n_inputs();
-        let n_values = stepper.agents().len() * width;
-        simulation
-            .simulate(&genotype, trial_set, 3, &mut |record| {
-                let step = record.step as usize;
-                assert_eq!(record.fitness, fitness[step][1], "step {step}");
-                let expected = record.robots.iter().flat_map(|robot| &robot.stimuli);
-                let actual = &stimuli[step][n_values..2 * n_values];
-                assert!(
-                    expected.eq(actual
-                        .iter()
-                        .map(|&value| f64::from(value))
-                        .collect::<Vec<_>>()
-                        .iter())
-                );
-            })
-            .unwrap();
-        let actions = stepper.decide(&mut policy);
-        assert_eq!(stepper.step(&actions), Err(StepError::Over(simulation.n_steps())));
-    }
-
-    #[test]
-    fn agents_decide_by_the_stimuli_that_they_are_given() {
-        let simulation = Simulation::compile(&experiment_a()).unwrap();
-        let genotype = genotype(simulation.genotype_len(), 3);
-        let episode = |changed: Option<f32>| {
-            let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..2).unwrap();
-            let mut policy = stepper.policy(&genotype).unwrap();
-            let mut course = Vec::new();
-            for step in 0..30 {
-                let mut stimuli = stepper.stimuli();
-                if let Some(value) = changed.filter(|_| step == 12) {
-                    stimuli.fill(value);
-                }
-                stepper.set_stimuli(&stimuli).unwrap();
-                assert_eq!(stepper.stimuli(), stimuli);
-                course.push(stepper.decide(&mut policy));
-                stepper.step(&course[step]).unwrap();
-            }
-            course
-        };
-        let (as_it_was, otherwise) = (episode(None), episode(Some(1.0)));
-        assert_eq!(as_it_was[..12], otherwise[..12]);
-        assert_ne!(as_it_was[12], otherwise[12]);
-
-        let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..2).unwrap();
-        let before = stepper.stimuli();
-        let short = stepper.set_stimuli(&before[1..]);
-        assert!(matches!(short, Err(StepError::Length { what: "stimuli", .. })));
-        let mut wrong = vec![0.5; before.len()];
-        wrong[7] = f32::NAN;
-        assert!(matches!(stepper.set_stimuli(&wrong), Err(StepError::Range { index: 7, .. })));
-        assert_eq!(stepper.stimuli(), before);
-    }
-
-    #[test]
-    fn actions_that_do_not_fit_are_refused_and_no_step_is_taken() {
-        let simulation = Simulation::compile(&experiment_a()).unwrap();
-        let mut stepper = Stepper::new(&simulation, TrialSet::Evaluation, 0..1).unwrap();
-        let mut policy = stepper.policy(&genotype(simulation.genotype_len(), 1)).unwrap();
-        let actions = stepper.decide(&mut policy);
-        let mut short = actions.clone();
-        short.leds.pop();
-        assert!(matches!(stepper.step(&short), Err(StepError::Length { what: "LEDs", .. })));
-        for value in [f64::NAN, -0.1, 1.1] {
-            let mut wrong = actions.clone();
-            wrong.messages[1] = value;
-            let refused = stepper.step(&wrong).unwrap_err();
-            assert!(matches!(refused, StepError::Range { index: 1, .. }), "{refused}");
-        }
-        assert_eq!(stepper.n_steps_done(), 0);
-        assert!(stepper.step(&actions).is_ok());
-    }
-}
+mod tests;

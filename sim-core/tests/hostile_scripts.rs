@@ -4,8 +4,13 @@
 //! `SWARM_TEST_SCRIPTS` says how many.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::Duration,
+};
 
 use experiment_file::{
     ExperimentConfig, FitnessFunction, LightController, ObjectConfig, RobotController,
@@ -163,8 +168,35 @@ fn mutated(text: &str, stream: &mut Stream) -> String {
     pieces.concat()
 }
 
+/// Longest that five steps may take, on a machine with much other work: all that a script may
+/// use in them takes about a second.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// Most memory that this process may ever have had, KiB: scripts may keep some hundred KiB.
+const PEAK_KIB: u64 = 256 << 10;
+
 #[test]
 fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
+    let (next, started) = channel();
+    let trying = thread::spawn(move || try_damaged_scripts(|text| next.send(text).unwrap()));
+    let mut latest = String::new();
+    loop {
+        match started.recv_timeout(PATIENCE) {
+            Ok(text) => latest = text,
+            Err(RecvTimeoutError::Timeout) => panic!("this script does not end:\n{latest}"),
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    trying.join().unwrap();
+    // Where the system says it.
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    if let Some(peak) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+        let peak: u64 = peak.trim().trim_end_matches(" kB").parse().unwrap();
+        assert!(peak < PEAK_KIB, "{peak} KiB");
+    }
+}
+
+/// `on_start` is told each script.
+fn try_damaged_scripts(on_start: impl Fn(String)) {
     let n = std::env::var("SWARM_TEST_SCRIPTS").map_or(300, |n| n.parse().unwrap());
     let scripts = scripts();
     let mut stream = Stream::new(1, 0, 0, Purpose::Evolution, 0);
@@ -172,6 +204,7 @@ fn damaged_scripts_are_refused_or_fail_with_their_place_or_compute_numbers() {
     for number in 0..n {
         let (text, config) = &scripts[number % scripts.len()];
         let text = mutated(text, &mut stream);
+        on_start(text.clone());
         let mut config = config.clone();
         let script = ScriptConfig { name: "hostile.star".into(), text: text.clone() };
         config.task = Some(TaskConfig { script });

@@ -19,7 +19,7 @@ pub(crate) struct Radio {
     ether: Ether,
     hearing: Hearing,
     /// Who is not heard.
-    failed: Vec<bool>,
+    silent: Vec<bool>,
     /// Per robot.
     reception: Vec<Stream>,
     /// Per robot.
@@ -42,7 +42,7 @@ impl Radio {
         Self {
             ether,
             hearing: Hearing::new(&world.antennas),
-            failed: vec![false; world.n_robots()],
+            silent: vec![false; world.n_robots()],
             reception,
             quantisation,
             u: Vec::new(),
@@ -56,16 +56,16 @@ impl Radio {
         self.hearing.update(neighbours, &swarm.headings);
     }
 
-    /// Those who have failed are not heard. Returns whether this is another set of robots than
-    /// before.
-    pub fn mute(&mut self, world: &World, failed: &[bool]) -> bool {
-        if self.failed == failed {
+    /// Those who have failed, or are silent otherwise, are not heard. Returns whether this is
+    /// another set of robots than before.
+    pub fn mute(&mut self, world: &World, silent: &[bool]) -> bool {
+        if self.silent == silent {
             return false;
         }
-        self.failed.copy_from_slice(failed);
+        self.silent.copy_from_slice(silent);
         let reach =
-            |(antenna, &failed): (&Antenna, &bool)| if failed { -1.0 } else { antenna.reach() };
-        self.hearing.set_reaches(world.antennas.iter().zip(failed).map(reach));
+            |(antenna, &silent): (&Antenna, &bool)| if silent { -1.0 } else { antenna.reach() };
+        self.hearing.set_reaches(world.antennas.iter().zip(silent).map(reach));
         true
     }
 

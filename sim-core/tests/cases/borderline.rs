@@ -25,6 +25,19 @@ fn experiments_with_an_interior_agree() {
 }
 
 #[test]
+fn borders_of_other_alpha_shapes_agree() {
+    let n_interior = [5.0, 15.0, 40.0].map(|alpha| {
+        let mut config = experiment_b();
+        config.algorithm.evaluation_steps = 40;
+        config.algorithm.fitness_params.alpha = alpha;
+        let episodes = assert_agreement(&config, &random_genotype(&config, LIVELY[0]), 0, 0..3);
+        episodes.iter().map(|episode| episode.witness.n_interior).sum::<usize>()
+    });
+    // The greater alpha, the more concave the shape, and the more robots are on its border.
+    assert!(n_interior[0] > n_interior[1] && n_interior[1] > n_interior[2], "{n_interior:?}");
+}
+
+#[test]
 fn swarms_across_the_border_of_an_oblong_world_agree() {
     let mut config = experiment_b();
     config.algorithm.evaluation_steps = 40;

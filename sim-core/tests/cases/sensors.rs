@@ -3,9 +3,9 @@
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PlainSensorConfig, PositionInitializers,
-    RandomTargetsConfig, SensorQuery, StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig,
-    WholeReceiver,
+    LightSourceConfig, NeighborhoodSensorConfig, ObjectConfig, OrbitConfig, Pace,
+    PlainSensorConfig, PositionInitializers, RandomTargetsConfig, SensorQuery,
+    StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -124,6 +124,27 @@ fn food_areas_and_nests_are_sensed_as_ground_areas_of_their_colours() {
         }
         assert_eq!(fitness(&assert_varied_agreement(&config)), ground, "{color}");
     }
+}
+
+#[test]
+fn robots_that_know_where_they_and_the_nearest_are_agree() {
+    let mut config = all_sensors();
+    let without = fitness(&assert_varied_agreement(&config));
+    let sensors = &mut swarm_mut(&mut config).sensors;
+    sensors.own_position_sensor = Some(PlainSensorConfig {});
+    sensors.own_orientation_sensor = Some(PlainSensorConfig {});
+    sensors.neighborhood_pos_sensor = Some(NeighborhoodSensorConfig { n_neighbors: 3 });
+    for (stimulus, n, sensor) in [
+        ("I6", 2, SensorQuery::OwnPosition),
+        ("I7", 1, SensorQuery::OwnOrientation),
+        ("I8", 9, SensorQuery::NeighborhoodPos),
+    ] {
+        config.topology.stimuli[stimulus] = StimulusConfig { n, sensor };
+    }
+    assert_ne!(fitness(&assert_varied_agreement(&config)), without);
+    // Of two robots, none has three others.
+    swarm_mut(&mut config).num_instances = 2;
+    assert_varied_agreement(&config);
 }
 
 #[test]

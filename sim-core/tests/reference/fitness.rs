@@ -10,8 +10,6 @@ use super::perturbations::SoleLeader;
 use super::torus::{Torus, Vector, angular_difference};
 use super::world::Robot;
 
-const NEAR_LIGHT_CM: f64 = 80.0;
-
 /// Fitness of a trial: the mean over its steps. `alignment` leaves out the first
 /// 100.
 pub fn of_trial(function: FitnessFunction, of_steps: &[f64]) -> f64 {
@@ -37,10 +35,10 @@ pub fn identify_leader(leader: &SoleLeader) -> f64 {
     }
 }
 
-/// Experiment B's target: for each robot, whether it is on the border.
-pub fn borderline_of_swarm(robots: &[Robot<'_>], torus: Torus) -> Vec<bool> {
+/// Experiment B's target: for each robot, whether it is on the border of the alpha shape.
+pub fn borderline_of_swarm(robots: &[Robot<'_>], torus: Torus, alpha: f64) -> Vec<bool> {
     let range = robots[0].communication_range();
-    borderline(&positions(robots), torus, range, torus.width / 15.0)
+    borderline(&positions(robots), torus, range, torus.width / alpha)
 }
 
 /// Experiment B, Eq. 5.4: TPR * TNR of "LED on" as a sign of the border; TPR
@@ -85,11 +83,11 @@ pub fn alignment(robots: &[Robot<'_>]) -> f64 {
     (1.0 - largest / (0.4 * PI)).clamp(0.0, 1.0) * stillness
 }
 
-/// Experiment D: share of the robots within 80 cm of the light (of a light, if
+/// Experiment D: share of the robots within `near` cm of the light (of a light, if
 /// there are several).
-pub fn goto_light(robots: &[Robot<'_>], lights: &[Light<'_>], torus: Torus) -> f64 {
+pub fn goto_light(robots: &[Robot<'_>], lights: &[Light<'_>], torus: Torus, near: f64) -> f64 {
     let is_near = |robot: &Robot<'_>| {
-        lights.iter().any(|light| torus.distance(robot.position, light.position) <= NEAR_LIGHT_CM)
+        lights.iter().any(|light| torus.distance(robot.position, light.position) <= near)
     };
     mean(robots.iter().map(|robot| if is_near(robot) { 1.0 } else { 0.0 }))
 }

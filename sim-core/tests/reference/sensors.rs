@@ -23,6 +23,8 @@ pub struct Readings {
     pub position: Vector,
     /// In turns.
     pub orientation: f64,
+    /// (x, y, heading) of the nearest robots, cm and radians.
+    pub neighborhood: Vec<f64>,
 }
 
 impl Readings {
@@ -50,7 +52,7 @@ impl Readings {
             SensorQuery::OwnOrientation => vec![self.orientation],
             // Nothing but a script has robots carry anything.
             SensorQuery::Food => vec![0.0],
-            SensorQuery::NeighborhoodPos => panic!("no equation is given"),
+            SensorQuery::NeighborhoodPos => self.neighborhood.clone(),
         }
     }
 }
@@ -112,6 +114,23 @@ pub fn distance(
         readings.push(with_noise(largest, config.noise_variance, noise));
     }
     readings
+}
+
+/// Places and headings of the `n` nearest other robots, the nearest first, of equally near ones
+/// the first; zeros where there are none.
+pub fn neighborhood(n: usize, own_idx: usize, robots: &[Robot<'_>], torus: Torus) -> Vec<f64> {
+    let own = &robots[own_idx];
+    let mut others: Vec<&Robot<'_>> =
+        robots.iter().enumerate().filter(|(idx, _)| *idx != own_idx).map(|(_, it)| it).collect();
+    // Stable: ties keep their order.
+    others.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|robot| torus.distance(own.position, robot.position));
+        a.total_cmp(&b)
+    });
+    let of = |robot: &&Robot<'_>| [robot.position[0], robot.position[1], robot.heading];
+    let mut reading: Vec<f64> = others.iter().take(n).flat_map(of).collect();
+    reading.resize(3 * n, 0.0);
+    reading
 }
 
 /// 1 on an area of a colour, else 0.

@@ -294,6 +294,9 @@ impl<'a> Simulation<'a> {
         let on = |color: &str| sensors::ground(color, robot.position, &self.areas, self.torus);
         let ground = sensors.ground_sensor.as_ref().map_or(0.0, |config| on(&config.color));
         let (food_area, nest) = (on("green"), on("black"));
+        let neighborhood = sensors.neighborhood_pos_sensor.as_ref().map_or(vec![], |config| {
+            sensors::neighborhood(config.n_neighbors as usize, i, &self.robots, self.torus)
+        });
         let (position, orientation) = (robot.position, robot.heading / std::f64::consts::TAU);
         let state = if robot.send { 1.0 } else { 0.0 };
         self.robots[i].noise = noise;
@@ -311,6 +314,7 @@ impl<'a> Simulation<'a> {
             nest,
             position,
             orientation,
+            neighborhood,
         }
     }
 
@@ -441,17 +445,20 @@ impl<'a> Simulation<'a> {
     /// Fitness of the step, from its actions and from positions after moving.
     fn fitness(&mut self) -> f64 {
         let robots = &self.robots[self.evaluated_robots()];
+        let params = &self.config.algorithm.fitness_params;
         match self.config.algorithm.fitness_function {
             FitnessFunction::IdentifyLeader => fitness::identify_leader(&self.leader),
             FitnessFunction::IdentifyBorderline => {
-                let is_border = fitness::borderline_of_swarm(robots, self.torus);
+                let is_border = fitness::borderline_of_swarm(robots, self.torus, params.alpha);
                 self.witness.n_interior +=
                     is_border.iter().filter(|&&is_border| !is_border).count();
                 fitness::identify_borderline(robots, &is_border)
             }
             FitnessFunction::OrientationConsensus => fitness::orientation_consensus(robots),
             FitnessFunction::Alignment => fitness::alignment(robots),
-            FitnessFunction::GotoLight => fitness::goto_light(robots, &self.lights, self.torus),
+            FitnessFunction::GotoLight => {
+                fitness::goto_light(robots, &self.lights, self.torus, params.near)
+            }
             FitnessFunction::Grouping => fitness::grouping(robots, self.torus),
             FitnessFunction::Script => unreachable!("scripts are compared with the functions"),
         }

@@ -5,9 +5,10 @@ use pulp::{Simd, WithSimd};
 use super::super::aligned::Aligned;
 use super::super::learning::Memory;
 use super::super::{Inputs, SpikeWindow};
+use super::circuit::{Circuit, weight};
 use super::encoding::EncoderState;
-use super::kernel::{Kernel, weight};
 use super::model::Model;
+use super::neurons::Neurons;
 use super::receptors::ReceptorState;
 use crate::lanes::Lanes;
 use numeric::Isa;
@@ -23,6 +24,8 @@ pub(super) struct Chunk {
     width: usize,
     /// Lanes per row.
     n_lanes: usize,
+    /// State variables of a neuron.
+    n_variables: usize,
     /// `[neuron][variable][lane]`
     state: Aligned,
     /// 1 where a neuron spiked in the last substep, or a node of an encoder in this one, else
@@ -49,35 +52,37 @@ pub(super) struct Chunk {
 impl Chunk {
     /// At rest.
     pub fn new<M: Model<C, Z>, const C: usize, const Z: usize>(
-        kernel: &Kernel<M, C, Z>,
+        circuit: &Circuit,
+        neurons: &Neurons<M, C, Z>,
         first_lane: usize,
         width: usize,
         isa: Isa,
     ) -> Self {
         let n_lanes = width * isa.vector_len();
         let rows = |n: usize| Aligned::new(n * n_lanes);
-        let (n_neurons, n_sources) = (kernel.n_neurons(), kernel.n_sources());
+        let (n_neurons, n_sources) = (circuit.n_neurons, circuit.n_sources());
         let mut chunk = Self {
             first_lane,
             width,
             n_lanes,
+            n_variables: Z,
             state: rows(n_neurons * Z),
             spikes: rows(n_sources),
             active: Vec::with_capacity(n_sources),
             drive: rows(n_neurons),
             current: rows(n_neurons),
-            receptors: kernel.receptors.as_ref().map(|_| ReceptorState::new(n_sources, n_lanes)),
-            encoders: EncoderState::new(&kernel.encoders, n_lanes),
-            memory: kernel.rule.as_ref().map(|rule| Memory::new(rule, n_lanes)),
+            receptors: circuit.receptors.as_ref().map(|_| ReceptorState::new(n_sources, n_lanes)),
+            encoders: EncoderState::new(&circuit.encoders, n_lanes),
+            memory: circuit.rule.as_ref().map(|rule| Memory::new(rule, n_lanes)),
             counts: rows(n_sources),
-            motor: rows(kernel.motor.len() * 3),
+            motor: rows(circuit.motor.len() * 3),
         };
-        let starts = kernel.starts.iter().flatten();
+        let starts = neurons.starts.iter().flatten();
         for (row, &start) in chunk.state.values_mut().chunks_exact_mut(n_lanes).zip(starts) {
             row.fill(start);
         }
         for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
-            rows[..n_lanes].fill(kernel.n_substeps as f32);
+            rows[..n_lanes].fill(circuit.n_substeps as f32);
         }
         chunk
     }
@@ -85,28 +90,46 @@ impl Chunk {
     /// Advances by one environment step.
     pub fn advance<M: Model<C, Z>, const C: usize, const Z: usize>(
         &mut self,
-        kernel: &Kernel<M, C, Z>,
+        circuit: &Circuit,
+        neurons: &Neurons<M, C, Z>,
         inputs: Inputs<'_>,
         isa: Isa,
     ) {
         match self.width {
-            1 if kernel.rule.is_some() => {
-                isa.run(Work::<M, C, Z, 1, true> { kernel, chunk: self, inputs });
+            1 if circuit.rule.is_some() => {
+                self.step::<M, C, Z, 1, true>(circuit, neurons, inputs, isa);
             }
-            1 => isa.run(Work::<M, C, Z, 1, false> { kernel, chunk: self, inputs }),
-            2 => isa.run(Work::<M, C, Z, 2, false> { kernel, chunk: self, inputs }),
+            1 => self.step::<M, C, Z, 1, false>(circuit, neurons, inputs, isa),
+            2 => self.step::<M, C, Z, 2, false>(circuit, neurons, inputs, isa),
             width => unreachable!("{width} vectors are more than MAX_WIDTH"),
         }
     }
 
-    /// Writes the share of substeps in which each neuron spiked, `[neuron][lane]`.
-    pub fn write_activity<M, const C: usize, const Z: usize>(
-        &self,
-        kernel: &Kernel<M, C, Z>,
-        activity: &mut Lanes,
+    /// With W vectors per row; with PLASTIC, weights change.
+    fn step<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
+        &mut self,
+        circuit: &Circuit,
+        neurons: &Neurons<M, C, Z>,
+        inputs: Inputs<'_>,
+        isa: Isa,
     ) {
-        let n_substeps = kernel.n_substeps as f32;
-        let counts = self.counts.values().chunks_exact(self.n_lanes).take(kernel.n_neurons());
+        isa.run(Perceive::<W, PLASTIC> { circuit, chunk: self, inputs });
+        for substep in 0..circuit.n_substeps {
+            let draws = inputs.draws;
+            isa.run(Propagate::<W, PLASTIC> { circuit, chunk: self, draws, substep });
+            isa.run(Integrate::<M, C, Z, W> { neurons, chunk: self });
+            isa.run(Listen::<W> { circuit, chunk: self, substep });
+        }
+        if PLASTIC && let (Some(rule), Some(memory)) = (&circuit.rule, &mut self.memory) {
+            let share = 1.0 / circuit.n_substeps as f32;
+            rule.remember(memory, self.counts.values(), share, inputs.stimuli, self.first_lane);
+        }
+    }
+
+    /// Writes the share of substeps in which each neuron spiked, `[neuron][lane]`.
+    pub fn write_activity(&self, circuit: &Circuit, activity: &mut Lanes) {
+        let n_substeps = circuit.n_substeps as f32;
+        let counts = self.counts.values().chunks_exact(self.n_lanes).take(circuit.n_neurons);
         for (neuron, counts) in counts.enumerate() {
             let row = &mut activity.row_mut(neuron)[self.first_lane..][..self.n_lanes];
             for (share, count) in row.iter_mut().zip(counts) {
@@ -116,14 +139,10 @@ impl Chunk {
     }
 
     /// Writes what decoders read of motor neurons.
-    pub fn write_window<M, const C: usize, const Z: usize>(
-        &self,
-        kernel: &Kernel<M, C, Z>,
-        window: &mut SpikeWindow,
-    ) {
+    pub fn write_window(&self, circuit: &Circuit, window: &mut SpikeWindow) {
         let n_lanes = self.n_lanes;
         let motor = self.motor.values().chunks_exact(3 * n_lanes);
-        for (&neuron, rows) in kernel.motor.iter().zip(motor) {
+        for (&neuron, rows) in circuit.motor.iter().zip(motor) {
             let counts = &self.counts.values()[neuron * n_lanes..][..n_lanes];
             for (lanes, values) in [
                 (&mut window.counts, counts),
@@ -136,8 +155,8 @@ impl Chunk {
     }
 
     /// Writes the voltage of each neuron, mV, `[neuron][lane]`.
-    pub fn write_voltages<const Z: usize>(&self, voltages: &mut Lanes) {
-        let neurons = self.state.values().chunks_exact(Z * self.n_lanes);
+    pub fn write_voltages(&self, voltages: &mut Lanes) {
+        let neurons = self.state.values().chunks_exact(self.n_variables * self.n_lanes);
         for (neuron, state) in neurons.enumerate() {
             let row = &mut voltages.row_mut(neuron)[self.first_lane..][..self.n_lanes];
             row.copy_from_slice(&state[..self.n_lanes]);
@@ -145,87 +164,100 @@ impl Chunk {
     }
 }
 
-/// An environment step of a chunk of W vectors per row; with PLASTIC, weights change.
-struct Work<'a, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool> {
-    kernel: &'a Kernel<M, C, Z>,
+// The stages of a step are compiled apart, for each instruction set: neurons for each model, all
+// else once. What touches vectors is inlined into `with_simd`, which is compiled for the vectors'
+// instruction set; closures would not be, hence the plain loops.
+
+/// The start of an environment step, in W vectors per row: what the stimuli add to currents.
+/// With PLASTIC, weights learn from the step before. Nothing has spiked yet.
+struct Perceive<'a, const W: usize, const PLASTIC: bool> {
+    circuit: &'a Circuit,
     chunk: &'a mut Chunk,
     inputs: Inputs<'a>,
 }
 
-impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool> WithSimd
-    for Work<'_, M, C, Z, W, PLASTIC>
-{
+impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { kernel, chunk, inputs } = self;
-        if PLASTIC && let (Some(rule), Some(memory)) = (&kernel.rule, &mut chunk.memory) {
-            let rewards = &inputs.rewards.row(0)[chunk.first_lane..][..chunk.n_lanes];
+        let Self { circuit, chunk, inputs: Inputs { stimuli, rewards, .. } } = self;
+        let n_lanes = W * S::F32_LANES;
+        if PLASTIC && let (Some(rule), Some(memory)) = (&circuit.rule, &mut chunk.memory) {
+            let rewards = &rewards.row(0)[chunk.first_lane..][..n_lanes];
             rule.learn::<S, W>(simd, memory, rewards);
         }
-        perceive::<S, M, C, Z, W, PLASTIC>(simd, kernel, chunk, inputs.stimuli);
-        for substep in 0..kernel.n_substeps {
-            if kernel.encoders.n_nodes() > 0 {
-                encode::<S, M, C, Z, W>(simd, kernel, chunk, inputs.draws, substep);
+        let drives = rows_mut::<S, W>(chunk.drive.values_mut());
+        let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
+        let plastic = rows::<S, W>(plastic);
+        for (neuron, drive) in drives.iter_mut().enumerate() {
+            let mut sum = [simd.splat_f32s(0.0); W];
+            let numbers = circuit.afferent.numbers_of(neuron);
+            for (&(input, shared), &number) in circuit.afferent.of(neuron).iter().zip(numbers) {
+                let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
+                let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
+                accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
             }
-            propagate::<S, M, C, Z, W, PLASTIC>(simd, kernel, chunk);
-            integrate::<S, M, C, Z, W>(simd, kernel, chunk);
-            listen::<S, M, C, Z, W>(simd, kernel, chunk, substep);
+            *drive = sum;
         }
-        if PLASTIC && let (Some(rule), Some(memory)) = (&kernel.rule, &mut chunk.memory) {
-            let share = 1.0 / kernel.n_substeps as f32;
-            rule.remember(memory, chunk.counts.values(), share, inputs.stimuli, chunk.first_lane);
+        let lanes = chunk.first_lane..chunk.first_lane + n_lanes;
+        circuit.encoders.perceive::<S, W>(simd, &mut chunk.encoders, stimuli, lanes);
+        chunk.counts.values_mut().fill(0.0);
+        for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
+            rows[..n_lanes].fill(circuit.n_substeps as f32);
         }
     }
 }
 
-// All that touches vectors is inlined into `with_simd`, which is compiled for the
-// vectors' instruction set; closures would not be, hence the plain loops.
+/// The spikes of the nodes of encoders in a substep, and the current of every neuron from those
+/// and from the neurons' spikes in the substep before.
+struct Propagate<'a, const W: usize, const PLASTIC: bool> {
+    circuit: &'a Circuit,
+    chunk: &'a mut Chunk,
+    draws: &'a Lanes,
+    substep: u32,
+}
 
-/// What the stimuli of this environment step add to currents; nothing has spiked in it.
-#[inline(always)]
-fn perceive<S: Simd, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
-    simd: S,
-    kernel: &Kernel<M, C, Z>,
-    chunk: &mut Chunk,
-    stimuli: &Lanes,
-) {
-    let n_lanes = W * S::F32_LANES;
-    let drives = rows_mut::<S, W>(chunk.drive.values_mut());
-    let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
-    let plastic = rows::<S, W>(plastic);
-    for (neuron, drive) in drives.iter_mut().enumerate() {
-        let mut sum = [simd.splat_f32s(0.0); W];
-        let numbers = kernel.afferent.numbers_of(neuron);
-        for (&(input, shared), &number) in kernel.afferent.of(neuron).iter().zip(numbers) {
-            let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
-            let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
-            accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
+impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { circuit, chunk, draws, substep } = self;
+        if circuit.encoders.n_nodes() > 0 {
+            encode::<S, W>(simd, circuit, chunk, draws, substep);
         }
-        *drive = sum;
-    }
-    let lanes = chunk.first_lane..chunk.first_lane + n_lanes;
-    kernel.encoders.perceive::<S, W>(simd, &mut chunk.encoders, stimuli, lanes);
-    chunk.counts.values_mut().fill(0.0);
-    for rows in chunk.motor.values_mut().chunks_exact_mut(3 * n_lanes) {
-        rows[..n_lanes].fill(kernel.n_substeps as f32);
+        chunk.current.values_mut().copy_from_slice(chunk.drive.values());
+        let currents = rows_mut::<S, W>(chunk.current.values_mut());
+        let spikes = rows::<S, W>(chunk.spikes.values());
+        let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
+        let plastic = rows::<S, W>(plastic);
+        for &pre in &chunk.active {
+            let numbers = circuit.outgoing.numbers_of(pre);
+            for (&(post, shared), &number) in circuit.outgoing.of(pre).iter().zip(numbers) {
+                let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
+                accumulate(simd, &mut currents[post], weight, &spikes[pre]);
+            }
+        }
+        if let (Some(receptors), Some(held)) = (&circuit.receptors, &mut chunk.receptors) {
+            let states = (rows::<S, W>(chunk.state.values()), chunk.n_variables);
+            receptors.propagate::<S, W, PLASTIC>(simd, plastic, held, spikes, states, currents);
+        }
     }
 }
 
-/// The spikes of the nodes of encoders.
 #[inline(always)]
-fn encode<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
+fn encode<S: Simd, const W: usize>(
     simd: S,
-    kernel: &Kernel<M, C, Z>,
+    circuit: &Circuit,
     chunk: &mut Chunk,
     draws: &Lanes,
     substep: u32,
 ) {
     let lanes = chunk.first_lane..chunk.first_lane + W * S::F32_LANES;
-    let n_neurons = kernel.n_neurons();
+    let n_neurons = circuit.n_neurons;
     let spikes = &mut rows_mut::<S, W>(chunk.spikes.values_mut())[n_neurons..];
-    kernel.encoders.encode::<S, W>(simd, &mut chunk.encoders, draws, lanes, substep, spikes);
+    circuit.encoders.encode::<S, W>(simd, &mut chunk.encoders, draws, lanes, substep, spikes);
     let none = simd.splat_f32s(0.5);
     let counts = &mut rows_mut::<S, W>(chunk.counts.values_mut())[n_neurons..];
     for ((node, spikes), counts) in spikes.iter().enumerate().zip(counts) {
@@ -241,97 +273,86 @@ fn encode<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
     }
 }
 
-/// The current of every neuron, from the spikes of the substep before.
-#[inline(always)]
-fn propagate<S: Simd, M, const C: usize, const Z: usize, const W: usize, const PLASTIC: bool>(
-    simd: S,
-    kernel: &Kernel<M, C, Z>,
-    chunk: &mut Chunk,
-) {
-    chunk.current.values_mut().copy_from_slice(chunk.drive.values());
-    let currents = rows_mut::<S, W>(chunk.current.values_mut());
-    let spikes = rows::<S, W>(chunk.spikes.values());
-    let plastic = chunk.memory.as_ref().map_or(&[][..], Memory::weights);
-    let plastic = rows::<S, W>(plastic);
-    for &pre in &chunk.active {
-        let numbers = kernel.outgoing.numbers_of(pre);
-        for (&(post, shared), &number) in kernel.outgoing.of(pre).iter().zip(numbers) {
-            let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
-            accumulate(simd, &mut currents[post], weight, &spikes[pre]);
-        }
-    }
-    if let (Some(receptors), Some(held)) = (&kernel.receptors, &mut chunk.receptors) {
-        let states = rows::<S, W>(chunk.state.values()).as_chunks::<Z>().0;
-        receptors.propagate::<S, Z, W, PLASTIC>(simd, plastic, held, spikes, states, currents);
-    }
+/// One Euler step of every neuron.
+struct Integrate<'a, M, const C: usize, const Z: usize, const W: usize> {
+    neurons: &'a Neurons<M, C, Z>,
+    chunk: &'a mut Chunk,
 }
 
-/// One Euler step of every neuron.
-#[inline(always)]
-fn integrate<S: Simd, M: Model<C, Z>, const C: usize, const Z: usize, const W: usize>(
-    simd: S,
-    kernel: &Kernel<M, C, Z>,
-    chunk: &mut Chunk,
-) {
-    let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
-    let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
-    let currents = rows::<S, W>(chunk.current.values());
-    let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
-    let counts = rows_mut::<S, W>(chunk.counts.values_mut());
-    chunk.active.clear();
-    for (neuron, constants) in kernel.constants.iter().enumerate() {
-        let mut splat = [zero; C];
-        for (splat, &constant) in splat.iter_mut().zip(constants) {
-            *splat = simd.splat_f32s(constant);
-        }
-        let mut is_active = false;
-        for vector in 0..W {
-            let mut state = [zero; Z];
-            for (value, row) in state.iter_mut().zip(&states[neuron]) {
-                *value = row[vector];
+impl<M: Model<C, Z>, const C: usize, const Z: usize, const W: usize> WithSimd
+    for Integrate<'_, M, C, Z, W>
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { neurons, chunk } = self;
+        let (zero, one) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0));
+        let states = rows_mut::<S, W>(chunk.state.values_mut()).as_chunks_mut::<Z>().0;
+        let currents = rows::<S, W>(chunk.current.values());
+        let spikes = rows_mut::<S, W>(chunk.spikes.values_mut());
+        let counts = rows_mut::<S, W>(chunk.counts.values_mut());
+        chunk.active.clear();
+        for (neuron, constants) in neurons.constants.iter().enumerate() {
+            let mut splat = [zero; C];
+            for (splat, &constant) in splat.iter_mut().zip(constants) {
+                *splat = simd.splat_f32s(constant);
             }
-            let (state, spiked) = M::update(simd, splat, state, currents[neuron][vector]);
-            for (row, value) in states[neuron].iter_mut().zip(state) {
-                row[vector] = value;
+            let mut is_active = false;
+            for vector in 0..W {
+                let mut state = [zero; Z];
+                for (value, row) in state.iter_mut().zip(&states[neuron]) {
+                    *value = row[vector];
+                }
+                let (state, spiked) = M::update(simd, splat, state, currents[neuron][vector]);
+                for (row, value) in states[neuron].iter_mut().zip(state) {
+                    row[vector] = value;
+                }
+                let spike = simd.select_f32s(spiked, one, zero);
+                spikes[neuron][vector] = spike;
+                counts[neuron][vector] = simd.add_f32s(counts[neuron][vector], spike);
+                is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
             }
-            let spike = simd.select_f32s(spiked, one, zero);
-            spikes[neuron][vector] = spike;
-            counts[neuron][vector] = simd.add_f32s(counts[neuron][vector], spike);
-            is_active |= simd.first_true_m32s(spiked) < S::F32_LANES;
-        }
-        if is_active {
-            chunk.active.push(neuron);
+            if is_active {
+                chunk.active.push(neuron);
+            }
         }
     }
 }
 
 /// What decoders keep of the motor neurons' spikes.
-#[inline(always)]
-fn listen<S: Simd, M, const C: usize, const Z: usize, const W: usize>(
-    simd: S,
-    kernel: &Kernel<M, C, Z>,
-    chunk: &mut Chunk,
+struct Listen<'a, const W: usize> {
+    circuit: &'a Circuit,
+    chunk: &'a mut Chunk,
     substep: u32,
-) {
-    let one = simd.splat_f32s(1.0);
-    let [retention, rise, decay] =
-        [kernel.filter.retention, kernel.filter.rise, kernel.filter.decay]
-            .map(|constant| simd.splat_f32s(constant));
-    let now = simd.splat_f32s(substep as f32);
-    let spikes = rows::<S, W>(chunk.spikes.values());
-    let motor = rows_mut::<S, W>(chunk.motor.values_mut()).as_chunks_mut::<3>().0;
-    for (&neuron, [first, x, a]) in kernel.motor.iter().zip(motor) {
-        for vector in 0..W {
-            let spiked = simd.equal_f32s(spikes[neuron][vector], one);
-            let earliest = simd.min_f32s(first[vector], now);
-            first[vector] = simd.select_f32s(spiked, earliest, first[vector]);
-            let decayed = simd.mul_f32s(x[vector], retention);
-            x[vector] = simd.select_f32s(spiked, one, decayed);
-            let growth = simd.mul_f32s(rise, x[vector]);
-            let room = simd.sub_f32s(one, a[vector]);
-            let loss = simd.mul_f32s(decay, a[vector]);
-            let change = simd.sub_f32s(simd.mul_f32s(growth, room), loss);
-            a[vector] = simd.add_f32s(a[vector], change);
+}
+
+impl<const W: usize> WithSimd for Listen<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { circuit, chunk, substep } = self;
+        let one = simd.splat_f32s(1.0);
+        let [retention, rise, decay] =
+            [circuit.filter.retention, circuit.filter.rise, circuit.filter.decay]
+                .map(|constant| simd.splat_f32s(constant));
+        let now = simd.splat_f32s(substep as f32);
+        let spikes = rows::<S, W>(chunk.spikes.values());
+        let motor = rows_mut::<S, W>(chunk.motor.values_mut()).as_chunks_mut::<3>().0;
+        for (&neuron, [first, x, a]) in circuit.motor.iter().zip(motor) {
+            for vector in 0..W {
+                let spiked = simd.equal_f32s(spikes[neuron][vector], one);
+                let earliest = simd.min_f32s(first[vector], now);
+                first[vector] = simd.select_f32s(spiked, earliest, first[vector]);
+                let decayed = simd.mul_f32s(x[vector], retention);
+                x[vector] = simd.select_f32s(spiked, one, decayed);
+                let growth = simd.mul_f32s(rise, x[vector]);
+                let room = simd.sub_f32s(one, a[vector]);
+                let loss = simd.mul_f32s(decay, a[vector]);
+                let change = simd.sub_f32s(simd.mul_f32s(growth, room), loss);
+                a[vector] = simd.add_f32s(a[vector], change);
+            }
         }
     }
 }

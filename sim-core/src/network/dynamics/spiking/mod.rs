@@ -11,14 +11,15 @@
 
 mod adex;
 mod chunk;
+mod circuit;
 mod encoding;
 mod exp_lif;
 mod functions;
 mod izhikevich;
-mod kernel;
 mod lif;
 mod model;
 mod morris_lecar;
+mod neurons;
 mod receptors;
 mod wiring;
 
@@ -26,9 +27,10 @@ use super::{Dynamics, Inputs, SpikeWindow};
 use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
 use chunk::Chunk;
+use circuit::Circuit;
 use experiment_file::NeuronModel;
-use kernel::Kernel;
 use model::Model;
+use neurons::Neurons;
 use numeric::Isa;
 pub(super) use wiring::Wiring;
 
@@ -59,7 +61,8 @@ pub(super) fn compile(
 #[derive(Debug)]
 struct Spiking<M, const C: usize, const Z: usize> {
     isa: Isa,
-    kernel: Kernel<M, C, Z>,
+    circuit: Circuit,
+    neurons: Neurons<M, C, Z>,
     chunks: Vec<Chunk>,
 }
 
@@ -71,43 +74,44 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Spiking<M, C, Z> {
         phenotype: &Phenotype,
         n_lanes: usize,
     ) -> Self {
-        let kernel = Kernel::compile(network, wiring, phenotype);
+        let circuit = Circuit::compile(network, wiring, phenotype);
+        let neurons = Neurons::compile(network, phenotype);
         let vector_len = isa.vector_len();
         let n_vectors = n_lanes.div_ceil(vector_len);
         // Weights of their own take most of what a chunk of lanes holds.
-        let max_width = if kernel.rule.is_some() { 1 } else { chunk::MAX_WIDTH };
+        let max_width = if circuit.rule.is_some() { 1 } else { chunk::MAX_WIDTH };
         let chunks = (0..n_vectors).step_by(max_width).map(|first| {
             let width = max_width.min(n_vectors - first);
-            Chunk::new(&kernel, first * vector_len, width, isa)
+            Chunk::new(&circuit, &neurons, first * vector_len, width, isa)
         });
         let chunks = chunks.collect();
-        Self { isa, kernel, chunks }
+        Self { isa, circuit, neurons, chunks }
     }
 }
 
 impl<M: Model<C, Z>, const C: usize, const Z: usize> Dynamics for Spiking<M, C, Z> {
     fn step(&mut self, inputs: Inputs<'_>) {
         for chunk in &mut self.chunks {
-            chunk.advance(&self.kernel, inputs, self.isa);
+            chunk.advance(&self.circuit, &self.neurons, inputs, self.isa);
         }
     }
 
     /// The share of the substeps in which it spiked.
     fn write_activity(&self, activity: &mut Lanes) {
         for chunk in &self.chunks {
-            chunk.write_activity(&self.kernel, activity);
+            chunk.write_activity(&self.circuit, activity);
         }
     }
 
     fn write_window(&self, window: &mut SpikeWindow) {
         for chunk in &self.chunks {
-            chunk.write_window(&self.kernel, window);
+            chunk.write_window(&self.circuit, window);
         }
     }
 
     fn write_voltages(&self, voltages: &mut Lanes) -> bool {
         for chunk in &self.chunks {
-            chunk.write_voltages::<Z>(voltages);
+            chunk.write_voltages(voltages);
         }
         true
     }

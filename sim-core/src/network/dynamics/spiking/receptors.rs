@@ -12,8 +12,8 @@
 use pulp::Simd;
 
 use super::super::aligned::Aligned;
+use super::circuit::{Weighted, weight};
 use super::functions::exp;
-use super::kernel::{Weighted, weight};
 use super::wiring::Wiring;
 use crate::network::Phenotype;
 use experiment_file::{SynapseParams, limits};
@@ -76,16 +76,16 @@ impl Receptors {
     }
 
     /// Adds to the currents of a substep. `spikes`: of neurons in the substep before, and of
-    /// nodes of encoders. `states`: of the neurons, their first variable v. `weights`: of
-    /// plastic synapses, by their number.
+    /// nodes of encoders. `states`: of the neurons, `n_variables` each, the first of which is v.
+    /// `weights`: of plastic synapses, by their number.
     #[inline(always)]
-    pub fn propagate<S: Simd, const Z: usize, const W: usize, const PLASTIC: bool>(
+    pub fn propagate<S: Simd, const W: usize, const PLASTIC: bool>(
         &self,
         simd: S,
         weights: &[[S::f32s; W]],
         held: &mut ReceptorState,
         spikes: &[[S::f32s; W]],
-        states: &[[[S::f32s; W]; Z]],
+        (states, n_variables): (&[[S::f32s; W]], usize),
         currents: &mut [[S::f32s; W]],
     ) {
         let n_axons = spikes.len();
@@ -118,7 +118,7 @@ impl Receptors {
         }
         held.clock += 1;
         for (neuron, current) in currents.iter_mut().enumerate() {
-            let v = &states[neuron][0];
+            let v = &states[neuron * n_variables];
             for (receptor, (incoming, (gain, reversal))) in
                 self.incoming.iter().zip(self.drives).enumerate()
             {

@@ -1,5 +1,5 @@
 //! The order in which the synapses of a spiking network are computed: what of a
-//! [`Kernel`](super::kernel::Kernel) depends on the network's structure alone.
+//! [`Circuit`](super::circuit::Circuit) depends on the network's structure alone.
 
 use std::ops::Range;
 

@@ -1,25 +1,21 @@
-//! A spiking network with its values, in the order in which it is computed.
+//! A spiking network with its values, in the order in which it is computed; apart from what its
+//! neurons do, which is in [`neurons`](super::neurons).
 
-use std::marker::PhantomData;
 use std::ops::Range;
 
 use pulp::Simd;
 
 use super::super::learning::Rule;
 use super::encoding::Encoders;
-use super::model::Model;
 use super::receptors::Receptors;
 use super::wiring::{Grouped, Wiring};
 use crate::network::{Network, Phenotype};
 
-/// The values of a genotype for a [`Wiring`], and its neurons by model M.
+/// The values of a genotype for a [`Wiring`].
 #[derive(Debug)]
-pub(super) struct Kernel<M, const C: usize, const Z: usize> {
+pub(super) struct Circuit {
+    pub n_neurons: usize,
     pub n_substeps: u32,
-    /// Per neuron.
-    pub constants: Vec<[f32; C]>,
-    /// Per neuron.
-    pub starts: Vec<[f32; Z]>,
     /// Makes spikes of stimuli.
     pub encoders: Encoders,
     /// Synapses from stimuli that act as they are, by postsynaptic neuron.
@@ -34,7 +30,6 @@ pub(super) struct Kernel<M, const C: usize, const Z: usize> {
     pub motor: Vec<usize>,
     /// What decoders filter spikes with.
     pub filter: Filter,
-    model: PhantomData<M>,
 }
 
 /// Synapses in groups, with their weights.
@@ -69,19 +64,13 @@ impl Filter {
     }
 }
 
-impl<M: Model<C, Z>, const C: usize, const Z: usize> Kernel<M, C, Z> {
-    /// The kernel of a genotype.
+impl Circuit {
+    /// The circuit of a genotype.
     pub fn compile(network: &Network, wiring: &Wiring, phenotype: &Phenotype) -> Self {
-        let n_neurons = network.n_neurons();
-        let of_neuron = |neuron: usize| move |name: &str| phenotype.neurons[name][neuron];
-        let constants =
-            (0..n_neurons).map(|i| M::constants(&of_neuron(i), network.dt).map(|x| x as f32));
-        let starts = (0..n_neurons).map(|i| M::start(&of_neuron(i)).map(|x| x as f32));
         let motor = network.ensembles.values().filter(|ensemble| ensemble.motor);
         Self {
+            n_neurons: network.n_neurons(),
             n_substeps: network.n_substeps,
-            constants: constants.collect(),
-            starts: starts.collect(),
             encoders: Encoders::compile(network, phenotype),
             afferent: Weighted::new(&wiring.afferent, phenotype),
             outgoing: Weighted::new(&wiring.outgoing, phenotype),
@@ -91,20 +80,12 @@ impl<M: Model<C, Z>, const C: usize, const Z: usize> Kernel<M, C, Z> {
             rule: Rule::compile(network, phenotype),
             motor: motor.flat_map(|ensemble| ensemble.neurons.clone()).collect(),
             filter: Filter::new(network.dt),
-            model: PhantomData,
         }
-    }
-}
-
-impl<M, const C: usize, const Z: usize> Kernel<M, C, Z> {
-    /// Number of neurons.
-    pub fn n_neurons(&self) -> usize {
-        self.constants.len()
     }
 
     /// What spikes: neurons and nodes of encoders.
     pub fn n_sources(&self) -> usize {
-        self.n_neurons() + self.encoders.n_nodes()
+        self.n_neurons + self.encoders.n_nodes()
     }
 }
 
