@@ -1,5 +1,5 @@
 //! What the history of an experiment takes on disk, and how long an individual takes to come
-//! back, per algorithm, at the size of experiment A: 100 individuals of 455 genes, 5 trials.
+//! back, per algorithm, at the size of experiment A: 100 individuals of 445 genes, 5 trials.
 //! Fitness is made up; everything else is what a coordinator does. An argument selects
 //! algorithms by a part of their name.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]

@@ -19,9 +19,12 @@ use simulated_fleet::{FleetModel, SimulatedFleet, fitness, population, uniform};
 const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
 const LEASE: Duration = Duration::from_secs(10);
 const N_TRIALS: u32 = 5;
-/// The first one teaches the engine how long things take.
-const N_GENERATIONS: u64 = 4;
+const N_GENERATIONS: u64 = 8;
+/// The first ones teach the engine how long things take.
+const N_TEACHING: u64 = 4;
 const CALL_OVERHEAD: f64 = 0.4;
+/// Trials take up to so much more or less than on average.
+const DISPERSION: f64 = 0.3;
 
 /// What things cost.
 #[derive(Debug, Clone, Copy)]
@@ -42,20 +45,21 @@ fn main() {
     let split = EngineConfig { split: true, ..plain };
     let both = EngineConfig { duplicate: true, ..split };
     println!("parallel efficiency; whole: items of all trials; split: by trial; both: split,");
-    println!("and moved and duplicated");
+    println!("and moved and duplicated; known: all given out at once by known speeds");
     for costs in [LONG, EXPERIMENT_A] {
         for population_size in [100, 10_000] {
             for stalled in [0.0, 0.01] {
                 print!("\ntrials of {:?}, {:?} each way, ", costs.trial, costs.latency);
                 println!("P = {population_size}, {} % of the workers stall", 100.0 * stalled);
-                println!("workers   whole   split    both   limit");
+                println!("workers   whole   split    both   known   limit");
                 for n_workers in [1, 10, 100, 1_000, 10_000] {
                     let measured = [plain, split, both].map(|config| {
                         costs.efficiency(config, population_size, n_workers, stalled)
                     });
                     print!("{n_workers:>7}");
+                    let known = costs.with_known_speeds(population_size, n_workers);
                     let limit = costs.limit(population_size, n_workers);
-                    for share in measured.into_iter().chain([limit]) {
+                    for share in measured.into_iter().chain([known, limit]) {
                         print!(" {:>6.1}%", 100.0 * share);
                     }
                     println!();
@@ -90,6 +94,50 @@ impl Costs {
         ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
     }
 
+    /// The same for whoever knows all speeds, but not how long each trial takes, and gives all
+    /// trials out at once: with the margin for long trials that turns out best.
+    fn with_known_speeds(self, population_size: usize, n_workers: usize) -> f64 {
+        let margins = (0..=8).map(|half| f64::from(half) / 2.0);
+        let times = margins.map(|margin| self.planned_time(population_size, n_workers, margin));
+        let best = times.fold(f64::INFINITY, f64::min);
+        self.work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / best
+    }
+
+    /// Seconds that a generation takes if every worker gets as many trials as it is expected to
+    /// compute in one and the same time, and so many standard deviations more.
+    fn planned_time(self, population_size: usize, n_workers: usize, margin: f64) -> f64 {
+        let n_needed = population_size * N_TRIALS as usize;
+        // A uniform distribution's standard deviation is its width / sqrt(12).
+        let deviation = 2.0 * DISPERSION / 12_f64.sqrt();
+        // In trials of a worker of speed 1.
+        let overhead = |n: usize| n.div_ceil(N_TRIALS as usize) as f64 * CALL_OVERHEAD;
+        let expected = |n: usize| n as f64 + overhead(n) + margin * deviation * (n as f64).sqrt();
+        let n_within = |time: f64, worker: usize| {
+            let most = (time * speed(worker)) as usize;
+            (0..=most).rev().find(|&n| expected(n) <= time * speed(worker)).unwrap_or(0)
+        };
+        let is_enough = |time: f64| {
+            (0..n_workers).map(|worker| n_within(time, worker)).sum::<usize>() >= n_needed
+        };
+        let (mut too_short, mut enough) = (0.0, 1.0);
+        while !is_enough(enough) {
+            enough *= 2.0;
+        }
+        while enough - too_short > 1e-3 * enough {
+            let middle = f64::midpoint(too_short, enough);
+            *if is_enough(middle) { &mut enough } else { &mut too_short } = middle;
+        }
+        let (mut n_given, mut longest) = (0, 0.0_f64);
+        for worker in 0..n_workers {
+            let n = n_within(enough, worker).min(n_needed - n_given);
+            let trials = (n_given..n_given + n).map(|trial| uniform(trial as u64));
+            let trials = trials.map(|draw| 1.0 + DISPERSION * (2.0 * draw - 1.0)).sum::<f64>();
+            longest = longest.max((trials + overhead(n)) / speed(worker));
+            n_given += n;
+        }
+        longest * self.trial.as_secs_f64() + 2.0 * self.latency.as_secs_f64()
+    }
+
     /// The time that generations would take if no slot were ever idle, by the time
     /// that they take.
     fn efficiency(
@@ -102,7 +150,7 @@ impl Costs {
         let model = FleetModel {
             latency: self.latency,
             trial: self.trial,
-            dispersion: 0.3,
+            dispersion: DISPERSION,
             stops: false,
             checks: false,
         };
@@ -113,7 +161,7 @@ impl Costs {
         fleet.submit(EXPERIMENT, 100);
         let mut measured_from = Duration::ZERO;
         for generation in 0..N_GENERATIONS {
-            if generation == 1 {
+            if generation == N_TEACHING {
                 measured_from = fleet.now();
             }
             fleet.ask(EXPERIMENT, generation, population_size, N_TRIALS);
@@ -128,7 +176,8 @@ impl Costs {
             let is_done = |fleet: &SimulatedFleet| fleet.evaluated.len() == n_evaluated;
             assert!(fleet.run_until(Duration::from_secs(1_000_000), is_done));
         }
-        let taken = (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - 1) as f64;
+        let taken =
+            (fleet.now() - measured_from).as_secs_f64() / (N_GENERATIONS - N_TEACHING) as f64;
         self.work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / taken
     }
 }

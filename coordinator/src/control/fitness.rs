@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use evolution::{ALGORITHMS, Genotype};
-use experiment_file::{ExperimentConfig, limits};
-use sim_core::{Simulation, TrialSet};
+use evolution::Genotype;
+use experiment_file::limits;
+use sim_core::TrialSet;
 
 use crate::{
     driver::DriverEvent, engine::Batch, limits::EVALUATION_VALUES_MAX, priority::Priority,
     runs::Evaluation,
 };
 
-use super::{Control, ControlError};
+use super::{Control, ControlError, experiment_files::ExperimentFiles};
 
 /// Genotypes whose fitness a client wants in trials of an evolution.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl FitnessOrder {
     }
 
     /// Checks everything about an order; work for a CPU.
-    fn check(self) -> Result<Evaluation, ControlError> {
+    fn check(self, files: &ExperimentFiles) -> Result<Evaluation, ControlError> {
         let Self { config_json, genotypes, trial_set, n_trials, priority } = self;
         let invalid = |what: String| Err(ControlError::Invalid(what));
         if n_trials == 0 || n_trials > limits::TRIALS {
@@ -54,15 +54,13 @@ impl FitnessOrder {
         if trial_set.generation().is_some_and(|generation| generation > limits::GENERATIONS) {
             return invalid(format!("no run has more than {} generations", limits::GENERATIONS));
         }
-        let (config, _) = ExperimentConfig::from_json(&config_json, "", ALGORITHMS)?;
-        let simulation = Simulation::compile(&config)?;
+        let file = files.check(&config_json)?;
         for genotype in &genotypes {
-            let checked = simulation.check_genotype(genotype);
+            let checked = file.simulation.check_genotype(genotype);
             checked.map_err(|error| ControlError::Invalid(error.to_string()))?;
         }
-        let spec: Arc<str> = config.to_canonical_json().into();
         let batch = Batch::fitness(trial_set, genotypes.into(), n_trials);
-        Ok(Evaluation { name: config.name.as_str().into(), spec, batch, priority })
+        Ok(Evaluation { name: file.name.clone(), spec: file.spec.clone(), batch, priority })
     }
 }
 
@@ -71,7 +69,8 @@ impl Control {
     /// tells the driver that nobody waits.
     pub async fn fitness(&self, order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
         let _place = self.requests.enter(order.len())?;
-        let evaluation = Box::new(self.requests.check(move || order.check()).await??);
+        let files = Arc::clone(&self.experiment_files);
+        let evaluation = Box::new(self.requests.check(move || order.check(&files)).await??);
         let permits = Arc::clone(&self.evaluations);
         let _permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
         let result = self.ask(|reply| DriverEvent::EvaluationRequested(evaluation, reply));

@@ -4,6 +4,7 @@
 //! Works on core types. What is only read is in [`queries`](crate::queries).
 
 mod evaluate;
+mod experiment_files;
 mod explain;
 mod fitness;
 mod import;
@@ -36,6 +37,7 @@ use crate::{
     store::{ExperimentRecord, StoreError},
 };
 
+use experiment_files::ExperimentFiles;
 use requests::Requests;
 
 pub use evaluate::{CheckedEvaluation, EvaluationOrder};
@@ -52,6 +54,7 @@ pub struct Control {
     /// Bytes that all unfinished experiments may take together.
     memory_budget: u64,
     requests: Requests,
+    experiment_files: Arc<ExperimentFiles>,
     /// One for each evaluation that is computed.
     evaluations: Arc<Semaphore>,
     /// Unfinished experiments that are damaged, so that the driver does not know them.
@@ -132,8 +135,15 @@ impl Control {
     /// all unfinished experiments may take together.
     pub fn new(events: EventSender, store: SharedStore, memory_budget: u64) -> Self {
         let evaluations = Arc::new(Semaphore::new(EVALUATIONS_MAX));
-        let requests = Requests::default();
-        Self { events, store, memory_budget, requests, evaluations, set_aside: Arc::default() }
+        Self {
+            events,
+            store,
+            memory_budget,
+            requests: Requests::default(),
+            experiment_files: Arc::default(),
+            evaluations,
+            set_aside: Arc::default(),
+        }
     }
 
     /// The connected workers, in the order in which they joined.

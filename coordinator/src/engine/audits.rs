@@ -5,7 +5,11 @@ use std::{
     sync::Arc,
 };
 
-use super::item::Item;
+use sim_core::TrialSet;
+
+use crate::ids::JobId;
+
+use super::{Engine, item::Item};
 
 /// The names of workers whose word is in doubt, and for how many questions.
 pub type Doubted = BTreeMap<Arc<str>, usize>;
@@ -83,4 +87,41 @@ impl Audits {
         self.waiting.remove(name);
         self.confirmed.remove(name);
     }
+}
+
+impl Engine {
+    /// Whether the results of an item are compared with another worker's. Depends
+    /// on nothing but the place of the individual, so that the same individuals are
+    /// audited whoever computes them.
+    pub(super) fn is_audited(&self, id: JobId, item: &Item) -> bool {
+        let Some(work) = self.jobs.get(&id) else { return false };
+        let Some(batch) = &work.batch else { return false };
+        let (kind, number) = match id {
+            JobId::Experiment(id) => (0, id.0),
+            JobId::Evaluation(id) => (1, id.0),
+        };
+        let (set, generation) = match batch.trial_set() {
+            TrialSet::Generation(generation) => (0, generation),
+            TrialSet::Evaluation => (2, 0),
+            TrialSet::Judgement(generation) => (3, generation),
+            TrialSet::HeldOut { generation, block: 0 } => (1, generation),
+            TrialSet::HeldOut { generation, block } => (3 + u64::from(block), generation),
+        };
+        let place = [mix_in(number, kind), mix_in(generation, set), u64::from(item.individual)];
+        let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
+        (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
+    }
+}
+
+/// A number of a kind; of kind 0, the number itself.
+fn mix_in(number: u64, kind: u64) -> u64 {
+    number ^ kind.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+/// A step of SplitMix64 (Steele, Lea & Flood 2014).
+fn mix(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
 }

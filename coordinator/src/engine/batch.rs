@@ -2,7 +2,7 @@
 //! what waits.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::BTreeMap,
     mem,
     ops::Range,
     sync::Arc,
@@ -15,12 +15,17 @@ use crate::ids::{AssignmentId, WorkerId};
 
 use super::{
     Batch, EvaluatedBatch, SharedGenotype, audits::Audits, fleet_time::FleetTime, item::Item,
-    known_results::KnownResults, losses::LossRecord,
+    known_results::KnownResults, losses::LossRecord, queue::Queue,
 };
 
 /// Numbers of one item of measures, half a MiB: results travel in messages of
 /// limited size.
 const VALUES_PER_ITEM: usize = 1 << 16;
+
+/// Individuals that the referee evaluates before a generation counts as one without finite
+/// fitness. One is enough if any worker is honest and the fitness function is of use; more,
+/// as single genotypes may have no finite fitness.
+const WITHOUT_FITNESS_MIN: u32 = 8;
 
 /// Trials of an item: all of them, unless they give more numbers than that.
 fn trials_per_item(batch: &Batch) -> u32 {
@@ -47,16 +52,17 @@ struct Holder {
 pub struct BatchInProgress {
     batch: Batch,
     /// What no worker has been given, in the order in which it will be.
-    queue: VecDeque<Item>,
-    n_trials_queued: usize,
+    queue: Queue,
     /// Items that workers were lost with and that no worker has been given again.
-    suspects: VecDeque<Item>,
+    suspects: Queue,
     /// Items that no worker is given until the referee has answered.
     held_back: Vec<Item>,
     /// Items that no worker is given until a time.
     delayed: Vec<(Instant, Item)>,
     /// Disagreements that the referee has not settled.
     pub n_disagreements: usize,
+    /// Individuals that the referee has evaluated because none has a finite fitness.
+    pub n_without_fitness: u32,
     /// The workers that compute items, by individual.
     holders: BTreeMap<u32, Vec<Holder>>,
     /// Assignments that are not duplicated yet, by when they should be done.
@@ -86,15 +92,14 @@ impl BatchInProgress {
     /// A batch without results.
     pub fn new(batch: Batch, now: Instant, fleet_time: FleetTime) -> Self {
         let n_individuals = batch.genotypes.len();
-        let n_episodes = n_individuals * batch.n_trials as usize;
         let known = KnownResults::new(n_individuals, batch.n_trials, batch.values_per_trial);
         Self {
             queue: items(&batch).collect(),
-            n_trials_queued: n_episodes,
-            suspects: VecDeque::new(),
+            suspects: Queue::default(),
             held_back: Vec::new(),
             delayed: Vec::new(),
             n_disagreements: 0,
+            n_without_fitness: 0,
             holders: BTreeMap::new(),
             uncovered: BTreeMap::new(),
             losses: LossRecord::default(),
@@ -131,9 +136,7 @@ impl BatchInProgress {
         self.holders.clear();
         self.audits.n_in_flight = 0;
         self.uncovered.clear();
-        self.queue.clear();
-        self.n_trials_queued = 0;
-        self.suspects.clear();
+        (self.queue, self.suspects) = Default::default();
         for item in items(&self.batch) {
             for item in self.unclaimed(&item) {
                 self.queue_back(item);
@@ -142,12 +145,7 @@ impl BatchInProgress {
     }
 
     fn queue_back(&mut self, item: Item) {
-        if self.losses.is_suspect(&item) {
-            self.suspects.push_back(item);
-        } else {
-            self.n_trials_queued += item.trials.len();
-            self.queue.push_back(item);
-        }
+        self.queue_of(&item).push_back(item);
     }
 
     /// Forgets all values of a worker, and the audits of them, and queues what is unknown
@@ -164,18 +162,10 @@ impl BatchInProgress {
     /// Takes what is known or held back of an individual out of the queues.
     pub fn unqueue(&mut self, individual: u32) {
         let queues = [mem::take(&mut self.queue), mem::take(&mut self.suspects)];
-        let [queue, suspects] = queues.map(|queue| {
-            let mut rest = VecDeque::with_capacity(queue.len());
-            for item in queue {
-                if item.individual == individual {
-                    rest.extend(self.unclaimed(&item));
-                } else {
-                    rest.push_back(item);
-                }
-            }
-            rest
-        });
-        self.n_trials_queued = queue.iter().map(|item| item.trials.len()).sum();
+        let rest = |item: Item| {
+            if item.individual == individual { self.unclaimed(&item) } else { vec![item] }
+        };
+        let [queue, suspects] = queues.map(|queue| queue.into_iter().flat_map(rest).collect());
         (self.queue, self.suspects) = (queue, suspects);
     }
 
@@ -244,28 +234,21 @@ impl BatchInProgress {
 
     /// Queues an item before all others; a suspect, with the suspects.
     pub fn queue_front(&mut self, item: Item) {
-        if self.losses.is_suspect(&item) {
-            self.suspects.push_front(item);
-        } else {
-            self.push_front(item);
-        }
+        self.queue_of(&item).push_front(item);
     }
 
-    fn push_front(&mut self, item: Item) {
-        self.n_trials_queued += item.trials.len();
-        self.queue.push_front(item);
+    fn queue_of(&mut self, item: &Item) -> &mut Queue {
+        if self.losses.is_suspect(item) { &mut self.suspects } else { &mut self.queue }
     }
 
-    /// Takes at most `n_trials` trials, the first ones, of the first item in the queue.
+    /// Takes at most `n_trials` trials of the first item that waits: [`Queue::pop_front`].
     pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
-        let mut item = self.queue.pop_front()?;
-        self.n_trials_queued -= item.trials.len();
-        if n_trials < item.trials.len() {
-            let middle = item.trials.start + n_trials as u32;
-            self.push_front(Item { trials: middle..item.trials.end, ..item.clone() });
-            item.trials.end = middle;
-        }
-        Some(item)
+        self.queue.pop_front(n_trials)
+    }
+
+    /// The same with the rests last: [`Queue::pop_whole_first`].
+    pub fn pop_whole_first(&mut self, n_trials: usize) -> Option<Item> {
+        self.queue.pop_whole_first(n_trials, trials_per_item(&self.batch) as usize)
     }
 
     /// Trials per individual.
@@ -295,7 +278,7 @@ impl BatchInProgress {
 
     /// Trials that wait.
     pub fn n_trials_queued(&self) -> usize {
-        self.n_trials_queued
+        self.queue.n_trials()
     }
 
     /// Whether a suspect waits.
@@ -305,7 +288,7 @@ impl BatchInProgress {
 
     /// Takes the first suspect.
     pub fn pop_suspect(&mut self) -> Option<Item> {
-        self.suspects.pop_front()
+        self.suspects.pop_front(usize::MAX)
     }
 
     /// Whether anything waits.
@@ -419,6 +402,19 @@ impl BatchInProgress {
         self.known.n_episodes_left() == 0
     }
 
+    /// If no individual of a generation has a finite fitness: the next that the referee
+    /// evaluates for that reason. Call when all fitness is known.
+    pub fn without_fitness(&self) -> Option<Item> {
+        let is_generation = matches!(self.batch.trial_set, TrialSet::Generation(_));
+        let n_individuals = self.batch.genotypes.len() as u32;
+        let individual = self.n_without_fitness;
+        let is_open = is_generation
+            && self.batch.output == Output::Fitness
+            && individual < n_individuals.min(WITHOUT_FITNESS_MIN)
+            && !evolution::has_finite_fitness(self.known.values());
+        is_open.then_some(Item { individual, trials: 0..self.batch.n_trials })
+    }
+
     /// The outcome.
     pub fn into_evaluated(
         self,
@@ -443,7 +439,7 @@ impl BatchInProgress {
     /// it, in any order.
     pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
         let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
-        assert_eq!(n_queued, self.n_trials_queued);
+        assert_eq!(n_queued, self.queue.n_trials());
         self.known.sanity_check();
         let mut n_holders = 0;
         for (&individual, holders) in &self.holders {
@@ -464,7 +460,7 @@ impl BatchInProgress {
         // held back; and it is queued only if it is nothing else.
         let n_trials = self.batch.n_trials as usize;
         let mut claims = vec![0_u32; self.known.n_episodes()];
-        for item in self.queue.iter().chain(&self.suspects) {
+        for item in self.queue.iter().chain(self.suspects.iter()) {
             for trial in item.trials.clone() {
                 claims[item.individual as usize * n_trials + trial as usize] += 1;
             }

@@ -21,20 +21,28 @@ use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
     Assignment, Command, Engine,
+    batch::BatchInProgress,
     item::Item,
-    job::{JobWork, remaining},
+    job::{CALL_OVERHEAD, JobWork, remaining},
     timeline::Fate,
     worker::{AssignedItem, FULL_LOAD, Worker},
 };
 
 /// What moving work costs: a round trip, and the coordinator's own delays.
 const MOVING_COST: Duration = Duration::from_millis(20);
+/// Trials of a slot's share of a batch that are left to others: half a one as shares are
+/// rounded down, and some for what the rests cost as calls of their own. Of 0 to 1.3, this
+/// makes the most of the fleets of `cargo bench -p coordinator --bench scaling`.
+const LOST_PER_SLOT: f64 = 0.7;
 /// Workers that are looked at when the first is not suitable.
 const N_LOOKED_AT: usize = 8;
 /// Bytes of a distribution that fit into a message with room to spare.
 const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
 /// Time after which an item is late whose like nobody has computed yet.
 const UNKNOWN_LATE: Duration = Duration::from_secs(5);
+/// Copies of such an item for each that is late: the first may hang, too, and so may the
+/// next, so that their number has to grow.
+const UNKNOWN_COPIES: usize = 2;
 
 /// From where a worker's next item is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,8 +96,14 @@ impl Engine {
                 }
                 Source::Suspects => self.batch_mut(job).pop_suspect(),
                 Source::Queue => {
-                    let n_trials = self.n_trials_per_item(job, self.workers[&worker].pace);
-                    self.batch_mut(job).pop_front(n_trials)
+                    let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
+                    let is_short = self.is_short(job);
+                    let batch = self.batch_mut(job);
+                    if is_short {
+                        batch.pop_whole_first(n_trials)
+                    } else {
+                        batch.pop_front(n_trials)
+                    }
                 }
             };
             let item = item.expect("it was just seen");
@@ -168,14 +182,18 @@ impl Engine {
         let work = &self.jobs[&id];
         let Some(batch) = &work.batch else { return false };
         let n_left = batch.n_trials() as usize * self.n_slots_each(self.load_index.n_usable_slots);
-        let is_short = || work.expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST);
-        !self.config.split || batch.n_trials_queued() > n_left || is_short()
+        !self.config.split || batch.n_trials_queued() > n_left || self.is_short(id)
     }
 
-    /// How many trials of the next item a worker of a pace is given: all of them,
-    /// unless slots would stay empty, or the batch is near its end, when the worker's
-    /// share of what is left is smaller than an item.
-    fn n_trials_per_item(&self, id: JobId, pace: f64) -> usize {
+    /// Whether a job's trials take no longer than a round trip, as far as is known.
+    fn is_short(&self, id: JobId) -> bool {
+        self.jobs[&id].expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST)
+    }
+
+    /// How many trials of the next item a worker is given: all of them, unless slots would
+    /// stay empty, or the batch is near its end, when the worker's share of what is left is
+    /// smaller than an item.
+    fn n_trials_per_item(&self, id: JobId, worker: &Worker) -> usize {
         let Some(batch) = &self.jobs[&id].batch else { return usize::MAX };
         if !self.config.split {
             return usize::MAX;
@@ -183,9 +201,26 @@ impl Engine {
         let n_trials = batch.n_trials() as usize;
         let n_idle_slots = self.n_slots_each(self.load_index.n_idle_slots);
         let n_parts = (n_idle_slots / batch.n_queued().max(1)).max(1);
-        let n_slots = self.n_slots_each(self.load_index.n_usable_slots).max(1);
-        let share = batch.n_trials_queued() as f64 / (n_slots as f64 * pace);
-        n_trials.div_ceil(n_parts).min(share.ceil() as usize).max(1)
+        let share = if self.is_short(id) {
+            self.share_of_batch(batch, worker).floor()
+        } else {
+            let n_slots = self.n_slots_each(self.load_index.n_usable_slots).max(1);
+            (batch.n_trials_queued() as f64 / (n_slots as f64 * worker.pace)).ceil()
+        };
+        n_trials.div_ceil(n_parts).min(share as usize).max(1)
+    }
+
+    /// How many more trials a worker would be given if all that is left of a batch were given
+    /// out now, and every worker took equally long. Short trials are given out so, because a
+    /// worker that has none left waits for the next ones as long as a trial takes.
+    fn share_of_batch(&self, batch: &BatchInProgress, worker: &Worker) -> f64 {
+        let n_slots = self.load_index.n_usable_slots as f64;
+        let n_left = self.ready_queue.len().max(1) as f64 * batch.known.n_episodes_left() as f64;
+        let n_calls = (n_left / f64::from(batch.n_trials())).max(n_slots);
+        let work = n_left + CALL_OVERHEAD * n_calls + LOST_PER_SLOT * n_slots;
+        let share = worker.usable_speed() as f64 / self.load_index.usable_speed.max(1) as f64;
+        let held = &worker.in_flight;
+        work * share - held.n_trials() as f64 - CALL_OVERHEAD * (held.len() + 1) as f64
     }
 
     /// Takes the last item that waits behind others in a worker back and queues
@@ -217,7 +252,7 @@ impl Engine {
             let copy = work.slowest(now, self.load_index.n_idle_slots, pace, &self.workers)?;
             Some((id, copy))
         });
-        let Some((job, Slow { key, item, n_parts })) = candidate else { return false };
+        let Some((job, Slow { key, item, n_parts, n_copies })) = candidate else { return false };
         let other = |engine: &Self, item: &Item| {
             let work = &engine.jobs[&job];
             let batch = work.batch.as_ref();
@@ -228,13 +263,15 @@ impl Engine {
         }
         self.batch_mut(job).uncovered.remove(&key);
         let n_per_part = item.trials.len().div_ceil(n_parts) as u32;
-        let mut start = item.trials.start;
-        while start < item.trials.end {
-            let trials = start..(start + n_per_part).min(item.trials.end);
-            let part = Item { individual: item.individual, trials };
-            let Some(worker) = other(self, &part) else { break };
-            start = part.trials.end;
-            self.give(now, worker, job, part, Source::Queue, Duration::ZERO);
+        for _ in 0..n_copies {
+            let mut start = item.trials.start;
+            while start < item.trials.end {
+                let trials = start..(start + n_per_part).min(item.trials.end);
+                let part = Item { individual: item.individual, trials };
+                let Some(worker) = other(self, &part) else { break };
+                start = part.trials.end;
+                self.give(now, worker, job, part, Source::Queue, Duration::ZERO);
+            }
         }
         true
     }
@@ -301,7 +338,7 @@ impl Engine {
         assignment_id: AssignmentId,
     ) -> AssignedItem {
         let assignment =
-            self.update_worker(worker, |worker| worker.in_flight.remove(&assignment_id));
+            self.update_worker(worker, |worker| worker.in_flight.remove(assignment_id));
         let assignment = assignment.expect("the caller has seen it");
         self.forget_holder(assignment_id, &assignment);
         assignment
@@ -392,6 +429,8 @@ struct Slow {
     item: Item,
     /// Into how many items it is split for that.
     n_parts: usize,
+    /// How many times.
+    n_copies: usize,
 }
 
 impl JobWork {
@@ -413,14 +452,14 @@ impl JobWork {
             let item = batch.duplicable(running)?;
             let n_trials = item.trials.len();
             let n_parts = (n_idle_slots / batch.uncovered.len()).clamp(1, n_trials);
-            let needed = match self.expected(n_trials.div_ceil(n_parts), pace) {
+            let (needed, n_copies) = match self.expected(n_trials.div_ceil(n_parts), pace) {
                 // Half as long again, as a worker may finish what it is told to drop.
-                Some(needed) => needed.mul_f64(1.5) + MOVING_COST,
-                // Twice as late for each copy.
-                None => UNKNOWN_LATE.max(batch.running_for(now) / 2),
+                Some(needed) => (needed.mul_f64(1.5) + MOVING_COST, 1),
+                // Later each time.
+                None => (UNKNOWN_LATE.max(batch.running_for(now) / 2), UNKNOWN_COPIES),
             };
             let is_worth_it = needed < remaining(expected, now);
-            is_worth_it.then_some(Slow { key, item, n_parts })
+            is_worth_it.then_some(Slow { key, item, n_parts, n_copies })
         })
     }
 }

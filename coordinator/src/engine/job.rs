@@ -11,7 +11,7 @@ use super::{batch::BatchInProgress, item::Item, unaudited::Unaudited};
 
 /// What a call costs beside its trials, in trials. Measured: one trial of the
 /// shipped experiments takes 1.38 to 1.8 times as long as one of several.
-const CALL_OVERHEAD: f64 = 0.4;
+pub const CALL_OVERHEAD: f64 = 0.4;
 /// What a trial is taken to cost before one has been seen.
 const UNKNOWN_TRIAL: Duration = Duration::from_millis(10);
 
@@ -77,13 +77,15 @@ impl JobWork {
         self.expected(n_trials, pace).unwrap_or(UNKNOWN_TRIAL * n_trials as u32)
     }
 
-    /// Learns from an item that took a worker of a pace `busy`.
-    pub fn learn(&mut self, item: &Item, busy: Duration, pace: f64) {
+    /// Learns from an item that took a worker of a pace `busy`, one of so many.
+    pub fn learn(&mut self, item: &Item, busy: Duration, pace: f64, n_workers: usize) {
         let trial_s = busy.as_secs_f64() / (item.trials.len() as f64 + CALL_OVERHEAD) / pace;
         let smoothed = self.trial_s.get_or_insert(trial_s);
-        // The mean of the first few, then of the last few.
+        // The mean of the first, then of the last: over several rounds of all workers, as the
+        // fast ones answer first and would all seem to be as slow as each other.
         self.n_learnt += 1;
-        let gain = (1.0 / self.n_learnt as f64).max(0.01);
+        let n_of_mean = self.n_learnt.min(100 + 4 * n_workers as u64);
+        let gain = 1.0 / n_of_mean as f64;
         *smoothed = (*smoothed + gain * (trial_s - *smoothed)).max(1e-9);
     }
 

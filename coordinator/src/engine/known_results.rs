@@ -162,6 +162,11 @@ impl KnownResults {
         discarded
     }
 
+    /// Per individual the numbers of all trials; meaningless for trials without a result.
+    pub fn values(&self) -> &[Vec<f64>] {
+        &self.values
+    }
+
     /// Per individual the numbers of all trials.
     pub fn into_values(self) -> Vec<Vec<f64>> {
         self.values

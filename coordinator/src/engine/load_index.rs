@@ -18,6 +18,9 @@ pub struct WorkerLoadIndex {
     pub n_idle_slots: usize,
     /// Slots that may have an item.
     pub n_usable_slots: usize,
+    /// The work that these do in the time that one of pace 1 takes for
+    /// [`SPEED_UNIT`](super::worker::SPEED_UNIT).
+    pub usable_speed: u64,
 }
 
 impl WorkerLoadIndex {
@@ -32,6 +35,7 @@ impl WorkerLoadIndex {
         }
         self.n_idle_slots += worker.n_idle_slots();
         self.n_usable_slots += worker.n_usable_slots();
+        self.usable_speed += worker.usable_speed();
     }
 
     /// Takes a worker out, as it was when it was added.
@@ -45,5 +49,6 @@ impl WorkerLoadIndex {
         }
         self.n_idle_slots -= worker.n_idle_slots();
         self.n_usable_slots -= worker.n_usable_slots();
+        self.usable_speed -= worker.usable_speed();
     }
 }

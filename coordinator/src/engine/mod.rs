@@ -44,6 +44,7 @@ mod batch;
 mod crash_loops;
 mod dispatch;
 mod fleet_time;
+mod in_flight;
 mod item;
 mod job;
 mod known_results;
@@ -53,7 +54,9 @@ mod messages;
 mod name_pattern;
 mod quarantine;
 mod questions;
+mod queue;
 mod results;
+mod sanity;
 mod stalls;
 mod stats;
 mod timeline;
@@ -68,8 +71,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sim_core::TrialSet;
-
 use crate::{
     ids::{AssignmentId, JobId, WorkerId},
     priority::Priority,
@@ -81,7 +82,6 @@ use batch::BatchInProgress;
 use crash_loops::CrashLoops;
 use dispatch::Outgoing;
 use fleet_time::FleetTime;
-use item::Item;
 use job::JobWork;
 use load_index::WorkerLoadIndex;
 pub use messages::{
@@ -383,28 +383,6 @@ impl Engine {
         }
     }
 
-    /// Whether the results of an item are compared with another worker's. Depends
-    /// on nothing but the place of the individual, so that the same individuals are
-    /// audited whoever computes them.
-    fn is_audited(&self, id: JobId, item: &Item) -> bool {
-        let Some(work) = self.jobs.get(&id) else { return false };
-        let Some(batch) = &work.batch else { return false };
-        let (kind, number) = match id {
-            JobId::Experiment(id) => (0, id.0),
-            JobId::Evaluation(id) => (1, id.0),
-        };
-        let (set, generation) = match batch.trial_set() {
-            TrialSet::Generation(generation) => (0, generation),
-            TrialSet::Evaluation => (2, 0),
-            TrialSet::Judgement(generation) => (3, generation),
-            TrialSet::HeldOut { generation, block: 0 } => (1, generation),
-            TrialSet::HeldOut { generation, block } => (3 + u64::from(block), generation),
-        };
-        let place = [mix_in(number, kind), mix_in(generation, set), u64::from(item.individual)];
-        let hash = place.into_iter().fold(0, |hash, part| mix(hash ^ part));
-        (hash as f64) < self.config.audit_fraction * (1u128 << 64) as f64
-    }
-
     /// `is_evidence`: whether the items that the worker was computing may have taken it down.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, is_evidence: bool) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
@@ -469,7 +447,7 @@ impl Engine {
             if worker.known_jobs.remove(&id).is_some() {
                 self.load_index.remove(worker_id, worker);
                 let is_ours = |_: &AssignmentId, it: &mut AssignedItem| it.job == id;
-                let ours: Vec<_> = worker.in_flight.extract_if(.., is_ours).collect();
+                let ours = worker.in_flight.remove_of(id);
                 let written_off = worker.written_off.extract_if(.., is_ours).collect::<Vec<_>>();
                 for (_, item) in ours.iter().chain(&written_off).cloned() {
                     let who = (worker_id, &*worker);
@@ -500,68 +478,4 @@ impl Engine {
         self.load_index.add(id, worker);
         result
     }
-
-    /// Panics if the state contradicts itself. For tests: it looks at everything.
-    pub fn sanity_check(&self) {
-        let mut load_index = WorkerLoadIndex::default();
-        let mut in_flight: BTreeMap<JobId, BTreeMap<_, _>> = BTreeMap::new();
-        for (&id, worker) in &self.workers {
-            load_index.add(id, worker);
-            for (&assignment_id, assignment) in &worker.in_flight {
-                assert!(worker.known_jobs.contains_key(&assignment.job));
-                let entry = (id, assignment.item.clone(), assignment.is_audit);
-                in_flight.entry(assignment.job).or_default().insert(assignment_id, entry);
-            }
-            assert!(worker.recalled.len() <= 2 * worker.n_slots());
-            assert!(
-                worker.is_usable()
-                    || worker.is_draining
-                    || worker.quarantined.is_none()
-                    || worker.in_flight.is_empty()
-            );
-        }
-        assert_eq!(load_index.available, self.load_index.available);
-        assert_eq!(load_index.backlogged, self.load_index.backlogged);
-        assert_eq!(load_index.n_idle_slots, self.load_index.n_idle_slots);
-        assert_eq!(load_index.n_usable_slots, self.load_index.n_usable_slots);
-        for (&id, work) in &self.jobs {
-            let in_flight = in_flight.remove(&id).unwrap_or_default();
-            assert!(!work.is_paused || in_flight.is_empty(), "paused work is nobody's");
-            assert_eq!(self.ready_queue.contains(&(work.virtual_time, id)), work.is_ready());
-            match &work.batch {
-                Some(batch) => batch.sanity_check(&in_flight),
-                None => assert!(in_flight.is_empty()),
-            }
-        }
-        assert!(in_flight.is_empty(), "nobody computes for a job that is over");
-        let n_ready = self.jobs.values().filter(|work| work.is_ready()).count();
-        assert_eq!(self.ready_queue.len(), n_ready);
-        let has_queued = |work: &&JobWork| {
-            work.is_ready() && work.batch.as_ref().is_some_and(|batch| batch.n_queued() > 0)
-        };
-        let is_neglected = |work: &JobWork| self.idle_taker(work, |_| true).is_some();
-        assert!(
-            !self.jobs.values().filter(has_queued).any(is_neglected),
-            "no work waits while a slot is idle whose worker takes it"
-        );
-        assert!(self.outgoing.is_empty(), "everything is sent");
-        let n_slots: usize = self.workers.values().map(Worker::n_slots).sum();
-        assert_eq!(n_slots, self.fleet_time.n_slots());
-        let Counters { n_workers_joined, n_workers_left, n_workers_lost, .. } = self.counters;
-        let n_gone = n_workers_left + n_workers_lost;
-        assert_eq!(n_workers_joined - n_gone, self.workers.len() as u64);
-    }
-}
-
-/// A number of a kind; of kind 0, the number itself.
-fn mix_in(number: u64, kind: u64) -> u64 {
-    number ^ kind.wrapping_mul(0x9e37_79b9_7f4a_7c15)
-}
-
-/// A step of SplitMix64 (Steele, Lea & Flood 2014).
-fn mix(x: u64) -> u64 {
-    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }

@@ -69,6 +69,9 @@ pub enum Doubt {
         /// The two, and the numbers that each has returned for the trial.
         parties: [(Party, Vec<f64>); 2],
     },
+    /// No individual of a generation has a finite fitness, as the workers say. Evolution ends
+    /// with that, so it takes more than their word.
+    NoFitness,
 }
 
 /// A worker whose word is in doubt; it may have left.
@@ -108,7 +111,7 @@ impl Question {
     pub fn parties(&self) -> Vec<&Party> {
         match &self.doubt {
             Doubt::Failure { reporter, .. } => vec![reporter],
-            Doubt::Losses => vec![],
+            Doubt::Losses | Doubt::NoFitness => vec![],
             Doubt::Disagreement { parties: [(first, _), (second, _)] } => vec![first, second],
         }
     }
@@ -123,14 +126,18 @@ impl Question {
             Doubt::Disagreement { parties: [(first, _), (second, _)] } => {
                 format!("workers \"{}\" and \"{}\" return different bits", first.name, second.name)
             }
+            Doubt::NoFitness => {
+                "no individual of the generation has a finite fitness, as the workers say"
+                    .to_owned()
+            }
         };
         OpenQuestion { individual: self.item.individual, doubt, trouble: self.trouble.clone() }
     }
 
-    /// Whether its item is given to no worker until it is answered. What two workers have
+    /// Whether its item is given to no worker until it is answered. What workers have
     /// computed is not waited for; what the referee cannot answer at present is not either.
     pub fn holds_back(&self) -> bool {
-        !matches!(self.doubt, Doubt::Disagreement { .. }) && self.trouble.is_none()
+        matches!(self.doubt, Doubt::Failure { .. } | Doubt::Losses) && self.trouble.is_none()
     }
 
     /// The referee could not answer.
@@ -200,6 +207,11 @@ impl Questions {
     pub fn of(&self, job: JobId) -> impl Iterator<Item = (QuestionId, &Question)> {
         let ours = self.open.iter().filter(move |(_, question)| question.job == job);
         ours.map(|(&id, question)| (id, question))
+    }
+
+    /// Number of those about a job that are asked for a reason.
+    pub fn n_about(&self, job: JobId, is_reason: impl Fn(&Doubt) -> bool) -> usize {
+        self.of(job).filter(|(_, question)| is_reason(&question.doubt)).count()
     }
 
     /// Number of questions since the engine began.

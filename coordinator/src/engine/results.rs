@@ -123,7 +123,7 @@ impl Engine {
         let jobs = &self.jobs;
         let worker = self.workers.get_mut(&id).expect("the caller has seen it");
         self.load_index.remove(id, worker);
-        let assignment = worker.in_flight.remove(&result.id);
+        let assignment = worker.in_flight.remove(result.id);
         let assignment = assignment.or_else(|| worker.written_off.remove(&result.id));
         let assignment = assignment.expect("the caller has seen it");
         let n_trials = assignment.item.trials.len();
@@ -140,7 +140,7 @@ impl Engine {
         self.timeline.add(now, (id, worker), assignment.clone(), fate, busy);
         let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
         if is_ok {
-            work.learn(&assignment.item, busy, pace);
+            work.learn(&assignment.item, busy, pace, self.workers.len());
         }
         self.correct_charge(assignment.job, assignment.charge, busy);
         (assignment, busy)
@@ -260,7 +260,7 @@ impl Engine {
     ) {
         let (job, item) = (assignment.job, assignment.item.clone());
         let reporter = self.party(id);
-        if let Some(confirmed) = self.confirms(job, &item, &reporter.name, &message) {
+        if let Some(confirmed) = self.confirms(job, &item, &reporter, &message) {
             return self.fail(now, job, &item, &confirmed);
         }
         // A worker whose word is in doubt already says nothing new.
@@ -344,6 +344,12 @@ impl Engine {
         if !batch.is_finished(has_auditor) {
             return;
         }
+        if let Some(item) = batch.without_fitness() {
+            if self.questions.n_about(id, |doubt| matches!(doubt, Doubt::NoFitness)) == 0 {
+                self.ask_referee(id, item, Doubt::NoFitness);
+            }
+            return;
+        }
         self.ready_queue.remove(&(work.virtual_time, id));
         self.fleet_time.advance(now);
         let batch = work.batch.take().expect("just seen");
@@ -410,8 +416,7 @@ impl Engine {
     fn may_ask_about_losses(&self, job: JobId, item: &Item) -> bool {
         let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
         let is_open = batch.is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
-        let questions = self.questions.of(job).map(|(_, question)| &question.doubt);
-        let n_asked = questions.filter(|doubt| matches!(doubt, Doubt::Losses)).count();
+        let n_asked = self.questions.n_about(job, |doubt| matches!(doubt, Doubt::Losses));
         is_open && n_asked < LOSS_QUESTIONS_MAX
     }
 

@@ -63,6 +63,7 @@ impl Engine {
         let question = Question::new(job, spec, what, item.clone(), doubt);
         match question.doubt {
             Doubt::Disagreement { .. } => batch.n_disagreements += 1,
+            Doubt::NoFitness => {}
             // An audit's is known.
             Doubt::Failure { .. } | Doubt::Losses if batch.unknown(&item).is_empty() => {}
             Doubt::Failure { .. } | Doubt::Losses => batch.hold_back(item),
@@ -86,27 +87,41 @@ impl Engine {
         self.commands.extend(self.questions.asked_again(now));
     }
 
-    /// Whether a failure that a worker reports has been reported in the same words by
-    /// another one, while the referee cannot be asked.
+    /// Whether a failure that a worker reports is reported in the same words by others, while
+    /// the referee cannot be asked: by workers with most of the slots, as fewer may be
+    /// faulty, and of two names at least.
     pub(super) fn confirms(
         &self,
         job: JobId,
         item: &Item,
-        name: &str,
+        reporter: &Party,
         message: &str,
     ) -> Option<String> {
-        let mut questions = self.questions.of(job).map(|(_, question)| question);
-        let is_confirmed = questions.any(|question| match &question.doubt {
-            Doubt::Failure { reporter, message: first } => {
-                question.trouble.is_some()
+        let questions = self.questions.of(job).map(|(_, question)| question);
+        let others = questions.filter_map(|question| match &question.doubt {
+            Doubt::Failure { reporter, message: same }
+                if question.trouble.is_some()
                     && self.batch_of(question)
-                    && *reporter.name != *name
-                    && *first == message
-                    && question.item.overlaps(item)
+                    && same == message
+                    && question.item.overlaps(item) =>
+            {
+                Some(reporter)
             }
-            _ => false,
+            _ => None,
         });
-        is_confirmed.then(|| format!("two workers report: {message}"))
+        let reporters: Vec<&Party> = others.chain([reporter]).collect();
+        let names: BTreeSet<&str> = reporters.iter().map(|party| &*party.name).collect();
+        let ids: BTreeSet<WorkerId> = reporters.iter().map(|party| party.id).collect();
+        let work = &self.jobs[&job];
+        let trusted =
+            self.workers.iter().filter(|(_, it)| it.quarantined.is_none() && it.takes(work));
+        let (mut n_slots, mut n_reporting) = (0, 0);
+        for (id, worker) in trusted {
+            n_slots += worker.n_slots();
+            n_reporting += if ids.contains(id) { worker.n_slots() } else { 0 };
+        }
+        let is_confirmed = names.len() > 1 && 2 * n_reporting > n_slots;
+        is_confirmed.then(|| format!("{} workers report: {message}", names.len()))
     }
 
     /// Forgets questions about a job that are no longer of interest.
@@ -144,7 +159,7 @@ impl Engine {
         let place = place(&question.item);
         let batch = name_of(question.trial_set);
         match &question.doubt {
-            Doubt::Losses => {}
+            Doubt::Losses | Doubt::NoFitness => {}
             Doubt::Failure { reporter, message } => {
                 let reason = format!(
                     "it reports that {place} of {batch} fails (\"{message}\"), and the referee \
@@ -163,6 +178,9 @@ impl Engine {
         }
         if self.batch_of(question) {
             let (job, item) = (question.job, &question.item);
+            if matches!(question.doubt, Doubt::NoFitness) {
+                self.batch_mut(job).n_without_fitness += 1;
+            }
             // What a third worker returned meanwhile may be wrong, too.
             while let Err(disagreement) = self.batch_mut(job).known.compare(item, values)
                 && disagreement.first != REFEREE

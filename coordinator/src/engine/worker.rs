@@ -11,13 +11,19 @@ use swarm_proto::ITEMS_PER_SLOT_MAX;
 
 use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
 
-use super::{Introduction, WorkerStatus, fleet_time::WorkerTime, item::Item, job::JobWork};
+use super::{
+    Introduction, WorkerStatus, fleet_time::WorkerTime, in_flight::InFlight, item::Item,
+    job::JobWork,
+};
 
 /// A worker is given so much work ahead, so that it computes while results and
 /// new items travel: longer than a round trip and the coordinator's own delays.
 const WORK_AHEAD: Duration = Duration::from_millis(50);
 /// [`Worker::load`] of a worker with as many items as slots.
 pub const FULL_LOAD: u64 = 1 << 20;
+
+/// [`Worker::usable_speed`] of a slot of pace 1.
+pub const SPEED_UNIT: u64 = 1 << 10;
 
 /// A connected worker.
 #[derive(Debug)]
@@ -47,7 +53,7 @@ pub struct Worker {
     /// distribution it has.
     pub known_jobs: BTreeMap<JobId, Option<TrialSet>>,
     /// What it has been given and has not answered; oldest first, as ids grow.
-    pub in_flight: BTreeMap<AssignmentId, AssignedItem>,
+    pub in_flight: InFlight,
     /// What it was computing when it was found to be stalled. Others have been given it, but
     /// its results are still welcome.
     pub written_off: BTreeMap<AssignmentId, AssignedItem>,
@@ -99,7 +105,7 @@ impl Worker {
             is_stalled: false,
             last_result: None,
             known_jobs: BTreeMap::new(),
-            in_flight: BTreeMap::new(),
+            in_flight: InFlight::default(),
             written_off: BTreeMap::new(),
             recalled: VecDeque::new(),
             item_s: None,
@@ -199,6 +205,12 @@ impl Worker {
         }
     }
 
+    /// How much its usable slots compute, in units of 1 / [`SPEED_UNIT`]; whole, so that a sum
+    /// over workers that come and go stays exact.
+    pub fn usable_speed(&self) -> u64 {
+        (self.n_usable_slots() as f64 / self.pace * SPEED_UNIT as f64) as u64
+    }
+
     /// Those that have none.
     pub fn n_idle_slots(&self) -> usize {
         self.n_usable_slots().saturating_sub(self.n_held())
@@ -214,7 +226,7 @@ impl Worker {
             let ratio = busy_s / expected.as_secs_f64().max(1e-9);
             // The mean of the first few, then of the last few.
             self.n_learnt += 1;
-            let gain = (1.0 / f64::from(self.n_learnt)).max(0.2);
+            let gain = (1.0 / f64::from(self.n_learnt)).max(0.1);
             self.pace = (self.pace + gain * (ratio - self.pace)).clamp(1e-2, 1e2);
         }
     }

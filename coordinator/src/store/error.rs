@@ -24,7 +24,7 @@ pub enum StoreError {
     },
     /// Another coordinator uses the directory.
     #[error(
-        "the data directory {} is in use by another coordinator; stop it or choose another directory",
+        "the data directory {} is in use by another coordinator or `swarmctl run`; stop it or choose another directory",
         path.display()
     )]
     Locked {

@@ -4,6 +4,7 @@
 mod by_hand;
 mod divided;
 mod evaluations;
+mod proof;
 mod timeline;
 mod trouble;
 
@@ -162,6 +163,30 @@ fn short_items_keep_slots_busy_over_a_slow_network() {
     assert!(idle < 0.05, "{idle}");
     let status = &fleet.status()[0];
     assert!(status.idle_share < 0.2 && status.results_per_s > 1000.0, "{status:?}");
+}
+
+#[test]
+fn fast_workers_get_more_of_short_trials_and_all_end_together() {
+    let (trial, latency) = (Duration::from_millis(1), Duration::from_micros(100));
+    let model = FleetModel { trial, latency, ..MODEL };
+    let idle_share = |config| {
+        let mut fleet = SimulatedFleet::new(model, config);
+        // One is three times as fast as another.
+        for worker in 0..40 {
+            fleet.join(1, 0.5 + f64::from(worker) / 40.0);
+        }
+        fleet.submit(EXPERIMENT, 100);
+        for generation in 0..8 {
+            fleet.ask(EXPERIMENT, generation, 40, 5);
+            assert!(fleet.run_until(HOUR, |fleet| fleet.evaluated.len() as u64 > generation));
+            assert_right(&fleet, 40, 5);
+        }
+        let later = &fleet.evaluated[4..];
+        later.iter().map(|(_, evaluated)| evaluated.idle_share).sum::<f64>() / later.len() as f64
+    };
+    let whole = idle_share(EngineConfig { split: false, ..EngineConfig::new(LEASE) });
+    let shared = idle_share(EngineConfig::new(LEASE));
+    assert!(whole > 0.4 && shared < 0.25, "{whole} {shared}");
 }
 
 #[test]

@@ -156,6 +156,18 @@ fn hung_workers_with_most_of_the_slots_do_not_hold_up_two_honest_ones() {
 }
 
 #[test]
+fn hung_workers_that_get_all_copies_of_a_first_item_do_not_hold_it_up_one_after_the_other() {
+    let mut fleet = fleet();
+    for _ in 0..6 {
+        fleet.join_with(1, 1.0, Conduct::Hangs);
+    }
+    fleet.join(1, 1.0);
+    fleet.submit(EXPERIMENT, 100);
+    fleet.ask(EXPERIMENT, 0, 1, 1);
+    assert!(fleet.run_until(12 * SECOND, |fleet| !fleet.evaluated.is_empty()));
+}
+
+#[test]
 fn a_poisonous_item_that_takes_its_time_is_found_too() {
     let mut fleet = fleet();
     fleet.poisonous.insert(3);
