@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use evolution::ALGORITHMS;
-use experiment_file::ExperimentConfig;
+use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use sim_core::Simulation;
@@ -24,6 +24,23 @@ pub struct Experiment {
     config: ExperimentConfig,
     simulation: Arc<Simulation>,
     warnings: Vec<String>,
+}
+
+/// The path of the script that a file's text refers to; none if it has none, or has it in it.
+#[pyfunction]
+pub fn script_path(text: &str) -> Option<String> {
+    experiment_file::script_path(text).map(|(path, _)| path)
+}
+
+/// A file's text with the script in the place of its path.
+#[pyfunction]
+pub fn inline_script(text: &str, name: String, script: String) -> String {
+    match experiment_file::script_path(text) {
+        Some((_, place)) => {
+            experiment_file::inline_script(text, place, &ScriptConfig { name, text: script })
+        }
+        None => text.to_owned(),
+    }
 }
 
 #[pymethods]

@@ -5,6 +5,7 @@ mod database;
 mod errors;
 mod evolution;
 mod experiment;
+mod genes;
 mod running;
 mod stepping;
 mod trace;
@@ -20,7 +21,8 @@ mod _core {
     use crate::{
         database::Database,
         evolution::{Evolution, Reevaluation, algorithms},
-        experiment::Experiment,
+        experiment::{Experiment, inline_script, script_path},
+        genes::encode_genes,
         stepping::Episodes,
         workers::Worker,
     };

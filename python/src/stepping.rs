@@ -67,6 +67,18 @@ impl Episodes {
         set.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
+    /// Has agents emit nothing in this step, flat.
+    fn silence(&self, py: Python<'_>, silent: PyReadonlyArray1<'_, bool>) -> PyResult<()> {
+        let silent = silent.to_vec()?;
+        let silenced = self.ask(py, move |stage| stage.stepper.silence(&silent))?;
+        silenced.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Whether agents sent their own message in the step before, flat: `[T * A]`.
+    fn sent<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
+        Ok(self.ask(py, |stage| stage.stepper.sent())?.into_pyarray(py))
+    }
+
     /// One step with these actions, flat. Returns its fitness in each trial, NaN where it does
     /// not count.
     fn step<'py>(

@@ -80,12 +80,27 @@ class Episodes:
     @stimuli.setter
     def stimuli(self, stimuli: ArrayLike) -> None:
         """Has the agents get this instead in this step: what :meth:`decide` sees. Radios still relay what
-        they heard; what is set for inputs that an agent has not does not matter."""
+        they heard; what is set for inputs that an agent has not does not matter, and what is inhibited stays 0."""
         values = np.ascontiguousarray(stimuli, dtype=np.float32)
         shape = (self.n_trials, len(self.agents), self.n_inputs)
         if values.shape != shape:
             raise ValueError(f"stimuli are an array {list(shape)}, not {list(values.shape)}")
         self._core.set_stimuli(values.reshape(-1))
+
+    @property
+    def sent(self) -> NDArray[np.bool_]:
+        """``[T, A]``: which agents sent their own message in the step before. That is what their actions said,
+        but for the first steps, in which all send, and for robots that fail."""
+        return self._core.sent().reshape(self.n_trials, len(self.agents))
+
+    def silence(self, silent: ArrayLike) -> None:
+        """``[T, A]``: has these agents emit nothing in this step, neither their own message nor one that they
+        relay. Hearers get the next strongest frame."""
+        values = np.ascontiguousarray(silent, dtype=np.bool_)
+        shape = (self.n_trials, len(self.agents))
+        if values.shape != shape:
+            raise ValueError(f"who is silent is an array {list(shape)}, not {list(values.shape)}")
+        self._core.silence(values.reshape(-1))
 
     def idle(self) -> Actions:
         """Actions of agents that stand, with the LED off, and send zeros."""

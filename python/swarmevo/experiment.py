@@ -56,9 +56,13 @@ class Experiment:
 
     @classmethod
     def from_file(cls, path: str | os.PathLike[str], seed: int | None = None) -> Experiment:
-        """Reads a file. Without a name of its own it has the file's."""
+        """Reads a file, and the script that it refers to. Without a name of its own it has the file's."""
         path = Path(path)
-        return cls(path.read_text(encoding="utf-8"), path.stem, seed)
+        text = path.read_text(encoding="utf-8")
+        if script := _core.script_path(text):
+            place = path.parent / script
+            text = _core.inline_script(text, place.name, place.read_text(encoding="utf-8"))
+        return cls(text, path.stem, seed)
 
     @classmethod
     def from_dict(

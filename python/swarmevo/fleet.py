@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import protocol
+from . import _core, protocol
 from .errors import ExperimentError, FleetError
 from .experiment import Experiment
 from .progress import shown
@@ -191,7 +191,7 @@ class Client(Records):
         if not parts:
             return np.empty((0, n_trials))
         asked = [
-            request | {"genotypes": [message(values=row.tolist()) for row in part]}
+            request | {"genotypes": [message.FromString(it) for it in _core.encode_genes(part)]}
             for part in parts
         ]
         answers = self._all_at_once("EvaluationService", "EvaluateFitness", asked)

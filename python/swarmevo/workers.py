@@ -11,6 +11,7 @@ import socket
 import threading
 import time
 import uuid
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType, TracebackType
@@ -61,6 +62,9 @@ def workers(
     the same time, and leaves after ``turn`` seconds for another one to take its place. So they
     end by themselves soon after this process does. A worker whose node is lost is started
     again; what it was computing is computed by others.
+
+    An executor of processes has to spawn them: a forked process has copies of this one's
+    connections, and disturbs them. ``ProcessPoolExecutor(4, mp_context=get_context("spawn"))``.
 
     ``coordinator``: its address as the workers' nodes reach it; like the other settings found
     as :func:`connect` finds it, but the token is a worker's, in ``SWARM_WORKER_TOKEN`` or the
@@ -190,6 +194,11 @@ class _OfExecutor:
     """Futures of ``concurrent.futures`` and of Dask."""
 
     def __init__(self, executor: Submits) -> None:
+        if _forks(executor):
+            raise ValueError(
+                "this executor forks its processes, which would share the connections of this one; "
+                'give it mp_context=multiprocessing.get_context("spawn")'
+            )
         self._executor = executor
         self._is_dask = type(executor).__module__.split(".")[0] == "distributed"
 
@@ -203,6 +212,14 @@ class _OfExecutor:
 
     def check(self, task: Any) -> None:
         task.result()
+
+
+def _forks(executor: Submits) -> bool:
+    # No public attribute says how a pool starts its processes.
+    context = getattr(executor, "_mp_context", None)
+    return isinstance(executor, ProcessPoolExecutor) and (
+        context is not None and context.get_start_method() == "fork"
+    )
 
 
 class _OfRay:

@@ -11,7 +11,6 @@ from conftest import PROJECT
 import swarmevo
 from swarmevo import analysis
 from swarmevo.analysis import CTRNN, Equilibrium, LimitCycle
-from swarmevo.analysis.generalisation import _conditions
 
 T, STEPS, R = 30, 60, 8
 
@@ -193,26 +192,3 @@ def test_an_input_that_is_absent_already_changes_not_a_bit(tmp_path):
         change = {row["input that is 0"]: row["change, in the same trials"] for row in csv.DictReader(file)}
     assert change["wireless_receiver:state"] == "the same bits"
     assert change["wireless_receiver:msg"] != "the same bits"
-
-
-def test_other_conditions_are_other_experiments_in_the_same_trials(quickstart, genotypes):
-    found = analysis.generalisation(quickstart, genotypes[0], trials=3)
-    as_it_is = quickstart.evaluate(genotypes[:1], 1_000_000, trials=3)[0]
-    assert found[0].what == "" and found[0].mean == as_it_is.mean()
-    assert {it.value for it in found if it.what == "robots"} == {2, 8, 10, 15, 25}
-    assert {it.value for it in found if it.what.startswith("reach of the radio")} == {50, 75, 150, 200}
-
-
-def test_a_swarm_that_does_not_fit_is_a_row_that_says_so(quickstart, genotypes):
-    config = quickstart.to_dict()
-    config["world"] |= {"width": 200, "height": 200}
-    found = analysis.generalisation(swarmevo.Experiment.from_dict(config), genotypes[0], trials=2)
-    problems = {it.value: it.problem for it in found if it.what == "robots"}
-    assert "no place" in problems[25] and problems[8] == ""
-
-
-def test_affected_robots_stay_the_same_share_of_a_swarm():
-    experiment = swarmevo.Experiment.from_file(PROJECT / "configs/light_follower_snes.json")
-    (robots,) = (config for what, value, config in _conditions(experiment.to_dict()) if (what, value) == ("robots", 20))
-    inhibited = robots["world"]["objects"]["robotA"]["perturbations"]["stimuli_inhibition"]
-    assert (inhibited if isinstance(inhibited, dict) else inhibited[0])["affected_robots"] == 16

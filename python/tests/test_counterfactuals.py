@@ -17,6 +17,37 @@ def leader():
     return swarmevo.Experiment.from_file(PROJECT / "configs/leader_selection_snes.json"), champion["genotype"]
 
 
+@pytest.fixture(scope="module")
+def follower():
+    """Experiment D, in which eight of ten robots do not see the light, and its champion."""
+    champion = json.loads((PROJECT / "results/champions/light_follower_snes-0.json").read_text())
+    return swarmevo.Experiment.from_file(PROJECT / "configs/light_follower_snes.json"), champion["genotype"]
+
+
+def inhibited(experiment, sensor):
+    """The experiment whose robots sense nothing by a sensor, and never fail."""
+    return analysis.variant(experiment, perturbations={"stimuli_inhibition": {"stimuli": sensor, "affected_robots": "all"}})
+
+
+def course(leader, silent=False):
+    """Actions of each step, and stimuli, of one episode; all robots are silent in all steps, or none is."""
+    experiment, genotype = leader
+    episodes = experiment.episodes(swarmevo.TrialSet.evaluation(), trials=1)
+    episodes.load(genotype)
+    actions, stimuli = [], []
+    while not episodes.is_over:
+        stimuli.append(episodes.stimuli[0])
+        actions.append(episodes.decide())
+        episodes.silence(np.full(actions[-1].sends.shape, silent))
+        episodes.step(actions[-1])
+    return actions, stimuli
+
+
+def same(one, other):
+    """Whether two answers are, but for who was asked about."""
+    return all(np.array_equal(mine, its) for name, mine in vars(one).items() for its in [vars(other)[name]])
+
+
 def test_what_a_leader_says_moves_others_and_what_relays_would_say_does_not(leader):
     found = analysis.influence(*leader, [40, 45], trials=4)
     assert found.said.any() and not found.said.all()
@@ -25,15 +56,31 @@ def test_what_a_leader_says_moves_others_and_what_relays_would_say_does_not(lead
     assert found.reached.max() <= 9
 
 
-def test_a_message_that_nobody_senses_has_no_influence_at_all(leader):
+@pytest.mark.parametrize("sensor", ["wireless_receiver:msg", "wireless_receiver"])
+def test_a_message_that_nobody_senses_has_no_influence_at_all(leader, sensor):
     experiment, genotype = leader
-    config = experiment.to_dict()
-    config["world"]["objects"]["robotA"]["perturbations"] = {
-        "stimuli_inhibition": {"stimuli": "wireless_receiver:msg", "affected_robots": "all"}
-    }
-    found = analysis.influence(swarmevo.Experiment.from_dict(config), genotype, [5, 40], trials=4)
+    found = analysis.influence(inhibited(experiment, sensor), genotype, [5, 40], trials=4)
     assert found.said.any()
     assert not found.reached.any() and not found.leds.any() and not found.fitness.any()
+
+
+@pytest.mark.parametrize("reading", ["msg", "receiving_direction", "state"])
+def test_what_is_inhibited_stays_so_whatever_a_robot_is_told_to_sense(leader, reading):
+    experiment, genotype = leader
+    sensor = f"wireless_receiver:{reading}"
+    there, away = (
+        analysis.attention(it, genotype, [30, 40], sensor=sensor, replace=0.7, lasting=5, trials=3)
+        for it in (experiment, inhibited(experiment, sensor))
+    )
+    assert there.sensed.all() and there.heeded.any()
+    assert not any(it.any() for it in (away.sensed, away.heeded, away.reached, away.leds, away.fitness))
+
+
+def test_light_that_a_robot_cannot_see_does_nothing_to_it_and_to_the_others_it_does(follower):
+    found = analysis.attention(*follower, [20, 60], sensor="light_sensor", replace=0.7, trials=3)
+    assert (found.sensed.sum(axis=-1) == 2).all(), "eight of ten are blind"
+    assert found.heeded[found.sensed].any()
+    assert not any(it[~found.sensed].any() for it in (found.heeded, found.reached, found.leds, found.fitness))
 
 
 def test_a_message_replaced_by_itself_changes_nothing_and_a_wrong_step_is_refused(leader):
@@ -100,3 +147,63 @@ def test_stimuli_that_do_not_fit_are_refused_and_those_that_are_set_are_sensed(q
     assert np.array_equal(episodes.stimuli, before)
     episodes.stimuli = np.full_like(before, 0.25)
     assert (episodes.stimuli == 0.25).all()
+
+
+def test_frozen_is_what_it_was_in_the_step_before_and_permuted_is_what_the_next_robot_has(leader):
+    actions, stimuli = course(leader)
+    episode = {"agents": [3], "trials": 1, "lasting": 1}
+    # A step in which robot 3 sends, and neither it nor robot 4 says or senses what it did or does.
+    step = next(
+        k for k in range(1, 290)
+        if actions[k].sends[0, 3]
+        and all((actions[k].messages[0, 3] != it).any() for it in (actions[k - 1].messages[0, 3], actions[k].messages[0, 4]))
+        and all((stimuli[k][3] != it).any() for it in (stimuli[k - 1][3], stimuli[k][4]))
+    )
+    of = {"freeze": (actions[step - 1].messages[0, 3], stimuli[step - 1][3]), "permute": (actions[step].messages[0, 4], stimuli[step][4])}
+    for mode, (message, sensed) in of.items():
+        said = [analysis.influence(*leader, [step], replace=it, **episode) for it in (mode, message)]
+        assert said[0].said.all() and same(*said), mode
+        heard = [analysis.attention(*leader, [step], replace=it, sensor="all", **episode) for it in (mode, sensed)]
+        assert heard[0].sensed.all() and same(*heard), mode
+
+
+def test_the_longer_a_robot_says_something_else_the_more_others_do_otherwise(leader):
+    once, always = (analysis.influence(*leader, [5], replace=0.0, lasting=lasting, trials=5) for lasting in (1, 11))
+    assert (once.said <= always.said).all() and once.said.any()
+    assert not once.reached[~once.said].any() and not always.reached[~always.said].any()
+    assert always.reached.sum() > once.reached.sum() and always.leds.sum() > once.leds.sum()
+
+
+def test_a_silent_swarm_does_what_robots_out_of_reach_do(leader):
+    experiment, genotype = leader
+    config = experiment.to_dict()
+    config["world"]["objects"]["robotA"]["initializers"]["positions"] = {
+        "name": "fixed", "params": {"values": [[200 * (i % 5), 500 * (i // 5)] for i in range(10)]}
+    }
+    apart, together = course((swarmevo.Experiment.from_dict(config), genotype))[0], course(leader)[0]
+    silent = course(leader, silent=True)[0]
+    assert [it.leds.tolist() for it in silent] == [it.leds.tolist() for it in apart] != [it.leds.tolist() for it in together]
+    assert all(np.array_equal(mine.messages, its.messages) for mine, its in zip(silent, apart))
+
+
+def test_silence_is_something_else_than_a_message_of_zeros(leader):
+    zeros, silence = (analysis.influence(*leader, [40, 45], replace=it, trials=4) for it in (0.0, "silence"))
+    assert silence.said.all(), "also a frame that is relayed is missing"
+    assert silence.reached[~zeros.said].any()
+    assert (silence.reached != zeros.reached)[zeros.said].any()
+
+
+def test_a_whole_robot_is_silenced_in_one_call(leader):
+    experiment, genotype = leader
+    found = analysis.influence(experiment, genotype, [0], replace="silence", lasting=300, window=299, trials=2)
+    once = analysis.influence(experiment, genotype, [0], replace="silence", window=299, trials=2)
+    assert (found.reached > 0).all() and found.leds.sum() > once.leds.sum()
+
+
+def test_silence_is_nothing_to_sense_and_has_to_fit(leader, quickstart):
+    with pytest.raises(ValueError, match='"permute" or, of messages, "silence", not \'silence\''):
+        analysis.attention(*leader, [40], replace="silence", trials=1)
+    with pytest.raises(ValueError, match="lasting from 1 to 11"):
+        analysis.influence(*leader, [40], lasting=0)
+    with pytest.raises(ValueError, match="who is silent is an array"):
+        quickstart.episodes().silence([True])

@@ -68,10 +68,36 @@ def test_the_networks_of_figure_2_2_have_the_attractors_that_the_thesis_states()
     start = [0.1, 0.0]
     for pattern in PATTERNS:
         assert isinstance(NETWORKS["a"].attractor(pattern, start=start), Equilibrium)
-        # A limit cycle or, with (1, 0), a state that takes very long: no equilibrium attracts.
+        # No equilibrium attracts.
         assert not any(it.is_stable for it in NETWORKS["b"].equilibria(pattern))
         kind = LimitCycle if pattern == (0, 0) else Equilibrium
         assert isinstance(NETWORKS["c"].attractor(pattern, start=start), kind)
+
+
+def test_the_cycles_of_figure_2_2_have_the_periods_that_are_documented():
+    found = {pattern: NETWORKS["b"].attractor(pattern, start=[0.1, 0.0]) for pattern in PATTERNS}
+    # With (1, 0) the state spirals for thousands of time constants, next to a Hopf point.
+    assert found.pop((1, 0)) is None
+    (beside,) = NETWORKS["b"].equilibria((1, 0))
+    assert beside.eigenvalues[0].real == pytest.approx(7e-5, abs=5e-6)
+    assert all(isinstance(it, LimitCycle) for it in found.values())
+    assert [round(it.period, 1) for it in found.values()] == [29.0, 30.1, 34.5]
+    assert NETWORKS["c"].attractor((0, 0), start=[0.1, 0.0]).period == pytest.approx(29.0, abs=0.05)
+    for it in found.values():
+        # One round: rates that go up and down once, and end where they began.
+        rates = it.rates[:, 0]
+        assert np.ptp(rates) > 0.1 and np.abs(it.rates[0] - it.rates[-1]).max() < 0.1
+        assert np.count_nonzero(np.diff(np.sign(rates - rates.mean()))) in (1, 2)
+
+
+def test_inputs_of_figure_2_2_pass_the_bifurcations_that_are_documented():
+    def on_the_way(name, last):
+        (branch,) = analysis.continuation(NETWORKS[name], (0, 0), last)
+        return [(it.kind, round(it.share, 2)) for it in branch.bifurcations]
+
+    assert sorted(on_the_way("a", (0, 1))) == [("fold", 0.03), ("fold", 0.11)]
+    for last, share in (((1, 0), 0.16), ((0, 1), 0.11), ((1, 1), 0.25)):
+        assert [at for kind, at in on_the_way("c", last) if kind == "hopf"] == [share]
 
 
 def test_the_ways_of_figure_2_3_move_a_point_and_turn_one_into_a_cycle():
@@ -80,7 +106,7 @@ def test_the_ways_of_figure_2_3_move_a_point_and_turn_one_into_a_cycle():
     first, last, which = WAYS["b"]
     (branch,) = analysis.continuation(NETWORKS[which], first, last)
     (hopf,) = branch.bifurcations
-    assert hopf.kind == "hopf"
+    assert hopf.kind == "hopf" and hopf.share == pytest.approx(0.748, abs=5e-4)
     assert branch.stable[branch.shares < hopf.share - 1e-6].all()
     assert not branch.stable[branch.shares > hopf.share + 1e-6].any()
 

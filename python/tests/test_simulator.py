@@ -44,6 +44,15 @@ def test_measures_have_a_value_per_step_and_change_no_fitness(quickstart, genoty
     assert np.array_equal(trace.measures["leaders"], measured.measures["leaders"][5])
 
 
+def test_a_file_is_read_with_the_script_that_it_refers_to(tmp_path):
+    experiment = Experiment.from_file(CONFIGS / "tasks" / "foraging.json")
+    script = (CONFIGS / "tasks" / "foraging.star").read_text(encoding="utf-8")
+    assert experiment.to_dict()["task"]["script"] == {"name": "foraging.star", "text": script}
+    (tmp_path / "alone.json").write_text((CONFIGS / "tasks" / "foraging.json").read_text())
+    with pytest.raises(OSError, match="foraging.star"):
+        Experiment.from_file(tmp_path / "alone.json")
+
+
 def test_a_file_with_mistakes_is_refused_with_all_of_them():
     config = Experiment.quickstart().to_dict()
     config["algorithm"]["population_sise"] = 3

@@ -28,6 +28,7 @@ def test_stepping_with_the_network_gives_the_bits_of_the_simulation(name):
         assert np.array_equal(actions.wheels, trace.wheels[:, step][:, episodes.agents])
         fitness = episodes.step(actions)
         assert np.array_equal(fitness, trace.step_fitness[:, step], equal_nan=True)
+        assert np.array_equal(episodes.sent, trace.sends[:, step][:, episodes.agents])
     assert episodes.is_over and np.array_equal(episodes.fitness, trace.fitness)
     with pytest.raises(ValueError, match="the episode has ended"):
         episodes.step(episodes.idle())

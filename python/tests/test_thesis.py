@@ -1,5 +1,6 @@
 """The figures of the thesis, from the champions of this project."""
 
+import re
 import subprocess
 import sys
 
@@ -29,6 +30,17 @@ def test_every_figure_is_drawn(name, number):
         figure = ALL[name][number](champion(name))
         axes = [axis for axis in figure.get_axes() if axis.axison]
         assert axes and all(axis.has_data() for axis in axes), "no panel is empty"
+
+
+def test_every_figure_of_the_registry_is_in_the_documents_with_its_number():
+    text = (PROJECT / "docs/reproduction.md").read_text(encoding="utf-8")
+    embedded = dict(re.findall(r"!\[Fig\. ([\d.]+): [^\]]+\]\(figures/(thesis-[^)]+)\)", text))
+    numbers = [number for figures in ALL.values() for number in figures]
+    assert embedded == {number: file_name(number) for number in numbers}
+    for name in embedded.values():
+        png = (PROJECT / "docs/figures" / name).read_bytes()
+        assert png.startswith(b"\x89PNG") and len(png) > 1_000, name
+    assert {it.name for it in (PROJECT / "docs/figures").glob("thesis-*")} == set(embedded.values())
 
 
 def test_one_command_writes_the_figures_that_are_asked_for_and_the_same_ones_twice(tmp_path):

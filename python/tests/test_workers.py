@@ -1,6 +1,7 @@
 """Workers inside executors, Dask and Ray, for a real coordinator."""
 
 import concurrent.futures
+import multiprocessing
 import os
 import signal
 import time
@@ -63,9 +64,17 @@ def test_a_worker_that_is_refused_says_why(programs, tmp_path, quickstart, genot
 
 
 def test_processes_are_workers(started, quickstart, genotypes):
-    with concurrent.futures.ProcessPoolExecutor(1) as executor:
+    spawning = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawning) as executor:
         with swarmevo.workers(executor, 1, started.url, turn=2):
             assert_evaluates(started, quickstart, genotypes)
+
+
+def test_processes_that_would_share_this_one_s_connections_are_refused():
+    forking = multiprocessing.get_context("fork")
+    with concurrent.futures.ProcessPoolExecutor(1, mp_context=forking) as executor:
+        with pytest.raises(ValueError, match="get_context..spawn"):
+            swarmevo.workers(executor, 1, "http://127.0.0.1:1", turn=0.1).stop(wait=False)
 
 
 def test_a_dask_cluster_is_a_fleet_and_a_lost_node_is_replaced(started, quickstart, genotypes):

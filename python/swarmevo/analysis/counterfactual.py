@@ -19,7 +19,7 @@ from ..episodes import Actions, Episodes
 from ..experiment import Experiment
 from ..trials import AnyTrialSet, TrialSet
 
-Replacement = Union[Literal["freeze", "permute"], ArrayLike]
+Replacement = Union[Literal["freeze", "permute", "silence"], ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Influence:
     """``[A]``: the robots that said them, by their numbers among all robots."""
     said: NDArray[np.bool_]
     """``[T, K, A]``: whether there was a message to replace: the robot sent its own, and the
-    replacement is another one (before both are quantised to symbols)."""
+    replacement is another one (before both are quantised to symbols). With ``"silence"``, everywhere."""
     reached: NDArray[np.int64]
     """``[T, K, A]``: how many other agents did anything otherwise, by a bit, within the window."""
     leds: NDArray[np.int64]
@@ -47,6 +47,7 @@ def influence(
     steps: Iterable[int],
     *,
     replace: Replacement = 0.0,
+    lasting: int = 1,
     agents: Iterable[int] | None = None,
     trials: int = 20,
     trial_set: AnyTrialSet | None = None,
@@ -56,15 +57,17 @@ def influence(
     among the agents; all if absent), and looks at the ``window`` steps after it.
 
     ``replace``: the message instead, ``[M]`` or one number for all its values; ``"freeze"``, what the
-    agent would have said in the step before; ``"permute"``, what the next agent says.
+    agent would have said in the step before; ``"permute"``, what the next agent says; ``"silence"``, nothing: the
+    agent emits no frame, not even one that it relays, so that others are heard where it was the loudest.
+    ``lasting``: for how many steps, within the window.
     """
-    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window)
+    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     if case.message_len == 0:
         raise ValueError("agents without radio have no messages")
     said, reached, leds = (np.zeros(case.shape, kind) for kind in (bool, int, int))
     fitness = np.zeros(case.shape)
     for place, step, agent in case.places():
-        course = case.run(_Said(step, agent, replace))
+        course = case.run(_Said(step, agent, replace, lasting))
         said[place] = course.changed
         after = slice(step + 1, course.end)
         others = case.others(agent)
@@ -109,17 +112,15 @@ def attention(
 ) -> Attention:
     """Replaces what one agent senses, once for each of ``steps`` and of ``agents`` (indices among the
     agents; all if absent), and looks at that step and the ``window`` after it: the hearer's side of
-    :func:`influence`. Its radio still relays what it heard.
+    :func:`influence`. Its radio still relays what it heard; what is inhibited stays so.
 
     ``sensor``: ``wireless_receiver`` for all inputs from the radio, ``wireless_receiver:msg`` for one of them,
-    or another sensor of the network. ``replace``: a number, or the values ``[C]`` of these C inputs;
+    another sensor of the network, or ``all``. ``replace``: a number, or the values ``[C]`` of these C inputs;
     ``"freeze"``, what they were in the step before; ``"permute"``, what the next agent senses.
     ``lasting``: for how many steps, within the window.
     """
-    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window)
+    case = _Case(experiment, genotype, steps, agents, trials, trial_set, window, lasting)
     columns = input_columns(experiment, sensor)
-    if not 1 <= lasting <= window + 1:
-        raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
     sensed, heeded = np.zeros(case.shape, bool), np.zeros(case.shape, bool)
     leds, reached = np.zeros(case.shape, int), np.zeros(case.shape, int)
     fitness = np.zeros(case.shape)
@@ -136,10 +137,10 @@ def attention(
 
 
 def input_columns(experiment: Experiment, sensor: str) -> list[int]:
-    """The inputs of a network that a sensor, or one of its readings, feeds."""
+    """The inputs of a network that a sensor, or one of its readings, feeds; those of ``all``."""
     stimuli = [it for it in experiment.to_dict()["topology"]["stimuli"].values() for _ in range(it["n"])]
     names = [it["sensor"] for it in stimuli]
-    found = [i for i, name in enumerate(names) if name == sensor or name.startswith(f"{sensor}:")]
+    found = [i for i, name in enumerate(names) if sensor in ("all", name) or name.startswith(f"{sensor}:")]
     if not found:
         raise ValueError(f"no input comes from {sensor!r}; there are {', '.join(dict.fromkeys(names))}")
     return found
@@ -150,8 +151,10 @@ class _Case:
 
     def __init__(
         self, experiment: Experiment, genotype: ArrayLike, steps: Iterable[int], agents: Iterable[int] | None,
-        trials: int, trial_set: AnyTrialSet | None, window: int,
+        trials: int, trial_set: AnyTrialSet | None, window: int, lasting: int,
     ) -> None:
+        if not 1 <= lasting <= window + 1:
+            raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
         self._experiment, self._genotype = experiment, genotype
         self._trials, self._window = trials, window
         self._where = TrialSet.evaluation() if trial_set is None else trial_set
@@ -205,9 +208,12 @@ class _Course:
                 self.changed |= change.stimulate(episodes, step)
             actions = episodes.decide()
             self._actions.append(actions)
-            if isinstance(change, _Said) and change.step == step:
-                actions, self.changed = change.instead(self._actions)
-            self._fitness.append(episodes.step(actions))
+            if isinstance(change, _Said):
+                fitness, changed = change.step_with(episodes, step, actions)
+                self.changed |= changed
+            else:
+                fitness = episodes.step(actions)
+            self._fitness.append(fitness)
         self.leds = np.stack([it.leds for it in self._actions])
 
     def differs(self, other: _Course, steps: slice) -> NDArray[np.bool_]:
@@ -231,21 +237,31 @@ class _Course:
         return np.asarray(np.where(counts, values, 0).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
 
 
-@dataclass(frozen=True)
 class _Said:
-    """Another message of one agent in one step."""
+    """Another message of one agent, or none, from one step on."""
 
-    step: int
-    agent: int
-    replacement: Replacement
+    def __init__(self, step: int, agent: int, replacement: Replacement, lasting: int) -> None:
+        self.step = step
+        self._agent, self._replacement, self._lasting = agent, replacement, lasting
+        self._is_silence = isinstance(replacement, str) and replacement == "silence"
+        self._before: NDArray[np.float64] | None = None
 
-    def instead(self, course: list[Actions]) -> tuple[Actions, NDArray[np.bool_]]:
-        """The last step's actions with it, and in which trials it is another one."""
-        actions, before = course[-1], course[max(0, len(course) - 2)]
-        messages = actions.messages.copy()
-        messages[:, self.agent] = _instead(self.replacement, self.agent, actions.messages, before.messages)
-        differs = (messages[:, self.agent] != actions.messages[:, self.agent]).any(axis=-1)
-        return Actions(actions.wheels, actions.leds, actions.sends, messages), actions.sends[:, self.agent] & differs
+    def step_with(self, episodes: Episodes, step: int, actions: Actions) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """A step with it, if it is time. Its fitness, and in which trials something else was on the air."""
+        said = actions.messages
+        if self._before is None and step >= self.step - 1:
+            self._before = said
+        if self._before is None or not self.step <= step < self.step + self._lasting:
+            return episodes.step(actions), np.zeros(episodes.n_trials, bool)
+        if self._is_silence:
+            silent = np.zeros_like(actions.sends)
+            silent[:, self._agent] = True
+            episodes.silence(silent)
+            return episodes.step(actions), np.ones(episodes.n_trials, bool)
+        messages = said.copy()
+        messages[:, self._agent] = _instead(self._replacement, self._agent, said, self._before)
+        fitness = episodes.step(Actions(actions.wheels, actions.leds, actions.sends, messages))
+        return fitness, episodes.sent[:, self._agent] & (messages != said).any(axis=(1, 2))
 
 
 class _Sensed:
@@ -269,7 +285,8 @@ class _Sensed:
         changed = stimuli.copy()
         changed[:, self._agent, self._columns] = _instead(self._replacement, self._agent, values, self._before)
         episodes.stimuli = changed
-        return np.asarray((changed != stimuli)[:, self._agent, self._columns].any(axis=-1))
+        # Read again: what is inhibited is as it was.
+        return np.asarray((episodes.stimuli != stimuli)[:, self._agent, self._columns].any(axis=-1))
 
 
 def _instead(
@@ -281,5 +298,5 @@ def _instead(
             return before[:, agent]
         if replacement == "permute":
             return values[:, (agent + 1) % values.shape[1]]
-        raise ValueError(f'replace is a number, values, "freeze" or "permute", not {replacement!r}')
+        raise ValueError(f'replace is a number, values, "freeze", "permute" or, of messages, "silence", not {replacement!r}')
     return np.broadcast_to(np.asarray(replacement, dtype=np.float64), values[:, agent].shape)

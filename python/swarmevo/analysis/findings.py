@@ -70,7 +70,7 @@ class Findings:
 
 
 def findings(experiment: Experiment, genotype: Floats, *, trials: int, client: Client | None = None) -> Findings:
-    """Measures all of it; some 40 s of processor time for 10 robots and 300 steps, 50 trials."""
+    """Measures all of it; some 30 s of processor time for 10 robots and 300 steps, 50 trials."""
     trace = experiment.simulate(genotype, TrialSet.evaluation(), trials=trials)
     sensors = _sensors(experiment)
     inputs = sorted((_input(experiment, genotype, trace, it) for it in sensors), key=lambda it: float(it.change.mean()))

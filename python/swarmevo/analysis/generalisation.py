@@ -1,4 +1,4 @@
-"""Under other conditions than those of evolution: sizes, ranges, noise, time steps."""
+"""Under other conditions than those of evolution: trials, sizes, densities, ranges, noise, time steps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import ExperimentError
 from ..experiment import Experiment
 from ..fleet import Client
 from ..trials import TrialSet
-from .variants import Config, evolved_robots, resize
+from .variants import Config, evolved_robots, resize, spread_out
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
 """Trials that no run gets to, and that a fleet computes, too: the same bits there and here."""
@@ -39,18 +39,22 @@ class Condition:
 def generalisation(
     experiment: Experiment, genotype: ArrayLike, *, trials: int = 50, client: Client | None = None
 ) -> list[Condition]:
-    """Fitness under every condition that the experiment has: as it is, with half to five times as many
-    robots, with other reaches of the radio, other noise of its sensors, and other steps of its wheels.
+    """Fitness under every condition that the experiment has: as it is; in other sets of as many trials; with
+    half to five times as many robots, in the same world and in one that grows with them; as many robots
+    closer together or farther apart; with other reaches of its sensors and its radio, other noise of its light
+    and distance sensors (where they have any), and other steps of its wheels.
 
-    All in trials with the same numbers, which had no part in evolution. ``client``: evaluate on its fleet.
+    But for the other sets, all in trials with the same numbers, which had no part in evolution. ``client``:
+    evaluate on its fleet.
     """
     genes = np.asarray(genotype, dtype=np.float64)[np.newaxis]
     found = []
     for what, value, config in _conditions(experiment.to_dict()):
+        trial_set = TrialSet.generation_of(TRIALS_OF.generation + int(value) - 1) if what == SETS else TRIALS_OF
         try:
             changed = Experiment.from_dict(config)
             run = changed.evaluate if client is None else lambda *it, **of: client.evaluate(changed, *it, **of)
-            fitness = run(genes, TRIALS_OF, trials=trials)[0]
+            fitness = run(genes, trial_set, trials=trials)[0]
         except ExperimentError as error:
             found.append(Condition(what, value, np.nan, (np.nan, np.nan), error.problems[0].message))
             continue
@@ -59,14 +63,30 @@ def generalisation(
     return found
 
 
+SETS = "set of trials"
+"""The set of the experiment as it is has number 1."""
+
+
 def _conditions(config: Config) -> Iterator[tuple[str, float, Config]]:
     yield "", np.nan, config
+    for number in range(2, 6):
+        yield SETS, number, config
     robots = evolved_robots(config)
-    for factor in (0.5, 1.5, 2, 3, 5):
-        n = round(robots["num_instances"] * factor)
-        changed = deepcopy(config)
-        resize(evolved_robots(changed), n)
-        yield "robots", n, changed
+    was = robots["num_instances"]
+    for what, grows in (("robots", False), ("robots, as dense as before", True)):
+        for factor in (0.5, 1.5, 2, 3, 5):
+            n = round(was * factor)
+            changed = deepcopy(config)
+            resize(evolved_robots(changed), n)
+            if grows:
+                spread_out(changed, (n / was) ** 0.5)
+            yield what, n, changed
+    # A random graph has distances of its own: the reach of the radio, below, is its density.
+    if robots["initializers"]["positions"]["name"] != "random_graph":
+        for density in (0.25, 0.5, 2, 4):
+            changed = deepcopy(config)
+            spread_out(changed, density**-0.5)
+            yield "density of as many robots, times", density, changed
     for what, keys in _SCALED.items():
         there = [(key, value) for key in keys if (value := _find(robots, key))]
         for factor in (0.5, 0.75, 1.5, 2) if there else ():

@@ -36,7 +36,10 @@ def report(
     ``trials`` episodes of the set of evaluations are simulated, which had no part in evolution, and
     as many for every input and every part of the network that is taken away. Other conditions and lesions are
     evaluated on the fleet of ``client``, if there is one. Needs SciPy and Matplotlib (``analysis``, ``plot``).
+    Raises ``ValueError`` for one trial, which has no intervals.
     """
+    if trials < 2:
+        raise ValueError(f"a report takes 2 or more trials, for intervals, not {trials}")
     found = findings(experiment, np.asarray(genotype, dtype=np.float64), trials=trials, client=client)
     trace = found.trace
     page = Page(title or experiment.name, Path(directory))
@@ -78,7 +81,7 @@ def _conditions(page: Page, conditions: list[Condition]) -> None:
         for it in conditions
     ]
     page.table("conditions", ["changed", "to", "fitness", "from", "to (95 %)"], rows)
-    page.note("Mean over trials that have the same numbers in all rows, and its 95 % interval.")
+    page.note("Mean over trials that have the same numbers in all rows but those of other sets, and its 95 % interval.")
 
 
 def _ends(condition: Condition) -> list[object]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ..experiment import Experiment
 
 Config = dict[str, Any]
@@ -50,6 +52,17 @@ def resize(robots: Config, n: int) -> None:
         for it in perturbation if isinstance(perturbation, list) else [perturbation]:
             if isinstance(it.get("affected_robots"), int):
                 it["affected_robots"] = (2 * it["affected_robots"] * n + was) // (2 * was)
+
+
+def spread_out(config: Config, factor: float) -> None:
+    """Makes the world, and the places where everything starts, ``factor`` times as long and as wide. Reaches,
+    speeds and the ways of lights stay as they were, and so do the distances within a random graph."""
+    world = config["world"]
+    world["width"], world["height"] = factor * world["width"], factor * world["height"]
+    for it in world["objects"].values():
+        params = it["initializers"]["positions"]["params"]
+        for key in params.keys() - {"size"}:
+            params[key] = (factor * np.array(params[key])).tolist()
 
 
 def inhibit(robots: Config, sensor: str) -> None:

@@ -28,8 +28,11 @@ def message(values: Sequence[float]) -> str:
 
 
 def percent(it: Proportion | None) -> str:
-    """A share with its standard error; empty without rows."""
-    return "" if it is None or it.rows == 0 else f"{100 * it.share:.1f} ± {100 * it.error:.1f} %"
+    """A share with its standard error, if more than one trial has rows; empty without rows."""
+    if it is None or it.rows == 0:
+        return ""
+    error = "" if np.isnan(it.error) else f" ± {100 * it.error:.1f}"
+    return f"{100 * it.share:.1f}{error} %"
 
 
 def share(value: float) -> str:

@@ -30,7 +30,7 @@ def fig_29(champion: Champion) -> Figure:
     """Fitness by generation."""
     figure, axis = canvas(6, 2.8)
     runs = {"SNES": champion.history("snes"), "SNES (format 2)": champion.history("snes", "format-2")}
-    histories(axis, {**runs, "GA (format 2)": champion.history("ga", "format-2")})
+    histories(axis, {**runs, "GA": champion.history("ga")})
     return figure
 
 
