@@ -136,7 +136,7 @@ def errors(folder, trials):
     """Wrong LEDs per step. A trial has one border, so that its size follows from the rates:
     accuracy * n = TPR * border + TNR * (n - border)."""
     name = json.loads((folder / "summary.json").read_text())["name"]
-    config = json.loads((RESULTS.parent / "configs" / f"{name}.json").read_text())
+    config = json.loads(next((RESULTS.parent / "configs").rglob(f"{name}.json")).read_text())
     evolved = config["algorithm"]["evolvable_object"]
     rows = []
     for condition, of in trials.items():
@@ -150,10 +150,17 @@ def errors(folder, trials):
             continue
         border = lambda accuracy, tpr, tnr: n * (accuracy - tnr) / (tpr - tnr)
         rates = list(rates)
-        misses = statistics.fmean(border(*rate) * (1 - rate[1]) for rate in rates)
-        alarms = statistics.fmean((n - border(*rate)) * (1 - rate[2]) for rate in rates)
-        rows.append([condition, number(misses, 2), number(alarms, 2)])
-    table(["condition", "false negatives per step", "false positives per step"], rows)
+        misses = [border(*rate) * (1 - rate[1]) for rate in rates]
+        alarms = [(n - border(*rate)) * (1 - rate[2]) for rate in rates]
+        rows.append([condition, *(number(statistics.fmean(values), 2) for values in (misses, alarms)),
+                     estimate([a - b for a, b in zip(misses, alarms)], 2), estimate([rate[1] - rate[2] for rate in rates])])
+    table(["condition", "false negatives per step", "false positives per step", "their difference", "TPR - TNR"], rows)
+
+
+def estimate(values, digits=3):
+    """Their mean with its 95 % interval, of the normal distribution."""
+    mean, error = statistics.fmean(values), 1.96 * statistics.stdev(values) / len(values) ** 0.5
+    return f"{mean:.{digits}f} ({mean - error:.{digits}f} to {mean + error:.{digits}f})"
 
 
 def lost_lights(folder):
