@@ -118,8 +118,8 @@ make_rust() {
 fleet() { "${compose[@]}" -p "$project" -f docker/compose.yaml "${overlays[@]}" "$@"; }
 # swarmctl in its container.
 swarmctl() { fleet run --rm -T swarmctl "$@" </dev/null; }
-# The first container of a service.
-container() { fleet ps -q "$1" | head -n 1; }
+# The first container of a service. `head` would not read the others, which breaks the pipe.
+container() { fleet ps -q "$1" | sed -n 1p; }
 is_healthy() { [[ $(docker inspect -f '{{.State.Health.Status}}' "$1") == healthy ]]; }
 n_workers() { swarmctl workers --output csv 2>/dev/null | tail -n +2 | wc -l; }
 has_workers() { [[ $(n_workers) == "$1" ]]; }

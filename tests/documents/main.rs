@@ -4,6 +4,7 @@
 mod logs;
 mod reliability;
 mod targets;
+mod tasks;
 mod versions;
 
 use std::{

@@ -261,7 +261,7 @@ async fn answers_of_the_wrong_size_are_refused_and_others_compute() {
     let coordinator = CoordinatorProcess::start();
     let subject = Subject::new();
     let request = subject.request();
-    let n_values = 1 + 500 * 2;
+    let n_values = 1 + 250 * 2;
     let url = coordinator.url();
     let asking = {
         let request = request.clone();

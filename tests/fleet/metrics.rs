@@ -63,8 +63,8 @@ fn figures_agree_with_what_a_run_did() {
         coordinator.database().query_row(sum, [id], |row| row.get(0)).unwrap();
     assert!(episodes > in_generations, "{episodes}: held-out trials come on top");
     assert_eq!(in_generations, 3.0 * 12.0 * 3.0);
-    // Ten robots, 600 steps.
-    assert_eq!(ours.value("swarm_worker_robot_steps_total", &[]), episodes * 6_000.0);
+    // Ten robots, 300 steps.
+    assert_eq!(ours.value("swarm_worker_robot_steps_total", &[]), episodes * 3_000.0);
     let computed = samples.value("swarm_items_computed_total", &[]);
     assert_eq!(samples.value("swarm_items_assigned_total", &[]), computed);
     assert_eq!(ours.value("swarm_worker_items_total", &[("outcome", "computed")]), computed);

@@ -2,7 +2,7 @@
 //! its bits. The whole of it takes hours; its beginning and its champion do not.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     env, fs,
     path::{Path, PathBuf},
     process::Command,
@@ -12,12 +12,14 @@ use evolution::Digest;
 use experiment_file::{ExperimentConfig, ScriptConfig, inline_script, script_path};
 use harness::{Outcome, binary, skipped_for_want_of, swarmctl, workspace_file};
 use serde_json::Value;
+use tempfile::TempDir;
 
-/// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, 1 without
-/// it. `.ci/run` takes 3, which is a minute of CPU.
-fn n_generations() -> usize {
-    let text = env::var("SWARM_TEST_GENERATIONS").unwrap_or_else(|_| "1".to_owned());
-    text.parse().unwrap_or_else(|_| panic!("SWARM_TEST_GENERATIONS is {text}, not a number"))
+/// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, of which `.ci/run`
+/// takes 3. Without it, one, and only of the first run of each task with each kind of neurons.
+fn n_generations() -> Option<usize> {
+    let text = env::var("SWARM_TEST_GENERATIONS").ok()?;
+    let n = text.parse();
+    Some(n.unwrap_or_else(|_| panic!("SWARM_TEST_GENERATIONS is {text}, not a number")))
 }
 
 /// A run in `results/`.
@@ -48,6 +50,12 @@ impl Run {
 
     fn seed(&self) -> String {
         self.champion["seed"].to_string()
+    }
+
+    /// Its experiment's name, without the algorithm.
+    fn task_and_neurons(&self) -> String {
+        let name = self.champion["name"].as_str().unwrap();
+        name.trim_end_matches("_ga").trim_end_matches("_snes").to_owned()
     }
 
     fn config_path(&self) -> String {
@@ -98,8 +106,13 @@ fn runs_are_complete_and_of_the_shipped_experiments_and_this_simulation() {
 
 #[test]
 fn runs_begin_again_with_the_same_bits() {
-    let n_generations = n_generations();
-    for run in Run::all() {
+    let mut runs = Run::all();
+    if n_generations().is_none() {
+        let mut known = BTreeSet::new();
+        runs.retain(|run| known.insert(run.task_and_neurons()));
+    }
+    let n_generations = n_generations().unwrap_or(1);
+    for run in runs {
         let data_dir = tempfile::tempdir().unwrap();
         let generations = n_generations.to_string();
         let lines = swarmctl([
@@ -219,21 +232,71 @@ fn the_script_of_the_report_prints_its_numbers() {
     Outcome::of(&mut Command::new(results("report.py"))).expect_success();
 }
 
-#[test]
-fn a_run_that_is_added_twice_is_computed_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = |path: &str| dir.path().join(path);
-    fs::create_dir(path("results")).unwrap();
-    fs::create_dir(path("configs")).unwrap();
-    fs::copy(results("add-run"), path("results/add-run")).unwrap();
-    fs::copy(workspace_file("configs/quickstart.json"), path("configs/quickstart.json")).unwrap();
+/// A script with the programs in its path.
+fn script(path: PathBuf) -> Command {
     let binaries = binary("swarmctl").parent().unwrap().to_str().unwrap().to_owned();
     binary("coordinator");
+    let mut command = Command::new(path);
+    command.env("PATH", format!("{binaries}:{}", env::var("PATH").unwrap()));
+    command
+}
+
+/// A script in Python; none without it.
+fn python_script(path: PathBuf) -> Option<Command> {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped_for_want_of("python3", "apt-get install python3");
+        return None;
+    }
+    Some(script(path))
+}
+
+/// A project that has a script of `results/` and the quickstart.
+fn project_with(script: &str) -> TempDir {
+    let project = tempfile::tempdir().unwrap();
+    for folder in ["results", "configs"] {
+        fs::create_dir(project.path().join(folder)).unwrap();
+    }
+    fs::copy(results(script), project.path().join("results").join(script)).unwrap();
+    let quickstart = "configs/quickstart.json";
+    fs::copy(workspace_file(quickstart), project.path().join(quickstart)).unwrap();
+    project
+}
+
+#[test]
+fn champions_are_compared_with_controllers_written_by_hand() {
+    let Some(mut command) = python_script(results("by-hand.py")) else { return };
+    command.args(["--trials", "3", "synchronisation"]);
+    let table = Outcome::of(&mut command).expect_success().stdout;
+    let row = table.lines().find(|line| line.starts_with("| synchronisation | ")).unwrap();
+    assert_eq!(row.matches(" to ").count(), 2, "two means with intervals: {row}");
+}
+
+#[test]
+fn algorithms_are_compared_on_the_same_budget() {
+    let project = project_with("algorithms.py");
+    let path = |path: &str| project.path().join(path);
+    let Some(mut command) = python_script(path("results/algorithms.py")) else { return };
+    command.args(["quickstart", "--generations", "2", "--seeds", "0", "1"]);
+    command.args(["--algorithms", "GA", "openaiES"]);
+    Outcome::of(&mut command).expect_success();
+    let runs = path("results/algorithms/quickstart");
+    let mut files: Vec<String> =
+        fs::read_dir(runs).unwrap().map(|it| it.unwrap().path().to_str().unwrap().into()).collect();
+    files.sort();
+    assert_eq!(files.len(), 8, "{files:?}");
+    let args = ["compare".to_owned()].into_iter().chain(files);
+    let compared = swarmctl(args).expect_success().stdout;
+    assert!(compared.contains("GA") && compared.contains("openaiES"), "{compared}");
+}
+
+#[test]
+fn a_run_that_is_added_twice_is_computed_once() {
+    let project = project_with("add-run");
+    let path = |path: &str| project.path().join(path);
     let add = || {
-        let mut command = Command::new(path("results/add-run"));
+        let mut command = script(path("results/add-run"));
         command.args(["quickstart", "7"]).arg(path("data"));
         command.args(["--generations", "2", "--workers", "1"]);
-        command.env("PATH", format!("{binaries}:{}", env::var("PATH").unwrap()));
         Outcome::of(&mut command).expect_success();
         let read = |name| fs::read_to_string(path(name)).unwrap();
         [read("results/histories/quickstart-7.csv"), read("results/champions/quickstart-7.json")]

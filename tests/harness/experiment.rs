@@ -22,7 +22,7 @@ pub struct Experiment {
 
 impl Experiment {
     /// The thesis's leader selection, cut down so that a genotype takes some
-    /// tens of milliseconds and a generation takes some tenths of a second.
+    /// milliseconds and a generation takes about a tenth of a second.
     pub fn small(generations: u64) -> Self {
         let text = fs::read_to_string(workspace_file("configs/leader_selection_snes.json"))
             .expect("shipped with the project");
@@ -31,19 +31,19 @@ impl Experiment {
         let algorithm = &mut value["algorithm"];
         algorithm["generations"] = json!(generations);
         algorithm["population_size"] = json!(12);
-        algorithm["evaluation_steps"] = json!(600);
+        algorithm["evaluation_steps"] = json!(300);
         algorithm["num_evaluations"] = json!(3);
         algorithm["champion_trials"] = json!(8);
         algorithm["judgement_trials"] = json!(8);
         Self::of(value)
     }
 
-    /// A smaller one still: a generation takes less than a tenth of a second.
+    /// A smaller one still: a generation takes some hundredths of a second.
     pub fn tiny(generations: u64) -> Self {
         Self::small(generations).edit(|value| {
             let algorithm = &mut value["algorithm"];
             algorithm["population_size"] = json!(10);
-            algorithm["evaluation_steps"] = json!(500);
+            algorithm["evaluation_steps"] = json!(250);
             algorithm["num_evaluations"] = json!(2);
         })
     }

@@ -158,7 +158,7 @@ async function follow() {
     complain(error);
   }
   clearTimeout(next);
-  if (["running", "paused"].includes(experiment?.state)) next = setTimeout(follow, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
+  if (["running", "unfinished", "paused"].includes(experiment?.state)) next = setTimeout(follow, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
 }
 
 try {

@@ -6,6 +6,7 @@
 mod assignment;
 mod backoff;
 mod convert;
+mod evaluators;
 mod lifetime;
 pub mod metrics;
 mod pool;
@@ -28,6 +29,7 @@ pub use crate::{
     stats::{Stats, StatsSnapshot},
 };
 use crate::{
+    evaluators::Evaluators,
     pool::{Evaluator, Pool},
     session::{Ended, OpenError, Session},
     session_file::SessionFile,
@@ -166,9 +168,8 @@ impl WorkerError {
 /// random delays that grow; only another service, where a coordinator has never been
 /// reached, ends the worker.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
-    let (isa, stats) = (config.isa, Arc::clone(&config.stats));
-    let evaluator = move |config_json| convert::evaluator(config_json, isa, Arc::clone(&stats));
-    run_with(config, shutdown, evaluator).await
+    let evaluators = Evaluators::new(config.isa, Arc::clone(&config.stats));
+    run_with(config, shutdown, |config_json| evaluators.get(&config_json)).await
 }
 
 /// [`run`] with another way to make a specification computable.

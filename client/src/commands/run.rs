@@ -181,7 +181,8 @@ async fn evolve(
 }
 
 /// The experiment that has completed in the data directory with this file, seed and number of
-/// generations, unless it is to begin anew. Runs of a group are found by their requests.
+/// generations, unless it is to begin anew; one of no group, if there is one. Runs of a group are
+/// found by their requests.
 async fn existing(
     connection: &Connection,
     runs: &[SweepRun],
@@ -200,13 +201,18 @@ async fn existing(
             && it.generations == config.algorithm.generations
             && it.forked_from.is_none()
     };
-    Ok(connection.experiments().await?.into_iter().rev().find(is_it))
+    let same = connection.experiments().await?.into_iter().filter(is_it);
+    Ok(same.max_by_key(|it| (it.group.is_empty(), it.id)))
 }
 
 /// Says what exists, and what else can be wanted.
 fn already_completed(existing: &Experiment) -> String {
+    let of_group = match &*existing.group {
+        "" => String::new(),
+        group => format!(" of group {group}"),
+    };
     format!(
-        "{} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> the same once more: --new",
+        "{}{of_group} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> the same once more: --new",
         text::title(existing),
         existing.generations.saturating_mul(2),
         existing.seed.wrapping_add(1)

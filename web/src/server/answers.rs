@@ -39,10 +39,15 @@ pub struct ExperimentAnswer {
     last_sequence: u64,
 }
 
-impl From<Experiment> for ExperimentAnswer {
-    fn from(it: Experiment) -> Self {
+impl ExperimentAnswer {
+    /// `has_coordinator`: whether one is there that could be computing it. Otherwise only the
+    /// files are known, which call running whatever has not ended.
+    pub fn new(it: Experiment, has_coordinator: bool) -> Self {
         Self {
-            state: state(it.state()),
+            state: match it.state() {
+                ExperimentState::Running if !has_coordinator => "unfinished",
+                known => state(known),
+            },
             id: it.id,
             name: it.name,
             reason: it.reason,

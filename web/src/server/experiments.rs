@@ -41,7 +41,7 @@ pub async fn all(State(shared): State<Shared>) -> Result<Json<Value>, Problem> {
         };
         let recent = shared.archive.generations(request).await?.generations;
         let recent: Vec<_> = recent.iter().filter_map(answers::generation_row).collect();
-        let mut answer = json!(ExperimentAnswer::from(experiment));
+        let mut answer = json!(ExperimentAnswer::new(experiment, shared.control.is_some()));
         answer["recent"] = json!(recent);
         list.push(answer);
     }
@@ -65,7 +65,7 @@ pub async fn one(
         })
     });
     Ok(Json(json!({
-        "experiment": found.experiment.map(ExperimentAnswer::from),
+        "experiment": found.experiment.map(|it| ExperimentAnswer::new(it, shared.control.is_some())),
         "config": serde_json::from_str::<Value>(&found.config_json).unwrap_or_default(),
         "champion": champion,
     })))

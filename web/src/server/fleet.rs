@@ -159,7 +159,7 @@ pub async fn steer(
         ("fork", _) => return fork(&shared, control, id, &order).await,
         (action, _) => return Err(Problem::bad(format!("no such action: {action}"))),
     };
-    Ok(Json(control.steer(id, action).await?.into()))
+    Ok(Json(ExperimentAnswer::new(control.steer(id, action).await?, true)))
 }
 
 async fn fork(
@@ -176,5 +176,5 @@ async fn fork(
         fork_of: Some(ForkPoint { experiment_id: id, generation }),
         ..SubmitExperimentRequest::default()
     });
-    Ok(Json(forked.await?.into()))
+    Ok(Json(ExperimentAnswer::new(forked.await?, true)))
 }

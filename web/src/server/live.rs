@@ -66,7 +66,7 @@ impl Latest {
         let found = shared.archive.experiment(id).await.ok()?.experiment?;
         let rows: Vec<_> = page.generations.iter().filter_map(answers::generation_row).collect();
         let news = Arc::new(News {
-            experiment: json!(ExperimentAnswer::from(found)).to_string(),
+            experiment: json!(ExperimentAnswer::new(found, shared.control.is_some())).to_string(),
             next: rows.last().map_or(from, |row| row.0 + 1),
             generations: (!rows.is_empty()).then(|| json!(rows).to_string()),
             is_cut: page.next_generation.is_some(),

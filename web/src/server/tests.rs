@@ -4,8 +4,9 @@ use axum::{
     body::{Body, to_bytes},
     http::{Request, Response, StatusCode},
 };
+use serde_json::json;
 use swarm_proto::v1::{
-    Experiment, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
+    Experiment, ExperimentState, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
     ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
 };
 use tokio::sync::watch;
@@ -16,13 +17,18 @@ use super::*;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
-/// One experiment, of which nothing is known but its name.
+fn running() -> Experiment {
+    let state = ExperimentState::Running.into();
+    Experiment { id: 1, name: "first".into(), state, ..Experiment::default() }
+}
+
+/// One experiment, of which nothing is known but its name and its state.
 struct OneExperiment(watch::Sender<u64>);
 
 #[async_trait]
 impl Archive for OneExperiment {
     async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
-        Ok(vec![Experiment { id: 1, name: "first".into(), ..Experiment::default() }])
+        Ok(vec![running()])
     }
 
     async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status> {
@@ -164,6 +170,15 @@ async fn what_went_wrong_is_said_in_one_line() {
         let text = text(refused).await;
         assert!(text.contains(part) && text.lines().count() == 1, "{text}");
     }
+}
+
+/// A database says of a run that was interrupted that it runs.
+#[tokio::test]
+async fn only_where_a_coordinator_is_something_runs() {
+    let list = text(answer(HERE, None, get("/api/experiments", HERE, "")).await).await;
+    assert!(list.contains(r#""state":"unfinished""#), "{list}");
+    let beside_a_coordinator = json!(answers::ExperimentAnswer::new(running(), true));
+    assert_eq!(beside_a_coordinator["state"], "running");
 }
 
 #[tokio::test]
