@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, of which `.ci/run`
-/// takes 3. Without it, one, and only of the first run of each task with each kind of neurons.
+/// takes 3. Without it, one, and only of as many runs as show each task and each kind of neurons.
 fn n_generations() -> Option<usize> {
     let text = env::var("SWARM_TEST_GENERATIONS").ok()?;
     let n = text.parse();
@@ -52,10 +52,13 @@ impl Run {
         self.champion["seed"].to_string()
     }
 
-    /// Its experiment's name, without the algorithm.
-    fn task_and_neurons(&self) -> String {
+    /// What it is an example of: its task, and its kind of neurons.
+    fn shows(&self) -> [String; 2] {
         let name = self.champion["name"].as_str().unwrap();
-        name.trim_end_matches("_ga").trim_end_matches("_snes").to_owned()
+        let name = name.trim_end_matches("_ga").trim_end_matches("_snes");
+        let neurons = ["_lif", "_adex"].into_iter().find(|neurons| name.ends_with(neurons));
+        let neurons = neurons.unwrap_or_default();
+        [name.trim_end_matches(neurons).to_owned(), neurons.to_owned()]
     }
 
     fn config_path(&self) -> String {
@@ -109,7 +112,13 @@ fn runs_begin_again_with_the_same_bits() {
     let mut runs = Run::all();
     if n_generations().is_none() {
         let mut known = BTreeSet::new();
-        runs.retain(|run| known.insert(run.task_and_neurons()));
+        // Those of rate networks first.
+        runs.sort_by_key(|run| run.shows()[1].clone());
+        runs.retain(|run| {
+            let n_known = known.len();
+            known.extend(run.shows());
+            known.len() > n_known
+        });
     }
     let n_generations = n_generations().unwrap_or(1);
     for run in runs {
