@@ -258,11 +258,11 @@ impl Evolution {
         assert_eq!(index, self.n_generations, "generations are told in order");
         assert_eq!(genotypes.len(), trial_fitness.len(), "one fitness per individual");
         let fitness: Vec<f64> = trial_fitness.iter().map(|trials| mean(trials)).collect();
+        let ranking = ranking::ranking(&fitness);
+        let best = ranking[0];
         if !has_finite_fitness(trial_fitness) {
             return Err(EvolutionError::NoFiniteFitness { generation: index });
         }
-        let ranking = ranking::ranking(&fitness);
-        let best = ranking[0];
 
         for (population, sample) in self.populations.iter_mut().zip(&samples) {
             population.learn(sample, &ranking, &fitness);
