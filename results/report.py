@@ -8,6 +8,7 @@ Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of s
 
 import csv
 import json
+import math
 import statistics
 import sys
 from collections import defaultdict
@@ -176,8 +177,19 @@ def lost_lights(folder):
         rows[condition][lost].append(trial["near_light_others"])
     mean = lambda values: f"{statistics.fmean(values):.3f}" if values else ""
     behind = lambda kept: sum(near < 0.5 for near in kept)
-    table(["condition", "trials that lose the light", "others near it in these", "in the rest", "trials in which only the others lose it"],
-          [[name, f"{len(lost)} of {len(lost) + len(kept)}", mean(lost), mean(kept), behind(kept)] for name, (kept, lost) in rows.items()])
+    first = tuple(map(len, next(iter(rows.values()))))
+    table(["condition", "trials that lose the light", "p of the difference from the first", "others near it in these", "in the rest",
+           "trials in which only the others lose it"],
+          [[name, f"{len(lost)} of {len(lost) + len(kept)}", number(fisher(first, (len(kept), len(lost)))), mean(lost), mean(kept), behind(kept)]
+           for name, (kept, lost) in rows.items()])
+
+
+def fisher(first, second):
+    """Fisher's exact test of two samples, two-sided; of each, how many do not and how many do."""
+    n, marked = sum(first), first[1] + second[1]
+    ways = lambda k: math.comb(n, k) * math.comb(sum(second), marked - k)
+    all_ways = [ways(k) for k in range(min(n, marked) + 1)]
+    return sum(of for of in all_ways if of <= ways(first[1])) / sum(all_ways)
 
 
 def main():
