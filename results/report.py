@@ -79,7 +79,7 @@ def models(folder):
     """Neuron models on the same task, with the same algorithm and budget."""
     rows = []
     for task in ("leader_selection", "borderline", "light_follower"):
-        for model, ending in (("CTRNN", "snes"), ("LIF", "lif"), ("AdEx", "adex")):
+        for model, ending in (("CTRNN", "snes"), ("LIF", "lif"), ("LIF, plastic", "lif_plastic"), ("AdEx", "adex")):
             paths = sorted((folder / "histories").glob(f"{task}_{ending}-*.csv"))
             means = [[float(it["mean"]) for it in read_csv(path)] for path in paths]
             seeds = ", ".join(path.stem.rsplit("-", 1)[1] for path in paths)
