@@ -19,6 +19,14 @@ LAST = 50
 MEANS = (0.1, 0.3, 0.5, 0.7, 1.0)
 BESTS = (0.5, 1.0)
 ENDS = (50, 100, 150, 200, 250, 300)
+# Kinds of neurons, and how the names of their files end.
+MODELS = {
+    "CTRNN": "snes",
+    "LIF": "lif",
+    "LIF, plastic": "lif_plastic",
+    "LIF, encoders": "lif_encoded",
+    "AdEx": "adex",
+}
 STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 700, 1000)
 
 
@@ -79,7 +87,7 @@ def models(folder):
     """Neuron models on the same task, with the same algorithm and budget."""
     rows = []
     for task in ("leader_selection", "borderline", "light_follower"):
-        for model, ending in (("CTRNN", "snes"), ("LIF", "lif"), ("LIF, plastic", "lif_plastic"), ("AdEx", "adex")):
+        for model, ending in MODELS.items():
             paths = sorted((folder / "histories").glob(f"{task}_{ending}-*.csv"))
             means = [[float(it["mean"]) for it in read_csv(path)] for path in paths]
             seeds = ", ".join(path.stem.rsplit("-", 1)[1] for path in paths)

@@ -56,9 +56,11 @@ impl Run {
     fn shows(&self) -> [String; 2] {
         let name = self.champion["name"].as_str().unwrap();
         let name = name.trim_end_matches("_ga").trim_end_matches("_snes");
-        let neurons = ["_lif", "_adex"].into_iter().find(|neurons| name.ends_with(neurons));
-        let neurons = neurons.unwrap_or_default();
-        [name.trim_end_matches(neurons).to_owned(), neurons.to_owned()]
+        let (task, neurons) = ["_lif", "_adex"]
+            .into_iter()
+            .find_map(|neurons| Some((name.split_once(neurons)?.0, neurons)))
+            .unwrap_or((name, ""));
+        [task.to_owned(), neurons.to_owned()]
     }
 
     fn config_path(&self) -> String {
