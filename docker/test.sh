@@ -48,7 +48,12 @@ expect() {
 need() {
     command -v "$1" >/dev/null && return
     [[ $EUID == 0 ]] && command -v apt-get >/dev/null || return
-    apt-get update -qq && apt-get install -qq --no-install-recommends "$2" >/dev/null
+    local wait
+    # Registries fail for a moment now and then.
+    for wait in 0 10 30; do
+        sleep "$wait"
+        apt-get update -qq && apt-get install -qq --no-install-recommends "$2" >/dev/null && break
+    done
     command -v "$1" >/dev/null
 }
 

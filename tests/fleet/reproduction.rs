@@ -15,7 +15,8 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 /// Generations of each run that are computed again: `SWARM_TEST_GENERATIONS`, of which `.ci/run`
-/// takes 3. Without it, one, and only of as many runs as show each task and each kind of neurons.
+/// takes 3. Without it, one of one run by each algorithm, and as many evaluations as show each task
+/// and each kind of neurons.
 fn n_generations() -> Option<usize> {
     let text = env::var("SWARM_TEST_GENERATIONS").ok()?;
     let n = text.parse();
@@ -54,7 +55,7 @@ impl Run {
 
     /// What it is an example of: its task, and its kind of neurons.
     fn shows(&self) -> [String; 2] {
-        let name = self.champion["name"].as_str().unwrap();
+        let name = self.champion["name"].as_str().unwrap().trim_end_matches("_original");
         let name = name.trim_end_matches("_ga").trim_end_matches("_snes");
         let (task, neurons) = ["_lif", "_adex"]
             .into_iter()
@@ -65,7 +66,7 @@ impl Run {
 
     fn config_path(&self) -> String {
         let name = self.champion["name"].as_str().unwrap();
-        let mut files = ["", "tasks/", "spiking/"]
+        let mut files = ["", "original/", "spiking/", "tasks/"]
             .map(|folder| workspace_file(&format!("configs/{folder}{name}.json")))
             .into_iter();
         let file = files.find(|file| file.exists());
@@ -114,13 +115,7 @@ fn runs_begin_again_with_the_same_bits() {
     let mut runs = Run::all();
     if n_generations().is_none() {
         let mut known = BTreeSet::new();
-        // Those of rate networks first.
-        runs.sort_by_key(|run| run.shows()[1].clone());
-        runs.retain(|run| {
-            let n_known = known.len();
-            known.extend(run.shows());
-            known.len() > n_known
-        });
+        runs.retain(|run| known.insert(run.config().algorithm.name));
     }
     let n_generations = n_generations().unwrap_or(1);
     for run in runs {
@@ -188,12 +183,18 @@ fn evaluations_have_the_same_bits_again() {
     let mut evaluations: Vec<PathBuf> = evaluations.map(|entry| entry.unwrap().path()).collect();
     evaluations.sort();
     assert!(!evaluations.is_empty());
+    let mut known = BTreeSet::new();
     for evaluation in evaluations {
         let stem = evaluation.file_name().unwrap().to_str().unwrap();
+        let run = Run::read(&results(&format!("champions/{stem}.json")));
+        let n_known = known.len();
+        known.extend(run.shows());
+        if n_generations().is_none() && known.len() == n_known {
+            continue;
+        }
         let summary: Value =
             serde_json::from_str(&fs::read_to_string(evaluation.join("summary.json")).unwrap())
                 .unwrap();
-        let run = Run::read(&results(&format!("champions/{stem}.json")));
         let again = tempfile::tempdir().unwrap();
         let mut args: Vec<String> =
             ["evaluate", "--local", "--trials", "2", "--genotype"].map(str::to_owned).into();

@@ -33,8 +33,8 @@ impl Experiment {
         algorithm["population_size"] = json!(12);
         algorithm["evaluation_steps"] = json!(300);
         algorithm["num_evaluations"] = json!(3);
-        algorithm["champion_trials"] = json!(8);
-        algorithm["judgement_trials"] = json!(8);
+        algorithm["champion_trials"] = json!(3);
+        algorithm["judgement_trials"] = json!(3);
         Self::of(value)
     }
 

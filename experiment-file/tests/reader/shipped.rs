@@ -18,6 +18,11 @@ pub(super) fn spiking() -> Vec<(String, String)> {
     files_of("../configs/spiking")
 }
 
+/// Tasks of the thesis as its Python simulator has them.
+fn original() -> Vec<(String, String)> {
+    files_of("../configs/original")
+}
+
 fn files_of(folder: &str) -> Vec<(String, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
@@ -30,7 +35,7 @@ fn files_of(folder: &str) -> Vec<(String, String)> {
 
 #[test]
 fn shipped_files_are_accepted_without_warnings_under_their_own_names() {
-    for (stem, text) in shipped().into_iter().chain(spiking()) {
+    for (stem, text) in shipped().into_iter().chain(spiking()).chain(original()) {
         assert_eq!(accept(&text).name, stem);
     }
 }
