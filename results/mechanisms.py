@@ -215,11 +215,12 @@ def simulated(path, config):
 
 
 def main():
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else RESULTS
-    for path in sorted((folder / "champions").glob("*.json")):
+    directory = Path(sys.argv[1]) if len(sys.argv) > 1 else RESULTS
+    for path in sorted((directory / "champions").glob("*.json")):
         name = json.loads(path.read_text())["name"]
-        config = RESULTS.parent / "configs" / f"{name}.json"
-        if not config.exists():
+        places = [RESULTS.parent / "configs" / folder / f"{name}.json" for folder in ("", "original")]
+        config = next((place for place in places if place.exists()), None)
+        if config is None:
             continue  # a task of another folder
         stimuli = {of["sensor"].rpartition(":")[2]: key for key, of in json.loads(config.read_text())["topology"]["stimuli"].items()}
         all_rows = simulated(path, config)
