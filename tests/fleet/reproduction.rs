@@ -275,6 +275,17 @@ fn project_with(script: &str) -> TempDir {
 }
 
 #[test]
+fn the_report_has_what_the_algorithms_came_to_on_each_task() {
+    let Some(mut command) = python_script(results("compare.py")) else { return };
+    let table = Outcome::of(&mut command).expect_success().stdout;
+    let report = fs::read_to_string(workspace_file("docs/reproduction.md")).unwrap();
+    assert!(table.contains("| D | "), "{table}");
+    for row in table.lines() {
+        assert!(report.contains(row), "{row}");
+    }
+}
+
+#[test]
 fn champions_are_compared_with_controllers_written_by_hand() {
     let Some(mut command) = python_script(results("by-hand.py")) else { return };
     command.args(["--trials", "3", "synchronisation"]);

@@ -11,10 +11,10 @@ use sim_core::{Simulation, StepRecord};
 /// Damaged variants of each file that is right.
 const N_VARIANTS: u64 = 20;
 
-/// Number of files that are right: `SWARM_TEST_FILES`, 300 without it. `.ci/run` takes
+/// Number of files that are right: `SWARM_TEST_FILES`, 150 without it. `.ci/run` takes
 /// 5,000, which is half a minute of CPU.
 fn n_files() -> u64 {
-    let text = env::var("SWARM_TEST_FILES").unwrap_or_else(|_| "300".to_owned());
+    let text = env::var("SWARM_TEST_FILES").unwrap_or_else(|_| "150".to_owned());
     text.parse().unwrap_or_else(|_| panic!("SWARM_TEST_FILES is {text}, not a number"))
 }
 

@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""Prints GA and SNES side by side on every task, as `swarmctl compare` has them, as a table.
+
+    results/compare.py
+
+Each value is the median over the runs in results/, in brackets the least and the greatest. Needs
+swarmctl in the PATH, Python 3.9 and nothing else.
+"""
+
+import json
+import subprocess
+
+from report import RESULTS, table
+
+TASKS = {
+    "A": "leader_selection",
+    "B": "borderline",
+    "C": "orientation_consensus",
+    "C, original's function": "orientation_consensus_alignment",
+    "D": "light_follower",
+}
+QUANTITIES = {"judged": "champion", "mean": "mean, last 50", "best": "best, last 50"}
+
+
+def compared(task):
+    """What `swarmctl compare` says of a task; nothing without runs by both algorithms."""
+    files = [sorted((RESULTS / folder).glob(f"{task}_{algorithm}-*"))
+             for algorithm in ("ga", "snes") for folder in ("histories", "champions")]
+    if not all(files):
+        return []
+    command = ["swarmctl", "compare", "--output", "json", *sum(files, [])]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    return [it for it in json.loads(done.stdout)["quantities"] if it["name"] in QUANTITIES]
+
+
+def cell(sample):
+    values = sample["values"]
+    return f"{sample['median']['value']:.3f} ({min(values):.3f} to {max(values):.3f})"
+
+
+def main():
+    rows = []
+    for task, name in TASKS.items():
+        for quantity in compared(name):
+            ga, snes = quantity["samples"]
+            pair = quantity["pairs"][0]
+            rows.append([task, f"{len(ga['values'])}, {len(snes['values'])}", QUANTITIES[quantity["name"]], cell(ga), cell(snes),
+                         f"{pair['probability_of_improvement']['value']:.2f}", f"{pair['p']:.2f}"])
+    table(["task", "runs", "of fitness", "GA", "SNES", "GA's is better", "p"], rows)
+
+
+if __name__ == "__main__":
+    main()
