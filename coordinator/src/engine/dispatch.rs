@@ -56,13 +56,39 @@ enum Source {
 #[derive(Debug, Default)]
 pub struct Outgoing {
     recalled: BTreeMap<WorkerId, Vec<AssignmentId>>,
-    assignments: BTreeMap<(WorkerId, JobId), (TrialSet, Output, Vec<Assignment>)>,
+    /// In the order given, so that what a worker computes first is what [`InFlight`] has as its
+    /// oldest: a loss is blamed on that.
+    ///
+    /// [`InFlight`]: super::in_flight::InFlight
+    assignments: BTreeMap<WorkerId, Vec<AssignmentsOfBatch>>,
+}
+
+/// What one message has room for: items of one batch.
+#[derive(Debug)]
+struct AssignmentsOfBatch {
+    job: JobId,
+    trial_set: TrialSet,
+    output: Output,
+    assignments: Vec<Assignment>,
 }
 
 impl Outgoing {
     /// Whether there is nothing to send.
     pub fn is_empty(&self) -> bool {
         self.recalled.is_empty() && self.assignments.is_empty()
+    }
+
+    fn add(&mut self, worker: WorkerId, job: JobId, batch: &BatchInProgress, item: Assignment) {
+        let messages = self.assignments.entry(worker).or_default();
+        match messages.last_mut() {
+            Some(last) if last.job == job => last.assignments.push(item),
+            _ => messages.push(AssignmentsOfBatch {
+                job,
+                trial_set: batch.trial_set(),
+                output: batch.output(),
+                assignments: vec![item],
+            }),
+        }
     }
 }
 
@@ -311,13 +337,12 @@ impl Engine {
         if source == Source::Queue {
             batch.uncovered.insert((expected, id), worker_id);
         }
-        let (trial_set, output) = (batch.trial_set(), batch.output());
+        let trial_set = batch.trial_set();
         let genotype = batch.genotype(item.individual);
         // Audits are sent genotypes, so that they compare the two ways, too.
         let is_drawn = !is_audit && batch.distribution().is_some();
         let assignment = Assignment { id, trials: item.trials.clone(), genotype, is_drawn };
-        let outgoing = self.outgoing.assignments.entry((worker_id, job));
-        outgoing.or_insert_with(|| (trial_set, output, Vec::new())).2.push(assignment);
+        self.outgoing.add(worker_id, job, batch, assignment);
         let assigned = AssignedItem {
             job,
             trial_set,
@@ -409,7 +434,10 @@ impl Engine {
                 self.commands.push_back(Command::SendDrop { worker, assignments });
             }
         }
-        for ((worker, job), (trial_set, output, mut assignments)) in assignments {
+        let messages = assignments.into_iter().flat_map(|(worker, messages)| {
+            messages.into_iter().map(move |message| (worker, message))
+        });
+        for (worker, AssignmentsOfBatch { job, trial_set, output, mut assignments }) in messages {
             let known = self.workers.get_mut(&worker).map(|worker| &mut worker.known_jobs);
             if let Some(known) = known.filter(|known| !known.contains_key(&job)) {
                 known.insert(job, None);

@@ -55,7 +55,13 @@ impl SimulatedFleet {
                     let known = worker.distributions.get(&job);
                     assert_eq!(known, Some(&distribution(trial_set)), "what it draws from");
                 }
-                worker.queue.extend(assignments.into_iter().map(|assignment| (job, assignment)));
+                for assignment in assignments {
+                    // The engine blames a loss on what it gave first.
+                    let is_next = assignment.id > worker.last_assignment;
+                    assert!(is_next, "sent in the order given: {:?}", assignment.id);
+                    worker.last_assignment = assignment.id;
+                    worker.queue.push_back((job, assignment));
+                }
             }
             Command::SendDrop { assignments, .. } => {
                 let assignments = BTreeSet::from_iter(assignments);

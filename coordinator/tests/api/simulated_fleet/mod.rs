@@ -79,6 +79,7 @@ struct Worker {
     introduction: Introduction,
     speed: f64,
     queue: VecDeque<(JobId, Assignment)>,
+    last_assignment: AssignmentId,
     distributions: BTreeMap<JobId, Arc<[u8]>>,
     running: BTreeMap<AssignmentId, JobId>,
     /// Computed, but wanted no more.
@@ -282,6 +283,7 @@ impl SimulatedFleet {
             introduction,
             speed,
             queue: VecDeque::new(),
+            last_assignment: AssignmentId(0),
             distributions: BTreeMap::new(),
             running: BTreeMap::new(),
             dropped: BTreeSet::new(),
