@@ -286,6 +286,28 @@ fn the_report_has_what_the_algorithms_came_to_on_each_task() {
 }
 
 #[test]
+fn mechanisms_of_a_champion_of_each_file_are_told() {
+    let Some(mut command) = python_script(results("mechanisms.py")) else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let champions = directory.path().join("champions");
+    fs::create_dir(&champions).unwrap();
+    let mut names = BTreeSet::new();
+    for run in Run::all() {
+        let is_told = Path::new(&run.config_path())
+            .parent()
+            .is_some_and(|folder| folder.ends_with("configs") || folder.ends_with("original"));
+        if is_told && names.insert(run.champion["name"].to_string()) {
+            let file = format!("{}.json", run.stem);
+            fs::copy(results("champions").join(&file), champions.join(&file)).unwrap();
+        }
+    }
+    let args = [directory.path().as_os_str(), "--trials".as_ref(), "1".as_ref()];
+    let told = Outcome::of(command.args(args)).expect_success().stdout;
+    assert!(names.len() >= 10, "{names:?}");
+    assert_eq!(told.matches("## ").count(), names.len(), "{told}");
+}
+
+#[test]
 fn champions_are_compared_with_controllers_written_by_hand() {
     let Some(mut command) = python_script(results("by-hand.py")) else { return };
     command.args(["--trials", "3", "synchronisation"]);

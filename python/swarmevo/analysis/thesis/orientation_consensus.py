@@ -27,14 +27,14 @@ ANGLES = (0, 90, 180, 270)
 
 
 def fig_20(champion: Champion) -> Figure:
-    """Fitness by generation: with Eq. 5.5, and with the original's function, of format 2."""
+    """Fitness by generation: with Eq. 5.5, and with the original's function."""
     figure, axes = canvas(8, 2.8, 1, 2)
     histories(axes[0], {"SNES": champion.history("snes"), "GA": champion.history("ga")})
     axes[0].legend(loc="lower right")
     axes[0].set_title("Eq. 5.5")
     other = replace(champion, name="orientation_consensus_alignment")
-    histories(axes[1], {"SNES": other.history("snes", "format-2"), "GA": other.history("ga", "format-2")})
-    axes[1].set_title("the original's function (format 2)")
+    histories(axes[1], {"SNES": other.history("snes"), "GA": other.history("ga")})
+    axes[1].set_title("the original's function")
     return figure
 
 
