@@ -31,7 +31,7 @@ use swarm_proto::v1::{
 };
 use tokio::{runtime::Runtime, task::JoinHandle};
 
-const DEFAULT_SECONDS: u64 = 10;
+const DEFAULT_SECONDS: u64 = 3;
 const GENERATIONS: u64 = 20;
 const N_WORKERS: usize = 4;
 /// Short, so that the pauses are longer and shorter than it.

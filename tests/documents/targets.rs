@@ -1,4 +1,4 @@
-//! No test is where Cargo was told that there are none.
+//! No test is where Cargo was told that there are none, which spares it compiling for them.
 
 use std::fs;
 
@@ -15,5 +15,25 @@ fn sources_that_cargo_does_not_test_contain_no_tests() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(!text.contains("#[cfg(test)]"), "{}", path.display());
         assert!(!text.contains("#[test]"), "{}", path.display());
+    }
+}
+
+#[test]
+fn crates_whose_documentation_is_not_tested_have_no_code_in_it() {
+    let without = ["bundle", "coordinator", "proto", "telemetry", "transport", "web", "worker"];
+    let sources = without.map(|name| (format!("{name}/Cargo.toml"), format!("{name}/src")));
+    let harness = ("tests/Cargo.toml".to_owned(), "tests/harness".to_owned());
+    for (manifest, source) in sources.into_iter().chain([harness]) {
+        let text = fs::read_to_string(workspace_file(&manifest)).unwrap();
+        assert!(text.contains("doctest = false"), "{manifest} says no more that it has none");
+        for path in super::rust_files(&workspace_file(&source)) {
+            let text = fs::read_to_string(&path).unwrap();
+            let mut comments = text.lines().filter(|line| {
+                let line = line.trim_start();
+                line.starts_with("///") || line.starts_with("//!")
+            });
+            let fence = comments.find(|line| line.contains("```"));
+            assert_eq!(fence, None, "{}: delete `doctest = false` in {manifest}", path.display());
+        }
     }
 }
