@@ -16,8 +16,8 @@ from pathlib import Path
 
 RESULTS = Path(__file__).resolve().parent
 LAST = 50
-MEANS = (0.1, 0.3, 0.5, 0.7, 1.0)
-BESTS = (0.5, 1.0)
+MEANS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
+BESTS = (0.3, 0.5, 1.0)
 ENDS = (50, 100, 150, 200, 250, 300)
 # Kinds of neurons, and how the names of their files end.
 MODELS = {
@@ -27,7 +27,7 @@ MODELS = {
     "LIF, encoders": "lif_encoded",
     "AdEx": "adex",
 }
-STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 700, 1000)
+STEPS = (0, 10, 12, 14, 16, 20, 24, 50, 100, 200, 250, 300, 500, 660, 700, 1000)
 
 
 def table(head, rows):
