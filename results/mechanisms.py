@@ -3,8 +3,9 @@
 
     results/mechanisms.py [DIRECTORY] [--trials N]    champions in it; results/ by default
 
-Every champion is simulated in N trials, 20 by default, that had no part in its evolution; steps 0 to 9, in which
-robots are made to send, count for negotiations only. A robot acts on the stimuli of the same row of the trace.
+Every champion is simulated in N trials, 20 by default, that had no part in its evolution; steps 0 to
+9, in which robots are made to send, count for negotiations only. A robot acts on the stimuli of the
+same row of the trace.
 Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
@@ -152,6 +153,8 @@ def signals(rows, config):
     reading of that sector, the largest over all robots within 60 cm, here with the receiver's decay."""
     robot = config["world"]["objects"][config["algorithm"]["evolvable_object"]]
     receiver, sides = robot["sensors"]["wireless_receiver"], (config["world"]["width"], config["world"]["height"])
+    if "decay_rho" not in receiver:
+        return  # left to the file's semantics
     swarms = defaultdict(dict)
     for row in rows:
         heading = float(row["heading_rad"])
@@ -238,8 +241,7 @@ def main():
             alignment(rows, stimuli)
         elif name.startswith("light_follower"):
             following(rows, stimuli)
-            if not name.endswith("_original"):  # whose file leaves the decay to its semantics
-                signals(rows, json.loads(config.read_text()))
+            signals(rows, json.loads(config.read_text()))
 
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ def runs(folder):
 def models(folder):
     """Neuron models on the same task, with the same algorithm and budget."""
     rows = []
-    for task in ("leader_selection", "borderline", "light_follower"):
+    for task in ("leader_selection", "borderline", "orientation_consensus", "light_follower"):
         for model, ending in MODELS.items():
             paths = sorted((folder / "histories").glob(f"{task}_{ending}-*.csv"))
             means = [[float(it["mean"]) for it in read_csv(path)] for path in paths]
