@@ -43,12 +43,15 @@ impl Setup {
         }
     }
 
+    /// Whether it can start, before anything takes memory.
+    pub fn check(&self) -> Result<(), SetupError> {
+        let problems = self.problems();
+        if problems.is_empty() { Ok(()) } else { Err(SetupError { problems }) }
+    }
+
     /// The evolution before its first generation.
     pub fn start(&self) -> Result<Evolution, SetupError> {
-        let problems = self.problems();
-        if !problems.is_empty() {
-            return Err(SetupError { problems });
-        }
+        self.check()?;
         let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes);
         let population = algorithm.expect("the algorithm is known");
         let size = self.population_size as usize;

@@ -42,3 +42,8 @@ pub fn evaluate_error(error: &EvaluateError) -> PyErr {
 pub fn panic_error(py: Python<'_>, message: &str) -> PyErr {
     exception(py, "InternalError", (message,))
 }
+
+/// Something that does not work in a process that was forked: `ForkError`.
+pub fn fork_error(py: Python<'_>, message: &str) -> PyErr {
+    exception(py, "ForkError", (message,))
+}

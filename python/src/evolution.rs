@@ -1,8 +1,6 @@
 //! The algorithms, as ask and tell.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
-use evolution::{ALGORITHMS, Champion, ChampionSource, Generation, Setup};
+use evolution::{ALGORITHMS, Champion, ChampionSource, Generation, Setup, SetupError};
 use experiment_file::{
     AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, ExperimentConfig, Parameter,
     ParameterValue,
@@ -15,11 +13,16 @@ use pyo3::{
 };
 use sim_core::{FINGERPRINT, Simulation, TrialSet};
 
-use crate::running::guarded;
+use crate::{memory, running::Shared};
+
+/// Arrays as long as a genotype that any algorithm keeps, and those per individual while a
+/// generation is drawn and handed over: upper bounds.
+const KEPT_PER_GENE: u128 = 8;
+const DRAWN_PER_GENE: u128 = 4;
 
 /// An evolution between two generations.
 #[pyclass(frozen, module = "swarmevo._core")]
-pub struct Evolution(Mutex<State>);
+pub struct Evolution(Shared<State>);
 
 #[derive(Clone)]
 struct State {
@@ -41,7 +44,13 @@ impl Evolution {
     ) -> PyResult<Self> {
         let params = read_params(algorithm, params)?;
         let setup = Setup { population_size, seed, params, ..Setup::new(algorithm, n_genes) };
-        let evolution = setup.start().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let refused = |error: SetupError| PyValueError::new_err(error.to_string());
+        setup.check().map_err(refused)?;
+        let numbers = KEPT_PER_GENE + DRAWN_PER_GENE * u128::from(population_size);
+        let bytes = n_genes as u128 * numbers * size_of::<f64>() as u128;
+        let what = format!("an evolution of {population_size} genotypes of {n_genes} genes");
+        memory::ensure(bytes, &what)?;
+        let evolution = setup.start().map_err(refused)?;
         Ok(Self::of(evolution))
     }
 
@@ -55,15 +64,14 @@ impl Evolution {
     }
 
     /// The state.
-    fn to_json(&self) -> PyResult<String> {
-        serde_json::to_string(&self.state().evolution)
-            .map_err(|error| PyRuntimeError::new_err(error.to_string()))
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        let text = self.0.with(py, |state| serde_json::to_string(&state.evolution))?;
+        text.map_err(|error| PyRuntimeError::new_err(error.to_string()))
     }
 
     /// The next generation, `[P, d]`.
     fn ask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let genotypes = guarded(py, || {
-            let mut state = self.state();
+        let genotypes = self.0.with(py, |state| {
             let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
             let genotypes = asked.genotypes.to_vec();
             state.asked = Some(asked);
@@ -80,16 +88,11 @@ impl Evolution {
         fitness: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<(u64, f64, f64, f64, usize)> {
         let fitness = rows(&fitness);
-        let summary = guarded(py, || {
-            let mut state = self.state();
+        let summary = self.0.with(py, |state| {
             let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
-            if asked.genotypes.len() != fitness.len() || fitness.iter().any(Vec::is_empty) {
-                let expected = asked.genotypes.len();
+            if let Err(problem) = check_rows(&fitness, asked.genotypes.len()) {
                 state.asked = Some(asked);
-                return Err(format!(
-                    "the generation has {expected} genotypes; their fitness has to be an array of \
-                     {expected} numbers, or of {expected} rows with a number for each trial"
-                ));
+                return Err(problem);
             }
             let kept = asked.clone();
             let told = state.evolution.tell(asked, &fitness);
@@ -104,53 +107,73 @@ impl Evolution {
     }
 
     #[getter]
-    fn n_generations(&self) -> u64 {
-        self.state().evolution.n_generations()
+    fn n_generations(&self, py: Python<'_>) -> PyResult<u64> {
+        self.0.with(py, |state| state.evolution.n_generations())
     }
 
     /// The link of the digest chain of generations.
     #[getter]
-    fn digest(&self) -> String {
-        self.state().evolution.digest().to_string()
+    fn digest(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.with(py, |state| state.evolution.digest().to_string())
     }
 
     /// The link of the digest chain of re-evaluations.
     #[getter]
-    fn champion_digest(&self) -> String {
-        self.state().evolution.champion_digest().to_string()
+    fn champion_digest(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.with(py, |state| state.evolution.champion_digest().to_string())
     }
 
     /// The champion so far.
     #[getter]
     fn champion<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let champion = self.state().evolution.champion().cloned();
+        let champion = self.0.with(py, |state| state.evolution.champion().cloned())?;
         champion.map(|champion| champion_dict(py, &champion)).transpose()
     }
 
     /// The mean of the distribution, if there is one.
     #[getter]
-    fn mean<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.state().evolution.mean().map(|mean| PyArray1::from_vec(py, mean))
+    fn mean<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let mean = self.0.with(py, |state| state.evolution.mean())?;
+        Ok(mean.map(|mean| PyArray1::from_vec(py, mean)))
     }
 
     /// Another one in the same state.
-    fn copy(&self) -> Self {
-        Self(Mutex::new(self.state().clone()))
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        Ok(Self(Shared::new(self.0.with(py, |state| state.clone())?)))
     }
 
-    /// The comparison of candidates for the champion.
-    fn reevaluation(&self) -> Option<Reevaluation> {
-        self.state().evolution.reevaluation().map(|it| Reevaluation(Mutex::new(it)))
+    /// Whether an individual has come since the last comparison of candidates.
+    #[getter]
+    fn has_challenger(&self, py: Python<'_>) -> PyResult<bool> {
+        let is_new = |it: &Champion| {
+            it.held_out.is_none() && matches!(it.source, ChampionSource::Individual(_))
+        };
+        self.0.with(py, |state| {
+            let candidates = state.evolution.reevaluation();
+            candidates.is_some_and(|all| all.candidates().iter().any(is_new))
+        })
+    }
+
+    /// The comparison of candidates for the champion; none before the first generation.
+    fn reevaluation(&self, py: Python<'_>) -> PyResult<Option<Reevaluation>> {
+        let reevaluation = self.0.with(py, |state| state.evolution.reevaluation())?;
+        Ok(reevaluation.map(|it| Reevaluation(Shared::new(it))))
     }
 
     /// Makes the winner of a comparison that is over the champion.
-    fn set_champion(&self, reevaluation: &Reevaluation) {
-        self.state().evolution.set_champion(&reevaluation.lock());
+    fn set_champion(&self, py: Python<'_>, reevaluation: &Reevaluation) -> PyResult<()> {
+        let reevaluation = reevaluation.0.with(py, |it| it.clone())?;
+        if !reevaluation.is_over() {
+            return Err(PyValueError::new_err(
+                "the comparison is not over; tell it the next block",
+            ));
+        }
+        self.0.with(py, |state| state.evolution.set_champion(&reevaluation))
     }
 
-    /// Judges the champion: its genotypes and trials.
+    /// Judges the champion: its genotype and trials; none before the first generation.
     fn judgement<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
-        let judgement = self.state().evolution.judgement();
+        let judgement = self.0.with(py, |state| state.evolution.judgement())?;
         judgement.map(|it| asked_trials(py, &it.genotypes(), it.trial_set())).transpose()
     }
 
@@ -160,18 +183,22 @@ impl Evolution {
         py: Python<'py>,
         fitness: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
-        let judgement = self.state().evolution.judgement();
-        let judgement =
-            judgement.ok_or_else(|| PyValueError::new_err("there is no champion yet"))?;
         let fitness = rows(&fitness);
-        let (champion, digest) = guarded(py, || judgement.decide(&fitness))?;
+        let judged = self.0.with(py, |state| {
+            let judgement = state.evolution.judgement();
+            let judgement = judgement.ok_or("there is no champion before the first generation")?;
+            check_rows(&fitness, 1)?;
+            Ok::<_, String>(judgement.decide(&fitness))
+        })?;
+        let (champion, digest) = judged.map_err(PyValueError::new_err)?;
         Ok((champion_dict(py, &champion)?, digest.to_string()))
     }
 }
 
 impl Evolution {
-    fn of(evolution: evolution::Evolution) -> Self {
-        Self(Mutex::new(State { evolution, asked: None }))
+    /// One that Python has as its own.
+    pub fn of(evolution: evolution::Evolution) -> Self {
+        Self(Shared::new(State { evolution, asked: None }))
     }
 
     /// As the coordinator's of the same file.
@@ -179,36 +206,45 @@ impl Evolution {
         let segments = simulation.population_segments();
         Self::of(evolution::Evolution::new(config, segments, FINGERPRINT))
     }
-
-    /// A panic leaves a state that can be read.
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 /// Candidates for the champion, compared block by block on held-out trials.
 #[pyclass(frozen, module = "swarmevo._core")]
-pub struct Reevaluation(Mutex<evolution::Reevaluation>);
+pub struct Reevaluation(Shared<evolution::Reevaluation>);
 
 #[pymethods]
 impl Reevaluation {
     /// The genotypes and trials of the next block; none if the comparison is over.
     fn ask<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
-        let this = self.lock();
-        (!this.is_over()).then(|| asked_trials(py, &this.genotypes(), this.trial_set())).transpose()
+        let next =
+            self.0.with(py, |it| (!it.is_over()).then(|| (it.genotypes(), it.trial_set())))?;
+        next.map(|(genotypes, trials)| asked_trials(py, &genotypes, trials)).transpose()
     }
 
     /// Takes the fitness of a block in.
     fn tell(&self, py: Python<'_>, fitness: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
         let fitness = rows(&fitness);
-        guarded(py, || self.lock().learn(&fitness))
+        let told = self.0.with(py, |it| {
+            if it.is_over() {
+                return Err("the comparison is over".to_owned());
+            }
+            check_rows(&fitness, it.genotypes().len())?;
+            it.learn(&fitness);
+            Ok(())
+        })?;
+        told.map_err(PyValueError::new_err)
     }
 }
 
-impl Reevaluation {
-    fn lock(&self) -> MutexGuard<'_, evolution::Reevaluation> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+/// That there is a row for each genotype, with a number for each trial.
+fn check_rows(fitness: &[Vec<f64>], n_genotypes: usize) -> Result<(), String> {
+    if fitness.len() == n_genotypes && !fitness.iter().any(Vec::is_empty) {
+        return Ok(());
     }
+    Err(format!(
+        "there are {n_genotypes} genotypes; their fitness has to be an array of {n_genotypes} \
+         numbers, or of {n_genotypes} rows with a number for each trial"
+    ))
 }
 
 /// Genotypes `[P, d]`; kind, generation and block of the trials that they are to meet.
@@ -228,7 +264,7 @@ fn asked_trials<'py>(
     Ok((PyArray2::from_vec2(py, genotypes)?, trials))
 }
 
-fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Bound<'py, PyDict>> {
+pub fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Bound<'py, PyDict>> {
     let Champion { generation, source, genotype, trial_fitness, held_out, judged } = champion;
     let dict = PyDict::new(py);
     dict.set_item("generation", generation)?;
@@ -244,7 +280,7 @@ fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Bound<'p
     Ok(dict)
 }
 
-fn rows(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+pub fn rows(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
     array.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
 }
 

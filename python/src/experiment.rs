@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use evolution::ALGORITHMS;
+use evolution::{ALGORITHMS, Digest};
 use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
-use sim_core::Simulation;
+use sim_core::{FINGERPRINT, Simulation};
 use swarm_web::{Episode, Replay, replay_file};
 
 use crate::{
@@ -61,6 +61,12 @@ impl Experiment {
     #[getter]
     fn name(&self) -> &str {
         &self.config.name
+    }
+
+    /// Link -1 of the digest chain: equal ones, the same bits of every generation.
+    #[getter]
+    fn config_digest(&self) -> String {
+        Digest::of_config(&self.config, FINGERPRINT).to_string()
     }
 
     #[getter]

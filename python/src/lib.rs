@@ -6,6 +6,7 @@ mod errors;
 mod evolution;
 mod experiment;
 mod genes;
+mod memory;
 mod running;
 mod stepping;
 mod trace;
@@ -30,6 +31,10 @@ mod _core {
     /// Names the function that the simulator computes: equal names, equal bits.
     #[pymodule_export]
     const FINGERPRINT: &str = sim_core::FINGERPRINT;
+
+    /// Of the project.
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
 
     /// An experiment file to begin with.
     #[pymodule_export]

@@ -4,7 +4,9 @@
 use std::{
     any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
+    process,
     sync::{
+        Mutex, MutexGuard, TryLockError,
         atomic::{AtomicBool, AtomicUsize, Ordering},
         mpsc::{self, RecvTimeoutError},
     },
@@ -15,7 +17,7 @@ use std::{
 use pyo3::prelude::*;
 use sim_core::EvaluateError;
 
-use crate::errors::{evaluate_error, panic_error};
+use crate::errors::{evaluate_error, fork_error, panic_error};
 
 /// How often the interpreter is asked whether a signal has come.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
@@ -107,6 +109,59 @@ pub fn compute<T: Send>(
 pub fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panic_message(&*panic)))
         .map_err(|message| panic_error(py, &message))
+}
+
+/// The process in which something was made. A process that is forked from it has none of its
+/// threads, and locks that those held stay locked.
+#[derive(Clone, Copy)]
+pub struct Home(u32);
+
+impl Home {
+    /// This process.
+    pub fn here() -> Self {
+        Self(process::id())
+    }
+
+    /// Whether this is another process.
+    pub fn is_left(self) -> bool {
+        self.0 != process::id()
+    }
+}
+
+/// A value that threads share. Whoever asks for it in a forked process never waits for a thread
+/// that is not there.
+pub struct Shared<T> {
+    value: Mutex<T>,
+    home: Home,
+}
+
+impl<T: Send> Shared<T> {
+    /// It, from this process on.
+    pub fn new(value: T) -> Self {
+        Self { value: Mutex::new(value), home: Home::here() }
+    }
+
+    /// Does something short with it, without the interpreter's lock.
+    pub fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut T) -> R + Send,
+    ) -> PyResult<R> {
+        let done = guarded(py, || self.lock().map(|mut value| work(&mut value)))?;
+        done.ok_or_else(|| fork_error(py, "another thread used this when the process was forked"))
+    }
+
+    /// None if whoever has it did not come along. A panic leaves a value that can be read.
+    fn lock(&self) -> Option<MutexGuard<'_, T>> {
+        if !self.home.is_left() {
+            return Some(self.value.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
+        }
+        match self.value.try_lock() {
+            Ok(value) => Some(value),
+            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
 }
 
 fn panic_message(panic: &(dyn Any + Send)) -> String {

@@ -14,13 +14,18 @@ use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sim_core::{Actions, EvaluateError, Policy, Simulation, Stepper, TrialSet};
 
-use crate::errors::{evaluate_error, panic_error};
+use crate::{
+    errors::{evaluate_error, fork_error, panic_error},
+    running::Home,
+};
 
 /// Trials side by side, with agents that do what they are told.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Episodes {
     /// To the thread, which ends when this is dropped.
     work: Mutex<Sender<Work>>,
+    /// Where the thread is.
+    home: Home,
     agents: Vec<usize>,
     n_inputs: usize,
     message_len: usize,
@@ -53,6 +58,12 @@ impl Episodes {
     #[getter]
     fn message_len(&self) -> usize {
         self.message_len
+    }
+
+    /// Whether a forked process asks, which has not the thread.
+    #[getter]
+    fn is_left(&self) -> bool {
+        self.home.is_left()
     }
 
     /// What the agents get, flat: `[T * A * I]`.
@@ -159,7 +170,7 @@ impl Episodes {
         )?;
         let started = py.detach(move || outbox.recv()).map_err(|_| has_panicked(py))?;
         let (agents, n_inputs, message_len) = started.map_err(|error| evaluate_error(&error))?;
-        Ok(Self { work: Mutex::new(work), agents, n_inputs, message_len })
+        Ok(Self { work: Mutex::new(work), home: Home::here(), agents, n_inputs, message_len })
     }
 
     /// Has the thread do something, and waits for it.
@@ -168,6 +179,9 @@ impl Episodes {
         py: Python<'_>,
         work: impl for<'a> FnOnce(&mut Stage<'a>) -> T + Send + 'static,
     ) -> PyResult<T> {
+        if self.home.is_left() {
+            return Err(fork_error(py, "the thread of these episodes is in another process"));
+        }
         let (answer, answered) = mpsc::channel();
         let work: Work = Box::new(move |stage| {
             // Whoever asked waits.

@@ -13,10 +13,14 @@ use swarm_transport::{CredentialArgs, Credentials, Token};
 use tokio_util::sync::CancellationToken;
 use worker::{WorkerConfig, WorkerError};
 
+use crate::{errors::fork_error, running::Home};
+
 /// A worker that computes until it is stopped.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Worker {
     stop: CancellationToken,
+    /// Where the thread is.
+    home: Home,
     thread: Mutex<Option<JoinHandle<Result<(), WorkerError>>>>,
 }
 
@@ -39,22 +43,31 @@ impl Worker {
         let thread = thread::Builder::new()
             .name("swarmevo-worker".into())
             .spawn(move || runtime.block_on(worker::run(config, stopped)))?;
-        Ok(Self { stop, thread: Mutex::new(Some(thread)) })
+        Ok(Self { stop, home: Home::here(), thread: Mutex::new(Some(thread)) })
     }
 
     /// Whether it has not ended: it only ends by itself if the coordinator refuses it.
     fn is_alive(&self) -> bool {
+        if self.home.is_left() {
+            return false;
+        }
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// Tells it to finish what it computes, and to leave.
     fn stop(&self) {
+        if self.home.is_left() {
+            return;
+        }
         self.stop.cancel();
     }
 
     /// Waits for its end. Raises why it has ended, if it was not told to.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
+        if self.home.is_left() {
+            return Err(fork_error(py, "the thread of this worker is in another process"));
+        }
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(thread) = thread else { return Ok(()) };
         match py.detach(move || thread.join()) {
@@ -67,6 +80,9 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
+        if self.home.is_left() {
+            return;
+        }
         self.stop.cancel();
     }
 }

@@ -8,15 +8,16 @@
 """
 
 from ._core import FINGERPRINT
+from ._core import VERSION as __version__
+from .champion import Champion, Judged, Selection
 from .environment import parallel_env
 from .episodes import Actions, Episodes
-from .errors import ExperimentError, FleetError, InternalError, Problem, SwarmError
+from .errors import ExperimentError, FleetError, ForkError, InternalError, Problem, SwarmError
 from .evolution import (
     CMAES,
     GA,
     SNES,
     XNES,
-    Champion,
     Evolution,
     Generation,
     OpenAIES,
@@ -37,8 +38,8 @@ from .workers import Workers, workers
 
 __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
-    "FINGERPRINT", "FleetError", "FleetRun", "GA", "Generation", "Individuals", "InternalError",
-    "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES",
-    "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "algorithms", "connect", "evolve",
+    "FINGERPRINT", "FleetError", "FleetRun", "ForkError", "GA", "Generation", "Individuals", "InternalError",
+    "Judged", "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES", "Selection",
+    "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",
     "mirror", "open", "parallel_env", "workers",
 ]

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FINGERPRINT: str
+VERSION: str
 QUICKSTART: str
 PROTOCOL: bytes
 
@@ -17,6 +18,7 @@ def inline_script(text: str, name: str, script: str) -> str: ...
 
 class Experiment:
     name: str
+    config_digest: str
     warnings: list[str]
     n_genes: int
     n_steps: int
@@ -39,13 +41,14 @@ class Evolution:
     champion_digest: str
     champion: dict[str, Any] | None
     mean: _Floats | None
+    has_challenger: bool
     def __init__(
         self,
         algorithm: str,
         n_genes: int,
         population_size: int,
         seed: int,
-        params: dict[str, float | str],
+        params: dict[str, int | float | str],
     ) -> None: ...
     @staticmethod
     def from_json(text: str) -> Evolution: ...
@@ -69,6 +72,7 @@ class Database:
     def call(self, name: str, request: bytes) -> bytes: ...
 
 class Episodes:
+    is_left: bool
     agents: list[int]
     n_inputs: int
     message_len: int

@@ -53,3 +53,8 @@ class FleetError(SwarmError):
 
     def __str__(self) -> str:
         return str(self.args[1])
+
+
+class ForkError(SwarmError, RuntimeError):
+    """Something does not work in a process that was forked, because its threads or connections are in another:
+    make it anew here, or start processes by ``multiprocessing.get_context("spawn")``."""

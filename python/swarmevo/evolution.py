@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, Callable, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
+from . import _core, arguments
+from .champion import Champion
 from .trials import TrialSet
 
 Floats = NDArray[np.float64]
+
+Evaluate = Callable[[Floats, TrialSet, int], ArrayLike]
+"""Fitness of genotypes ``[P, d]`` in T trials of a set: ``f(genotypes, trial_set, T)`` returns ``[P, T]``, in any
+type of array, list or tuple of numbers; or ``[P]`` if trials do not matter, which counts as one trial."""
+
+CHAMPION_TRIALS = 50
+JUDGEMENT_TRIALS = 200
+"""What experiment files have if they say nothing else."""
 
 
 @dataclass(frozen=True)
@@ -28,35 +38,6 @@ class Generation:
     digest: str
     """A link of a hash chain over all genotypes and fitness so far: equal digests, equal
     runs, bit for bit."""
-
-
-@dataclass(frozen=True, eq=False)
-class Champion:
-    """A genotype worth keeping, and what is known of it."""
-
-    genotype: Floats
-    """``[d]``"""
-    generation: int
-    """Generation after which it was found."""
-    individual: int | None
-    """Its index there; none if it is the mean of the distribution."""
-    trial_fitness: Floats
-    """``[T]``: by which it became a candidate; empty for a mean."""
-    selection: tuple[float, int] | None
-    """Mean on the trials by which it was compared with other candidates, which is
-    optimistic, and their number; none before the first comparison."""
-    judged: tuple[float, float, float, int] | None
-    """What it is worth, on trials that selected nothing: mean, the 95 % interval's lower and
-    upper end, number of trials; none before the end of a run."""
-
-    @property
-    def fitness(self) -> float:
-        """The best that is known: judged, else by selection, else in its generation."""
-        if self.judged is not None:
-            return self.judged[0]
-        if self.selection is not None:
-            return self.selection[0]
-        return float(np.mean(self.trial_fitness))
 
 
 class Evolution:
@@ -84,12 +65,21 @@ class Evolution:
         and :func:`algorithms` list them."""
         if type(self) is Evolution:
             raise TypeError("use the class of an algorithm, such as SNES, or Experiment.evolution")
-        self._core = _core.Evolution(self.algorithm, n_genes, population_size, seed, params)
+        n_genes = arguments.whole(n_genes, "n_genes", 0, arguments.SIZE_MAX)
+        population_size = arguments.whole(population_size, "population_size", 0, arguments.U32_MAX)
+        seed = arguments.whole(seed, "seed")
+        given = {key: arguments.parameter(value, key) for key, value in params.items()}
+        try:
+            self._core = _core.Evolution(self.algorithm, n_genes, population_size, seed, given)
+        except ValueError as error:
+            raise ValueError(_with_hints(str(error), self.algorithm, given)) from None
+        self._trials = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)
 
     @classmethod
-    def _of(cls, core: _core.Evolution) -> Evolution:
+    def _of(cls, core: _core.Evolution, trials: tuple[int, int] = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)) -> Evolution:
         self = cls.__new__(cls)
         self._core = core
+        self._trials = trials
         return self
 
     def ask(self) -> Floats:
@@ -100,13 +90,61 @@ class Evolution:
         """Learns from the fitness of the genotypes that :meth:`ask` gave: ``[P]``, or
         ``[P, T]`` for T trials of each, whose mean counts. Raises ValueError if none is
         finite."""
-        values = np.ascontiguousarray(fitness, dtype=np.float64)
+        values = arguments.numbers(fitness, "fitness")
         if values.ndim == 1:
             values = values[:, np.newaxis]
         if values.ndim != 2:
             raise ValueError(f"fitness is an array [P] or [P, T], not {list(values.shape)}")
         index, best, mean, least, n_non_finite = self._core.tell(values)
         return Generation(index, best, mean, least, n_non_finite, self.digest)
+
+    def compare(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
+        """Compares the candidates for the champion on held-out trials, and makes the winner the champion: the
+        best individual since the last comparison, the mean of the distribution and the champion so far.
+        :func:`evolve` does so every ``champion_every`` generations.
+
+        ``evaluate``: as :func:`evolve` takes it, such as :attr:`Experiment.fitness`. ``trials``: of each block;
+        the experiment's ``champion_trials`` if absent, 50 without an experiment. Returns the champion. Whoever has
+        a fitness that is not finite does not win; if that is everybody, the champion stays.
+        """
+        self._compare(evaluate, self._trials[0] if trials is None else arguments.whole(trials, "trials", 1))
+        champion = self.champion
+        assert champion is not None, "a generation has been told"
+        return champion
+
+    def judge(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
+        """Judges the champion on trials that selected nothing, as :func:`evolve` does at its end; candidates
+        that have not been compared yet are compared before. Evolution goes on as if nobody had judged.
+
+        ``evaluate``: as :meth:`compare` has it. ``trials``: the experiment's ``judgement_trials`` if absent, 200
+        without an experiment. ``judged`` of the champion is none if the fitness of a trial is not finite.
+        """
+        return self._judge(evaluate, self._trials[1] if trials is None else arguments.whole(trials, "trials", 1)).champion
+
+    def _compare(self, evaluate: Evaluate, n_trials: int) -> list[Floats]:
+        """Returns the fitness of all blocks."""
+        candidates = self._core.reevaluation()
+        if candidates is None:
+            raise ValueError("there is nobody to compare before the first `tell`")
+        blocks = []
+        while (asked := candidates.ask()) is not None:
+            genotypes, trial_set = asked
+            blocks.append(compute(evaluate, genotypes, TrialSet(*trial_set), n_trials))
+            candidates.tell(blocks[-1])
+        self._core.set_champion(candidates)
+        return blocks
+
+    def _judge(self, evaluate: Evaluate, n_trials: int) -> Judgement:
+        ended = self.copy()
+        # A comparison that is only the end's is not what a longer run goes on from.
+        blocks = ended._compare(evaluate, self._trials[0]) if self._core.has_challenger else []
+        asked = ended._core.judgement()
+        if asked is None:
+            raise ValueError("there is nobody to judge before the first `tell`")
+        genotypes, trial_set = asked
+        fitness = compute(evaluate, genotypes, TrialSet(*trial_set), n_trials)
+        champion, digest = ended._core.judge(fitness)
+        return Judgement(Champion._of(champion), digest, blocks, fitness)
 
     @property
     def n_generations(self) -> int:
@@ -117,7 +155,7 @@ class Evolution:
     def champion(self) -> Champion | None:
         """The best so far; none before the first :meth:`tell`."""
         champion = self._core.champion
-        return None if champion is None else Champion(**champion)
+        return None if champion is None else Champion._of(champion)
 
     @property
     def mean(self) -> Floats | None:
@@ -136,20 +174,49 @@ class Evolution:
     @classmethod
     def from_json(cls, text: str) -> Evolution:
         """Goes on from :meth:`to_json`, to the same bits."""
-        return cls._of(_core.Evolution.from_json(text))
+        return cls._of(_core.Evolution.from_json(arguments.name_of(text, "the state of an evolution")))
 
     def copy(self) -> Evolution:
         """Another one in the same state."""
-        return type(self)._of(self._core.copy())
+        return type(self)._of(self._core.copy(), self._trials)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"json": self.to_json()}
+        return {"json": self.to_json(), "trials": self._trials}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._core = _core.Evolution.from_json(state["json"])
+        self._trials = state.get("trials", (CHAMPION_TRIALS, JUDGEMENT_TRIALS))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} after {self.n_generations} generations>"
+
+
+class Judgement(NamedTuple):
+    """What came of the end of a run."""
+
+    champion: Champion
+    digest: str
+    blocks: list[Floats]
+    """Fitness of the blocks of a comparison that was only the end's."""
+    fitness: Floats
+    """``[1, T]``: of the champion."""
+
+
+def compute(evaluate: Evaluate, genotypes: Floats, trial_set: TrialSet, n_trials: int) -> Floats:
+    """The fitness ``[P, T]`` by ``evaluate``, checked."""
+    return arguments.fitness_of(evaluate(genotypes, trial_set, n_trials), len(genotypes), n_trials)
+
+
+def _with_hints(problems: str, algorithm: str, given: dict[str, Any]) -> str:
+    """Problems of a setup, with the parameter that a misspelt one may mean."""
+    names = [it.key for it in algorithms()[algorithm]]
+    lines = problems.splitlines()
+    for i, line in enumerate(lines):
+        for key in given:
+            close = difflib.get_close_matches(key, names, 1)
+            if line.endswith(f"has no parameter `{key}`"):
+                lines[i] += f"; did you mean `{close[0]}`?" if close else f"; it has {', '.join(names)}"
+    return "\n".join(lines)
 
 
 class GA(Evolution):

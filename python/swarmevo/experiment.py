@@ -228,7 +228,13 @@ class Experiment:
         coordinator's: the same genotypes for the same fitness, and the same digests."""
         from .evolution import Evolution
 
-        return Evolution._of(self._core.evolution())
+        settings = self._config["algorithm"]
+        trials = (settings["champion_trials"], settings["judgement_trials"])
+        return Evolution._of(self._core.evolution(), trials)
+
+    def fitness(self, genotypes: ArrayLike, trial_set: AnyTrialSet, n_trials: int) -> Floats:
+        """:meth:`evaluate`, in the form that :meth:`Evolution.compare` and :meth:`Evolution.judge` take."""
+        return self.evaluate(genotypes, trial_set, trials=n_trials)
 
     def _genotypes(self, genotypes: ArrayLike) -> tuple[Floats, bool]:
         genes = np.ascontiguousarray(genotypes, dtype=np.float64)

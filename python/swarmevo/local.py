@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .evolution import Champion, Evolution, Generation
+from . import arguments
+from .champion import Champion
+from .evolution import Evaluate, Evolution, Generation, compute
 from .experiment import Experiment
 from .plotting import plot_history
 from .progress import shown
@@ -17,9 +19,6 @@ from .trials import TrialSet
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-Evaluate = Callable[[NDArray[np.float64], TrialSet, int], NDArray[np.float64]]
-"""Fitness ``[P, T]`` of genotypes ``[P, d]`` in T trials of a set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,43 +69,29 @@ def evolve(
 
     ``generations``: instead of the file's. ``threads``: as many as there are processors if
     absent. ``progress``: whether tqdm, if it is installed, shows how far it is.
-    ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`.
+    ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`:
+    ``f(genotypes, trial_set, n_trials)`` returns an array ``[P, T]`` of T = ``n_trials``, of any type of numbers
+    (NumPy, JAX, PyTorch, lists, tuples), or ``[P]`` if trials do not matter, which counts as one trial. Anything
+    else is a ValueError at once. A fitness that is not finite ranks last; a generation without a finite one is a
+    ValueError. What ``evaluate`` raises ends the run, unchanged.
     """
     settings = experiment.to_dict()["algorithm"]
-    n_generations: int = settings["generations"] if generations is None else generations
-    if n_generations < 1:
-        raise ValueError(f"generations are 1 or more, not {n_generations}")
+    n_generations: int = settings["generations"]
+    if generations is not None:
+        n_generations = arguments.whole(generations, "generations", 1)
 
     def here(
         genotypes: NDArray[np.float64], trial_set: TrialSet, n_trials: int
     ) -> NDArray[np.float64]:
         return experiment.evaluate(genotypes, trial_set, trials=n_trials, threads=threads)
 
-    compute = here if evaluate is None else evaluate
-
-    def compare(evolution: Evolution) -> None:
-        candidates = evolution._core.reevaluation()
-        assert candidates is not None, "a generation has been told"
-        while (asked := candidates.ask()) is not None:
-            genotypes, trials = asked
-            candidates.tell(compute(genotypes, TrialSet(*trials), settings["champion_trials"]))
-        evolution._core.set_champion(candidates)
-
+    fitness_by: Evaluate = here if evaluate is None else evaluate
     evolution = experiment.evolution()
     done: list[Generation] = []
     for index in shown(range(n_generations), experiment.name, progress, n_generations):
-        fitness = compute(evolution.ask(), TrialSet.of(index), experiment.n_trials)
+        fitness = compute(fitness_by, evolution.ask(), TrialSet.of(index), experiment.n_trials)
         done.append(evolution.tell(fitness))
         if evolution.n_generations % settings["champion_every"] == 0:
-            compare(evolution)
-    # A comparison that is only the end's is not what a longer run goes on from.
-    ended = evolution.copy()
-    if evolution.n_generations % settings["champion_every"] != 0:
-        compare(ended)
-    asked = ended._core.judgement()
-    assert asked is not None, "a generation has been told"
-    genotypes, trials = asked
-    fitness = compute(genotypes, TrialSet(*trials), settings["judgement_trials"])
-    champion, digest = ended._core.judge(fitness)
-    return LocalRun(experiment, done, Champion(**champion), digest, evolution)
-
+            evolution.compare(fitness_by)
+    judged = evolution._judge(fitness_by, settings["judgement_trials"])
+    return LocalRun(experiment, done, judged.champion, judged.digest, evolution)

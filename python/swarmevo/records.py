@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import protocol
-from .evolution import Champion
+from .champion import Champion, Judged, Selection
 from .experiment import Experiment
 from .plotting import plot_history
 
@@ -236,10 +236,10 @@ def champion_of(message: Any) -> Champion:
         generation=message.generation,
         individual=message.individual if message.HasField("individual") else None,
         trial_fitness=np.array(message.trial_fitness),
-        selection=None if held_out is None else (held_out.mean, held_out.trials),
+        selection=None if held_out is None else Selection(held_out.mean, held_out.trials),
         judged=None
         if judged is None
-        else (judged.mean, judged.low, judged.high, judged.trials),
+        else Judged(judged.mean, judged.low, judged.high, judged.trials),
     )
 
 
