@@ -9,10 +9,10 @@
 
 from ._core import FINGERPRINT
 from ._core import VERSION as __version__
-from .champion import Champion, Judged, Selection
+from .champion import Champion, Judged, Origin, Selection
 from .environment import parallel_env
 from .episodes import Actions, Episodes
-from .errors import ExperimentError, FleetError, ForkError, InternalError, Problem, SwarmError
+from .errors import ExperimentError, FleetError, ForkError, InternalError, OtherExperimentError, Problem, SwarmError
 from .evolution import (
     CMAES,
     GA,
@@ -39,7 +39,7 @@ from .workers import Workers, workers
 __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "ForkError", "GA", "Generation", "Individuals", "InternalError",
-    "Judged", "LocalRun", "Measured", "Network", "OpenAIES", "Problem", "RecordedRun", "Replay", "SNES", "Selection",
+    "Judged", "LocalRun", "Measured", "Network", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "Replay", "SNES", "Selection",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",
     "mirror", "open", "parallel_env", "workers",
 ]

@@ -12,7 +12,7 @@ import reprlib
 from typing import Any, Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def fitness_of(value: Any, n_genotypes: int, n_trials: int) -> Floats:
     return fitness
 
 
-def genotypes_of(value: ArrayLike, n_genes: int) -> tuple[Floats, bool]:
+def genotypes_of(value: Any, n_genes: int) -> tuple[Floats, bool]:
     """Genotypes ``[P, d]``, and whether one ``[d]`` was given."""
     genes = numbers(value, "genotypes")
     is_one = genes.ndim == 1

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Mapping, NamedTuple
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Mapping, NamedTuple, Union
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +32,18 @@ class Judged(NamedTuple):
     n_trials: int
 
 
+class Origin(NamedTuple):
+    """In what a champion was evolved."""
+
+    config_digest: str
+    """Of the experiment file with its seed, and of the simulation: see :attr:`Experiment.config_digest`."""
+    name: str
+    """Of the experiment; it influences nothing."""
+    seed: int | None
+    simulation: str | None
+    """The simulation's ``FINGERPRINT``."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Champion:
     """A genotype worth keeping, and what is known of it."""
@@ -48,8 +63,25 @@ class Champion:
     """What it is worth, on trials that selected nothing: mean, the 95 % interval's lower and
     upper end, number of trials; none before the end of a run, and if a trial's fitness is not finite."""
 
+    origin: Origin | None = None
+    """In what it was evolved; none if that was no experiment. Where a champion meets an experiment, such as in
+    ``experiment.simulate(champion)``, the two are compared: :meth:`Experiment.check`."""
+
     @classmethod
-    def _of(cls, found: Mapping[str, Any]) -> Champion:
+    def from_file(cls, path: str | os.PathLike[str]) -> Champion:
+        """Reads a champion file, as ``swarmctl run`` writes it and ``swarmctl champion --output json`` prints it."""
+        path = Path(path)
+        try:
+            found = json.loads(path.read_text(encoding="utf-8-sig"))
+            champion = _of_document(found)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise ValueError(f"{path} is no champion file: {type(error).__name__}: {error}") from None
+        if champion.genotype.ndim != 1 or not len(champion.genotype):
+            raise ValueError(f"{path} is no champion file: its genotype is no list of numbers")
+        return champion
+
+    @classmethod
+    def _of(cls, found: Mapping[str, Any], origin: Origin | None = None) -> Champion:
         """What the extension knows of it."""
         selection, judged = found["selection"], found["judged"]
         return cls(
@@ -57,8 +89,12 @@ class Champion:
                 **found,
                 "selection": None if selection is None else Selection(*selection),
                 "judged": None if judged is None else Judged(*judged),
+                "origin": origin,
             }
         )
+
+    def _from(self, origin: Origin | None) -> Champion:
+        return replace(self, origin=origin)
 
     @property
     def fitness(self) -> float:
@@ -74,3 +110,25 @@ class Champion:
         known = "judged" if self.judged else "by selection, optimistic" if self.selection else "in its generation, optimistic"
         fitness = "" if self.judged is None and self.selection is None and not len(self.trial_fitness) else f", fitness {self.fitness:.6f} {known}"
         return f"<Champion: {who} of generation {self.generation}, {len(self.genotype)} genes{fitness}>"
+
+
+Genes = Union[ArrayLike, Champion]
+"""A genotype ``[d]``, or a champion, which is compared with the experiment that it meets."""
+
+
+def _of_document(found: Mapping[str, Any]) -> Champion:
+    selection, judged = found.get("selection"), found.get("judged")
+    digest = found.get("config_digest")
+    return Champion(
+        genotype=np.array(found["genotype"], dtype=np.float64),
+        generation=int(found["generation"]),
+        individual=None if found.get("individual") is None else int(found["individual"]),
+        trial_fitness=np.array(found.get("trial_fitness") or [], dtype=np.float64),
+        selection=None if selection is None else Selection(float(selection["mean"]), int(selection["trials"])),
+        judged=None if judged is None else Judged(
+            float(judged["mean"]), float(judged["ci95"][0]), float(judged["ci95"][1]), int(judged["trials"])
+        ),
+        origin=None if digest is None else Origin(
+            str(digest), str(found.get("name", "")), None if found.get("seed") is None else int(found["seed"]), found.get("simulation")
+        ),
+    )

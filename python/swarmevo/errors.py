@@ -36,6 +36,18 @@ class ExperimentError(SwarmError, ValueError):
         return "\n".join(map(str, self.problems))
 
 
+class OtherExperimentError(SwarmError, ValueError):
+    """A champion meets an experiment that it was not evolved in: their configurations have other digests."""
+
+    def __init__(self, reason: str, advice: str) -> None:
+        self.reason = reason
+        """How they differ."""
+        super().__init__(reason, advice)
+
+    def __str__(self) -> str:
+        return f"{self.reason}. {self.args[1]}"
+
+
 class InternalError(SwarmError, RuntimeError):
     """The simulator has panicked: a bug of it, or a state of an evolution that was edited."""
 

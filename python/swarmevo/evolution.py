@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments
-from .champion import Champion
+from .champion import Champion, Origin
 from .trials import TrialSet
 
 Floats = NDArray[np.float64]
@@ -74,12 +74,19 @@ class Evolution:
         except ValueError as error:
             raise ValueError(_with_hints(str(error), self.algorithm, given)) from None
         self._trials = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)
+        self._origin: Origin | None = None
 
     @classmethod
-    def _of(cls, core: _core.Evolution, trials: tuple[int, int] = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)) -> Evolution:
+    def _of(
+        cls,
+        core: _core.Evolution,
+        trials: tuple[int, int] = (CHAMPION_TRIALS, JUDGEMENT_TRIALS),
+        origin: Origin | None = None,
+    ) -> Evolution:
         self = cls.__new__(cls)
         self._core = core
         self._trials = trials
+        self._origin = origin
         return self
 
     def ask(self) -> Floats:
@@ -144,7 +151,7 @@ class Evolution:
         genotypes, trial_set = asked
         fitness = compute(evaluate, genotypes, TrialSet(*trial_set), n_trials)
         champion, digest = ended._core.judge(fitness)
-        return Judgement(Champion._of(champion), digest, blocks, fitness)
+        return Judgement(Champion._of(champion, self._origin), digest, blocks, fitness)
 
     @property
     def n_generations(self) -> int:
@@ -155,7 +162,7 @@ class Evolution:
     def champion(self) -> Champion | None:
         """The best so far; none before the first :meth:`tell`."""
         champion = self._core.champion
-        return None if champion is None else Champion._of(champion)
+        return None if champion is None else Champion._of(champion, self._origin)
 
     @property
     def mean(self) -> Floats | None:
@@ -178,14 +185,15 @@ class Evolution:
 
     def copy(self) -> Evolution:
         """Another one in the same state."""
-        return type(self)._of(self._core.copy(), self._trials)
+        return type(self)._of(self._core.copy(), self._trials, self._origin)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"json": self.to_json(), "trials": self._trials}
+        return {"json": self.to_json(), "trials": self._trials, "origin": self._origin}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._core = _core.Evolution.from_json(state["json"])
         self._trials = state.get("trials", (CHAMPION_TRIALS, JUDGEMENT_TRIALS))
+        self._origin = state.get("origin")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} after {self.n_generations} generations>"

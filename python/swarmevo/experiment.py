@@ -6,13 +6,15 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from . import _core
+from . import _core, arguments
+from .champion import Champion, Genes, Origin
 from .episodes import Episodes
+from .errors import OtherExperimentError
 from .network import Network
 from .trace import Trace
 from .trials import AnyTrialSet, address
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from .evolution import Evolution
 
 Floats = NDArray[np.float64]
+
+THREADS_MAX = 1024
+"""Of one computation."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,9 @@ class Experiment:
     def __init__(self, text: str, name: str = "", seed: int | None = None) -> None:
         """Reads an experiment file's text. ``name`` names it if the text does not, ``seed``
         replaces its seed. Raises :class:`ExperimentError` with all that is wrong."""
+        arguments.name_of(text, "an experiment file")
+        arguments.name_of(name, "name")
+        seed = None if seed is None else arguments.whole(seed, "seed")
         self._core = _core.Experiment(text, name, seed)
         self._json = self._core.to_json()
         self._config: dict[str, Any] = json.loads(self._json)
@@ -69,7 +77,7 @@ class Experiment:
         cls, config: Mapping[str, Any], name: str = "", seed: int | None = None
     ) -> Experiment:
         """Takes what an experiment file says, such as a changed :meth:`to_dict`."""
-        return cls(json.dumps(config), name, seed)
+        return cls(config_text(config), name, seed)
 
     @classmethod
     def quickstart(cls) -> Experiment:
@@ -152,19 +160,31 @@ class Experiment:
         return self._core.measure_names
 
     @property
+    def config_digest(self) -> str:
+        """Of all that decides a bit of a generation: the file but for its name, ``generations``,
+        ``target_fitness`` and ``judgement_trials``, its seed, and the simulation's ``FINGERPRINT``. Champions
+        have that of their experiment: :attr:`Champion.origin`."""
+        return self._core.config_digest
+
+    @property
+    def _origin(self) -> Origin:
+        return Origin(self.config_digest, self.name, self.seed, _core.FINGERPRINT)
+
+    @property
     def warnings(self) -> list[str]:
         """Keys of the file that were accepted and ignored."""
         return self._core.warnings
 
     def evaluate(
         self,
-        genotypes: ArrayLike,
+        genotypes: Genes | Sequence[Champion],
         generation: AnyTrialSet = 0,
         *,
         trials: int | range | None = None,
         threads: int | None = None,
     ) -> Floats:
-        """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``).
+        """Fitness ``[P, T]`` of genotypes ``[P, d]``, or of a list of champions; of one, ``[d]`` or a champion,
+        ``[T]``. Champions are compared with the experiment: :meth:`check`.
 
         ``generation``: in the trials of which generation, or a :class:`TrialSet`.
         ``trials``: how many, or a range of them; the file's number if absent.
@@ -179,7 +199,7 @@ class Experiment:
 
     def measure(
         self,
-        genotypes: ArrayLike,
+        genotypes: Genes | Sequence[Champion],
         generation: AnyTrialSet = 0,
         *,
         trials: int | range | None = None,
@@ -200,7 +220,7 @@ class Experiment:
 
     def simulate(
         self,
-        genotype: ArrayLike,
+        genotype: Genes,
         generation: AnyTrialSet = 0,
         *,
         trials: int | range | None = None,
@@ -219,9 +239,13 @@ class Experiment:
         where = address(generation, trials, self.n_trials)
         return Episodes(self, where, self._core.episodes(where))
 
-    def network(self, genotype: ArrayLike) -> Network:
+    def network(self, genotype: Genes) -> Network:
         """The network that a genotype ``[d]`` encodes."""
         return Network(json.loads(self._core.network_json(self._genotype(genotype))))
+
+    def replace(self, *, seed: int | None = None) -> Experiment:
+        """Another experiment with these changes."""
+        return Experiment(self._json, seed=seed)
 
     def evolution(self) -> Evolution:
         """The experiment's evolution before its first generation, the same as a
@@ -230,25 +254,55 @@ class Experiment:
 
         settings = self._config["algorithm"]
         trials = (settings["champion_trials"], settings["judgement_trials"])
-        return Evolution._of(self._core.evolution(), trials)
+        return Evolution._of(self._core.evolution(), trials, self._origin)
 
-    def fitness(self, genotypes: ArrayLike, trial_set: AnyTrialSet, n_trials: int) -> Floats:
+    def fitness(self, genotypes: Genes | Sequence[Champion], trial_set: AnyTrialSet, n_trials: int) -> Floats:
         """:meth:`evaluate`, in the form that :meth:`Evolution.compare` and :meth:`Evolution.judge` take."""
         return self.evaluate(genotypes, trial_set, trials=n_trials)
 
-    def _genotypes(self, genotypes: ArrayLike) -> tuple[Floats, bool]:
-        genes = np.ascontiguousarray(genotypes, dtype=np.float64)
-        is_one = genes.ndim == 1
-        if is_one:
-            genes = genes[np.newaxis]
-        if genes.ndim != 2 or genes.shape[1] != self.n_genes:
-            raise ValueError(
-                f"genotypes are an array [P, {self.n_genes}], not {list(np.shape(genotypes))}"
-            )
-        return genes, is_one
+    def check(self, champion: Champion) -> None:
+        """Whether a champion was evolved in this experiment: its file (but for its name, ``generations``,
+        ``target_fitness`` and ``judgement_trials``), seed and simulation, by their digest.
+        :class:`OtherExperimentError` if not. Every function that takes a champion does so.
 
-    def _genotype(self, genotype: ArrayLike) -> Floats:
-        genes = np.ascontiguousarray(genotype, dtype=np.float64)
+        Under other conditions, knowingly, give the champion's ``genotype``, which says nothing of where it is from.
+        """
+        origin = champion.origin
+        if origin is None:
+            raise OtherExperimentError(
+                "the champion does not say in what experiment it was evolved", "Give its `genotype` if it is of this one"
+            )
+        if origin.config_digest == self.config_digest:
+            return
+        raise OtherExperimentError(
+            f"the champion was evolved in another experiment: {origin.name or 'one without a name'}"
+            f"{'' if origin.seed is None else f', seed {origin.seed}'}, configuration {origin.config_digest[:12]}; "
+            f"this is {self.name}, seed {self.seed}, configuration {self.config_digest[:12]}",
+            self._difference(origin),
+        )
+
+    def _difference(self, origin: Origin) -> str:
+        if origin.simulation not in (None, _core.FINGERPRINT):
+            return (
+                f"It was evolved by the simulation `{origin.simulation}`, and this is `{_core.FINGERPRINT}`; "
+                f"give its `genotype` if you want to see what it does in this one"
+            )
+        if origin.seed is not None and origin.seed != self.seed and self.replace(seed=origin.seed).config_digest == origin.config_digest:
+            return f"Only the seed differs: read this experiment with seed={origin.seed}"
+        return "Read the experiment that it was evolved in, or give its `genotype` to see it under other conditions"
+
+    def _genotypes(self, genotypes: Genes | Sequence[Champion]) -> tuple[Floats, bool]:
+        if isinstance(genotypes, Champion):
+            return self._genotype(genotypes)[np.newaxis], True
+        if isinstance(genotypes, (list, tuple)) and any(isinstance(it, Champion) for it in genotypes):
+            return np.array([self._genotype(it) for it in genotypes]), False
+        return arguments.genotypes_of(genotypes, self.n_genes)
+
+    def _genotype(self, genotype: Genes) -> Floats:
+        if isinstance(genotype, Champion):
+            self.check(genotype)
+            genotype = genotype.genotype
+        genes = arguments.numbers(genotype, "the genotype")
         if genes.shape != (self.n_genes,):
             raise ValueError(f"a genotype has {self.n_genes} genes, not {list(genes.shape)}")
         return genes
@@ -257,9 +311,22 @@ class Experiment:
 def _threads(threads: int | None) -> int:
     if threads is None:
         return available_cpus()
-    if threads < 1:
-        raise ValueError(f"threads are 1 or more, not {threads}")
-    return threads
+    return arguments.whole(threads, "threads", 1, THREADS_MAX)
+
+
+def config_text(config: Mapping[str, Any]) -> str:
+    """What an experiment file says, as text; arrays and numbers of NumPy are lists and numbers."""
+    if not isinstance(config, Mapping):
+        raise ValueError(f"an experiment is a mapping from keys to values, not {type(config).__name__}")
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, (np.ndarray, np.generic)):
+            return value.tolist()
+        if isinstance(value, Mapping):
+            return dict(value)
+        raise ValueError(f"an experiment file has no values such as {value!r}, a {type(value).__name__}")
+
+    return json.dumps(config if isinstance(config, dict) else dict(config), default=plain)
 
 
 def available_cpus() -> int:

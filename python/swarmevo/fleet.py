@@ -6,13 +6,14 @@ import time
 import uuid
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence
 from urllib.parse import urlsplit
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from . import _core, protocol
+from . import _core, arguments, protocol
+from .champion import Champion, Genes
 from .errors import ExperimentError, FleetError
 from .experiment import Experiment
 from .progress import shown
@@ -162,7 +163,7 @@ class Client(Records):
     def evaluate(
         self,
         experiment: Experiment,
-        genotypes: ArrayLike,
+        genotypes: Genes | Sequence[Champion],
         generation: AnyTrialSet = 0,
         *,
         trials: int | None = None,

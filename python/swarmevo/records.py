@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from . import protocol
-from .champion import Champion, Judged, Selection
+from . import arguments, protocol
+from .champion import Champion, Judged, Origin, Selection
 from .experiment import Experiment
 from .plotting import plot_history
 
@@ -53,8 +53,8 @@ class Records(ABC):
     def run(self, experiment: int | str) -> RecordedRun:
         """The experiment of a number, or the one of a name. KeyError if there is none, or
         several of that name."""
-        if isinstance(experiment, int):
-            run = self._run(experiment)
+        if not isinstance(experiment, str):
+            run = self._run(arguments.whole(experiment, "an experiment is a name, or a number: it", 1))
             run.refresh()
             return run
         found = [it.id for it in self._call("ListExperiments").experiments if it.name == experiment]
@@ -63,14 +63,18 @@ class Records(ABC):
             raise KeyError(f"{which} named {experiment!r}; name one by its number")
         return self._run(found[0])
 
-    def individual(self, address: str) -> Champion:
+    def individual(self, address: str | int) -> Champion:
         """Whoever is at an address, bit for bit: ``3`` is the champion of experiment 3,
         ``3@5/7`` individual 7 of its generation 5, ``3@5/mean`` the mean of the distribution
         after that."""
-        found = self._call("GetIndividuals", address=address).individuals
-        if len(found) != 1:
+        if not isinstance(address, str):
+            address = str(arguments.whole(address, "an address is a text such as 3@5/7, or a number: it", 1))
+        if "@" in address and "/" not in address:
             raise ValueError(f"`{address}` is a generation; name one of it, such as {address}/0")
-        return champion_of(found[0])
+        found = self._call("GetIndividuals", address=address).individuals
+        number = address.partition("@")[0]
+        of = self._call("GetExperiment", experiment_id=int(number)).experiment
+        return champion_of(found[0])._from(Origin(of.config_digest, of.name, of.seed, of.simulation))
 
     @abstractmethod
     def _run(self, experiment_id: int) -> RecordedRun: ...
@@ -172,14 +176,17 @@ class RecordedRun:
 
     def individual(self, generation: int, index: int) -> Champion:
         """An individual of any generation."""
+        generation, index = arguments.whole(generation, "generation"), arguments.whole(index, "index", 0, arguments.U32_MAX)
         return self._records.individual(f"{self.id}@{generation}/{index}")
 
     def mean(self, generation: int) -> Floats:
         """``[d]``: the mean of the distribution after a generation."""
+        generation = arguments.whole(generation, "generation")
         return self._records.individual(f"{self.id}@{generation}/mean").genotype
 
     def individuals(self, generation: int) -> Individuals:
         """All individuals of a generation, with what evolution was told of them."""
+        generation = arguments.whole(generation, "generation")
         genotypes: list[Any] = []
         fitness: list[Any] = []
         next_individual: int | None = 0

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple, Union
 
+from . import arguments
+
+KINDS = ("generation", "held_out", "judgement", "evaluation")
+
 
 class TrialSet(NamedTuple):
     """Worlds and noise. A generation's number means the set of that generation.
@@ -28,17 +32,17 @@ class TrialSet(NamedTuple):
     @classmethod
     def generation_of(cls, generation: int) -> TrialSet:
         """The trials that generation ``generation`` is selected by."""
-        return cls("generation", generation)
+        return cls.of(cls("generation", generation))
 
     @classmethod
     def held_out(cls, generation: int, block: int = 0) -> TrialSet:
         """Trials that candidates for the champion are compared by after a generation."""
-        return cls("held_out", generation, block)
+        return cls.of(cls("held_out", generation, block))
 
     @classmethod
     def judgement(cls, generation: int) -> TrialSet:
         """Trials that say what the champion is worth after the last generation."""
-        return cls("judgement", generation)
+        return cls.of(cls("judgement", generation))
 
     @classmethod
     def evaluation(cls) -> TrialSet:
@@ -48,8 +52,15 @@ class TrialSet(NamedTuple):
     @classmethod
     def of(cls, trials: AnyTrialSet) -> TrialSet:
         """``trials`` itself, or the set of the generation of that number."""
-        return trials if isinstance(trials, TrialSet) else cls("generation", int(trials))
+        if not isinstance(trials, TrialSet):
+            return cls("generation", arguments.whole(trials, "generation"))
+        arguments.known([trials.kind], KINDS, "trial set")
+        generation = arguments.whole(trials.generation, "generation of a trial set")
+        return cls(trials.kind, generation, arguments.whole(trials.block, "block of a trial set", 0, 255))
 
+
+TRIALS_MAX = 1000
+"""Trials of a set."""
 
 AnyTrialSet = Union[int, TrialSet]
 """A trial set, or the number of a generation."""
@@ -61,7 +72,10 @@ def address(
     """What the extension takes: set and range of trials."""
     if trials is None:
         trials = default
-    chosen = range(trials) if isinstance(trials, int) else trials
-    if chosen.step != 1 or len(chosen) == 0 or chosen.start < 0:
-        raise ValueError(f"trials are a number above 0 or a range such as range(5, 10), not {trials}")
-    return (*TrialSet.of(trial_set), chosen.start, chosen.stop)
+    if not isinstance(trials, range):
+        trials = range(arguments.whole(trials, "trials: a number, or a range such as range(5, 10); it", 1, TRIALS_MAX))
+    if trials.step != 1 or len(trials) == 0 or trials.start < 0 or trials.stop > TRIALS_MAX:
+        raise ValueError(
+            f"trials are a number from 1 to {TRIALS_MAX} or a range within it such as range(5, 10), not {trials}"
+        )
+    return (*TrialSet.of(trial_set), trials.start, trials.stop)

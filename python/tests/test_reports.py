@@ -51,7 +51,7 @@ def short(tmp_path_factory):
 def reported(short, tmp_path_factory):
     """The report on it, computed here."""
     directory = tmp_path_factory.mktemp("here")
-    made = command(short[0], "--config", short[1], "--trials", 2, "-o", directory)
+    made = command(short[0], "--config", short[1], "--changed-conditions", "--trials", 2, "-o", directory)
     assert made.returncode == 0, made.stderr
     assert made.stdout == f"{directory / 'report.html'}\n"
     return directory
@@ -67,13 +67,20 @@ def test_one_command_reports_on_a_champion_file(short, reported, tmp_path):
 
 def test_what_cannot_be_reported_on_is_one_line(short, tmp_path):
     champion, config = short
+    (tmp_path / "half.json").write_text('{"genotype": [0.5]}')
     without = command(champion, "-o", tmp_path)
     assert without.returncode == 2 and "a champion file needs --config" in without.stderr
     for arguments, says in (
         ((champion, "--config", tmp_path / "none.json"), "none.json"),
-        ((champion, "--config", PROJECT / "configs/quickstart.json"), "a genotype has 424 genes, not [445]"),
+        ((champion, "--config", PROJECT / "configs/quickstart.json"), "evolved in another experiment"),
+        (
+            (champion, "--config", PROJECT / "configs/quickstart.json", "--changed-conditions"),
+            "a genotype has 424 genes, not [445]",
+        ),
+        ((champion, "--config", config), "--changed-conditions reports on it"),
+        ((tmp_path / "half.json", "--config", config), "is no champion file"),
         (("1@3/2", "--data-dir", tmp_path), str(tmp_path)),
-        ((champion, "--config", config, "--trials", 1), "2 or more trials"),
+        ((champion, "--config", config, "--changed-conditions", "--trials", 1), "from 2 to 1000"),
     ):
         refused = command(*arguments, "-o", tmp_path / "report")
         assert refused.returncode == 1 and refused.stderr.startswith("error: ") and says in refused.stderr
@@ -99,7 +106,8 @@ def test_conditions_and_lesions_of_a_fleet_are_those_computed_here(programs, sho
     with fleet(programs, tmp_path) as running:
         running.start_worker()
         made = command(
-            champion, "--config", config, "--trials", 2, "--fleet", "-o", tmp_path / "report", SWARM_COORDINATOR=running.url
+            champion, "--config", config, "--changed-conditions", "--trials", 2, "--fleet", "-o", tmp_path / "report",
+            SWARM_COORDINATOR=running.url,
         )
         assert made.returncode == 0, made.stderr
         assert files(tmp_path / "report") == files(reported)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
-from ..errors import SwarmError
+from ..champion import Champion
+from ..errors import OtherExperimentError, SwarmError
 from ..experiment import Experiment
 from ..files import open as open_archive
 from ..fleet import connect
@@ -17,7 +17,11 @@ from .report import report
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m swarmevo.analysis", description="Writes a report on how a genotype does it.")
     parser.add_argument("genotype", help="champion file, or an address such as 3 or 3@5/7")
-    parser.add_argument("--config", type=Path, help="experiment file of a champion file")
+    parser.add_argument("--config", type=Path, help="experiment file; a champion file needs it, and its seed replaces the file's")
+    parser.add_argument(
+        "--changed-conditions", action="store_true",
+        help="report on the genotype in an experiment that it was not evolved in",
+    )
     parser.add_argument("--data-dir", type=Path, help="read addresses from this directory instead of a coordinator")
     parser.add_argument("--fleet", action="store_true", help="evaluate other conditions on the coordinator's fleet")
     parser.add_argument("--trials", type=int, default=50, help="episodes (%(default)s)")
@@ -27,24 +31,27 @@ def main() -> int:
         if Path(arguments.genotype).is_file():
             if arguments.config is None:
                 parser.error("a champion file needs --config, the experiment file that it was evolved with")
-            champion = json.loads(Path(arguments.genotype).read_text(encoding="utf-8"))
-            experiment, genotype = Experiment.from_file(arguments.config), champion["genotype"]
+            champion = Champion.from_file(arguments.genotype)
         else:
             records = connect() if arguments.data_dir is None else open_archive(arguments.data_dir)
-            experiment = records.run(_run_of(arguments.genotype)).experiment
-            genotype = records.individual(arguments.genotype).genotype
+            champion = records.individual(arguments.genotype)
+        if arguments.config is None:
+            experiment = records.run(int(arguments.genotype.partition("@")[0])).experiment
+        else:
+            seed = None if champion.origin is None else champion.origin.seed
+            experiment = Experiment.from_file(arguments.config, seed)
+        if not arguments.changed_conditions:
+            experiment.check(champion)
         client = connect() if arguments.fleet else None
         title = f"{experiment.name}: {Path(arguments.genotype).stem}"
-        print(report(experiment, genotype, arguments.output, title=title, trials=arguments.trials, client=client))
+        print(report(experiment, champion.genotype, arguments.output, title=title, trials=arguments.trials, client=client))
+    except OtherExperimentError as error:
+        print(f"error: {error.reason}; --changed-conditions reports on it in this one all the same", file=sys.stderr)
+        return 1
     except (SwarmError, OSError, ValueError, KeyError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     return 0
-
-
-def _run_of(address: str) -> int | str:
-    experiment = address.partition("@")[0]
-    return int(experiment) if experiment.isdecimal() else experiment
 
 
 if __name__ == "__main__":

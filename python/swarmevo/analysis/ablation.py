@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
 from ..network import Network
@@ -39,7 +40,7 @@ class Lesion:
 
 def ablation(
     experiment: Experiment,
-    genotype: ArrayLike,
+    genotype: Genes,
     parts: Parts = "neurons",
     *,
     trials: int = 50,
@@ -55,7 +56,7 @@ def ablation(
     In trials that had no part in evolution, here or on the fleet of ``client``. Raises ``ValueError``
     if weights of a part are not the genotype's, or have no gene that gives 0.
     """
-    genes = np.asarray(genotype, np.float64)
+    genes = experiment._genotype(genotype)
     network = experiment.network(genes)
     named = _parts(network, parts)
     where, zero = synapse_genes(experiment)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..episodes import Actions, Episodes
+from ..champion import Genes
 from ..experiment import Experiment
 from ..trials import AnyTrialSet, TrialSet
 
@@ -43,7 +44,7 @@ class Influence:
 
 def influence(
     experiment: Experiment,
-    genotype: ArrayLike,
+    genotype: Genes,
     steps: Iterable[int],
     *,
     replace: Replacement = 0.0,
@@ -99,7 +100,7 @@ class Attention:
 
 def attention(
     experiment: Experiment,
-    genotype: ArrayLike,
+    genotype: Genes,
     steps: Iterable[int],
     *,
     sensor: str = "wireless_receiver",
@@ -150,12 +151,12 @@ class _Case:
     """Which counterfactuals are asked for, and the episodes as they were."""
 
     def __init__(
-        self, experiment: Experiment, genotype: ArrayLike, steps: Iterable[int], agents: Iterable[int] | None,
+        self, experiment: Experiment, genotype: Genes, steps: Iterable[int], agents: Iterable[int] | None,
         trials: int, trial_set: AnyTrialSet | None, window: int, lasting: int,
     ) -> None:
         if not 1 <= lasting <= window + 1:
             raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
-        self._experiment, self._genotype = experiment, genotype
+        self._experiment, self._genotype = experiment, experiment._genotype(genotype)
         self._trials, self._window = trials, window
         self._where = TrialSet.evaluation() if trial_set is None else trial_set
         episodes = self._episodes()
@@ -171,7 +172,7 @@ class _Case:
         self.robots = [episodes.agents[agent] for agent in self._chosen]
         self.shape = (trials, len(self.steps), len(self._chosen))
         self.real = _Course(experiment.n_steps)
-        self.real.run(episodes, genotype)
+        self.real.run(episodes, self._genotype)
 
     def places(self) -> Iterator[tuple[tuple[slice, int, int], int, int]]:
         """Where the results of a step and an agent belong."""

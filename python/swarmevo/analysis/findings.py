@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
 from ..trace import Trace
@@ -69,8 +70,9 @@ class Findings:
     """Where the network goes alone, under the inputs that come most often; of rate neurons."""
 
 
-def findings(experiment: Experiment, genotype: Floats, *, trials: int, client: Client | None = None) -> Findings:
+def findings(experiment: Experiment, genotype: Genes, *, trials: int, client: Client | None = None) -> Findings:
     """Measures all of it; some 30 s of processor time for 10 robots and 300 steps, 50 trials."""
+    genotype = experiment._genotype(genotype)
     trace = experiment.simulate(genotype, TrialSet.evaluation(), trials=trials)
     sensors = _sensors(experiment)
     inputs = sorted((_input(experiment, genotype, trace, it) for it in sensors), key=lambda it: float(it.change.mean()))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import ExperimentError
+from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
 from ..trials import TrialSet
@@ -37,7 +37,7 @@ class Condition:
 
 
 def generalisation(
-    experiment: Experiment, genotype: ArrayLike, *, trials: int = 50, client: Client | None = None
+    experiment: Experiment, genotype: Genes, *, trials: int = 50, client: Client | None = None
 ) -> list[Condition]:
     """Fitness under every condition that the experiment has: as it is; in other sets of as many trials; with
     half to five times as many robots, in the same world and in one that grows with them; as many robots
@@ -47,7 +47,7 @@ def generalisation(
     But for the other sets, all in trials with the same numbers, which had no part in evolution. ``client``:
     evaluate on its fleet.
     """
-    genes = np.asarray(genotype, dtype=np.float64)[np.newaxis]
+    genes = experiment._genotype(genotype)[np.newaxis]
     found = []
     for what, value, config in _conditions(experiment.to_dict()):
         trial_set = TrialSet.generation_of(TRIALS_OF.generation + int(value) - 1) if what == SETS else TRIALS_OF

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from .. import arguments
+from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
+from ..trials import TRIALS_MAX
 from .answer import answer
 from .channel import FIRST, informants, symbols
 from .drawing import canvas, raster, style
@@ -24,7 +26,7 @@ from .wording import mean, message, percent
 
 def report(
     experiment: Experiment,
-    genotype: ArrayLike,
+    genotype: Genes,
     directory: str | os.PathLike[str],
     *,
     title: str | None = None,
@@ -36,11 +38,11 @@ def report(
     ``trials`` episodes of the set of evaluations are simulated, which had no part in evolution, and
     as many for every input and every part of the network that is taken away. Other conditions and lesions are
     evaluated on the fleet of ``client``, if there is one. Needs SciPy and Matplotlib (``analysis``, ``plot``).
-    Raises ``ValueError`` for one trial, which has no intervals.
+    Raises ``ValueError`` for one trial, which has no intervals, and :class:`~swarmevo.OtherExperimentError` for a
+    champion of another experiment; a report on one under changed conditions takes its ``genotype``.
     """
-    if trials < 2:
-        raise ValueError(f"a report takes 2 or more trials, for intervals, not {trials}")
-    found = findings(experiment, np.asarray(genotype, dtype=np.float64), trials=trials, client=client)
+    trials = arguments.whole(trials, "trials of a report, which need intervals: their number", 2, TRIALS_MAX)
+    found = findings(experiment, genotype, trials=trials, client=client)
     trace = found.trace
     page = Page(title or experiment.name, Path(directory))
     page.text(

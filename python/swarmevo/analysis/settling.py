@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..champion import Genes
 from ..experiment import Experiment
 from ..trace import Trace
 from .channel import FIRST
@@ -29,7 +30,7 @@ class Settled:
     """Least and largest rate of each neuron of an output there."""
 
 
-def settled(experiment: Experiment, genotype: Floats, trace: Trace, most: int = 6) -> list[Settled]:
+def settled(experiment: Experiment, genotype: Genes, trace: Trace, most: int = 6) -> list[Settled]:
     """For the ``most`` inputs that come most often from step 10 on; nothing for networks of other
     neurons than ``rate_model``."""
     network = experiment.network(genotype)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...champion import Champion as Evolved
 from ...experiment import Experiment, Measured
 from ...trace import Trace
 from ...trials import TrialSet
@@ -37,13 +37,18 @@ class Champion:
     @cached_property
     def experiment(self) -> Experiment:
         """As it was evolved."""
-        return Experiment.from_file(self.configs / f"{self.name}_snes.json")
+        experiment = Experiment.from_file(self.configs / f"{self.name}_snes.json", self.seed)
+        experiment.check(self._evolved)
+        return experiment
+
+    @cached_property
+    def _evolved(self) -> Evolved:
+        return Evolved.from_file(self.results / "champions" / f"{self.name}_snes-{self.seed}.json")
 
     @cached_property
     def genotype(self) -> Floats:
         """``[d]``"""
-        text = (self.results / "champions" / f"{self.name}_snes-{self.seed}.json").read_text(encoding="utf-8")
-        return np.array(json.loads(text)["genotype"])
+        return self._evolved.genotype
 
     def under(self, **changes: Any) -> Experiment:
         """The experiment with :func:`~swarmevo.analysis.variants.variant`'s changes."""
