@@ -21,7 +21,7 @@ pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
     exception(py, "ExperimentError", (problems.collect::<Vec<_>>(),))
 }
 
-/// A request that is refused: `FleetError`, with the name of the status.
+/// A request that is refused: `FleetError`, or one of its kinds, with the name of the status.
 pub fn refused(py: Python<'_>, status: &Status) -> PyErr {
     let mut code = String::new();
     for (i, letter) in format!("{:?}", status.code()).chars().enumerate() {
@@ -30,7 +30,7 @@ pub fn refused(py: Python<'_>, status: &Status) -> PyErr {
         }
         code.push(letter.to_ascii_uppercase());
     }
-    exception(py, "FleetError", (code, status.message()))
+    exception(py, "refused", (code, status.message()))
 }
 
 /// What the caller asked for cannot be simulated.

@@ -24,6 +24,7 @@ mod _core {
         evolution::{Evolution, Reevaluation, algorithms},
         experiment::{Experiment, inline_script, script_path},
         genes::encode_genes,
+        memory::ensure_memory,
         stepping::Episodes,
         workers::Worker,
     };

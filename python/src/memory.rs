@@ -6,6 +6,13 @@ use std::fs;
 use pyo3::{exceptions::PyMemoryError, prelude::*};
 
 /// Raises `MemoryError` if there is no room for so many bytes. `what`: who takes them.
+#[pyfunction(name = "ensure_memory")]
+#[expect(clippy::needless_pass_by_value, reason = "numbers from Python")]
+pub fn ensure_memory(bytes: u128, what: String) -> PyResult<()> {
+    ensure(bytes, &what)
+}
+
+/// As `ensure_memory`.
 pub fn ensure(bytes: u128, what: &str) -> PyResult<()> {
     let free = free();
     let fits = free.is_none_or(|free| bytes <= free);

@@ -3,6 +3,7 @@
 
 use std::{
     any::Any,
+    io,
     panic::{AssertUnwindSafe, catch_unwind},
     process,
     sync::{
@@ -30,6 +31,7 @@ enum Failure {
     Evaluate(EvaluateError),
     Panic(String),
     Signal(PyErr),
+    NoThread(io::Error),
 }
 
 /// Computes `work` of 0..`n_items` on `n_threads` threads and returns the results in order.
@@ -61,17 +63,23 @@ pub fn compute<T: Send>(
     let computed = py.detach(|| {
         thread::scope(|scope| {
             let (outbox, inbox) = mpsc::channel();
-            for _ in 0..n_threads.min(n_items) {
+            let mut failure = None;
+            for number in 0..n_threads.min(n_items) {
                 let outbox = outbox.clone();
                 let work_off = &work_off;
-                scope.spawn(move || {
+                let started = thread::Builder::new().spawn_scoped(scope, move || {
                     let outcome = catch_unwind(AssertUnwindSafe(work_off));
                     // The receiver reads until all senders are gone.
                     let _ = outbox.send(outcome);
                 });
+                // Fewer threads than were asked for give the same bits.
+                if let Err(error) = started {
+                    failure = (number == 0).then_some(Failure::NoThread(error));
+                    break;
+                }
             }
             drop(outbox);
-            let (mut results, mut failure) = (Vec::with_capacity(n_items), None);
+            let mut results = Vec::new();
             loop {
                 let failed = match inbox.recv_timeout(SIGNAL_INTERVAL) {
                     Ok(Ok(Ok(done))) => {
@@ -102,6 +110,7 @@ pub fn compute<T: Send>(
         Err(Failure::Evaluate(error)) => Err(evaluate_error(&error)),
         Err(Failure::Panic(message)) => Err(panic_error(py, &message)),
         Err(Failure::Signal(error)) => Err(error),
+        Err(Failure::NoThread(error)) => Err(error.into()),
     }
 }
 

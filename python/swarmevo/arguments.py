@@ -9,7 +9,7 @@ import difflib
 import math
 import operator
 import reprlib
-from typing import Any, Iterable
+from typing import Any, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,13 @@ def known(given: Iterable[str], names: Iterable[str], what: str) -> None:
         )
 
 
+def misspelt(given: Iterable[str], names: Iterable[str], what: str) -> None:
+    """That nothing that is given looks like one of the names without being one: others may have their own."""
+    names = list(names)
+    meant = [it for it in given if it not in names and isinstance(it, str) and difflib.get_close_matches(it, names)]
+    known(meant, names, what)
+
+
 def numbers(value: Any, name: str, dtype: Any = np.float64) -> NDArray[Any]:
     """An array of numbers, from whatever array, list or tuple of real numbers; in row order."""
     try:
@@ -108,14 +115,27 @@ def array_of(value: Any, name: str, shape: tuple[int, ...], dtype: Any = np.floa
     """An array of numbers that has this shape. An integer type takes whole numbers only."""
     array = numbers(value, name)
     if array.shape != shape:
-        raise ValueError(f"{name} is an array {list(shape)}, not {list(array.shape)}")
+        raise ValueError(f"{name}: an array {list(shape)} is needed, not {list(array.shape)}")
     if np.issubdtype(dtype, np.floating):
         return array.astype(dtype)
     info = (0, 1) if dtype is np.bool_ else (np.iinfo(dtype).min, np.iinfo(dtype).max)
     fits = (array == np.floor(array)) & (array >= info[0]) & (array <= info[1])
     if not fits.all():
-        raise ValueError(f"{name} has whole numbers from {info[0]} to {info[1]}, not {array[~fits][0]}")
+        raise ValueError(f"{name}: whole numbers from {info[0]} to {info[1]} are needed, not {array[~fits].flat[0]:g}")
     return array.astype(dtype)
+
+
+def plain(value: Any) -> Any:
+    """A value of an experiment file; arrays and numbers of other libraries are lists and numbers."""
+    if value is None or isinstance(value, (bool, int, float, str, dict, list)):
+        return value
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, (tuple, set, frozenset)):
+        return list(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise ValueError(f"an experiment file has no values such as {reprlib.repr(value)}, a {type(value).__name__}")
 
 
 def fitness_of(value: Any, n_genotypes: int, n_trials: int) -> Floats:

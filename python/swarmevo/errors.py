@@ -56,7 +56,8 @@ class FleetError(SwarmError):
     """The coordinator has refused a request, or cannot be reached.
 
     ``code`` is the name of the gRPC status, such as ``"NOT_FOUND"``; ``docs/clients.md``
-    says what each means.
+    says what each means. What would be a ValueError or KeyError here is one there, too: :class:`RefusedArgument`,
+    :class:`NotFound`.
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -65,6 +66,20 @@ class FleetError(SwarmError):
 
     def __str__(self) -> str:
         return str(self.args[1])
+
+
+class RefusedArgument(FleetError, ValueError):
+    """An argument does not fit: ``INVALID_ARGUMENT`` or ``OUT_OF_RANGE``."""
+
+
+class NotFound(FleetError, KeyError):
+    """There is no such experiment, or nothing of it yet: ``NOT_FOUND``."""
+
+
+def refused(code: str, message: str) -> FleetError:
+    """The error of a status."""
+    kinds = {"INVALID_ARGUMENT": RefusedArgument, "OUT_OF_RANGE": RefusedArgument, "NOT_FOUND": NotFound}
+    return kinds.get(code, FleetError)(code, message)
 
 
 class ForkError(SwarmError, RuntimeError):

@@ -209,6 +209,8 @@ class Experiment:
         genes, is_one = self._genotypes(genotypes)
         where = address(generation, trials, self.n_trials)
         n_trials = where[4] - where[3]
+        n_values = len(genes) * n_trials * (1 + self.n_steps * len(self.measure_names))
+        _core.ensure_memory(2 * 8 * n_values, f"measures of {len(genes)} genotypes in {n_trials} trials")
         values = self._core.measure(genes, where, _threads(threads))
         values = values.reshape(len(genes), n_trials, -1)
         names = self.measure_names
@@ -229,6 +231,7 @@ class Experiment:
         """Everything that there is to see of a genotype ``[d]`` in T trials."""
         genes = self._genotype(genotype)
         where = address(generation, trials, self.n_trials)
+        _core.ensure_memory(self._trace_len(where[4] - where[3]), f"a trace of {where[4] - where[3]} trials")
         arrays = self._core.simulate(genes, where, _threads(threads))
         return Trace(self, genes, where, arrays)
 
@@ -243,9 +246,49 @@ class Experiment:
         """The network that a genotype ``[d]`` encodes."""
         return Network(json.loads(self._core.network_json(self._genotype(genotype))))
 
-    def replace(self, *, seed: int | None = None) -> Experiment:
-        """Another experiment with these changes."""
-        return Experiment(self._json, seed=seed)
+    def replace(
+        self,
+        *,
+        name: str | None = None,
+        seed: int | None = None,
+        generations: int | None = None,
+        population_size: int | None = None,
+        algorithm: str | type[Evolution] | None = None,
+        params: Mapping[str, Any] | None = None,
+        **settings: Any,
+    ) -> Experiment:
+        """Another experiment, with these changes.
+
+        ``algorithm``: its class or its name in experiment files, such as ``"CMA-ES"``; parameters of the one before go, and
+        ``params`` has those that shall not be its defaults, for all populations. ``params`` without ``algorithm``
+        changes parameters of the algorithm that the experiment has. ``settings``: any other key of ``algorithm``
+        in the file, such as ``num_evaluations`` or ``evaluation_steps``. Raises :class:`ExperimentError` with all
+        that is wrong.
+
+        >>> experiment = Experiment.quickstart().replace(algorithm="CMA-ES", seed=7, params={"sigma_init": 0.1})
+        >>> experiment.to_dict()["algorithm"]["name"], experiment.seed
+        ('CMA-ES', 7)
+        """
+        config = self.to_dict()
+        of = config["algorithm"]
+        algorithm = getattr(algorithm, "algorithm", algorithm)
+        arguments.known(settings, [key for key in of if key not in ("name", "populations")] + ["target_fitness"], "setting of `algorithm`")
+        for key, value in (("generations", generations), ("population_size", population_size)):
+            if value is not None:
+                of[key] = arguments.whole(value, key, 1)
+        of |= {key: arguments.plain(value) for key, value in settings.items()}
+        for population in of["populations"].values():
+            old = population["params"]
+            if algorithm is not None and algorithm != of["name"]:
+                old = {key: value for key, value in old.items() if key not in parameters_of(of["name"])}
+            given = {key: arguments.parameter(value, key) for key, value in (params or {}).items()}
+            population["params"] = old | given
+        of["name"] = of["name"] if algorithm is None else arguments.name_of(algorithm, "algorithm")
+        if seed is not None:
+            config["seed"] = arguments.whole(seed, "seed")
+        if name is not None:
+            config["name"] = arguments.name_of(name, "name")
+        return Experiment(config_text(config))
 
     def evolution(self) -> Evolution:
         """The experiment's evolution before its first generation, the same as a
@@ -259,6 +302,19 @@ class Experiment:
     def fitness(self, genotypes: Genes | Sequence[Champion], trial_set: AnyTrialSet, n_trials: int) -> Floats:
         """:meth:`evaluate`, in the form that :meth:`Evolution.compare` and :meth:`Evolution.judge` take."""
         return self.evaluate(genotypes, trial_set, trials=n_trials)
+
+    def _trace_len(self, n_trials: int) -> int:
+        """About how many bytes a trace takes while it is made."""
+        topology = self._config["topology"]
+        widths = [sum(it["n"] for it in topology[key].values()) for key in ("stimuli", "ensembles")]
+        emitters = [
+            it["actuators"].get("wireless_transmitter") or {}
+            for it in self._config["world"]["objects"].values() if it["type"] == "robot"
+        ]
+        message_len = max((it.get("msg_length", 0) for it in emitters), default=0)
+        of_robot = 74 + 16 * message_len + 4 * widths[0] + 8 * widths[1]
+        total: int = 2 * n_trials * self.n_steps * (of_robot * self.n_robots + 8 * (8 + len(self.measure_names)))
+        return total
 
     def check(self, champion: Champion) -> None:
         """Whether a champion was evolved in this experiment: its file (but for its name, ``generations``,
@@ -319,14 +375,10 @@ def config_text(config: Mapping[str, Any]) -> str:
     if not isinstance(config, Mapping):
         raise ValueError(f"an experiment is a mapping from keys to values, not {type(config).__name__}")
 
-    def plain(value: Any) -> Any:
-        if isinstance(value, (np.ndarray, np.generic)):
-            return value.tolist()
-        if isinstance(value, Mapping):
-            return dict(value)
-        raise ValueError(f"an experiment file has no values such as {value!r}, a {type(value).__name__}")
-
-    return json.dumps(config if isinstance(config, dict) else dict(config), default=plain)
+    try:
+        return json.dumps(dict(config), default=arguments.plain)
+    except TypeError as error:
+        raise ValueError(f"an experiment file has no such keys: {error}") from None
 
 
 def available_cpus() -> int:
@@ -334,3 +386,15 @@ def available_cpus() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def parameters_of(algorithm: str) -> list[str]:
+    """Keys of an algorithm's parameters."""
+    return [key for name, _, parameters in _core.algorithms() if name == algorithm for key, *_ in parameters]
+
+
+def as_experiment(given: Experiment | Mapping[str, Any] | str) -> Experiment:
+    """An experiment, from what stands for one: itself, a file's text, or what it says."""
+    if isinstance(given, Experiment):
+        return given
+    return Experiment(given) if isinstance(given, str) else Experiment.from_dict(given)

@@ -10,6 +10,9 @@ from . import _core, protocol
 from .records import RecordedRun, Records
 
 
+_left_behind: list[_core.Database] = []
+
+
 def open(directory: str | os.PathLike[str] = "swarm-data") -> Archive:
     """Opens the data directory of ``swarmctl run`` or of a coordinator. It is only read; a
     coordinator may use it meanwhile."""
@@ -23,6 +26,7 @@ class Archive(Records):
         self.directory = Path(directory)
         """The data directory."""
         self._database = _core.Database(os.fspath(directory))
+        self._process = os.getpid()
 
     def to_parquet(self, directory: str | os.PathLike[str]) -> list[Path]:
         """Writes ``experiments.parquet``, and of each experiment ``history-ID.parquet`` and
@@ -45,8 +49,15 @@ class Archive(Records):
 
     def _call(self, name: str, **request: Any) -> Any:
         _, request_class, response_class = protocol.method("ExperimentService", name)
+        if self._process != os.getpid():
+            # A database must not be used, nor closed, by a process that was forked from the one that opened it.
+            _left_behind.append(self._database)
+            self._database, self._process = _core.Database(os.fspath(self.directory)), os.getpid()
         answer = self._database.call(name, request_class(**request).SerializeToString())
         return response_class.FromString(answer)
+
+    def __reduce__(self) -> tuple[type[Archive], tuple[Path]]:
+        return (Archive, (self.directory,))
 
     def __repr__(self) -> str:
         return f"<Archive in {self.directory}>"

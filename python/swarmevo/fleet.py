@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 import uuid
 from contextlib import contextmanager
@@ -14,12 +15,12 @@ from numpy.typing import NDArray
 
 from . import _core, arguments, protocol
 from .champion import Champion, Genes
-from .errors import ExperimentError, FleetError
-from .experiment import Experiment
+from .errors import ExperimentError, FleetError, ForkError, refused
+from .experiment import Experiment, as_experiment
 from .progress import shown
 from .records import RecordedRun, Records, config_json, problems_of
 from .settings import Settings
-from .trials import AnyTrialSet, TrialSet
+from .trials import TRIALS_MAX, AnyTrialSet, TrialSet
 
 if TYPE_CHECKING:
     import pandas
@@ -66,7 +67,8 @@ class Client(Records):
 
         self.address: str = settings.address
         """The coordinator's address."""
-        self.patience = patience
+        self._process = os.getpid()
+        self.patience = arguments.seconds(patience, "patience")
         url = urlsplit(self.address)
         if url.scheme not in ("http", "https") or not url.hostname:
             raise ValueError(
@@ -125,17 +127,25 @@ class Client(Records):
         request_id: str | None = None,
     ) -> FleetRun:
         """Has the fleet run an experiment: an :class:`Experiment`, a file's text, or what it
-        says. The same ``request_id`` leads to the same experiment. Raises
-        :class:`ExperimentError` with all that is wrong with the file."""
+        says. ``name``, ``seed`` and ``generations`` replace the file's. The same ``request_id`` leads to the same
+        experiment. Raises :class:`ExperimentError` with all that is wrong with the file."""
+        arguments.name_of(name, "name")
+        if name:
+            experiment = as_experiment(experiment).replace(name=name)
         request: dict[str, Any] = {
-            "request_id": request_id or str(uuid.uuid4()),
-            "config_json": config_json(
-                experiment if isinstance(experiment, (Experiment, str)) else dict(experiment)
-            ),
-            "default_name": name or "experiment",
-            "labels": dict(labels or {}),
+            "request_id": arguments.name_of(request_id or str(uuid.uuid4()), "request_id"),
+            "config_json": config_json(experiment),
+            "default_name": "experiment",
+            "labels": {
+                arguments.name_of(key, "the key of a label"): arguments.name_of(value, f"label {key}")
+                for key, value in (labels or {}).items()
+            },
         }
-        optional = {"seed": seed, "generations": generations, "priority": priority}
+        optional = {
+            "seed": None if seed is None else arguments.whole(seed, "seed"),
+            "generations": None if generations is None else arguments.whole(generations, "generations", 1),
+            "priority": None if priority is None else _priority(priority),
+        }
         request |= {key: value for key, value in optional.items() if value is not None}
         try:
             submitted = self._call("SubmitExperiment", **request)
@@ -177,14 +187,14 @@ class Client(Records):
         their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.
         """
         genes, is_one = experiment._genotypes(genotypes)
-        n_trials = experiment.n_trials if trials is None else trials
+        n_trials = experiment.n_trials if trials is None else arguments.whole(trials, "trials", 1, TRIALS_MAX)
         request: dict[str, Any] = {
             "config_json": experiment.to_json(),
             "trials": _evolution_trials(TrialSet.of(generation)),
             "trial_count": n_trials,
         }
         if priority is not None:
-            request["priority"] = priority
+            request["priority"] = _priority(priority)
         message = protocol.message("Genes")
         per_call = REQUEST_LEN_MAX // (8 * experiment.n_genes + 16)
         per_call = max(1, min(per_call, VALUES_MAX // max(1, n_trials)))
@@ -205,12 +215,17 @@ class Client(Records):
     def _call(self, name: str, **request: Any) -> Any:
         return self._request("ExperimentService", name, **request)
 
+    def _call_of(self, service: str, name: str, kind: str = "unary_unary") -> tuple[Any, Any]:
+        """A call, and the class of its request."""
+        if self._process != os.getpid():
+            raise ForkError("this client is connected in another process; swarmevo.connect() makes one for this process")
+        path, request_class, response_class = protocol.method(service, name)
+        stub = getattr(self._channel, kind)
+        return stub(path, request_class.SerializeToString, response_class.FromString), request_class
+
     def _request(self, service: str, name: str, **request: Any) -> Any:
         """One answer to one request, repeated while the coordinator is away."""
-        path, request_class, response_class = protocol.method(service, name)
-        call = self._channel.unary_unary(
-            path, request_class.SerializeToString, response_class.FromString
-        )
+        call, request_class = self._call_of(service, name)
         message = request_class(**request)
         return self._patiently(
             lambda: call(message, metadata=self._metadata, timeout=DEADLINE_S)
@@ -218,10 +233,7 @@ class Client(Records):
 
     def _all_at_once(self, service: str, name: str, requests: list[dict[str, Any]]) -> list[Any]:
         """Answers to requests that may take any time, sent together."""
-        path, request_class, response_class = protocol.method(service, name)
-        call = self._channel.unary_unary(
-            path, request_class.SerializeToString, response_class.FromString
-        )
+        call, request_class = self._call_of(service, name)
         messages = [request_class(**request) for request in requests]
         waiting = [call.future(it, metadata=self._metadata) for it in messages]
         try:
@@ -266,11 +278,8 @@ class FleetRun(RecordedRun):
     def watch(self) -> Iterator[Any]:
         """The messages ``GenerationSummary`` of all generations, each once, those that are done
         first, until the experiment has ended; through restarts of the coordinator."""
-        path, request_class, response_class = protocol.method("ExperimentService", "WatchExperiment")
         client = self._records
-        call = client._channel.unary_stream(
-            path, request_class.SerializeToString, response_class.FromString
-        )
+        call, request_class = client._call_of("ExperimentService", "WatchExperiment", "unary_stream")
         request = request_class(experiment_id=self.id, from_sequence=1)
         is_over = False
         while not is_over:
@@ -319,11 +328,16 @@ class FleetRun(RecordedRun):
 
     def extend(self, generations: int) -> None:
         """Has a completed experiment go on, to so many generations in all."""
+        generations = arguments.whole(generations, "generations", 1)
         self._records._call("ExtendExperiment", experiment_id=self.id, generations=generations)
 
     def set_priority(self, priority: int) -> None:
         """Its share of the fleet beside other experiments, 1 to 1000."""
-        self._records._call("SetPriority", experiment_id=self.id, priority=priority)
+        self._records._call("SetPriority", experiment_id=self.id, priority=_priority(priority))
+
+
+def _priority(priority: int) -> int:
+    return arguments.whole(priority, "priority", 1, 1000)
 
 
 @contextmanager
@@ -337,7 +351,7 @@ def _errors(address: str) -> Iterator[None]:
         code = error.code()
         name = "UNKNOWN" if code is None else code.name
         text = error.details() or name
-        raise FleetError(name, text if name != "UNAVAILABLE" else f"{address}: {text}") from None
+        raise refused(name, text if name != "UNAVAILABLE" else f"{address}: {text}") from None
 
 
 def _evolution_trials(trial_set: TrialSet) -> Any:

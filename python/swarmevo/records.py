@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Iterator
+from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import arguments, protocol
 from .champion import Champion, Judged, Origin, Selection
-from .experiment import Experiment
+from .experiment import Experiment, config_text
 from .plotting import plot_history
 
 if TYPE_CHECKING:
@@ -255,8 +254,8 @@ def problems_of(text: str) -> list[tuple[str, int | None, str]]:
     return [("", None, line) for line in text.splitlines() if line]
 
 
-def config_json(config: Experiment | str | dict[str, Any]) -> str:
+def config_json(config: Experiment | str | Mapping[str, Any]) -> str:
     """An experiment file as text."""
     if isinstance(config, Experiment):
         return config.to_json()
-    return config if isinstance(config, str) else json.dumps(config)
+    return config if isinstance(config, str) else config_text(config)

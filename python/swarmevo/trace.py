@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import arguments
 from .replay import Replay
+from .trials import TRIALS_MAX
 
 if TYPE_CHECKING:
     import pandas
@@ -193,7 +195,8 @@ class Trace:
     def show(self, trial: int | None = None, *, height: int = 800) -> Replay:
         """The player with one of the trials, for a notebook; the first if none is named.
         It needs no network. ``height``: of the frame, in pixels."""
-        trial = self.trials.start if trial is None else trial
+        trial = self.trials.start if trial is None else arguments.whole(trial, "trial", 0, TRIALS_MAX - 1)
+        height = arguments.whole(height, "height", 1, 100_000)
         if trial not in self.trials:
             raise ValueError(f"the trace has trials {self.trials}, not {trial}")
         where = (*self._where[:3], trial, trial + 1)

@@ -17,12 +17,13 @@ from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any, Callable, Protocol, Union, cast
 
-from . import _core
+from . import _core, arguments
 from .settings import Settings
 
 log = logging.getLogger(__name__)
 
 POLL_S = 0.2
+WORKERS_MAX = 100_000
 PAUSE_MIN_S, PAUSE_MAX_S = 0.5, 30.0
 
 _stopping: dict[str, threading.Event] = {}
@@ -70,8 +71,10 @@ def workers(
     as :func:`connect` finds it, but the token is a worker's, in ``SWARM_WORKER_TOKEN`` or the
     file that ``SWARM_WORKER_TOKEN_FILE`` names, here. TLS files are read where workers run.
     """
-    if n < 1 or slots < 1:
-        raise ValueError(f"workers and slots are 1 or more, not {n} and {slots}")
+    n = arguments.whole(n, "n, the number of workers,", 1, WORKERS_MAX)
+    slots = arguments.whole(slots, "slots", 1, 1024)
+    arguments.name_of(name, "name")
+    turn = arguments.seconds(turn, "turn")
     given = Settings(coordinator, None, tls_ca, tls_cert, tls_key, tls_domain, plaintext)
     settings = Settings.find(given)
     token_file = token_file or os.environ.get("SWARM_WORKER_TOKEN_FILE")

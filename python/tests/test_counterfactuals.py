@@ -138,7 +138,7 @@ def test_sensors_that_no_network_has_are_refused(leader):
 def test_stimuli_that_do_not_fit_are_refused_and_those_that_are_set_are_sensed(quickstart, genotypes):
     episodes = quickstart.episodes()
     before = episodes.stimuli
-    with pytest.raises(ValueError, match="stimuli are an array"):
+    with pytest.raises(ValueError, match="stimuli: an array"):
         episodes.stimuli = before[:, 1:]
     wrong = before.copy()
     wrong[0, 1, 2] = np.nan
@@ -205,5 +205,5 @@ def test_silence_is_nothing_to_sense_and_has_to_fit(leader, quickstart):
         analysis.attention(*leader, [40], replace="silence", trials=1)
     with pytest.raises(ValueError, match="lasting from 1 to 11"):
         analysis.influence(*leader, [40], lasting=0)
-    with pytest.raises(ValueError, match="who is silent is an array"):
+    with pytest.raises(ValueError, match="who is silent: an array"):
         quickstart.episodes().silence([True])

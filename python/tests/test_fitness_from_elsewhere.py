@@ -200,7 +200,7 @@ def test_no_call_of_the_extension_panics(quickstart):
     rng = np.random.default_rng(0)
     values = hostile()
     n_calls = 0
-    calls = [getattr(_core, name) for name in ("encode_genes", "script_path", "inline_script", "algorithms")]
+    calls = [getattr(_core, name) for name in ("encode_genes", "script_path", "inline_script", "algorithms", "ensure_memory")]
     calls += [getattr(it, name) for it in objects for name in dir(it) if not name.startswith("_")]
     calls += [_core.Evolution, _core.Evolution.from_json, _core.Experiment]
     for call in filter(callable, calls):

@@ -44,7 +44,7 @@ def test_actions_that_do_not_fit_are_refused(quickstart):
         episodes.step(actions)
     actions = episodes.idle()
     actions.leds = actions.leds[:, 1:]
-    with pytest.raises(ValueError, match="leds are an array"):
+    with pytest.raises(ValueError, match="leds: an array"):
         episodes.step(actions)
     assert episodes.n_steps_done == 0
 

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arguments
+from ..trials import TRIALS_MAX
 from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
@@ -56,6 +58,7 @@ def ablation(
     In trials that had no part in evolution, here or on the fleet of ``client``. Raises ``ValueError``
     if weights of a part are not the genotype's, or have no gene that gives 0.
     """
+    trials = arguments.whole(trials, "trials", 1, TRIALS_MAX)
     genes = experiment._genotype(genotype)
     network = experiment.network(genes)
     named = _parts(network, parts)

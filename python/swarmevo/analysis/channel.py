@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import arguments
 from ..trace import Trace
 from .information import Codes, Dependence, dependence, entropy, mutual_information
 
@@ -29,6 +30,7 @@ class Symbols:
 
 def symbols(trace: Trace, first: int = FIRST) -> Symbols:
     """The messages of a trace, from step ``first`` on."""
+    first = arguments.whole(first, "first", 0)
     own, others = trace.messages[:, first:], trace.frame_messages[:, first:]
     there = trace.frame_emitters[:, first:] >= 0
     everything = np.concatenate([own.reshape(-1, own.shape[-1]), others[there]])
@@ -61,6 +63,7 @@ class ChannelUse:
 
 def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:
     """What is sent and heard from step ``first`` on."""
+    first = arguments.whole(first, "first", 0)
     found = symbols(trace, first)
     sends = trace.sends[:, first:]
     sent = found.own[sends]
@@ -79,6 +82,7 @@ def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:
 
 def heard(trace: Trace, first: int = FIRST) -> Codes:
     """``[T, steps, R]``: what each robot heard, with 0 for nothing, else the symbol's code + 1."""
+    first = arguments.whole(first, "first", 0)
     return symbols(trace, first).heard + 1
 
 
@@ -89,6 +93,8 @@ def signalling(trace: Trace, about: ArrayLike, *, first: int = FIRST, shuffles: 
     ``trace.leds`` or ``discretise(trace.stimuli[..., 0])``; negative where there is none. Only what is
     sent counts. It says nothing of whether anybody listens.
     """
+    first = arguments.whole(first, "first", 0)
+    shuffles = arguments.whole(shuffles, "shuffles", 0)
     state = np.where(trace.sends, np.asarray(about, dtype=np.int64), -1)[:, first:]
     return dependence(symbols(trace, first).own, state, shuffles=shuffles)
 
@@ -100,6 +106,8 @@ def listening(trace: Trace, response: ArrayLike, *, first: int = FIRST, shuffles
     ``response`` is a code ``[T, steps, R]``, such as ``trace.leds``. A robot acts on the frame of the
     same step. Robots that are near each other also see alike: dependence is no proof of influence.
     """
+    first = arguments.whole(first, "first", 0)
+    shuffles = arguments.whole(shuffles, "shuffles", 0)
     done = np.asarray(response, dtype=np.int64)[:, first:]
     return dependence(symbols(trace, first).heard, done, shuffles=shuffles)
 
@@ -112,10 +120,11 @@ def speaker_consistency(
     and what itself does ``lag`` steps later, as a share of the message's entropy (the uncertainty
     coefficient, Theil 1970): 1 if the message follows from the action, 0 if it has no content.
     """
+    first = arguments.whole(first, "first", 0)
     found, done = symbols(trace, first).own, np.asarray(action, dtype=np.int64)[:, first:]
     sends = trace.sends[:, first:]
     result = {}
-    for lag in lags:
+    for lag in (arguments.whole(it, "a lag") for it in lags):
         end = found.shape[1] - lag
         if lag < 0 or end <= 0:
             raise ValueError(f"lag {lag} of a trace of {found.shape[1]} steps that count")
@@ -129,6 +138,7 @@ def speaker_consistency(
 def informants(trace: Trace, first: int = FIRST) -> NDArray[np.float64]:
     """``[R, R]``: of what robot i heard, the share that robot j had first sent, over all trials; rows of
     robots that heard nothing are zeros."""
+    first = arguments.whole(first, "first", 0)
     n = trace.n_robots
     originators = trace.frame_originators[:, first:]
     counts = np.zeros((n, n))
@@ -144,6 +154,7 @@ def sectors_heard(trace: Trace, window: int = 10) -> Codes:
     """``[T, steps, R]``: from how many sectors of its receiver a robot heard something within the last
     ``window`` steps, this one included: how the thesis counts neighbours (Fig. 6.19). Steps before the
     window is full are counted as far as there are any."""
+    window = arguments.whole(window, "window", 1)
     sectors = np.asarray(trace.frame_sectors)
     found = np.zeros(sectors.shape, dtype=np.int64)
     for sector in range(int(sectors.max(initial=-1)) + 1):

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import arguments
 from .ctrnn import CTRNN, Equilibrium
 
 Floats = NDArray[np.float64]
@@ -69,6 +70,8 @@ def continuation(
     reaches neither end, a closed one, is not found. ``max_step``: the longest step, in shares of the way
     and in units of voltage together. Raises ``ValueError`` if a branch takes more than ``max_points``.
     """
+    starts = arguments.whole(starts, "starts", 1)
+    max_points = arguments.whole(max_points, "max_points", 1)
     begin, end = np.asarray(first, np.float64), np.asarray(last, np.float64)
     path = _Path(network, begin, end - begin)
     ends = [(share, it) for share in (0.0, 1.0) for it in network.equilibria(path.inputs(share), starts=starts)]

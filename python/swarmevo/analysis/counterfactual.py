@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..episodes import Actions, Episodes
+from .. import arguments
 from ..champion import Genes
 from ..experiment import Experiment
-from ..trials import AnyTrialSet, TrialSet
+from ..trials import TRIALS_MAX, AnyTrialSet, TrialSet
 
 Replacement = Union[Literal["freeze", "permute", "silence"], ArrayLike]
 
@@ -154,16 +155,18 @@ class _Case:
         self, experiment: Experiment, genotype: Genes, steps: Iterable[int], agents: Iterable[int] | None,
         trials: int, trial_set: AnyTrialSet | None, window: int, lasting: int,
     ) -> None:
-        if not 1 <= lasting <= window + 1:
+        window = arguments.whole(window, "window", 0)
+        trials = arguments.whole(trials, "trials", 1, TRIALS_MAX)
+        if not 1 <= arguments.whole(lasting, "lasting") <= window + 1:
             raise ValueError(f"lasting from 1 to {window + 1}, the step and its window, not {lasting}")
         self._experiment, self._genotype = experiment, experiment._genotype(genotype)
         self._trials, self._window = trials, window
         self._where = TrialSet.evaluation() if trial_set is None else trial_set
         episodes = self._episodes()
         self.message_len = episodes.message_len
-        self.steps = list(steps)
+        self.steps = [arguments.whole(step, "a step") for step in steps]
         self._n_agents = len(episodes.agents)
-        self._chosen = list(range(self._n_agents)) if agents is None else list(agents)
+        self._chosen = list(range(self._n_agents)) if agents is None else [arguments.whole(it, "an agent", -arguments.SIZE_MAX) for it in agents]
         if not self.steps or min(self.steps) < 0 or max(self.steps) + 1 >= experiment.n_steps:
             raise ValueError(f"steps from 0 to {experiment.n_steps - 2}, which have a step after them: {self.steps}")
         wrong = [agent for agent in self._chosen if not 0 <= agent < self._n_agents]

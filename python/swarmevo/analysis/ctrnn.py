@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import arguments
 from ..network import Network
 
 Floats = NDArray[np.float64]
@@ -117,6 +118,8 @@ class CTRNN:
 
     def equilibria(self, inputs: ArrayLike, *, starts: int = 200, seed: int = 0) -> list[Equilibrium]:
         """Those found from ``starts`` random rates, stable ones first; there may be more."""
+        starts = arguments.whole(starts, "starts", 1)
+        seed = arguments.whole(seed, "seed", 0)
         from scipy.optimize import root
 
         rng = np.random.default_rng(seed)

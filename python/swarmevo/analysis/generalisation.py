@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from .. import arguments
 from ..errors import ExperimentError
 from ..champion import Genes
 from ..experiment import Experiment
 from ..fleet import Client
-from ..trials import TrialSet
+from ..trials import TRIALS_MAX, TrialSet
 from .variants import Config, evolved_robots, resize, spread_out
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
@@ -47,6 +48,7 @@ def generalisation(
     But for the other sets, all in trials with the same numbers, which had no part in evolution. ``client``:
     evaluate on its fleet.
     """
+    trials = arguments.whole(trials, "trials", 2, TRIALS_MAX)
     genes = experiment._genotype(genotype)[np.newaxis]
     found = []
     for what, value, config in _conditions(experiment.to_dict()):

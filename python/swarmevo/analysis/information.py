@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import arguments
+
 Codes = NDArray[np.int64]
 
 
@@ -23,6 +25,7 @@ def discretise(values: ArrayLike, n_bins: int = 4) -> Codes:
 
     Values that are all alike, or take fewer than ``n_bins`` different ones, keep these.
     """
+    n_bins = arguments.whole(n_bins, "n_bins", 1)
     array = np.asarray(values, dtype=np.float64)
     known = array[~np.isnan(array)]
     distinct = np.unique(known)
@@ -89,6 +92,8 @@ def dependence(x: ArrayLike, y: ArrayLike, *, shuffles: int = 200, seed: int = 0
     the trials of ``y`` change places, so that both variables keep their course in time: shuffled
     single values would find dependence in whatever changes slowly.
     """
+    shuffles = arguments.whole(shuffles, "shuffles", 0)
+    seed = arguments.whole(seed, "seed", 0)
     first, second = np.asarray(x, dtype=np.int64), np.asarray(y, dtype=np.int64)
     if first.shape != second.shape or first.ndim < 1 or first.shape[0] < 2:
         raise ValueError(f"two arrays of one shape, of 2 trials and more: {first.shape}, {second.shape}")

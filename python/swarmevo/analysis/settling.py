@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arguments
 from ..champion import Genes
 from ..experiment import Experiment
 from ..trace import Trace
@@ -33,6 +34,7 @@ class Settled:
 def settled(experiment: Experiment, genotype: Genes, trace: Trace, most: int = 6) -> list[Settled]:
     """For the ``most`` inputs that come most often from step 10 on; nothing for networks of other
     neurons than ``rate_model``."""
+    most = arguments.whole(most, "most", 0)
     network = experiment.network(genotype)
     if network.description["neuron_model"] != "rate_model":
         return []

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arguments
 from ..trace import Trace
 from .channel import FIRST
 
@@ -44,6 +45,7 @@ class Spread:
 def spread(trace: Trace, first: int = FIRST) -> Spread:
     """Of what was heard from step ``first`` on. A frame of h hops was said h steps before by its
     originator, so that frames of one originator and that step carry the same word."""
+    first = arguments.whole(first, "first", 0)
     world = trace.experiment.to_dict()["world"]
     size = np.array([world["width"], world["height"]], np.float64)
     trial, step, hearer = np.nonzero(trace.frame_originators[:, first:] >= 0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import arguments
 from ..trace import Trace
 from .channel import FIRST
 
@@ -34,6 +35,7 @@ class Components:
 
 def components_of_states(trace: Trace, first: int = FIRST) -> Components:
     """Of all robots with a network, in all trials, from step ``first`` on."""
+    first = arguments.whole(first, "first", 0)
     states = np.asarray(trace.activities[:, first:], np.float64)
     active = ~np.isnan(states).any(axis=-1)
     known = states[active]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import arguments
 from ..experiment import Experiment
 
 Config = dict[str, Any]
@@ -28,9 +29,9 @@ def variant(
     config = experiment.to_dict()
     evolved = evolved_robots(config)
     if robots is not None:
-        resize(evolved, robots)
+        resize(evolved, arguments.whole(robots, "robots", 1))
     if steps is not None:
-        config["algorithm"]["evaluation_steps"] = steps
+        config["algorithm"]["evaluation_steps"] = arguments.whole(steps, "steps", 1)
     if perturbations is not None:
         evolved["perturbations"] = perturbations
     if without is not None:
