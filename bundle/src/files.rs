@@ -1,6 +1,6 @@
 //! The files of a bundle: what each holds, as bytes and back.
 
-use evolution::{Champion, ChampionSource, Digest, Statistics};
+use evolution::{Champion, ChampionSource, Digest, Real, Statistics};
 use experiment_file::limits;
 use serde::{Deserialize, Serialize};
 
@@ -36,10 +36,10 @@ pub fn all() -> [File; 6] {
 #[serde(deny_unknown_fields)]
 struct Row {
     generation: u64,
-    best: f64,
-    mean: f64,
-    min: f64,
-    standard_deviation: f64,
+    best: Real,
+    mean: Real,
+    min: Real,
+    standard_deviation: Real,
     episodes: u64,
     duration_ms: u64,
     completed_at_ms: u64,
@@ -115,11 +115,11 @@ pub fn champion_json(champion: &Champion) -> String {
         "individual": individual,
         "trial_fitness": trial_fitness,
         "selection": held_out.map(|it| serde_json::json!({
-            "mean": it.mean + 0.0, "ci95": it.ci95, "trials": it.n_trials, "generation": it.generation,
+            "mean": it.mean.get() + 0.0, "ci95": it.ci95, "trials": it.n_trials, "generation": it.generation,
         })),
         "judged": judged.map(|it| serde_json::json!({
-            "mean": it.mean + 0.0, "low": it.low + 0.0, "high": it.high + 0.0, "trials": it.n_trials,
-            "generation": it.generation,
+            "mean": it.mean.get() + 0.0, "low": it.low.get() + 0.0, "high": it.high.get() + 0.0,
+            "trials": it.n_trials, "generation": it.generation,
         })),
         "genotype": genotype,
     });
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
         let digest = Digest::default();
-        let statistics = Statistics { best: 1.0, mean: 0.5, min: 0.0, standard_deviation: 0.1 };
+        let statistics = Statistics::of(&[1.0, 0.0]);
         let row = GenerationRow {
             statistics,
             episodes: 1,

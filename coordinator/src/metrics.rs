@@ -185,8 +185,8 @@ fn put_run(scrape: &mut Scrape, run: &RunStats, work: &JobStats) {
     put(&ITEMS_QUEUED, work.n_items_queued as f64);
     put(&ITEMS_IN_FLIGHT, work.n_items_in_flight as f64);
     if let Some(latest) = latest {
-        put(&BEST_FITNESS, latest.statistics.best);
-        put(&MEAN_FITNESS, latest.statistics.mean);
+        put(&BEST_FITNESS, latest.statistics.best.get());
+        put(&MEAN_FITNESS, latest.statistics.mean.get());
         put(&GENERATION_DURATION, latest.duration_ms as f64 / 1000.0);
         put(&IDLE, latest.idle_share);
     }

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Genotype, mean};
+use super::{Genotype, Real, mean};
 
 /// A genotype worth keeping, and what is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,10 +45,11 @@ pub enum ChampionSource {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Mean over the trials.
-    pub mean: f64,
-    /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial. By it, candidates
-    /// are found to be close. It is no interval for what the winner is worth.
-    pub ci95: f64,
+    pub mean: Real,
+    /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial, infinite if squares
+    /// overflow. By it, candidates are found to be close. It is no interval for what the
+    /// winner is worth.
+    pub ci95: Real,
     /// Number of trials n.
     pub n_trials: u64,
     /// Generation of the latest of them.
@@ -59,11 +60,11 @@ pub struct HeldOut {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
     /// Mean over the trials.
-    pub mean: f64,
+    pub mean: Real,
     /// Lower end of the 95 % confidence interval of the mean.
-    pub low: f64,
+    pub low: Real,
     /// Upper end of the interval.
-    pub high: f64,
+    pub high: Real,
     /// Number of trials.
     pub n_trials: u32,
     /// Generation after which it was judged, the last one of the run.
@@ -81,37 +82,41 @@ impl Champion {
 const Z: f64 = 1.96;
 
 impl HeldOut {
-    /// Of trials that belong to this generation.
-    pub fn of(values: &[f64], generation: u64) -> Self {
+    /// Of trials that belong to this generation; none if their mean is not finite.
+    pub fn of(values: &[f64], generation: u64) -> Option<Self> {
         let mean = mean(values);
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         Self::from_squares(mean, squares, values.len() as u64, generation)
     }
 
-    /// Of these trials and later ones together (Chan, Golub & LeVeque 1983).
-    pub fn with(self, later: Self) -> Self {
+    /// Of these trials and later ones together (Chan, Golub & LeVeque 1983); none if their
+    /// mean is not finite.
+    pub fn with(self, later: Self) -> Option<Self> {
         let (n, n_later) = (self.n_trials as f64, later.n_trials as f64);
-        let (share, difference) = (n_later / (n + n_later), later.mean - self.mean);
+        let (share, difference) = (n_later / (n + n_later), later.mean.get() - self.mean.get());
         let squares = self.squares() + later.squares() + difference * difference * n * share;
         let n_trials = self.n_trials + later.n_trials;
-        Self::from_squares(self.mean + difference * share, squares, n_trials, later.generation)
+        let mean = self.mean.get() + difference * share;
+        Self::from_squares(mean, squares, n_trials, later.generation)
     }
 
     /// Whether chance alone may make this mean smaller than that of `best`, at 95 %.
     pub fn is_close_to(&self, best: &Self) -> bool {
-        let difference = best.mean - self.mean;
-        difference * difference < self.ci95 * self.ci95 + best.ci95 * best.ci95
+        let difference = best.mean.get() - self.mean.get();
+        let [own, other] = [self.ci95.get(), best.ci95.get()];
+        difference * difference < own * own + other * other
     }
 
-    fn from_squares(mean: f64, squares: f64, n_trials: u64, generation: u64) -> Self {
+    fn from_squares(mean: f64, squares: f64, n_trials: u64, generation: u64) -> Option<Self> {
         let n = n_trials as f64;
         let ci95 = if n_trials < 2 { 0.0 } else { Z * (squares / (n - 1.0) / n).sqrt() };
-        Self { mean, ci95, n_trials, generation }
+        let mean = Real::finite(mean)?;
+        Some(Self { mean, ci95: Real::new(ci95)?, n_trials, generation })
     }
 
     /// Sum of squared differences from the mean.
     fn squares(&self) -> f64 {
-        let (n, error) = (self.n_trials as f64, self.ci95 / Z);
+        let (n, error) = (self.n_trials as f64, self.ci95.get() / Z);
         error * error * n * (n - 1.0)
     }
 }
@@ -123,21 +128,24 @@ mod tests {
     #[test]
     fn trials_of_two_rounds_count_as_if_they_were_of_one() {
         let (first, later) = ([1.0, 2.0, 4.0], [8.0, 3.0]);
-        let together = HeldOut::of(&first, 3).with(HeldOut::of(&later, 9));
-        let at_once = HeldOut::of(&[first.to_vec(), later.to_vec()].concat(), 9);
+        let of = |values: &[f64], generation| HeldOut::of(values, generation).unwrap();
+        let together = of(&first, 3).with(of(&later, 9)).unwrap();
+        let at_once = of(&[first.to_vec(), later.to_vec()].concat(), 9);
         assert_eq!((together.n_trials, together.generation), (5, 9));
-        assert!((together.mean - at_once.mean).abs() < 1e-15, "{together:?}");
-        assert!((together.ci95 - at_once.ci95).abs() < 1e-14, "{together:?}");
+        assert!((together.mean.get() - at_once.mean.get()).abs() < 1e-15, "{together:?}");
+        assert!((together.ci95.get() - at_once.ci95.get()).abs() < 1e-14, "{together:?}");
         // s^2 = 29.2 / 4, n = 5
-        assert!((at_once.ci95 - 1.96 * 1.46f64.sqrt()).abs() < 1e-14, "{at_once:?}");
+        assert!((at_once.ci95.get() - 1.96 * 1.46f64.sqrt()).abs() < 1e-14, "{at_once:?}");
     }
 
     #[test]
     fn candidates_are_close_if_chance_may_have_ordered_them() {
-        let of = |mean, ci95| HeldOut { mean, ci95, n_trials: 50, generation: 0 };
+        let of = |mean: f64, ci95: f64| {
+            let [mean, ci95] = [mean, ci95].map(|value| Real::new(value).unwrap());
+            HeldOut { mean, ci95, n_trials: 50, generation: 0 }
+        };
         assert!(of(1.0, 0.3).is_close_to(&of(1.49, 0.4)));
         assert!(!of(1.0, 0.3).is_close_to(&of(1.51, 0.4)));
         assert!(!of(1.0, 0.0).is_close_to(&of(1.0, 0.0)), "more trials would show nothing new");
-        assert!(!of(f64::NAN, f64::NAN).is_close_to(&of(1.0, 0.5)));
     }
 }

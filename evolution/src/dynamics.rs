@@ -1,6 +1,8 @@
 //! How evolution moves: what a generation did to the distribution, and how far its trials agree.
 
-use super::{CheckpointError, Digest, Evolution, Told, algorithms::Strategy as _};
+use super::{
+    CheckpointError, Digest, Evolution, Told, algorithms::Strategy as _, statistics::between,
+};
 
 /// What a generation did.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +48,7 @@ fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
     [0, 1, 2, 3, 4].map(|quarter| {
         let position = last * quarter;
         let (below, rest) = (position / 4, (position % 4) as f64 / 4.0);
-        values[below] + rest * (values[last.min(below + 1)] - values[below])
+        between(values[below], values[last.min(below + 1)], rest)
     })
 }
 
@@ -145,7 +147,7 @@ mod tests {
             let genotypes = evolution.ask().genotypes;
             for (j, expected) in deviations.iter().enumerate() {
                 let genes: Vec<f64> = genotypes.iter().map(|genes| genes[j]).collect();
-                let found = crate::Statistics::of(&genes).standard_deviation;
+                let found = crate::Statistics::of(&genes).standard_deviation.get();
                 assert!((found / expected - 1.0).abs() < 0.06, "{name}: {found} {expected}");
             }
         }

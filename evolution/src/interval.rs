@@ -10,6 +10,8 @@
 //! and is as lopsided as they are. q is the square of Student's t with n - 1 degrees of
 //! freedom, which is somewhat wider than the chi-squared of large n.
 
+use super::{Real, statistics::bounds};
+
 /// 0.975 quantile of the normal distribution.
 const Z: f64 = 1.959_963_984_540_054;
 /// Halvings of the range of an exponent: enough for every bit that matters.
@@ -20,23 +22,34 @@ const EXPONENT_MAX: f64 = 60.0;
 /// The 95 % confidence interval of the mean; none without values or if one is not
 /// finite. If all values are equal, as a single one is, it is that value: what was not
 /// seen is not in it.
-pub fn interval(values: &[f64]) -> Option<(f64, f64)> {
+pub fn interval(values: &[f64]) -> Option<(Real, Real)> {
     if values.is_empty() || values.iter().any(|value| !value.is_finite()) {
         return None;
     }
     let mirrored: Vec<f64> = values.iter().map(|value| -value).collect();
-    Some((-upper_end(&mirrored), upper_end(values)))
+    Some((Real::finite(-upper_end(&mirrored))?, Real::finite(upper_end(values))?))
 }
 
-/// The largest mean that weighted values may have. The likeliest weights of a larger mean
-/// than that of the sample are w_i = c / (max + d - x_i); the smaller d, the larger it is.
+/// The largest mean that weighted values may have.
 fn upper_end(values: &[f64]) -> f64 {
-    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let range = max - min;
-    if range == 0.0 {
+    let (min, max) = bounds(values);
+    if min == max {
         return max;
     }
+    // Scaled by a power of two, all steps give the same bits, except for those that would
+    // overflow or lose bits at the smallest numbers. The range itself may overflow.
+    let range = max - min;
+    let exponent =
+        if range.is_finite() { libm::ilogb(range) } else { libm::ilogb(max / 2.0 - min / 2.0) + 1 };
+    let scaled: Vec<f64> = values.iter().map(|&value| libm::scalbn(value, -exponent)).collect();
+    libm::scalbn(scaled_upper_end(&scaled), exponent).clamp(min, max)
+}
+
+/// Of values whose range is about 1. The likeliest weights of a larger mean than that of the
+/// sample are w_i = c / (max + d - x_i); the smaller d, the larger it is.
+fn scaled_upper_end(values: &[f64]) -> f64 {
+    let (min, max) = bounds(values);
+    let range = max - min;
     let (mut near, mut far) = (-EXPONENT_MAX, EXPONENT_MAX);
     let bound = quantile(values.len());
     for _ in 0..N_HALVINGS {
@@ -73,11 +86,19 @@ fn quantile(n: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::statistics::tests::any_finite;
 
     /// Fitness of 200 trials, of which 8 fail.
     fn rarely_fails() -> Vec<f64> {
         (0..200).map(|i| if i % 25 == 0 { 0.01 } else { 0.9 + 0.0004 * f64::from(i) }).collect()
+    }
+
+    fn ends(values: &[f64]) -> (f64, f64) {
+        let (low, high) = interval(values).unwrap();
+        (low.get(), high.get())
     }
 
     /// -2 ln R(mu), by its definition: the weights 1 / (n (1 + lambda (x_i - mu))) with
@@ -97,7 +118,7 @@ mod tests {
     #[test]
     fn the_ends_are_the_means_of_that_likelihood() {
         for values in [rarely_fails(), vec![0.0, 1.0, 5.0, 2.0, 2.0, 7.0]] {
-            let (low, high) = interval(&values).unwrap();
+            let (low, high) = ends(&values);
             for end in [low, high] {
                 let (found, expected) = (statistic(&values, end), quantile(values.len()));
                 assert!((found - expected).abs() < 1e-6, "{end}: {found} {expected}");
@@ -116,7 +137,7 @@ mod tests {
     fn the_interval_reaches_farther_to_the_side_of_the_rare_failures() {
         let values = rarely_fails();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let (low, high) = interval(&values).unwrap();
+        let (low, high) = ends(&values);
         assert!(low < mean && mean < high);
         assert!(mean - low > 1.2 * (high - mean), "{low} {mean} {high}");
     }
@@ -124,20 +145,63 @@ mod tests {
     #[test]
     fn the_interval_scales_and_shifts_with_the_values() {
         let values = rarely_fails();
-        let (low, high) = interval(&values).unwrap();
+        let (low, high) = ends(&values);
         let moved: Vec<f64> = values.iter().map(|value| 5.0 - 3.0 * value).collect();
-        let (moved_low, moved_high) = interval(&moved).unwrap();
+        let (moved_low, moved_high) = ends(&moved);
         assert!((moved_low - (5.0 - 3.0 * high)).abs() < 1e-9);
         assert!((moved_high - (5.0 - 3.0 * low)).abs() < 1e-9);
     }
 
     #[test]
     fn what_has_no_spread_is_a_point_and_what_is_not_finite_has_no_interval() {
-        assert_eq!(interval(&[0.25]), Some((0.25, 0.25)));
-        assert_eq!(interval(&[0.25; 9]), Some((0.25, 0.25)));
+        assert_eq!(ends(&[0.25]), (0.25, 0.25));
+        assert_eq!(ends(&[0.25; 9]), (0.25, 0.25));
         assert_eq!(interval(&[]), None);
         assert_eq!(interval(&[0.25, f64::NAN]), None);
-        let (low, high) = interval(&[0.0, 1.0]).unwrap();
+        let (low, high) = ends(&[0.0, 1.0]);
         assert!((0.0..0.1).contains(&low) && (0.9..=1.0).contains(&high), "{low} {high}");
+    }
+
+    /// The upper end without scaling, as long as it is a number.
+    fn unscaled_upper_end(values: &[f64]) -> f64 {
+        let (min, max) = bounds(values);
+        if min == max { max } else { scaled_upper_end(values) }
+    }
+
+    proptest! {
+        #[test]
+        fn scaling_keeps_every_bit_of_what_is_a_number_without_it(
+            values in prop::collection::vec(-1e9f64..1e9, 1..60),
+            exponent in -600i32..600,
+            offset in -1e12f64..1e12,
+        ) {
+            for offset in [0.0, offset] {
+                let scale = |value: &f64| libm::scalbn(value + offset, exponent);
+                let values: Vec<f64> = values.iter().map(scale).collect();
+                let expected = unscaled_upper_end(&values);
+                prop_assert_eq!(upper_end(&values).to_bits(), expected.to_bits());
+            }
+        }
+
+        #[test]
+        fn finite_values_have_a_finite_interval_between_the_smallest_and_the_largest(
+            values in prop::collection::vec(any_finite(), 1..40),
+        ) {
+            let (low, high) = ends(&values);
+            let (min, max) = bounds(&values);
+            prop_assert!(min <= low && low <= high && high <= max, "{low:e} {high:e}");
+        }
+
+        #[test]
+        fn values_within_a_hair_have_an_interval_like_any_others(
+            steps in prop::collection::vec(0u64..1000, 2..40),
+        ) {
+            // The smallest numbers that there are, and the same numbers as wholes.
+            let tiny: Vec<f64> = steps.iter().map(|&step| f64::from_bits(step)).collect();
+            let whole: Vec<f64> = steps.iter().map(|&step| step as f64).collect();
+            let (found, expected) = (ends(&tiny), ends(&whole));
+            prop_assert_eq!(found.0.to_bits() as f64, expected.0.round_ties_even());
+            prop_assert_eq!(found.1.to_bits() as f64, expected.1.round_ties_even());
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numeric::random::TrialSet;
 
-use super::{Champion, Digest, Population, champion::Judged, interval::interval, mean};
+use super::{Champion, Digest, Population, champion::Judged, finite_mean, interval::interval};
 
 /// A champion that is to be judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,13 +47,10 @@ impl Judgement {
         let genotype = [&champion.genotype[..]].into_iter();
         let digest = digest.next_champion(of_generations, genotype, trial_fitness);
         let values = trial_fitness.concat();
-        let judged = interval(&values).map(|(low, high)| Judged {
-            mean: mean(&values),
-            low,
-            high,
-            n_trials: values.len() as u32,
-            generation,
-        });
+        let n_trials = values.len() as u32;
+        let judged = finite_mean(&values)
+            .zip(interval(&values))
+            .map(|(mean, (low, high))| Judged { mean, low, high, n_trials, generation });
         (Champion { judged, ..champion }, digest)
     }
 }

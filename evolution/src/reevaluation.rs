@@ -74,7 +74,11 @@ impl Reevaluation {
         for (&i, values) in self.participants.iter().zip(trial_fitness) {
             let block = HeldOut::of(values, self.generation);
             let held_out = &mut self.candidates[i].held_out;
-            *held_out = Some(held_out.map_or(block, |so_far| so_far.with(block)));
+            // Without a finite mean it has lost: it has none, and meets no further block.
+            *held_out = match *held_out {
+                Some(so_far) => block.and_then(|block| so_far.with(block)),
+                None => block,
+            };
         }
         self.blocks.push(trial_fitness.to_vec());
         self.participants = self.next_participants();
@@ -92,10 +96,11 @@ impl Reevaluation {
     }
 
     fn leader(&self) -> Option<(usize, HeldOut)> {
-        let mean = |candidate: &Champion| candidate.held_out.map_or(f64::NAN, |known| known.mean);
+        let mean =
+            |candidate: &Champion| candidate.held_out.map_or(f64::NAN, |known| known.mean.get());
         let means: Vec<f64> = self.candidates.iter().map(mean).collect();
         let leader = ranking(&means)[0];
-        self.candidates[leader].held_out.filter(|known| known.mean.is_finite()).map(|k| (leader, k))
+        self.candidates[leader].held_out.map(|known| (leader, known))
     }
 
     fn next_participants(&self) -> Vec<usize> {
@@ -158,7 +163,7 @@ mod tests {
         assert!(round.is_over());
         assert_eq!(winner(&round), Some(ChampionSource::Individual(1)));
         let held_out = round.outcome().0.unwrap().held_out.unwrap();
-        assert!((held_out.mean - 5.0).abs() < 1e-12);
+        assert!((held_out.mean.get() - 5.0).abs() < 1e-12);
         assert_eq!((held_out.n_trials, held_out.generation), (4, 9));
     }
 
@@ -172,13 +177,13 @@ mod tests {
         round.learn(&[around(9.0), around(4.5)]);
         assert!(round.is_over(), "7 is clearly more than 5");
         assert_eq!(winner(&round), Some(ChampionSource::Individual(0)));
-        assert!((round.outcome().0.unwrap().held_out.unwrap().mean - 7.0).abs() < 1e-12);
+        assert!((round.outcome().0.unwrap().held_out.unwrap().mean.get() - 7.0).abs() < 1e-12);
     }
 
     #[test]
     fn whoever_has_met_more_trials_waits_for_the_others() {
         let known = HeldOut::of(&[around(5.0), around(5.0)].concat(), 3);
-        let mut round = reevaluation(&[Some(known), None]);
+        let mut round = reevaluation(&[known, None]);
         round.learn(&[around(5.0), around(5.5)]);
         for block in 1..BLOCKS_MAX {
             assert_eq!(round.trial_set(), TrialSet::HeldOut { generation: 9, block });
@@ -194,7 +199,7 @@ mod tests {
     #[test]
     fn one_lucky_block_does_not_beat_what_is_known_of_many() {
         let known = HeldOut::of(&[around(5.0), around(5.0), around(5.0)].concat(), 3);
-        let mut round = reevaluation(&[Some(known), None]);
+        let mut round = reevaluation(&[known, None]);
         round.learn(&[around(2.0), around(5.1)]);
         assert_eq!(participants(&round), [1.0], "4.25 and 5.1 are close");
         round.learn(&[around(3.0)]);

@@ -103,7 +103,8 @@ impl Evolution {
         })?;
         let summary = summary.map_err(PyValueError::new_err)?;
         let of = &summary.statistics;
-        Ok((summary.generation, of.best, of.mean, of.min, summary.n_non_finite))
+        let [best, mean, min] = [of.best, of.mean, of.min].map(f64::from);
+        Ok((summary.generation, best, mean, min, summary.n_non_finite))
     }
 
     #[getter]
@@ -275,8 +276,11 @@ pub fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Boun
     dict.set_item("individual", individual)?;
     dict.set_item("genotype", PyArray1::from_slice(py, genotype))?;
     dict.set_item("trial_fitness", PyArray1::from_slice(py, trial_fitness))?;
-    dict.set_item("selection", held_out.map(|it| (it.mean, it.n_trials)))?;
-    dict.set_item("judged", judged.map(|it| (it.mean, it.low, it.high, it.n_trials)))?;
+    dict.set_item("selection", held_out.map(|it| (it.mean.get(), it.n_trials)))?;
+    dict.set_item(
+        "judged",
+        judged.map(|it| (it.mean.get(), it.low.get(), it.high.get(), it.n_trials)),
+    )?;
     Ok(dict)
 }
 

@@ -116,10 +116,10 @@ fn run(
         .flat_map(|generation| evaluate(&champion.genotype, generation.into(), 0..N_FRESH_TRIALS))
         .collect();
     Figures {
-        judged: judged.mean,
-        interval: [judged.low, judged.high],
-        normal: HeldOut::of(&fitness[0], 0).ci95,
-        selection: champion.held_out.expect("it was compared").mean,
+        judged: judged.mean.get(),
+        interval: [judged.low.get(), judged.high.get()],
+        normal: HeldOut::of(&fitness[0], 0).expect("fitness is finite").ci95.get(),
+        selection: champion.held_out.expect("it was compared").mean.get(),
         fresh: mean(&fresh),
         n_selection_trials,
     }

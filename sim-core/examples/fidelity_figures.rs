@@ -149,7 +149,7 @@ fn evolved(file: &str, seed: u64, wheels: Wheels) -> Result<f64, Box<dyn Error>>
         for genotype in genotypes.iter() {
             fitness.push(eq_5_5(&config, &simulation, genotype, number, wheels)?);
         }
-        means.push(evolution.tell(generation, &fitness)?.statistics.mean);
+        means.push(evolution.tell(generation, &fitness)?.statistics.mean.get());
     }
     Ok(mean(&means[40..]))
 }

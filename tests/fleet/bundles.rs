@@ -171,10 +171,10 @@ fn tensorboard_reads_the_history() {
         .expect_success();
     let bundle = bundle::Bundle::read(&fs::read(bundle).unwrap()).unwrap();
     for (tag, value) in [
-        ("fitness/best", (|it| it.best) as fn(&evolution::Statistics) -> f64),
-        ("fitness/mean", |it| it.mean),
-        ("fitness/min", |it| it.min),
-        ("fitness/standard_deviation", |it| it.standard_deviation),
+        ("fitness/best", (|it| it.best.get()) as fn(&evolution::Statistics) -> f64),
+        ("fitness/mean", |it| it.mean.get()),
+        ("fitness/min", |it| it.min.get()),
+        ("fitness/standard_deviation", |it| it.standard_deviation.get()),
     ] {
         let scalars = found[tag].as_array().unwrap_or_else(|| panic!("{tag}: {found}"));
         assert_eq!(scalars.len(), 3, "{tag}");

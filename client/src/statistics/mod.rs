@@ -20,7 +20,13 @@ pub fn interquartile_mean(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let cut = values.len() / 4;
     let kept = &values[cut..values.len() - cut];
-    kept.iter().sum::<f64>() / kept.len() as f64
+    mean(kept)
+}
+
+/// The mean; finite if all values are, whatever their sum. NaN without values.
+pub fn mean(values: &[f64]) -> f64 {
+    let plain = || values.iter().sum::<f64>() / values.len() as f64;
+    evolution::finite_mean(values).map_or_else(plain, f64::from)
 }
 
 /// A quantile of sorted values, by linear interpolation between them, p in [0, 1]. NaN
@@ -30,10 +36,12 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
     let place = p * last as f64;
     let low = (place as usize).min(last);
     let high = (low + 1).min(last);
-    // Infinities stand for what never happened: their difference is no number.
-    let rise = if sorted[low] == sorted[high] { 0.0 } else { sorted[high] - sorted[low] };
     let share = place - low as f64;
-    if share == 0.0 { sorted[low] } else { sorted[low] + share * rise }
+    // Infinities stand for what never happened: their difference is no number.
+    match sorted[low] == sorted[high] || share == 0.0 {
+        true => sorted[low],
+        false => evolution::between(sorted[low], sorted[high], share),
+    }
 }
 
 #[cfg(test)]

@@ -90,3 +90,13 @@ fn one_run_or_two_say_nothing_of_the_spread_and_none_say_nothing() {
     assert_eq!(mann_whitney(&[], &[1.0]), None);
     assert_eq!(mann_whitney(&[1.0], &[1.0]), Some(1.0));
 }
+
+#[test]
+fn values_of_every_size_have_summaries_of_numbers() {
+    for values in [[f64::MIN, f64::MAX, f64::MAX, 1e308], [5e-324, 1e-323, 0.0, -5e-324]] {
+        for found in [interval(&values, median), interval(&values, interquartile_mean)] {
+            let [low, high] = found.ci95.unwrap();
+            assert!(found.value.is_finite() && low.is_finite() && high.is_finite(), "{found:?}");
+        }
+    }
+}

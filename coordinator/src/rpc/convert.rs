@@ -303,8 +303,8 @@ pub fn individual(
 
 fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
     v1::HeldOutFitness {
-        mean: held_out.mean,
-        ci95: held_out.ci95,
+        mean: held_out.mean.get(),
+        ci95: held_out.ci95.get(),
         trials: u32::try_from(held_out.n_trials).unwrap_or(u32::MAX),
         generation: held_out.generation,
     }
@@ -312,6 +312,7 @@ fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
 
 fn judged(judged: Judged) -> v1::JudgedFitness {
     let Judged { mean, low, high, n_trials, generation } = judged;
+    let [mean, low, high] = [mean, low, high].map(f64::from);
     v1::JudgedFitness { mean, low, high, trials: n_trials, generation }
 }
 
@@ -353,10 +354,10 @@ fn completed_generation(
 fn generation(generation: GenerationRecord) -> v1::GenerationSummary {
     v1::GenerationSummary {
         generation: generation.generation,
-        best: generation.statistics.best,
-        mean: generation.statistics.mean,
-        min: generation.statistics.min,
-        standard_deviation: generation.statistics.standard_deviation,
+        best: generation.statistics.best.get(),
+        mean: generation.statistics.mean.get(),
+        min: generation.statistics.min.get(),
+        standard_deviation: generation.statistics.standard_deviation.get(),
         digest: generation.digest,
         duration_ms: generation.duration_ms,
         episodes: generation.episodes,

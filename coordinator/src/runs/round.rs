@@ -226,7 +226,7 @@ fn learn(
     }
     let algorithm = &config.algorithm;
     let mean = record.statistics.mean;
-    let completed = if algorithm.target_fitness.is_some_and(|target| mean >= target) {
+    let completed = if algorithm.target_fitness.is_some_and(|target| mean.get() >= target) {
         Some(format!("the mean fitness {mean} has reached the target"))
     } else {
         (evolution.n_generations() >= algorithm.generations).then(String::new)

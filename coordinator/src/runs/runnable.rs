@@ -149,7 +149,7 @@ mod tests {
 
         let latest = GenerationRecord {
             generation: 0,
-            statistics: Statistics { best: 0.0, mean: 0.0, min: 0.0, standard_deviation: 0.0 },
+            statistics: Statistics::of(&[0.0]),
             digest: sound.config_digest.clone(),
             duration_ms: 1,
             episodes: 1,

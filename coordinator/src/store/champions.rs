@@ -7,6 +7,7 @@ use evolution::{Champion, ChampionSource, HeldOut, Judged};
 
 use super::{
     StoreError,
+    history::real,
     seals::{Seal, Sealer},
 };
 
@@ -40,14 +41,14 @@ pub fn put(
         individual,
         trial_fitness,
         genotype,
-        held_out.map(|held_out| held_out.mean),
-        held_out.map(|held_out| held_out.ci95),
+        held_out.map(|held_out| held_out.mean.get()),
+        held_out.map(|held_out| held_out.ci95.get()),
         held_out.map(|held_out| held_out.n_trials),
         held_out.map(|held_out| held_out.generation),
         seal,
-        judged.map(|judged| judged.mean),
-        judged.map(|judged| judged.low),
-        judged.map(|judged| judged.high),
+        judged.map(|judged| judged.mean.get()),
+        judged.map(|judged| judged.low.get()),
+        judged.map(|judged| judged.high.get()),
         judged.map(|judged| judged.n_trials),
         judged.map(|judged| judged.generation),
     ])?;
@@ -76,11 +77,11 @@ fn seal_of(
         seal = seal.text(b"individual").number(individual.into());
     }
     if let Some(HeldOut { mean, ci95, n_trials, generation }) = champion.held_out {
-        seal = seal.text(b"held out").real(mean).real(ci95);
+        seal = seal.text(b"held out").real(mean.get()).real(ci95.get());
         seal = seal.number(n_trials).number(generation);
     }
     if let Some(Judged { mean, low, high, n_trials, generation }) = champion.judged {
-        seal = seal.text(b"judged").real(mean).real(low).real(high);
+        seal = seal.text(b"judged").real(mean.get()).real(low.get()).real(high.get());
         seal = seal.number(n_trials.into()).number(generation);
     }
     seal.finish()
@@ -113,20 +114,20 @@ impl Stored {
 
     fn from_row(row: &Row<'_>) -> rusqlite::Result<Self> {
         let individual: Option<u32> = row.get(1)?;
-        let held_out = match row.get(4)? {
-            Some(mean) => Some(HeldOut {
-                mean,
-                ci95: row.get(5)?,
+        let held_out = match row.get::<_, Option<f64>>(4)? {
+            Some(_) => Some(HeldOut {
+                mean: real(row, 4)?,
+                ci95: real(row, 5)?,
                 n_trials: row.get(6)?,
                 generation: row.get(7)?,
             }),
             None => None,
         };
-        let judged = match row.get(11)? {
-            Some(mean) => Some(Judged {
-                mean,
-                low: row.get(12)?,
-                high: row.get(13)?,
+        let judged = match row.get::<_, Option<f64>>(11)? {
+            Some(_) => Some(Judged {
+                mean: real(row, 11)?,
+                low: real(row, 12)?,
+                high: real(row, 13)?,
                 n_trials: row.get(14)?,
                 generation: row.get(15)?,
             }),

@@ -1,9 +1,9 @@
 //! What has happened to an experiment: its events and its generations.
 
-use rusqlite::{Connection, Row, Transaction, params};
+use rusqlite::{Connection, Row, Transaction, params, types::Type};
 
 use crate::ids::ExperimentId;
-use evolution::Statistics;
+use evolution::{Real, Statistics};
 
 use super::{
     Event, EventKind, ExperimentState, GenerationRecord, Result, Store, StoreError, seals::Sealer,
@@ -94,10 +94,10 @@ pub fn put(
     statement.execute(params![
         id.0,
         generation.generation,
-        statistics.best,
-        statistics.mean,
-        statistics.min,
-        statistics.standard_deviation,
+        statistics.best.get(),
+        statistics.mean.get(),
+        statistics.min.get(),
+        statistics.standard_deviation.get(),
         generation.digest,
         generation.duration_ms,
         generation.episodes,
@@ -168,10 +168,10 @@ pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<G
     Ok(Some(GenerationRecord {
         generation,
         statistics: Statistics {
-            best: row.get(first + 1)?,
-            mean: row.get(first + 2)?,
-            min: row.get(first + 3)?,
-            standard_deviation: row.get(first + 4)?,
+            best: real(row, first + 1)?,
+            mean: real(row, first + 2)?,
+            min: real(row, first + 3)?,
+            standard_deviation: real(row, first + 4)?,
         },
         digest: row.get(first + 5)?,
         duration_ms: row.get(first + 6)?,
@@ -179,4 +179,12 @@ pub fn read_generation(row: &Row<'_>, first: usize) -> rusqlite::Result<Option<G
         workers: row.get(first + 8)?,
         idle_share: row.get(first + 9)?,
     }))
+}
+
+/// A column that has a number. SQLite keeps NaN as NULL, so there is none of it to be read.
+pub fn real(row: &Row<'_>, column: usize) -> rusqlite::Result<Real> {
+    let number: f64 = row.get(column)?;
+    Real::try_from(number).map_err(|error| {
+        rusqlite::Error::FromSqlConversionFailure(column, Type::Real, Box::new(error))
+    })
 }

@@ -3,7 +3,9 @@
 use std::fs;
 
 use crate::{group::Membership, submission::Submission};
-use evolution::{Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Judged, Statistics};
+use evolution::{
+    Champion, ChampionSource, Checkpoint, Evolution, HeldOut, Judged, Real, Statistics,
+};
 
 use super::*;
 
@@ -19,14 +21,18 @@ pub fn new_experiment(request_id: Option<&str>) -> NewExperiment {
     submission.check().unwrap().new
 }
 
+fn real(value: f64) -> Real {
+    Real::new(value).unwrap()
+}
+
 fn generation(generation: u64) -> GenerationRecord {
     GenerationRecord {
         generation,
         statistics: Statistics {
-            best: 0.1 + 0.2,
-            mean: 1.0 / 3.0,
-            min: -f64::MIN_POSITIVE,
-            standard_deviation: 0.0,
+            best: real(0.1 + 0.2),
+            mean: real(1.0 / 3.0),
+            min: real(-f64::MIN_POSITIVE),
+            standard_deviation: real(f64::INFINITY),
         },
         digest: format!("{generation:064x}"),
         duration_ms: 12,
@@ -139,7 +145,8 @@ fn what_is_committed_is_there_after_reopening_bit_for_bit() {
 fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
     let (_directory, mut store) = open();
     let (id, _) = store.create(&new_experiment(None), 5).unwrap();
-    let held_out = HeldOut { mean: 0.1 + 0.2, ci95: 1.0 / 3.0, n_trials: 50, generation: 4 };
+    let held_out =
+        HeldOut { mean: real(0.1 + 0.2), ci95: real(1.0 / 3.0), n_trials: 50, generation: 4 };
     let champion = Champion {
         generation: 3,
         source: ChampionSource::Mean,
@@ -148,7 +155,8 @@ fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
         held_out: Some(held_out),
         judged: None,
     };
-    let judged = Judged { mean: 0.1, low: 0.1 / 3.0, high: 0.7, n_trials: 200, generation: 5 };
+    let [mean, low, high] = [0.1, 0.1 / 3.0, 0.7].map(real);
+    let judged = Judged { mean, low, high, n_trials: 200, generation: 5 };
     // The end of a run, and then more generations of it, by which the champion is another.
     for (number, judged) in [(4, None), (5, Some(judged)), (6, None)] {
         let champion = Champion { judged, ..champion.clone() };
@@ -168,8 +176,8 @@ fn a_champion_keeps_its_origin_and_its_fitness_of_both_kinds_apart() {
             .unwrap();
         assert_eq!(store.champion(id).unwrap(), Some(champion));
         let experiment = store.experiment(id).unwrap().unwrap();
-        assert_eq!(experiment.held_out_fitness, Some(held_out.mean));
-        assert_eq!(experiment.judged_fitness, judged.map(|judged| judged.mean));
+        assert_eq!(experiment.held_out_fitness, Some(held_out.mean.get()));
+        assert_eq!(experiment.judged_fitness, judged.map(|judged| judged.mean.get()));
     }
 }
 

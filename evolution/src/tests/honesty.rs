@@ -54,17 +54,17 @@ fn champions_are_worth_what_their_judgement_says() {
     let champions: Vec<Champion> = (0..200).map(champion_of_a_run).collect();
     let errors = |of: fn(&Champion) -> f64| -> (f64, f64) {
         let errors: Vec<f64> = champions.iter().map(|it| of(it) - worth(&it.genotype)).collect();
-        let HeldOut { mean, ci95, .. } = HeldOut::of(&errors, 0);
-        (mean, ci95)
+        let HeldOut { mean, ci95, .. } = HeldOut::of(&errors, 0).unwrap();
+        (mean.get(), ci95.get())
     };
-    let (error, ci95) = errors(|champion| champion.judged.unwrap().mean);
+    let (error, ci95) = errors(|champion| champion.judged.unwrap().mean.get());
     assert!(error.abs() < ci95, "{error} +- {ci95}");
-    let (error, ci95) = errors(|champion| champion.held_out.unwrap().mean);
+    let (error, ci95) = errors(|champion| champion.held_out.unwrap().mean.get());
     assert!(error > ci95, "what selected them is optimistic: {error} +- {ci95}");
 
     let is_covered = |champion: &&Champion| {
         let Judged { low, high, .. } = champion.judged.unwrap();
-        (low..=high).contains(&worth(&champion.genotype))
+        (low.get()..=high.get()).contains(&worth(&champion.genotype))
     };
     let n_covered = champions.iter().filter(is_covered).count();
     // 95 % and two standard errors.

@@ -129,7 +129,7 @@ fn champions_are_kept_by_their_held_out_fitness() {
     assert_eq!(evolution.champion().unwrap().source, ChampionSource::Mean);
     choose(&mut other, &[3.0, 2.0, f64::NAN]);
     let kept = other.champion().unwrap().held_out.unwrap();
-    assert_eq!((kept.mean, kept.n_trials), (4.0, 4), "5 and 3, of two trials each");
+    assert_eq!((kept.mean.get(), kept.n_trials), (4.0, 4), "5 and 3, of two trials each");
     assert_ne!(other.champion_digest(), evolution.champion_digest());
 
     // Who has lost once does not come back: the next challenger is of later birth.
@@ -152,8 +152,8 @@ fn a_judgement_changes_nothing_of_evolution_and_has_a_link_of_its_own() {
 
     let (judged, digest) = judgement.clone().decide(&[vec![1.0, 2.0, 6.0]]);
     let Judged { mean, low, high, n_trials, generation } = judged.judged.unwrap();
-    assert_eq!((mean, n_trials, generation), (3.0, 3, 0));
-    assert!(1.0 <= low && low < mean && mean < high && high <= 6.0, "{low} {high}");
+    assert_eq!((mean.get(), n_trials, generation), (3.0, 3, 0));
+    assert!(1.0 <= low.get() && low < mean && mean < high && high.get() <= 6.0, "{low} {high}");
     assert_eq!(Champion { judged: None, ..judged }, *champion);
     assert_ne!(digest, evolution.champion_digest());
     assert_ne!(digest, judgement.clone().decide(&[vec![1.0, 2.0, 6.0f64.next_up()]]).1);
@@ -169,7 +169,8 @@ fn fitness_that_is_not_finite_ranks_last_and_is_counted() {
     let fitness = [vec![f64::NAN, 9.0], vec![1.0, 1.0], vec![f64::INFINITY, 0.0], vec![2.0, 4.0]];
     let record = evolution.tell(generation, &fitness).unwrap();
     assert_eq!(record.n_non_finite, 2);
-    let expected = Statistics { best: 3.0, mean: 2.0, min: 1.0, standard_deviation: 1.0 };
+    let [best, mean, min] = [3.0, 2.0, 1.0].map(|it| Real::new(it).unwrap());
+    let expected = Statistics { best, mean, min, standard_deviation: min };
     assert_eq!(record.statistics, expected);
     assert_eq!(evolution.champion().unwrap().source, ChampionSource::Individual(3));
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::{
     statistics::{
-        Interval, interquartile_mean, interval, interval_of_two, mann_whitney, median,
+        Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
         probability_of_improvement,
     },
     table::{Column, Screen, Table},
@@ -216,7 +216,7 @@ fn average(
     let history = run.history.as_ref()?;
     let first = history.len().saturating_sub(usize::try_from(last).unwrap_or(usize::MAX));
     let values: Vec<f64> = history[first..].iter().map(value).collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    (!values.is_empty()).then(|| mean(&values))
 }
 
 /// Number of generations until the mean first reaches the target; infinite if it does not.

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use evolution::interval::interval;
+use evolution::{between, deviation, finite_mean, interval::interval};
 use serde::Serialize;
 
 /// Upper 2.5 % point of the standard normal distribution: 95 % of it lie within.
@@ -26,7 +26,7 @@ impl Quartiles {
             let place = p * last as f64;
             let low = place as usize;
             let high = (low + 1).min(last);
-            values[low] + (place - low as f64) * (values[high] - values[low])
+            between(values[low], values[high], place - low as f64)
         };
         Some(Self { median: quantile(0.5), q1: quantile(0.25), q3: quantile(0.75) })
     }
@@ -58,9 +58,14 @@ impl Estimate {
     pub fn of(values: &[f64], is_share: bool) -> Option<Self> {
         let quartiles = Quartiles::of(values.to_vec())?;
         let n = values.len() as f64;
-        let mean = mean(values)?;
-        let squares = values.iter().fold(0.0, |sum, value| sum + (value - mean) * (value - mean));
-        let deviation = if n > 1.0 { (squares / (n - 1.0)).sqrt() } else { 0.0 };
+        let finite_mean = finite_mean(values)?;
+        let deviation = match values.len() - 1 {
+            0 => 0.0,
+            divisor => deviation(values, finite_mean, divisor).get(),
+        };
+        // Without the sign of zero.
+        let mean = finite_mean.get() + 0.0;
+        let (low, high) = interval(values)?;
         let around = |radius: f64| [mean - radius, mean + radius];
         // Rounding must not make the root's argument negative.
         let proportion = || around(Z * ((mean * (1.0 - mean)).max(0.0) / n).sqrt());
@@ -68,7 +73,7 @@ impl Estimate {
             n: values.len(),
             mean,
             standard_deviation: deviation,
-            ci95: interval(values)?.into(),
+            ci95: [low.get(), high.get()],
             proportion_ci95: is_share.then(proportion),
             quartiles,
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -84,10 +89,11 @@ impl fmt::Display for Estimate {
     }
 }
 
-/// The mean; none if there are no values.
+/// The mean; none if there are no values. Of finite values it is finite.
 pub fn mean(values: &[f64]) -> Option<f64> {
     let sum = values.iter().fold(0.0, |sum, value| sum + value);
-    (!values.is_empty()).then(|| sum / values.len() as f64)
+    let plain = (!values.is_empty()).then(|| sum / values.len() as f64)?;
+    Some(finite_mean(values).filter(|_| !plain.is_finite()).map_or(plain, f64::from))
 }
 
 #[cfg(test)]
@@ -139,5 +145,23 @@ mod tests {
         let all = Estimate::of(&[1.0; 3], true).unwrap();
         assert_eq!(all.proportion_ci95, Some([1.0, 1.0]));
         assert_eq!(Estimate::of(&[], true), None);
+    }
+
+    #[test]
+    fn values_of_every_size_have_an_estimate_of_numbers() {
+        let tiny = |step: u64| f64::from_bits(step);
+        for values in [
+            [tiny(0), tiny(1), tiny(3)],
+            [0.0, 1e-300, 2e-300],
+            [1e308, 1.5e308, f64::MAX],
+            [f64::MIN, 0.0, f64::MAX],
+            [f64::MIN, f64::MAX, f64::MAX],
+        ] {
+            let estimate = Estimate::of(&values, false).unwrap();
+            let json = serde_json::to_string(&estimate).unwrap();
+            assert!(!json.contains("null"), "{json}");
+            let [low, high] = estimate.ci95;
+            assert!(values[0] <= low && low <= high && high <= values[2], "{estimate:?}");
+        }
     }
 }
