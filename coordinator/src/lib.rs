@@ -11,6 +11,7 @@
 //! - `queries`: what can be read of experiments; works on the store alone
 //! - `rpc`: gRPC services, which only translate
 //! - `server`: listening, TLS, tokens, limits on connections and calls
+//! - [`local`]: experiments that the calling process computes by itself
 //! - [`group`]: which experiments belong together
 //! - [`labels`]: what people find experiments by
 //! - `health_check`: asks another process's coordinator how it is
@@ -29,6 +30,7 @@ mod health_check;
 pub mod ids;
 pub mod labels;
 pub mod limits;
+pub mod local;
 mod memory;
 pub mod metrics;
 pub mod priority;

@@ -81,12 +81,13 @@ impl Evolution {
     }
 
     /// Learns from the fitness of the generation that was asked for, `[P, T]`. Returns the
-    /// index of the generation, best, mean, min and the number of those that are not finite.
+    /// index of the generation, best, mean, min, standard deviation and the number of those that
+    /// are not finite.
     fn tell(
         &self,
         py: Python<'_>,
         fitness: PyReadonlyArray2<'_, f64>,
-    ) -> PyResult<(u64, f64, f64, f64, usize)> {
+    ) -> PyResult<(u64, f64, f64, f64, f64, usize)> {
         let fitness = rows(&fitness);
         let summary = self.0.with(py, |state| {
             let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
@@ -103,8 +104,9 @@ impl Evolution {
         })?;
         let summary = summary.map_err(PyValueError::new_err)?;
         let of = &summary.statistics;
-        let [best, mean, min] = [of.best, of.mean, of.min].map(f64::from);
-        Ok((summary.generation, best, mean, min, summary.n_non_finite))
+        let numbers = [of.best, of.mean, of.min, of.standard_deviation];
+        let [best, mean, min, deviation] = numbers.map(f64::from);
+        Ok((summary.generation, best, mean, min, deviation, summary.n_non_finite))
     }
 
     #[getter]
@@ -200,6 +202,11 @@ impl Evolution {
     /// One that Python has as its own.
     pub fn of(evolution: evolution::Evolution) -> Self {
         Self(Shared::new(State { evolution, asked: None }))
+    }
+
+    /// It, as it is now.
+    pub fn state(&self, py: Python<'_>) -> PyResult<evolution::Evolution> {
+        self.0.with(py, |state| state.evolution.clone())
     }
 
     /// As the coordinator's of the same file.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use coordinator::local::completion;
 use evolution::{ALGORITHMS, Digest};
 use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
@@ -91,7 +92,13 @@ impl Experiment {
 
     /// The file with all defaults, as JSON.
     fn to_json(&self) -> String {
-        self.config.to_canonical_json()
+        self.text()
+    }
+
+    /// Why its evolution is over after so many generations, the latest with this mean fitness;
+    /// none if it is not, empty if all generations are done.
+    fn completion(&self, n_generations: u64, mean: f64) -> Option<String> {
+        completion(&self.config, n_generations, mean)
     }
 
     /// Fitness of P genotypes in T trials, flat: `[P * T]`.
@@ -180,6 +187,11 @@ impl Experiment {
 }
 
 impl Experiment {
+    /// The file with all defaults, as JSON.
+    pub fn text(&self) -> String {
+        self.config.to_canonical_json()
+    }
+
     /// Computes P genotypes, in so many items that all threads have something to do.
     fn of_all<'py>(
         &self,

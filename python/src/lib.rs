@@ -5,8 +5,10 @@ mod database;
 mod errors;
 mod evolution;
 mod experiment;
+mod fitness_log;
 mod genes;
 mod memory;
+mod record;
 mod running;
 mod stepping;
 mod trace;
@@ -23,8 +25,10 @@ mod _core {
         database::Database,
         evolution::{Evolution, Reevaluation, algorithms},
         experiment::{Experiment, inline_script, script_path},
+        fitness_log::fitness_log,
         genes::encode_genes,
         memory::ensure_memory,
+        record::Record,
         stepping::Episodes,
         workers::Worker,
     };

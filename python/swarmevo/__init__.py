@@ -12,14 +12,13 @@ from ._core import VERSION as __version__
 from .champion import Champion, Judged, Origin, Selection
 from .environment import parallel_env
 from .episodes import Actions, Episodes
-from .errors import ExperimentError, FleetError, ForkError, InternalError, OtherExperimentError, Problem, SwarmError
+from .errors import ExperimentError, FleetError, ForkError, InternalError, NotFound, OtherExperimentError, Problem, RefusedArgument, SwarmError
 from .evolution import (
     CMAES,
     GA,
     SNES,
     XNES,
     Evolution,
-    Generation,
     OpenAIES,
     SepCMAES,
     algorithms,
@@ -27,7 +26,8 @@ from .evolution import (
 from .experiment import Experiment, Measured
 from .files import Archive, open
 from .fleet import Client, FleetRun, connect
-from .local import LocalRun, evolve
+from .generations import Generation
+from .local import Interrupted, LocalRun, evolve
 from .mirroring import mirror
 from .network import Network
 from .records import Individuals, RecordedRun
@@ -39,7 +39,7 @@ from .workers import Workers, workers
 __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "ForkError", "GA", "Generation", "Individuals", "InternalError",
-    "Judged", "LocalRun", "Measured", "Network", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "Replay", "SNES", "Selection",
+    "Interrupted", "Judged", "LocalRun", "Measured", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",
     "mirror", "open", "parallel_env", "workers",
 ]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments
 from .champion import Genes
+from .representation import short
 
 if TYPE_CHECKING:
     from .experiment import Experiment
@@ -29,6 +30,8 @@ class Actions:
     """``[T, A]``: whether it sends its own message; else it relays."""
     messages: Floats
     """``[T, A, M]``: the message before quantisation, in [0, 1]."""
+
+    __repr__ = short
 
 
 class Episodes:

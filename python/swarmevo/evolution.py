@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments
 from .champion import Champion, Origin
+from .generations import Generation
 from .trials import TrialSet
 
 Floats = NDArray[np.float64]
@@ -22,22 +23,6 @@ type of array, list or tuple of numbers; or ``[P]`` if trials do not matter, whi
 CHAMPION_TRIALS = 50
 JUDGEMENT_TRIALS = 200
 """What experiment files have if they say nothing else."""
-
-
-@dataclass(frozen=True)
-class Generation:
-    """The fitness of a generation in short, over the individuals whose fitness is finite."""
-
-    index: int
-    """From 0."""
-    best: float
-    mean: float
-    min: float
-    n_non_finite: int
-    """Individuals whose fitness is not finite; they rank last."""
-    digest: str
-    """A link of a hash chain over all genotypes and fitness so far: equal digests, equal
-    runs, bit for bit."""
 
 
 class Evolution:
@@ -102,8 +87,8 @@ class Evolution:
             values = values[:, np.newaxis]
         if values.ndim != 2:
             raise ValueError(f"fitness is an array [P] or [P, T], not {list(values.shape)}")
-        index, best, mean, least, n_non_finite = self._core.tell(values)
-        return Generation(index, best, mean, least, n_non_finite, self.digest)
+        index, best, mean, least, deviation, n_non_finite = self._core.tell(values)
+        return Generation(index, best, mean, least, n_non_finite, self.digest, deviation)
 
     def compare(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
         """Compares the candidates for the champion on held-out trials, and makes the winner the champion: the

@@ -18,6 +18,7 @@ from .errors import OtherExperimentError
 from .network import Network
 from .trace import Trace
 from .trials import AnyTrialSet, address
+from .representation import short
 
 if TYPE_CHECKING:
     from .evolution import Evolution
@@ -37,6 +38,8 @@ class Measured:
     measures: dict[str, Floats]
     """By name, ``[P, T, steps]``; NaN where a step has none. ``docs/evaluation.md`` of the
     project has their units."""
+
+    __repr__ = short
 
 
 class Experiment:
@@ -193,7 +196,7 @@ class Experiment:
         """
         genes, is_one = self._genotypes(genotypes)
         where = address(generation, trials, self.n_trials)
-        fitness = self._core.evaluate(genes, where, _threads(threads))
+        fitness = self._core.evaluate(genes, where, thread_count(threads))
         fitness = fitness.reshape(len(genes), where[4] - where[3])
         return fitness[0] if is_one else fitness
 
@@ -211,7 +214,7 @@ class Experiment:
         n_trials = where[4] - where[3]
         n_values = len(genes) * n_trials * (1 + self.n_steps * len(self.measure_names))
         _core.ensure_memory(2 * 8 * n_values, f"measures of {len(genes)} genotypes in {n_trials} trials")
-        values = self._core.measure(genes, where, _threads(threads))
+        values = self._core.measure(genes, where, thread_count(threads))
         values = values.reshape(len(genes), n_trials, -1)
         names = self.measure_names
         fitness, steps = values[..., 0], values[..., 1:]
@@ -232,7 +235,7 @@ class Experiment:
         genes = self._genotype(genotype)
         where = address(generation, trials, self.n_trials)
         _core.ensure_memory(self._trace_len(where[4] - where[3]), f"a trace of {where[4] - where[3]} trials")
-        arrays = self._core.simulate(genes, where, _threads(threads))
+        arrays = self._core.simulate(genes, where, thread_count(threads))
         return Trace(self, genes, where, arrays)
 
     def episodes(
@@ -364,7 +367,8 @@ class Experiment:
         return genes
 
 
-def _threads(threads: int | None) -> int:
+def thread_count(threads: int | None) -> int:
+    """Of a computation: as many as there are processors if absent."""
     if threads is None:
         return available_cpus()
     return arguments.whole(threads, "threads", 1, THREADS_MAX)

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from . import _core, protocol
+from .extras import needs
 from .records import RecordedRun, Records
 
+
+AT_ONCE = 32
+"""Generations whose fitness is read at once."""
 
 _left_behind: list[_core.Database] = []
 
@@ -32,6 +41,8 @@ class Archive(Records):
         """Writes ``experiments.parquet``, and of each experiment ``history-ID.parquet`` and
         ``fitness-ID.parquet``: the tables of :meth:`~Records.experiments`,
         :meth:`~RecordedRun.history` and :meth:`~RecordedRun.fitness_log`. Returns the files."""
+        with needs("data"):
+            import_module("pyarrow")
         directory = Path(directory)
         directory.mkdir(parents=True, exist_ok=True)
         files = [directory / "experiments.parquet"]
@@ -43,6 +54,18 @@ class Archive(Records):
                 files.append(directory / f"{name}-{run.id}.parquet")
                 table.to_parquet(files[-1], index=False)
         return files
+
+    def _fitness(self, experiment: int, generations: Sequence[int]) -> list[NDArray[np.float64]]:
+        fitness: list[NDArray[np.float64]] = []
+        while len(fitness) < len(generations):
+            first = generations[len(fitness)]
+            wanted = itertools.takewhile(lambda it: it[0] == it[1], zip(generations[len(fitness) :], itertools.count(first)))
+            n_wanted = min(sum(1 for _ in wanted), AT_ONCE)
+            read = _core.fitness_log(os.fspath(self.directory), experiment, first, n_wanted)
+            found = list(itertools.takewhile(lambda it: it is not None, read))
+            # Without it, the answer says why it is not there.
+            fitness += [it for it in found if it is not None] or super()._fitness(experiment, [first])
+        return fitness
 
     def _run(self, experiment_id: int) -> RecordedRun:
         return RecordedRun(self, experiment_id)

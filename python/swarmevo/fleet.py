@@ -17,6 +17,8 @@ from . import _core, arguments, protocol
 from .champion import Champion, Genes
 from .errors import ExperimentError, FleetError, ForkError, refused
 from .experiment import Experiment, as_experiment
+from .extras import needs
+from .generations import Generation, of_message
 from .progress import shown
 from .records import RecordedRun, Records, config_json, problems_of
 from .settings import Settings
@@ -63,7 +65,9 @@ class Client(Records):
     """A connection to a coordinator; use :func:`connect`. Threads may share it."""
 
     def __init__(self, settings: Settings, patience: float = 60.0) -> None:
-        import grpc
+        with needs("fleet"):
+            import google.protobuf
+            import grpc
 
         self.address: str = settings.address
         """The coordinator's address."""
@@ -163,7 +167,8 @@ class Client(Records):
 
     def workers(self) -> pandas.DataFrame:
         """A row per connected worker."""
-        import pandas
+        with needs("data"):
+            import pandas
 
         found = self._request("FleetService", "ListWorkers").workers
         names = ("id", "name", "slots", "items_in_flight", "results_per_second", "idle_share",
@@ -275,9 +280,8 @@ class FleetRun(RecordedRun):
 
     _records: Client
 
-    def watch(self) -> Iterator[Any]:
-        """The messages ``GenerationSummary`` of all generations, each once, those that are done
-        first, until the experiment has ended; through restarts of the coordinator."""
+    def watch(self) -> Iterator[Generation]:
+        """All generations, each once, those that are done first, until the experiment has ended; through restarts of the coordinator."""
         client = self._records
         call, request_class = client._call_of("ExperimentService", "WatchExperiment", "unary_stream")
         request = request_class(experiment_id=self.id, from_sequence=1)
@@ -291,7 +295,7 @@ class FleetRun(RecordedRun):
                         request.from_sequence = event.sequence + 1
                         kind = event.WhichOneof("kind")
                         if kind == "generation_completed":
-                            yield event.generation_completed
+                            yield of_message(event.generation_completed, event.at_ms)
                         elif kind == "state_changed":
                             is_over = protocol.states().get(event.state_changed.state) in ENDS
             except FleetError as error:
@@ -315,7 +319,7 @@ class FleetRun(RecordedRun):
         return self
 
     def pause(self, reason: str = "") -> None:
-        """Takes it from the workers until it is resumed."""
+        """Takes it from the workers until it is resumed. FleetError if it has ended."""
         self._records._call("PauseExperiment", experiment_id=self.id, reason=reason)
 
     def resume(self) -> None:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import time
+from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
-from . import arguments
 from .champion import Champion
-from .evolution import Evaluate, Evolution, Generation, compute
-from .experiment import Experiment
+from .evolution import Evaluate, Evolution, Floats, compute
+from .experiment import Experiment, thread_count
+from .generations import Generation, table
+from .keepers import Done, End, InDatabase, InFile, Keeper
 from .plotting import plot_history
 from .progress import shown
 from .trials import TrialSet
@@ -20,27 +21,29 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
+Callback = Callable[[Generation, Evolution], Any]
+"""Called with every generation that is complete, and with a copy of evolution after it."""
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class LocalRun:
-    """A run that has ended."""
+    """A run that has ended, or was interrupted."""
 
     experiment: Experiment
     generations: list[Generation]
-    """All of them, in order."""
+    """All that are complete, in order."""
     champion: Champion
-    """Judged on trials that selected nothing."""
+    """Judged on trials that selected nothing, unless the run was interrupted."""
     digest: str
     """Covers every bit of the run: the one that ``swarmctl run`` prints."""
     evolution: Evolution
     """After the last generation, to go on from."""
+    id: int | None = None
+    """Its number in the data directory, if it has one."""
 
     def history(self) -> pandas.DataFrame:
-        """A row per generation."""
-        import pandas
-
-        rows = [vars(generation) for generation in self.generations]
-        return pandas.DataFrame(rows).rename(columns={"index": "generation"})
+        """A row per generation: best, mean, min, standard deviation, digest, times."""
+        return table(self.generations)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Best and mean fitness of every generation."""
@@ -51,9 +54,22 @@ class LocalRun:
 
     def __repr__(self) -> str:
         return (
-            f"<LocalRun of {self.experiment.name!r}: {len(self.generations)} generations, "
+            f"<LocalRun of {self.experiment.name!r}: {len(self.generations)} of {self.experiment.generations} generations, "
             f"champion {self.champion.fitness:.6f}>"
         )
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C has ended :func:`evolve`. ``run`` has everything until then: the generations that are complete,
+    ``evolution`` after them, and the champion so far, which is not judged."""
+
+    def __init__(self, run: LocalRun, advice: str) -> None:
+        self.run = run
+        super().__init__(run, advice)
+
+    def __str__(self) -> str:
+        run = self.run
+        return f"{len(run.generations)} of {run.experiment.generations} generations are complete; {self.args[1]}"
 
 
 def evolve(
@@ -63,35 +79,106 @@ def evolve(
     threads: int | None = None,
     progress: bool = True,
     evaluate: Evaluate | None = None,
+    callback: Callback | None = None,
+    data_dir: str | os.PathLike[str] | None = None,
 ) -> LocalRun:
     """Runs an experiment here, as ``swarmctl run`` does: the same generations, champion and
     digest.
 
     ``generations``: instead of the file's. ``threads``: as many as there are processors if
     absent. ``progress``: whether tqdm, if it is installed, shows how far it is.
+
+    ``data_dir``: the data directory that keeps every generation, as that of ``swarmctl run`` does. The same call goes
+    on with what was interrupted, and gives what has completed without computing it again; ``swarmctl list
+    --data-dir``, ``swarmevo.open`` and ``swarmctl run`` know the run. Nobody else uses the directory meanwhile.
+
+    ``callback``: called with every :class:`Generation` that is complete (and kept), and with a copy of evolution
+    after it. What it raises ends the run, unchanged.
+
+    Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all that is complete; within a second
+    where the experiment itself computes fitness.
+
     ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`:
     ``f(genotypes, trial_set, n_trials)`` returns an array ``[P, T]`` of T = ``n_trials``, of any type of numbers
     (NumPy, JAX, PyTorch, lists, tuples), or ``[P]`` if trials do not matter, which counts as one trial. Anything
     else is a ValueError at once. A fitness that is not finite ranks last; a generation without a finite one is a
-    ValueError. What ``evaluate`` raises ends the run, unchanged.
+    ValueError. What ``evaluate`` raises ends the run, unchanged. ``data_dir`` keeps such a run in a file of its own,
+    ``NAME-DIGEST.evolve.json``: no coordinator could go on with it. It is for one function: another one, which may
+    be the same with changes, needs another directory.
     """
-    settings = experiment.to_dict()["algorithm"]
-    n_generations: int = settings["generations"]
     if generations is not None:
-        n_generations = arguments.whole(generations, "generations", 1)
+        experiment = experiment.replace(generations=generations)
+    n_threads = thread_count(threads)
 
-    def here(
-        genotypes: NDArray[np.float64], trial_set: TrialSet, n_trials: int
-    ) -> NDArray[np.float64]:
+    def here(genotypes: Floats, trial_set: TrialSet, n_trials: int) -> Floats:
         return experiment.evaluate(genotypes, trial_set, trials=n_trials, threads=threads)
 
-    fitness_by: Evaluate = here if evaluate is None else evaluate
-    evolution = experiment.evolution()
-    done: list[Generation] = []
-    for index in shown(range(n_generations), experiment.name, progress, n_generations):
-        fitness = compute(fitness_by, evolution.ask(), TrialSet.of(index), experiment.n_trials)
-        done.append(evolution.tell(fitness))
-        if evolution.n_generations % settings["champion_every"] == 0:
-            evolution.compare(fitness_by)
-    judged = evolution._judge(fitness_by, settings["judgement_trials"])
-    return LocalRun(experiment, done, judged.champion, judged.digest, evolution)
+    if data_dir is None:
+        keeper = Keeper(experiment)
+    else:
+        keeper = (InDatabase if evaluate is None else InFile)(experiment, os.fspath(data_dir))
+    run = _Run(experiment, keeper, here if evaluate is None else evaluate, callback, n_threads)
+    with closing(keeper):
+        try:
+            todo = iter(run.step, False)
+            for _ in shown(todo, experiment.name, progress, experiment.generations, len(run.done)):
+                pass
+        except KeyboardInterrupt:
+            if not run.done:
+                raise
+            lost = "`run` of this exception has them" if data_dir is None else f"the same call goes on, from {data_dir}"
+            raise Interrupted(run.so_far(), lost) from None
+        return run.ended()
+
+
+class _Run:
+    """A run, generation by generation. It has whole ones only, whatever is raised meanwhile."""
+
+    def __init__(
+        self, experiment: Experiment, keeper: Keeper, evaluate: Evaluate, callback: Callback | None, n_threads: int
+    ) -> None:
+        self._experiment, self._keeper, self._evaluate = experiment, keeper, evaluate
+        self._callback, self._n_threads = callback, n_threads
+        self._settings = experiment.to_dict()["algorithm"]
+        self._evolution, self.done = keeper.evolution, list(keeper.generations)
+        self._end = keeper.end
+
+    def step(self) -> bool:
+        """One generation, unless the run is over; whether there was one."""
+        if self._end is not None:
+            return False
+        started = time.monotonic()
+        n_trials = self._experiment.n_trials
+        fitness = compute(self._evaluate, self._evolution.ask(), TrialSet.of(self._evolution.n_generations), n_trials)
+        after = self._evolution.copy()
+        told = after.tell(fitness)
+        is_due = after.n_generations % self._settings["champion_every"] == 0
+        blocks = after._compare(self._evaluate, self._settings["champion_trials"]) if is_due else []
+        completed = self._experiment._core.completion(after.n_generations, told.mean)
+        judgement = None if completed is None else after._judge(self._evaluate, self._settings["judgement_trials"])
+        seconds = time.monotonic() - started
+        generation = told._timed(seconds, fitness.size, self._n_threads)
+        kept = Done(generation, after, fitness, blocks, judgement, seconds, self._n_threads, completed)
+        self._keeper.commit(kept)
+        self._evolution = after
+        self.done.append(generation)
+        if judgement is not None:
+            self._end = End(judgement.champion, judgement.digest)
+        if self._callback is not None:
+            self._callback(generation, after.copy())
+        return True
+
+    def so_far(self) -> LocalRun:
+        """What is complete."""
+        if self._end is not None:
+            return self.ended()
+        champion = self._evolution.champion
+        assert champion is not None, "a generation is complete"
+        digest = self._evolution.digest
+        return LocalRun(self._experiment, self.done, champion, digest, self._evolution, self._keeper.id)
+
+    def ended(self) -> LocalRun:
+        """The whole of it."""
+        assert self._end is not None, "the run is over"
+        champion, digest = self._end
+        return LocalRun(self._experiment, self.done, champion, digest, self._evolution, self._keeper.id)

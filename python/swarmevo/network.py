@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .extras import needs
+
 if TYPE_CHECKING:
     import networkx
 
@@ -63,7 +65,8 @@ class Network:
     def to_networkx(self) -> networkx.MultiDiGraph:
         """A graph with a node per input, node of an encoder and neuron, under their names, and an
         edge per synapse with ``weight``, ``group`` (its name in the file) and ``trainable``."""
-        import networkx
+        with needs("network"):
+            import networkx
 
         graph: networkx.MultiDiGraph = networkx.MultiDiGraph()
         for name in self.inputs:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Sequence
 
+from .extras import needs
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -17,7 +19,8 @@ def plot_history(
 ) -> Axes:
     """Best and mean fitness of every generation."""
     if ax is None:
-        from matplotlib import pyplot
+        with needs("plot"):
+            from matplotlib import pyplot
 
         _, ax = pyplot.subplots()
     ax.plot(generations, best, linewidth=0.8, label="best of the generation")

@@ -8,7 +8,7 @@ Item = TypeVar("Item")
 
 
 def shown(
-    items: Iterable[Item], name: str, progress: bool, total: int | None = None
+    items: Iterable[Item], name: str, progress: bool, total: int | None = None, initial: int = 0
 ) -> Iterator[Item]:
     """``items``; tqdm, if it is installed and wanted, shows how many of them are done."""
     if progress:
@@ -17,5 +17,5 @@ def shown(
         except ImportError:
             pass
         else:
-            items = tqdm(items, desc=name, unit="generation", total=total)
+            items = tqdm(items, desc=name, unit="generation", total=total, initial=initial)
     yield from items

@@ -9,13 +9,15 @@ from functools import lru_cache
 from typing import Any
 
 from . import _core
+from .extras import needs
 
 PACKAGE = "swarm.v1"
 
 
 @lru_cache(maxsize=None)
 def _pool() -> Any:
-    from google.protobuf import descriptor_pb2, descriptor_pool
+    with needs("fleet"):
+        from google.protobuf import descriptor_pb2, descriptor_pool
 
     pool = descriptor_pool.DescriptorPool()
     for file in descriptor_pb2.FileDescriptorSet.FromString(_core.PROTOCOL).file:
@@ -26,7 +28,8 @@ def _pool() -> Any:
 @lru_cache(maxsize=None)
 def message(name: str) -> Any:
     """The class of a message, such as ``GetExperimentRequest``."""
-    from google.protobuf import message_factory
+    with needs("fleet"):
+        from google.protobuf import message_factory
 
     return message_factory.GetMessageClass(_pool().FindMessageTypeByName(f"{PACKAGE}.{name}"))
 

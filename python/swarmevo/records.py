@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from . import arguments, protocol
 from .champion import Champion, Judged, Origin, Selection
 from .experiment import Experiment, config_text
+from .extras import needs
+from .generations import Generation, Generations, of_message, table
 from .plotting import plot_history
+from .representation import short
 
 if TYPE_CHECKING:
     import pandas
@@ -30,6 +33,8 @@ class Individuals:
     fitness: Floats
     """``[P, T]``: of each in each trial."""
 
+    __repr__ = short
+
 
 class Records(ABC):
     """Where experiments are read."""
@@ -38,9 +43,14 @@ class Records(ABC):
     def _call(self, name: str, **request: Any) -> Any:
         """A call of ``ExperimentService``."""
 
+    def _fitness(self, experiment: int, generations: Sequence[int]) -> list[Floats]:
+        """``[P, T]``: of each of these generations."""
+        return [self._run(experiment).individuals(it).fitness for it in generations]
+
     def experiments(self) -> pandas.DataFrame:
         """A row per experiment: number, name, state, generations, fitness of the champion."""
-        import pandas
+        with needs("data"):
+            import pandas
 
         return pandas.DataFrame([run.summary() for run in self.runs()])
 
@@ -144,7 +154,13 @@ class RecordedRun:
             "digest": it.digest,
         }
 
-    def generations(self) -> Iterator[Any]:
+    @property
+    def generations(self) -> list[Generation]:
+        """All generations that are done, in order; asks for the latest."""
+        done = [of_message(it.summary, it.completed_at_ms) for it in self._completed()]
+        return Generations(done, self._completed)
+
+    def _completed(self) -> Iterator[Any]:
         """The messages ``CompletedGeneration`` of all generations."""
         next_generation: int | None = 0
         while next_generation is not None:
@@ -157,16 +173,7 @@ class RecordedRun:
 
     def history(self) -> pandas.DataFrame:
         """A row per generation: best, mean, min, standard deviation, digest, times."""
-        import pandas
-
-        names = ("generation", "best", "mean", "min", "standard_deviation", "digest",
-                 "duration_ms", "episodes", "workers", "idle_share")
-        rows = [
-            {name: getattr(it.summary, name) for name in names}
-            | {"completed_at_ms": it.completed_at_ms}
-            for it in self.generations()
-        ]
-        return pandas.DataFrame(rows, columns=[*names, "completed_at_ms"])
+        return table(self.generations)
 
     @property
     def champion(self) -> Champion:
@@ -199,31 +206,36 @@ class RecordedRun:
             next_individual = None if is_last else page.next_individual
         return Individuals(np.array(genotypes), np.array(fitness))
 
-    def fitness_log(self, generations: range | None = None) -> pandas.DataFrame:
+    def fitness(self, generation: int) -> Floats:
+        """``[P, T]``: of a generation, as evolution was told of it, without its genotypes."""
+        generation = arguments.whole(generation, "generation")
+        return self._records._fitness(self.id, [generation])[0]
+
+    def fitness_log(self, generations: range | Iterable[int] | None = None) -> pandas.DataFrame:
         """A row per generation, individual and trial: what evolution was told. All
         generations that are done, unless some are named."""
-        import pandas
+        with needs("data"):
+            import pandas
 
-        chosen = range(self.message.generations_done) if generations is None else generations
-        tables = []
-        for generation in chosen:
-            fitness = self.individuals(generation).fitness
+        if generations is None:
+            self.refresh()
+            chosen = list(range(self.message.generations_done))
+        else:
+            chosen = [arguments.whole(it, "a generation") for it in generations]
+        columns: dict[str, list[NDArray[Any]]] = {name: [] for name in ("generation", "individual", "trial", "fitness")}
+        for generation, fitness in zip(chosen, self._records._fitness(self.id, chosen)):
             individual, trial = np.indices(fitness.shape)
-            columns = {
-                "generation": np.full(fitness.size, generation),
-                "individual": individual.reshape(-1),
-                "trial": trial.reshape(-1),
-                "fitness": fitness.reshape(-1),
-            }
-            tables.append(pandas.DataFrame(columns))
-        return pandas.concat(tables, ignore_index=True)
+            columns["generation"].append(np.full(fitness.size, generation))
+            columns["individual"].append(individual.reshape(-1))
+            columns["trial"].append(trial.reshape(-1))
+            columns["fitness"].append(fitness.reshape(-1))
+        return pandas.DataFrame({name: np.concatenate(parts) if parts else [] for name, parts in columns.items()})
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Best and mean fitness of every generation."""
-        done = [it.summary for it in self.generations()]
-        generations = [it.generation for it in done]
+        done = self.generations
         best, mean = [it.best for it in done], [it.mean for it in done]
-        return plot_history(ax, self.name, generations, best, mean)
+        return plot_history(ax, self.name, [it.index for it in done], best, mean)
 
     def __repr__(self) -> str:
         it = self.message

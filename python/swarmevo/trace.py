@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import arguments
+from .extras import needs
 from .replay import Replay
 from .trials import TRIALS_MAX
 
@@ -180,13 +181,15 @@ class Trace:
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row per trial, step and robot."""
-        import pandas
+        with needs("data"):
+            import pandas
 
         return pandas.DataFrame(self.columns())
 
     def to_polars(self) -> polars.DataFrame:
         """One row per trial, step and robot."""
-        import polars
+        with needs("data"):
+            import polars
 
         columns: dict[str, Any] = dict(self.columns())
         columns["object"] = polars.Series(columns["object"].tolist(), dtype=polars.Categorical)

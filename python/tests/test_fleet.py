@@ -62,7 +62,7 @@ def test_a_run_of_the_fleet_is_the_run_here(run, here):
 
 
 def test_watching_shows_every_generation_once(run, here):
-    watched = [(it.generation, it.digest) for it in run.watch()]
+    watched = [(it.index, it.digest) for it in run.watch()]
     assert watched == [(it.index, it.digest) for it in here.generations]
 
 

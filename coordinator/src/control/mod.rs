@@ -43,7 +43,7 @@ use requests::Requests;
 pub use evaluate::{CheckedEvaluation, EvaluationOrder};
 pub use explain::Explanation;
 pub use fitness::FitnessOrder;
-pub use placement::Existing;
+pub use placement::{Existing, Placement, place};
 pub use submit::Submitted;
 
 /// The way to a running coordinator.

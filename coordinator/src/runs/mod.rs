@@ -55,7 +55,7 @@ use crate::{
 pub use change_queue::{Change, PendingChange};
 pub use evaluations::Evaluation;
 pub use messages::{Command, CommitOutcome, Request, RequestId, RunId};
-pub use round::{Next, ReadyToCommit, Round};
+pub use round::{Next, ReadyToCommit, Round, completion, describe, describe_judgement};
 pub use runnable::{Runnable, restore_evolution};
 pub use stats::RunStats;
 

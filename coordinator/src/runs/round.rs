@@ -224,19 +224,23 @@ fn learn(
             record.generation, record.n_non_finite
         ));
     }
-    let algorithm = &config.algorithm;
-    let mean = record.statistics.mean;
-    let completed = if algorithm.target_fitness.is_some_and(|target| mean.get() >= target) {
-        Some(format!("the mean fitness {mean} has reached the target"))
-    } else {
-        (evolution.n_generations() >= algorithm.generations).then(String::new)
-    };
+    let completed = completion(config, evolution.n_generations(), record.statistics.mean.get());
     let told = Told::of(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 
+/// Why evolution is over after so many generations, the latest with this mean fitness, if it is;
+/// empty: all generations are done.
+pub fn completion(config: &ExperimentConfig, n_generations: u64, mean: f64) -> Option<String> {
+    let algorithm = &config.algorithm;
+    if algorithm.target_fitness.is_some_and(|target| mean >= target) {
+        return Some(format!("the mean fitness {mean} has reached the target"));
+    }
+    (n_generations >= algorithm.generations).then(String::new)
+}
+
 /// A champion after a re-evaluation, for the log.
-fn describe(champion: &Champion) -> String {
+pub fn describe(champion: &Champion) -> String {
     let held_out = match &champion.held_out {
         Some(held_out) => format!(
             "selected with mean {:.6} on {} held-out trials, optimistic",
@@ -256,7 +260,7 @@ fn describe(champion: &Champion) -> String {
 }
 
 /// What a champion is worth, for the log.
-fn describe_judgement(champion: &Champion) -> String {
+pub fn describe_judgement(champion: &Champion) -> String {
     match &champion.judged {
         Some(judged) => format!(
             "champion judged: {:.6} (95 %: {:.6} to {:.6}) on {} trials that selected nothing",

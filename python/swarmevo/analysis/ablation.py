@@ -16,6 +16,7 @@ from ..experiment import Experiment
 from ..fleet import Client
 from ..network import Network
 from .generalisation import TRIALS_OF
+from ..representation import short
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -38,6 +39,8 @@ class Lesion:
     """Change ± 1.96 standard errors over trials."""
     is_same: bool
     """Whether not a bit of the fitness of any trial changes: it is not used."""
+
+    __repr__ = short
 
 
 def ablation(

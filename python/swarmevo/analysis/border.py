@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..extras import needs
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -51,7 +53,8 @@ def alpha_shape(points: ArrayLike, radius: float) -> tuple[Ints, Ints]:
     Returns the points that the union does not surround ``[B]``, in ascending order, and the edges of
     its outline ``[E, 2]``. All points are border if they lie on a line or if there is no such triangle.
     """
-    from scipy.spatial import Delaunay, QhullError
+    with needs("analysis"):
+        from scipy.spatial import Delaunay, QhullError
 
     at = np.asarray(points, np.float64)
     nothing = np.arange(len(at)), np.empty((0, 2), np.int64)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import arguments
 from ..trace import Trace
 from .information import Codes, Dependence, dependence, entropy, mutual_information
+from ..representation import short
 
 FIRST = 10
 """The first step that counts: until then robots are made to send."""
@@ -26,6 +27,8 @@ class Symbols:
     """``[T, steps, R]``: code of each robot's own message, sent or not."""
     heard: Codes
     """``[T, steps, R]``: code of the message that it heard; -1 without a frame."""
+
+    __repr__ = short
 
 
 def symbols(trace: Trace, first: int = FIRST) -> Symbols:
@@ -59,6 +62,8 @@ class ChannelUse:
     """Share of robots and steps that hear something."""
     hops: NDArray[np.float64]
     """Share of the frames that are heard by their number of emissions, from 1 on."""
+
+    __repr__ = short
 
 
 def channel_use(trace: Trace, first: int = FIRST) -> ChannelUse:

@@ -15,8 +15,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..extras import needs
 from .. import arguments
 from .ctrnn import CTRNN, Equilibrium
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +41,8 @@ class Bifurcation:
     period: float
     """Of the cycle that is born, 2 pi / the imaginary part, in the unit of tau; NaN of a fold."""
 
+    __repr__ = short
+
 
 @dataclass(frozen=True)
 class Branch:
@@ -59,6 +63,8 @@ class Branch:
     def stable(self) -> NDArray[np.bool_]:
         """``[K]``: which of its points attract."""
         return np.asarray(self.eigenvalues[:, 0].real < 0)
+
+    __repr__ = short
 
 
 def continuation(
@@ -160,7 +166,8 @@ def _branch(path: _Path, share: float, start: Equilibrium, max_step: float, max_
 
 def _to_the_end(path: _Path, points: list[Floats], kinds: list[Equilibrium], shares: Floats) -> None:
     """Puts the last point, which is beyond, onto the end of the way."""
-    from scipy.optimize import root
+    with needs("analysis"):
+        from scipy.optimize import root
 
     shares[-1] = min(1.0, max(0.0, shares[-1]))
     phi = path.inputs(float(shares[-1]))

@@ -20,6 +20,7 @@ from .. import arguments
 from ..champion import Genes
 from ..experiment import Experiment
 from ..trials import TRIALS_MAX, AnyTrialSet, TrialSet
+from ..representation import short
 
 Replacement = Union[Literal["freeze", "permute", "silence"], ArrayLike]
 
@@ -41,6 +42,8 @@ class Influence:
     """``[T, K, A]``: over how many agents and steps of the window another agent's LED was otherwise."""
     fitness: NDArray[np.float64]
     """``[T, K, A]``: mean fitness of the window's steps minus what it was; 0 where no step counts."""
+
+    __repr__ = short
 
 
 def influence(
@@ -97,6 +100,8 @@ class Attention:
     """``[T, K, A]``: how many other agents did anything otherwise."""
     fitness: NDArray[np.float64]
     """``[T, K, A]``: mean fitness of these steps minus what it was; 0 where no step counts."""
+
+    __repr__ = short
 
 
 def attention(

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..extras import needs
 from .. import arguments
 from ..network import Network
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,8 @@ class Equilibrium:
         """Whether states near it come back: a point attractor."""
         return bool(self.eigenvalues[0].real < 0)
 
+    __repr__ = short
+
 
 @dataclass(frozen=True)
 class LimitCycle:
@@ -46,6 +50,8 @@ class LimitCycle:
     """In the unit of tau."""
     rates: Floats
     """``[K, N]``: once round, K points at equal distances in time."""
+
+    __repr__ = short
 
 
 class CTRNN:
@@ -76,6 +82,9 @@ class CTRNN:
             raise ValueError(f"{n} neurons, with activations of {sorted(_ACTIVATIONS)}: {sorted(unknown)}")
 
         self._of = {name: np.flatnonzero(np.array(self.activations) == name) for name in dict.fromkeys(self.activations)}
+
+    def __repr__(self) -> str:
+        return f"<CTRNN: {len(self.activations)} neurons, {np.shape(self.input_weights)[-1]} inputs>"
 
     @classmethod
     def of(cls, network: Network) -> CTRNN:
@@ -120,7 +129,8 @@ class CTRNN:
         """Those found from ``starts`` random rates, stable ones first; there may be more."""
         starts = arguments.whole(starts, "starts", 1)
         seed = arguments.whole(seed, "seed", 0)
-        from scipy.optimize import root
+        with needs("analysis"):
+            from scipy.optimize import root
 
         rng = np.random.default_rng(seed)
         phi = np.asarray(inputs, np.float64)
@@ -139,8 +149,9 @@ class CTRNN:
     ) -> Equilibrium | LimitCycle | None:
         """Where the state goes from ``start`` (0 if absent) while the inputs are held: None if, after
         ``time`` (400 of the slowest neuron's tau if absent), it has neither come to rest nor repeated itself."""
-        from scipy.integrate import solve_ivp
-        from scipy.optimize import root
+        with needs("analysis"):
+            from scipy.integrate import solve_ivp
+            from scipy.optimize import root
 
         phi = np.asarray(inputs, np.float64)
         slowest = float(self.tau.max())

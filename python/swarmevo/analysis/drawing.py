@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..extras import needs
 from .border import components, displacements
 from .proportions import Proportion
 
@@ -40,7 +41,8 @@ _STYLE = {
 
 def style() -> AbstractContextManager[None]:
     """How figures look that are made within it."""
-    import matplotlib
+    with needs("plot"):
+        import matplotlib
 
     return matplotlib.rc_context(_STYLE)
 
@@ -48,8 +50,9 @@ def style() -> AbstractContextManager[None]:
 def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
     """A figure of ``width`` x ``height`` inches and its axes, as ``Figure.subplots`` gives them. No
     window and no global state."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    with needs("plot"):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)

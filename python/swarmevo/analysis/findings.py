@@ -21,6 +21,7 @@ from .settling import Settled, settled
 from .spread import Spread, spread
 from .states import Components, components_of_states
 from .variants import variant
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +42,8 @@ class Input:
     """``[T]``: fitness without it minus fitness with it."""
     usual: float
     """Share of robots and steps in which its most frequent value comes, of those that sense anything by it."""
+
+    __repr__ = short
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,8 @@ class Findings:
     components: Components
     settled: list[Settled]
     """Where the network goes alone, under the inputs that come most often; of rate neurons."""
+
+    __repr__ = short
 
 
 def findings(experiment: Experiment, genotype: Genes, *, trials: int, client: Client | None = None) -> Findings:

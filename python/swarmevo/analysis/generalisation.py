@@ -16,6 +16,7 @@ from ..experiment import Experiment
 from ..fleet import Client
 from ..trials import TRIALS_MAX, TrialSet
 from .variants import Config, evolved_robots, resize, spread_out
+from ..representation import short
 
 TRIALS_OF = TrialSet.generation_of(1_000_000)
 """Trials that no run gets to, and that a fleet computes, too: the same bits there and here."""
@@ -35,6 +36,8 @@ class Condition:
     """Mean ± 1.96 standard errors."""
     problem: str = ""
     """Why there is no such experiment: a swarm that does not fit into its world, say."""
+
+    __repr__ = short
 
 
 def generalisation(

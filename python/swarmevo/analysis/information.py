@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import arguments
+from ..representation import short
 
 Codes = NDArray[np.int64]
 
@@ -83,6 +84,8 @@ class Dependence:
     def excess(self) -> float:
         """Bits beyond chance."""
         return self.bits - self.chance
+
+    __repr__ = short
 
 
 def dependence(x: ArrayLike, y: ArrayLike, *, shuffles: int = 200, seed: int = 0) -> Dependence:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..representation import short
+
 
 @dataclass(frozen=True)
 class Proportion:
@@ -24,6 +26,8 @@ class Proportion:
     def ci95(self) -> tuple[float, float]:
         """The share ± 1.96 standard errors, within [0, 1]."""
         return max(0.0, self.share - 1.96 * self.error), min(1.0, self.share + 1.96 * self.error)
+
+    __repr__ = short
 
 
 def proportion(event: ArrayLike, where: ArrayLike | None = None) -> Proportion:

@@ -13,6 +13,7 @@ from ..experiment import Experiment
 from ..trace import Trace
 from .channel import FIRST
 from .ctrnn import CTRNN, Equilibrium, LimitCycle
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,8 @@ class Settled:
     """Where its state goes; None if, after 100 of the slowest time constants, it neither rests nor goes round."""
     outputs: dict[str, tuple[float, float]]
     """Least and largest rate of each neuron of an output there."""
+
+    __repr__ = short
 
 
 def settled(experiment: Experiment, genotype: Genes, trace: Trace, most: int = 6) -> list[Settled]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .. import arguments
 from ..trace import Trace
 from .channel import FIRST
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ class Spread:
             return float("nan")
         hops = np.arange(1, len(self.shares) + 1)[there]
         return float(np.polyfit(hops, self.distances[there], 1, w=np.sqrt(self.shares[there]))[0])
+
+    __repr__ = short
 
 
 def spread(trace: Trace, first: int = FIRST) -> Spread:

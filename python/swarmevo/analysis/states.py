@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .. import arguments
 from ..trace import Trace
 from .channel import FIRST
+from ..representation import short
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ class Components:
         Gao et al. 2017), from 1 to N; 0 of states that never change."""
         squares = float((self.shares**2).sum())
         return 1 / squares if squares > 0 else 0.0
+
+    __repr__ = short
 
 
 def components_of_states(trace: Trace, first: int = FIRST) -> Components:

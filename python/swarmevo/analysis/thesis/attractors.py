@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...extras import needs
 from ..continuation import continuation
 from ..ctrnn import CTRNN
 from ..drawing import COLOURS, canvas
@@ -66,7 +67,8 @@ def fig_2(_: Champion) -> Figure:
 
 def fig_3(_: Champion) -> Figure:
     """Attractors along one input, with the equilibria and the Hopf point that continuation finds."""
-    import matplotlib
+    with needs("plot"):
+        import matplotlib
 
     figure, axes = canvas(8, 3.3, 1, 2)
     colours = matplotlib.colormaps["viridis"]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...extras import needs
 from ...trace import Trace
 from ..channel import FIRST, symbols
 from ..drawing import COLOURS, ON, bars, boxes, canvas, in_one_piece, raster, swarm
@@ -150,7 +151,8 @@ def _by_size(axis: Axes, champion: Champion, with_faults: bool) -> None:
 
 def _what_is_sent(axis: Axes, trace: Trace) -> None:
     """Own messages of those who send, those heard of those who relay; blank where there is nothing."""
-    from matplotlib.colors import ListedColormap
+    with needs("plot"):
+        from matplotlib.colors import ListedColormap
 
     found = symbols(trace, 0)
     code = np.where(trace.sends[0], found.own[0], found.heard[0])

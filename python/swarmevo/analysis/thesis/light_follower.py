@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...extras import needs
 from ...experiment import Experiment
 from ...trace import Trace
 from ...trials import TrialSet
@@ -56,7 +57,8 @@ def fig_30(champion: Champion) -> Figure:
 
 def fig_31(champion: Champion) -> Figure:
     """Snapshots of the swarm and the light."""
-    from matplotlib.patches import Circle
+    with needs("plot"):
+        from matplotlib.patches import Circle
 
     trace = _seeing(champion)
     sees = photosensitive(trace)[0]
@@ -180,7 +182,8 @@ def _both(conditions: dict[str, dict[str, Floats]]) -> Figure:
 
 def _densities(figure: Any, trace: Trace, turns: Floats, is_dark: NDArray[np.bool_]) -> None:
     """Kernel density estimates of signal and turn, by the sector of the frame, with both margins."""
-    from scipy.stats import gaussian_kde
+    with needs("analysis"):
+        from scipy.stats import gaussian_kde
 
     grid = figure.add_gridspec(2, 2, width_ratios=(4, 1), height_ratios=(1, 4))
     axis = figure.add_subplot(grid[1, 0])
@@ -213,8 +216,9 @@ def _thinned(values: Floats, most: int = 3000) -> Floats:
 
 
 def _parts(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    with needs("plot"):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)

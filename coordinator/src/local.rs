@@ -1,0 +1,162 @@
+//! An experiment that the calling process computes by itself, without a fleet: found, stored and
+//! gone on with in the database of a data directory, as a coordinator does it.
+
+use std::{path::Path, time::Duration};
+
+use evolution::{Champion, Evolution, Statistics, Told};
+use experiment_file::ConfigError;
+
+use crate::{
+    clock,
+    control::{Existing, Placement, place},
+    ids::ExperimentId,
+    limits::UNFINISHED_MAX,
+    runs::{describe, describe_judgement, restore_evolution},
+    store::{
+        Entry, ExperimentRecord, ExperimentState, GenerationCommit, GenerationRecord, Store,
+        StoreError,
+    },
+    submission::Submission,
+};
+
+pub use crate::runs::completion;
+
+/// Generations that are read at once.
+const PAGE_LEN: u32 = 100;
+
+/// An experiment in a data directory, which no other process changes meanwhile.
+#[derive(Debug)]
+pub struct LocalRun {
+    store: Store,
+    id: ExperimentId,
+}
+
+/// A generation to be committed.
+#[derive(Debug)]
+pub struct Done<'a> {
+    /// Evolution after it.
+    pub evolution: &'a Evolution,
+    /// What it was told.
+    pub told: &'a Told,
+    /// How long it took.
+    pub duration: Duration,
+    /// Threads, or whatever computes beside others.
+    pub n_workers: u64,
+    /// Whether it was the last one, and why.
+    pub completed: Option<&'a str>,
+}
+
+/// Why a data directory cannot take an experiment.
+#[derive(Debug, thiserror::Error)]
+pub enum LocalRunError {
+    /// The experiment has problems.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The database cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// What is stored cannot be gone on with.
+    #[error("experiment {0} cannot go on: {1}; begin anew in another data directory")]
+    Unsound(ExperimentId, String),
+    /// There are too many.
+    #[error("{UNFINISHED_MAX} experiments of this data directory are unfinished; take another one")]
+    TooMany,
+}
+
+impl LocalRun {
+    /// Finds the experiment of a file's text in a data directory: one of the same bits that is
+    /// unfinished, has completed, or has completed fewer generations; else begins it. Keeps others
+    /// out of the directory until it is dropped.
+    pub fn open(directory: &Path, config_json: String) -> Result<Self, LocalRunError> {
+        let new = Submission { config_json, ..Submission::default() }.check()?.new;
+        let mut store = Store::open(directory)?;
+        let existing = Existing { resume_unfinished: true, reuse: true };
+        let id = match place(&mut store, new, existing, u64::MAX)?.0 {
+            Placement::Runs(runnable) => runnable.id,
+            Placement::RunsAlready(id) => id,
+            Placement::TooMany | Placement::NoMemory(_) => return Err(LocalRunError::TooMany),
+        };
+        let mut this = Self { store, id };
+        if this.record()?.state == ExperimentState::Paused {
+            let (running, now) = (ExperimentState::Running, clock::unix_ms());
+            this.store.set_state(id, now, running, "goes on in the process that asked for it")?;
+        }
+        Ok(this)
+    }
+
+    /// Its number.
+    pub fn id(&self) -> ExperimentId {
+        self.id
+    }
+
+    /// As it stands.
+    pub fn record(&self) -> Result<ExperimentRecord, StoreError> {
+        let found = self.store.experiment(self.id)?;
+        found.ok_or_else(|| StoreError::Corrupt(format!("experiment {} is gone", self.id)))
+    }
+
+    /// Evolution after the latest generation.
+    pub fn evolution(&self) -> Result<Evolution, LocalRunError> {
+        let (record, checkpoint) = self.store.resumable(self.id)?;
+        restore_evolution(&record, &checkpoint).map_err(|why| LocalRunError::Unsound(self.id, why))
+    }
+
+    /// The champion so far.
+    pub fn champion(&self) -> Result<Option<Champion>, StoreError> {
+        self.store.champion(self.id)
+    }
+
+    /// All generations, in order.
+    pub fn history(&self) -> Result<Vec<GenerationRecord>, StoreError> {
+        let mut history: Vec<GenerationRecord> = Vec::new();
+        loop {
+            let page = self.store.generations(self.id, history.len() as u64, PAGE_LEN)?;
+            let is_last = page.len() < PAGE_LEN as usize;
+            history.extend(page.into_iter().map(|(_, generation)| generation));
+            if is_last {
+                return Ok(history);
+            }
+        }
+    }
+
+    /// Stores a generation with everything that belongs to it. Returns its row.
+    pub fn commit(&mut self, done: &Done<'_>) -> Result<GenerationRecord, LocalRunError> {
+        let Done { evolution, told, duration, n_workers, completed } = *done;
+        let unsound = |why: String| LocalRunError::Unsound(self.id, why);
+        let outcome = evolution.outcome(told).map_err(|error| unsound(error.to_string()))?;
+        let means: Vec<f64> = told.trial_fitness.iter().map(|trials| mean(trials)).collect();
+        let generation = GenerationRecord {
+            generation: evolution.n_generations().saturating_sub(1),
+            statistics: Statistics::of(&means),
+            digest: evolution.digest().to_string(),
+            duration_ms: duration.as_millis() as u64,
+            episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
+            workers: n_workers,
+            idle_share: 0.0,
+        };
+        let mut notices = Vec::new();
+        if !told.blocks.is_empty() || !told.end.blocks.is_empty() {
+            notices.extend(outcome.champion.as_ref().map(describe));
+        }
+        if !told.end.judgement.is_empty() {
+            notices.extend(outcome.champion.as_ref().map(describe_judgement));
+        }
+        let bytes = told.to_bytes();
+        let keyframe = evolution.is_keyframe_due(bytes.len()).then(|| evolution.keyframe());
+        let commit = GenerationCommit {
+            generation: &generation,
+            entry: Entry { told: &bytes, keyframe: keyframe.as_deref() },
+            champion: outcome.champion.as_ref(),
+            digest: &outcome.digest.to_string(),
+            notices: &notices,
+            completed,
+        };
+        self.store.commit_generation(self.id, clock::unix_ms(), &commit)?;
+        Ok(generation)
+    }
+}
+
+/// As evolution has it.
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}

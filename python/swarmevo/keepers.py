@@ -1,0 +1,184 @@
+"""Where a run keeps its generations: nowhere, in the database of a data directory, or in a file."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from .champion import Champion, Judged, Selection
+from .evolution import Evolution, Generation, Judgement
+from .experiment import Experiment
+
+Floats = NDArray[np.float64]
+
+WRITE_EVERY_S = 1.0
+"""A file is written again after so long, and at the end."""
+FORMAT = 1
+
+
+class End(NamedTuple):
+    """Of a run that has completed."""
+
+    champion: Champion
+    digest: str
+
+
+class Done(NamedTuple):
+    """A generation that is complete."""
+
+    generation: Generation
+    evolution: Evolution
+    """After it."""
+    fitness: Floats
+    blocks: list[Floats]
+    """Fitness of the blocks of the comparison that was due; none if it was not."""
+    judgement: Judgement | None
+    """If it was the last one."""
+    seconds: float
+    n_workers: int
+    completed: str | None
+    """If it was the last one, why; empty: all are done."""
+
+
+class Keeper:
+    """Keeps nothing."""
+
+    id: int | None = None
+    """The number of the experiment, if it has one."""
+    end: End | None = None
+    """If the run has completed before."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.evolution: Evolution = experiment.evolution()
+        """After the generations that are done."""
+        self.generations: list[Generation] = []
+        """Those."""
+
+    def commit(self, done: Done) -> None:
+        """Keeps a generation."""
+
+    def close(self) -> None:
+        """Keeps what is to be kept, and lets others use it."""
+
+
+class InDatabase(Keeper):
+    """In the database of a data directory, as ``swarmctl run`` does."""
+
+    def __init__(self, experiment: Experiment, directory: str) -> None:
+        self._record = _core.Record(directory, experiment._core)
+        try:
+            self.id, is_over, digest = self._record.state()
+            empty = experiment.evolution()
+            self.evolution = Evolution._of(self._record.evolution(), empty._trials, empty._origin)
+            self.generations = [
+                Generation(index, best, mean, least, None, link, deviation, duration_ms)
+                for index, best, mean, least, deviation, link, duration_ms in self._record.history()
+            ]
+            champion = self._record.champion()
+            if is_over and champion is not None:
+                self.end = End(Champion._of(champion, empty._origin), digest)
+        except BaseException:
+            self._record.close()
+            raise
+
+    def commit(self, done: Done) -> None:
+        judgement = done.judgement
+        self._record.commit(
+            done.evolution._core,
+            done.fitness,
+            done.blocks,
+            [] if judgement is None else judgement.blocks,
+            None if judgement is None else judgement.fitness,
+            done.seconds,
+            done.n_workers,
+            done.completed,
+        )
+
+    def close(self) -> None:
+        self._record.close()
+
+
+class InFile(Keeper):
+    """In a file of a data directory: runs whose fitness is not the experiment's own, which no coordinator and no
+    ``swarmctl`` could go on with."""
+
+    def __init__(self, experiment: Experiment, directory: str) -> None:
+        super().__init__(experiment)
+        name = re.sub(r"[^\w.-]", "_", experiment.name)[:50]
+        self.path = Path(directory) / f"{name}-{experiment.config_digest[:12]}.evolve.json"
+        """The file."""
+        self._experiment = experiment
+        self._written_at = time.monotonic()
+        self._is_new = False
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        if self.path.exists():
+            self._read()
+
+    def _read(self) -> None:
+        try:
+            found = json.loads(self.path.read_text(encoding="utf-8"))
+            if found["format"] != FORMAT or found["config_digest"] != self._experiment.config_digest:
+                raise ValueError("it has another format, or is of another experiment")
+            state = _core.Evolution.from_json(found["evolution"])
+            generations = [Generation(**it) for it in found["generations"]]
+            if state.n_generations != len(generations) or (generations and state.digest != generations[-1].digest):
+                raise ValueError("its generations are not those of its evolution")
+            end = None if found["end"] is None else _end_of(found["end"], self._experiment)
+        except (ValueError, KeyError, TypeError) as error:
+            raise ValueError(f"{self.path} is no run to go on with: {error}; move it elsewhere to begin anew") from None
+        self.evolution = Evolution._of(state, self.evolution._trials, self.evolution._origin)
+        self.generations = generations
+        if end is not None and len(generations) >= self._experiment.generations:
+            self.end = end
+
+    def commit(self, done: Done) -> None:
+        self.evolution = done.evolution
+        self.generations = [*self.generations, done.generation]
+        if done.judgement is not None:
+            self.end = End(done.judgement.champion, done.judgement.digest)
+        self._is_new = True
+        if time.monotonic() - self._written_at >= WRITE_EVERY_S:
+            self._write()
+
+    def close(self) -> None:
+        if self._is_new:
+            self._write()
+
+    def _write(self) -> None:
+        """The file is always whole: another one takes its place."""
+        content = {
+            "format": FORMAT,
+            "config_digest": self._experiment.config_digest,
+            "experiment": self._experiment.to_dict(),
+            "generations": [vars(it) for it in self.generations],
+            "evolution": self.evolution.to_json(),
+            "end": None if self.end is None else _end_to(self.end),
+        }
+        unfinished = self.path.with_suffix(".new")
+        with unfinished.open("w", encoding="utf-8") as file:
+            json.dump(content, file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, self.path)
+        self._written_at, self._is_new = time.monotonic(), False
+
+
+def _end_to(end: End) -> dict[str, Any]:
+    champion = {**vars(end.champion), "origin": None}
+    plain = {key: it.tolist() if isinstance(it, np.ndarray) else it for key, it in champion.items()}
+    return {"champion": plain, "digest": end.digest}
+
+
+def _end_of(found: dict[str, Any], experiment: Experiment) -> End:
+    it = found["champion"]
+    it |= {key: np.array(it[key], dtype=np.float64) for key in ("genotype", "trial_fitness")}
+    it |= {"selection": it["selection"] and Selection(*it["selection"]), "judged": it["judged"] and Judged(*it["judged"])}
+    return End(Champion(**{**it, "origin": experiment._origin}), found["digest"])
