@@ -9,7 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, write::SimpleFileO
 use super::{
     Bundle, BundleError, FORMAT,
     description::{self, DESCRIPTION},
-    files,
+    directory, files,
 };
 
 /// Most bytes of a bundle.
@@ -27,6 +27,8 @@ pub struct File {
     pub about: &'static str,
     /// Its media type.
     pub encoding: &'static str,
+    /// Most bytes of it.
+    pub len_max: u64,
     /// Its content.
     pub content: Vec<u8>,
 }
@@ -99,34 +101,38 @@ fn check_len(len: u64) -> Result<(), BundleError> {
 /// All files by their names. `room`: most bytes of them all together.
 pub fn unpack(bytes: &[u8], mut room: u64) -> Result<Vec<(String, Vec<u8>)>, BundleError> {
     let damaged = |error: &dyn std::fmt::Display| BundleError::Archive(error.to_string());
+    let n_entries = directory::check(bytes).map_err(|what| damaged(&what))?;
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(&error))?;
     // Of several files of a name the library takes the last, and other programs another.
-    if n_entries(bytes) != Some(archive.len()) {
-        return Err(damaged(&"a file is in it twice, or something follows it"));
+    if n_entries != archive.len() {
+        return Err(damaged(&"a file is in it twice"));
     }
-    let known: Vec<&str> = files::all().iter().map(|file| file.name).chain([DESCRIPTION]).collect();
+    let description = (DESCRIPTION, description::LEN_MAX);
+    let known: Vec<(&str, u64)> =
+        files::all().iter().map(|file| (file.name, file.len_max)).chain([description]).collect();
     let mut contents: Vec<(String, Vec<u8>)> = Vec::new();
     for index in 0..archive.len() {
         let entry = archive.by_index(index).map_err(|error| damaged(&error))?;
         let name = entry.name().map_err(|error| damaged(&error))?.into_owned();
-        if !known.contains(&&*name) {
+        let Some(&(file, len_max)) = known.iter().find(|(known, _)| *known == name) else {
             return Err(BundleError::ExtraFile(printable(&name)));
+        };
+        // What the archive says of its length may be a lie; if it is none, nothing grows.
+        let most = room.min(len_max);
+        let stated = entry.size();
+        let mut content = Vec::with_capacity(stated.min(most) as usize);
+        entry.take(most + 1).read_to_end(&mut content).map_err(|error| damaged(&error))?;
+        let len = content.len() as u64;
+        if len > len_max {
+            return Err(BundleError::FileTooLong { file, len_max });
         }
-        let mut content = Vec::new();
-        // What the archive says of its length may be a lie.
-        let mut limited = entry.take(room + 1);
-        limited.read_to_end(&mut content).map_err(|error| damaged(&error))?;
-        room = room.checked_sub(content.len() as u64).ok_or(BundleError::UnpackedTooLong)?;
+        room = room.checked_sub(len).ok_or(BundleError::UnpackedTooLong)?;
+        if len != stated {
+            return Err(damaged(&format!("`{file}` has {len} bytes, and not {stated}")));
+        }
         contents.push((name, content));
     }
     Ok(contents)
-}
-
-/// The number of files in an archive that ends without a comment, as its last record has it.
-fn n_entries(bytes: &[u8]) -> Option<usize> {
-    let record: &[u8; 22] = bytes.last_chunk()?;
-    let number = u16::from_le_bytes([record[10], record[11]]);
-    record.starts_with(b"PK\x05\x06").then_some(number.into())
 }
 
 /// That the manifest is of a version that this program can check, which its other files may
@@ -139,7 +145,7 @@ fn check_version(manifest: &File) -> Result<(), BundleError> {
         simulation: String,
     }
     let Versions { format, program, simulation } = serde_json::from_slice(&manifest.content)
-        .map_err(|error| BundleError::Malformed { file: manifest.name, what: error.to_string() })?;
+        .map_err(|error| BundleError::malformed(manifest.name, &error))?;
     let (program, simulation) = (printable(&program), printable(&simulation));
     if format != FORMAT {
         return Err(BundleError::Format { found: format, program });
@@ -151,6 +157,6 @@ fn check_version(manifest: &File) -> Result<(), BundleError> {
 }
 
 /// Foreign text in one short line.
-fn printable(text: &str) -> String {
-    text.chars().take(80).flat_map(char::escape_debug).collect()
+pub fn printable(text: &str) -> String {
+    text.chars().take(200).flat_map(char::escape_debug).collect()
 }

@@ -1,13 +1,25 @@
 //! The description of a bundle for machines: `ro-crate-metadata.json` in the vocabulary of
 //! RO-Crate 1.3.
 
+use std::fmt;
+
+use serde::{
+    Deserialize, Deserializer,
+    de::{IgnoredAny, MapAccess, SeqAccess, Visitor},
+};
 use serde_json::{Value, json};
 use time::{OffsetDateTime, format_description::well_known::Rfc3339};
 
-use super::{Bundle, BundleError, archive::File};
+use super::{Bundle, BundleError, archive::File, files};
 
 /// The file with the description.
 pub const DESCRIPTION: &str = "ro-crate-metadata.json";
+
+/// Most bytes of it. This program writes some 4 KiB; who publishes a bundle may add to them.
+pub const LEN_MAX: u64 = 4 << 20;
+
+/// Bytes of the longest text in it that is looked at: a SHA-256 has 64.
+const SHORT_LEN_MAX: usize = 64;
 
 /// Describes a bundle that has these files.
 pub fn describe(bundle: &Bundle, files: &[File]) -> String {
@@ -75,19 +87,115 @@ pub fn describe(bundle: &Bundle, files: &[File]) -> String {
 /// Checks that the files are those that a description has the digests of. It may say more
 /// than this program writes: authors, a license.
 pub fn check(description: &[u8], files: &[File]) -> Result<(), BundleError> {
-    let malformed = |what: String| BundleError::Malformed { file: DESCRIPTION, what };
-    let document: Value =
-        serde_json::from_slice(description).map_err(|error| malformed(error.to_string()))?;
-    let graph = document["@graph"].as_array();
-    let graph = graph.ok_or_else(|| malformed("it has no list `@graph`".to_owned()))?;
+    let document: Document = serde_json::from_slice(description)
+        .map_err(|error| BundleError::malformed(DESCRIPTION, &error))?;
     for file in files {
-        let entity = graph.iter().find(|entity| entity["@id"] == file.name);
-        let described = entity.and_then(|entity| entity["sha256"].as_str());
-        if described != Some(&*file.sha256()) {
+        let entity = document.graph.0.iter().find(|entity| entity.id.0 == file.name);
+        if entity.is_none_or(|entity| entity.sha256.0 != file.sha256()) {
             return Err(BundleError::OtherFile(file.name));
         }
     }
     Ok(())
+}
+
+/// What is read of a description: a stranger's may list millions of things, of any kind.
+#[derive(Deserialize)]
+struct Document {
+    #[serde(rename = "@graph")]
+    graph: Graph,
+}
+
+/// The entities that may be files of a bundle, as many as a bundle has files.
+struct Graph(Vec<Entity>);
+
+#[derive(Deserialize)]
+struct Entity {
+    #[serde(rename = "@id", default)]
+    id: Short,
+    #[serde(default)]
+    sha256: Short,
+}
+
+/// A text that may be a name of a file or a digest; anything else counts as an empty one.
+#[derive(Default)]
+struct Short(String);
+
+impl<'de> Deserialize<'de> for Graph {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(GraphVisitor)
+    }
+}
+
+struct GraphVisitor;
+
+impl<'de> Visitor<'de> for GraphVisitor {
+    type Value = Graph;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list `@graph`")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut entities: A) -> Result<Graph, A::Error> {
+        let names = files::all().map(|file| file.name);
+        let mut found: Vec<Entity> = Vec::new();
+        while let Some(entity) = entities.next_element::<Entity>()? {
+            let is_new = !found.iter().any(|before| before.id.0 == entity.id.0);
+            if is_new && names.contains(&&*entity.id.0) {
+                found.push(entity);
+            }
+        }
+        Ok(Graph(found))
+    }
+}
+
+impl<'de> Deserialize<'de> for Short {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ShortVisitor)
+    }
+}
+
+struct ShortVisitor;
+
+impl<'de> Visitor<'de> for ShortVisitor {
+    type Value = Short;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("any value")
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Short, E> {
+        Ok(if text.len() > SHORT_LEN_MAX { Short::default() } else { Short(text.to_owned()) })
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<Short, E> {
+        Ok(Short::default())
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<Short, E> {
+        Ok(Short::default())
+    }
+
+    fn visit_u64<E>(self, _: u64) -> Result<Short, E> {
+        Ok(Short::default())
+    }
+
+    fn visit_f64<E>(self, _: f64) -> Result<Short, E> {
+        Ok(Short::default())
+    }
+
+    fn visit_unit<E>(self) -> Result<Short, E> {
+        Ok(Short::default())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Short, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Short::default())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Short, A::Error> {
+        while object.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(Short::default())
+    }
 }
 
 /// A time of milliseconds since 1970 UTC, to the second.

@@ -4,7 +4,10 @@ use evolution::{Champion, ChampionSource, Digest, Real, Statistics};
 use experiment_file::limits;
 use serde::{Deserialize, Serialize};
 
-use super::{Bundle, BundleError, GenerationRow, Manifest, archive::File};
+use super::{
+    Bundle, BundleError, GenerationRow, Manifest,
+    archive::{File, UNPACKED_LEN_MAX},
+};
 
 const MANIFEST: &str = "bundle.json";
 const EXPERIMENT: &str = "experiment.json";
@@ -15,21 +18,34 @@ const CHAMPION: &str = "champion.json";
 
 /// All files beside the description, empty, in the order of the archive.
 pub fn all() -> [File; 6] {
-    let file = |name, about, encoding| File { name, about, encoding, content: Vec::new() };
-    let binary = "application/octet-stream";
+    let file = |name, about, encoding, len_max| File {
+        name,
+        about,
+        encoding,
+        len_max,
+        content: Vec::new(),
+    };
+    let (json, binary) = ("application/json", "application/octet-stream");
+    let file_len_max = limits::FILE_BYTES as u64;
+    let (about, most) = ("Versions, digests and how the experiment ended", UNPACKED_LEN_MAX);
     [
-        file(MANIFEST, "Versions, digests and how the experiment ended", "application/json"),
+        // Of a fork it lists what was changed in two experiment files.
+        file(MANIFEST, about, json, 4 * file_len_max),
         file(
             EXPERIMENT,
             "The experiment file in canonical form, with its seed",
-            "application/json",
+            json,
+            file_len_max,
         ),
-        file(HISTORY, "Fitness, time and digest of every generation", "text/csv"),
-        file(LOG, "The fitness of every individual in every trial, bit for bit", binary),
-        file(KEYFRAMES, "The state of evolution after some generations", binary),
-        file(CHAMPION, "The champion, and what it is worth", "application/json"),
+        file(HISTORY, "Fitness, time and digest of every generation", "text/csv", most),
+        file(LOG, "The fitness of every individual in every trial, bit for bit", binary, most),
+        file(KEYFRAMES, "The state of evolution after some generations", binary, most),
+        file(CHAMPION, "The champion, and what it is worth", json, most),
     ]
 }
+
+/// Most bytes of a line of `history.csv`; usual ones have 200.
+const LINE_LEN_MAX: usize = 1 << 10;
 
 /// A row of `history.csv`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -69,36 +85,37 @@ impl Bundle {
     /// The bundle that has these files.
     pub(super) fn from_files(files: [File; 6]) -> Result<Self, BundleError> {
         let [manifest, experiment, history, log, keyframes, champion] = files;
-        let malformed = |file: &'static str, what: &dyn std::fmt::Display| BundleError::Malformed {
-            file,
-            what: what.to_string(),
-        };
+        let malformed = BundleError::malformed;
         let text = |file: File| {
             String::from_utf8(file.content).map_err(|error| malformed(file.name, &error))
         };
-        let bundle = Self {
-            manifest: serde_json::from_slice(&manifest.content)
-                .map_err(|error| malformed(MANIFEST, &error))?,
+        let about: Manifest = serde_json::from_slice(&manifest.content)
+            .map_err(|error| malformed(MANIFEST, &error))?;
+        // There is one way to write each of them, so every bit means something.
+        let other_way = |file| malformed(file, &"it is not written as a bundle is");
+        if write_manifest(&about) != manifest.content {
+            return Err(other_way(MANIFEST));
+        }
+        let rows = read_history(&history.content, limits::GENERATIONS)
+            .map_err(|what| malformed(HISTORY, &what))?;
+        if write_history(&rows) != history.content {
+            return Err(other_way(HISTORY));
+        }
+        drop(history);
+        // A row of the history is longer than an entry or a state is in memory before it has
+        // any content. What is of other generations is wrong, and its kind is found later.
+        let n_max = rows.len() as u64 + 1;
+        let entries = read_frames(&log.content, n_max).map_err(|what| malformed(LOG, &what))?;
+        drop(log);
+        Ok(Self {
+            manifest: about,
             config_json: text(experiment)?,
-            history: read_history(&history.content, limits::GENERATIONS)
-                .map_err(|what| malformed(HISTORY, &what))?,
-            log: read_frames(&log.content, limits::GENERATIONS)
-                .map_err(|what| malformed(LOG, &what))?,
-            keyframes: read_keyframes(&keyframes.content)
+            history: rows,
+            log: entries,
+            keyframes: read_keyframes(&keyframes.content, n_max)
                 .map_err(|what| malformed(KEYFRAMES, &what))?,
             champion_json: text(champion)?,
-        };
-        // There is one way to write each of them, so every bit means something.
-        let written = [
-            (MANIFEST, write_manifest(&bundle.manifest), manifest.content),
-            (HISTORY, write_history(&bundle.history), history.content),
-        ];
-        for (file, written, content) in written {
-            if written != content {
-                return Err(malformed(file, &"it is not written as a bundle is"));
-            }
-        }
-        Ok(bundle)
+        })
     }
 }
 
@@ -154,6 +171,11 @@ fn write_history(history: &[GenerationRow]) -> Vec<u8> {
 
 /// `n_max`: most generations.
 fn read_history(bytes: &[u8], n_max: u64) -> Result<Vec<GenerationRow>, String> {
+    // In a record, a comma takes the memory of many bytes; a quote would hide ends of lines.
+    let is_long = |line: &[u8]| line.len() > LINE_LEN_MAX;
+    if bytes.contains(&b'"') || bytes.split(|&byte| byte == b'\n').any(is_long) {
+        return Err(format!("a line has a quote, or more than {LINE_LEN_MAX} bytes"));
+    }
     let mut history = Vec::new();
     for (generation, row) in (0..).zip(csv::Reader::from_reader(bytes).into_deserialize()) {
         let row: Row = row.map_err(|error| error.to_string())?;
@@ -210,19 +232,19 @@ fn read_frames(mut bytes: &[u8], n_max: u64) -> Result<Vec<Vec<u8>>, String> {
     Ok(frames)
 }
 
-fn read_keyframes(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<u8>)>, String> {
+/// `n_max`: most of them.
+fn read_keyframes(mut bytes: &[u8], n_max: u64) -> Result<Vec<(u64, Vec<u8>)>, String> {
     let mut keyframes = Vec::new();
     while !bytes.is_empty() {
         let (n_generations, rest) = number(bytes).ok_or_else(cut_off)?;
         let (state, rest) = unframe(rest).ok_or_else(cut_off)?;
-        // In order, so that there are not more of them than generations.
         if keyframes.last().is_some_and(|&(before, _)| before >= n_generations) {
             return Err("its keyframes are not in order".to_owned());
         }
-        if n_generations > limits::GENERATIONS {
-            return Err(too_many(limits::GENERATIONS));
-        }
         keyframes.push((n_generations, state));
+        if keyframes.len() as u64 > n_max {
+            return Err(too_many(n_max));
+        }
         bytes = rest;
     }
     Ok(keyframes)
@@ -275,19 +297,18 @@ mod tests {
         }
         let whole = keyframes(&[1, 2]);
         for len in (1..whole.len()).filter(|&len| len != whole.len() / 2) {
-            assert_eq!(read_keyframes(&whole[..len]), Err(cut_off()), "{len}");
+            assert_eq!(read_keyframes(&whole[..len], 9), Err(cut_off()), "{len}");
         }
     }
 
     #[test]
-    fn keyframes_are_in_order_and_of_generations_that_may_be() {
-        assert_eq!(read_keyframes(&keyframes(&[1, 4])).unwrap()[1].0, 4);
+    fn keyframes_are_in_order_and_not_more_than_there_are_generations() {
+        assert_eq!(read_keyframes(&keyframes(&[1, 4]), 2).unwrap()[1].0, 4);
         for numbers in [[4, 1], [4, 4]] {
-            let error = read_keyframes(&keyframes(&numbers)).unwrap_err();
+            let error = read_keyframes(&keyframes(&numbers), 2).unwrap_err();
             assert!(error.contains("not in order"), "{error}");
         }
-        let beyond = keyframes(&[1, limits::GENERATIONS + 1]);
-        assert_eq!(read_keyframes(&beyond), Err(too_many(limits::GENERATIONS)));
+        assert_eq!(read_keyframes(&keyframes(&[1, 4, 7]), 2), Err(too_many(2)));
     }
 
     #[test]

@@ -9,9 +9,12 @@
 
 mod archive;
 mod description;
+mod directory;
 mod files;
 mod sample;
 mod verification;
+
+use std::fmt;
 
 use evolution::{Digest, Statistics};
 use serde::{Deserialize, Serialize};
@@ -116,6 +119,14 @@ pub enum BundleError {
     /// Unpacked, it would take too much room.
     #[error("unpacked it has more than {UNPACKED_LEN_MAX} bytes, so it is no bundle")]
     UnpackedTooLong,
+    /// So would one of its files.
+    #[error("its file `{file}` has more than {len_max} bytes, so it is no bundle")]
+    FileTooLong {
+        /// The file.
+        file: &'static str,
+        /// Most bytes of it.
+        len_max: u64,
+    },
     /// A file too many.
     #[error("it has the file `{0}`, which is not part of a bundle")]
     ExtraFile(String),
@@ -155,6 +166,13 @@ pub enum BundleError {
     },
 }
 
+impl BundleError {
+    /// A file that says something else. `what`: may have a stranger's words in it.
+    fn malformed(file: &'static str, what: &dyn fmt::Display) -> Self {
+        Self::Malformed { file, what: archive::printable(&what.to_string()) }
+    }
+}
+
 impl Bundle {
     /// The first generation of its own.
     pub fn first_own(&self) -> u64 {
@@ -162,5 +180,7 @@ impl Bundle {
     }
 }
 
+#[cfg(test)]
+mod hostile;
 #[cfg(test)]
 mod tests;

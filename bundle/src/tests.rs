@@ -111,7 +111,7 @@ fn started(config: &ExperimentConfig) -> Evolution {
     Evolution::new(config, simulation.population_segments(), FINGERPRINT)
 }
 
-fn bundle() -> &'static Bundle {
+pub fn bundle() -> &'static Bundle {
     static BUNDLE: OnceLock<Bundle> = OnceLock::new();
     BUNDLE.get_or_init(|| evolved(&config(), started(&config()), None, Vec::new(), |_, _| ()))
 }
@@ -153,7 +153,7 @@ fn packed<'a>(
 }
 
 /// The files of a bundle with their names, the description first.
-fn contents(bundle: &Bundle) -> Vec<(&'static str, Vec<u8>)> {
+pub fn contents(bundle: &Bundle) -> Vec<(&'static str, Vec<u8>)> {
     let files = bundle.to_files();
     let description = description::describe(bundle, &files).into_bytes();
     let files = files.into_iter().map(|file| (file.name, file.content));
@@ -292,15 +292,18 @@ fn what_is_no_bundle_is_refused_in_one_line() {
 
 #[test]
 fn a_bomb_is_not_unpacked() {
-    let bomb = packed([("experiment.json", vec![0; 4 << 20])], CompressionMethod::Deflated);
+    let bomb = packed([("champion.json", vec![0; 4 << 20])], CompressionMethod::Deflated);
     assert!(bomb.len() < 8 << 10);
     let unpacked = archive::unpack(&bomb, 1 << 20);
     assert_eq!(unpacked, Err(BundleError::UnpackedTooLong));
     assert_eq!(archive::unpack(&bomb, UNPACKED_LEN_MAX).unwrap()[0].1.len(), 4 << 20);
+    let long = packed([("experiment.json", vec![0; 4 << 20])], CompressionMethod::Deflated);
+    let error = archive::unpack(&long, UNPACKED_LEN_MAX).unwrap_err().to_string();
+    assert!(error.contains("`experiment.json` has more than 1048576 bytes"), "{error}");
 }
 
 /// A fork of the run, with more robots and generations.
-fn forked() -> Bundle {
+pub fn forked() -> Bundle {
     let parent = config();
     let mut child = parent.clone();
     child.seed += 1;

@@ -6,8 +6,9 @@
 
 use std::time::Duration;
 
-/// Bundles that are sent or received at the same time; more wait. Each takes up to a few
-/// times [`bundle::UNPACKED_LEN_MAX`] of memory.
+/// Bundles that are sent or received at the same time; more wait. Each takes at most four
+/// times [`bundle::UNPACKED_LEN_MAX`] of memory and 160 MiB, beside the evolution that is gone
+/// through, which takes what the experiment takes when it runs.
 pub const BUNDLES_MAX: usize = 1;
 /// Generations that are computed again at the same time.
 pub const RECONSTRUCTIONS_MAX: usize = 4;

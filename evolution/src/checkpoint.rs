@@ -10,9 +10,12 @@
 //! format of postcard (fields in order, without names; numbers as little-endian IEEE 754).
 
 use experiment_file::Keeps;
-use serde::{Serialize, de::DeserializeOwned};
 
-use super::{Algorithm, Evolution, EvolutionError, Told, algorithms::Strategy as _};
+use super::{
+    Algorithm, Evolution, EvolutionError, Told,
+    algorithms::Strategy as _,
+    wire::{decode, encode},
+};
 
 /// Version of the format of keyframes.
 pub(crate) const VERSION: u8 = 1;
@@ -115,19 +118,4 @@ fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
         Keeps::Population => population_size * d,
     };
     n_numbers * size_of::<f64>() as u64
-}
-
-pub(crate) fn encode(version: u8, value: &impl Serialize) -> Vec<u8> {
-    postcard::to_extend(value, vec![version]).expect("numbers and lists serialise")
-}
-
-pub(crate) fn decode<T: DeserializeOwned>(
-    supported: u8,
-    bytes: &[u8],
-) -> Result<T, CheckpointError> {
-    match bytes.split_first() {
-        Some((&found, rest)) if found == supported => Ok(postcard::from_bytes(rest)?),
-        Some((&found, _)) => Err(CheckpointError::Version { found, supported }),
-        None => Err(CheckpointError::Malformed(postcard::Error::DeserializeUnexpectedEnd)),
-    }
 }

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     Algorithm, CheckpointError, Evolution, Genotype,
     algorithms::Strategy as _,
-    checkpoint::{VERSION, decode, encode},
+    checkpoint::VERSION,
+    wire::{decode, encode},
 };
 
 /// What the genotypes of one generation are drawn from.

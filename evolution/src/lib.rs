@@ -63,6 +63,7 @@ mod replay;
 mod setup;
 mod statistics;
 mod told;
+mod wire;
 
 use std::{ops::Range, sync::Arc};
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     CheckpointError,
-    checkpoint::{decode, encode},
+    wire::{decode, encode},
 };
 
 /// Version of the format.

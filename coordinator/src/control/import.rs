@@ -2,9 +2,11 @@
 
 use bundle::{Bundle, Sample, Verification};
 use experiment_file::ExperimentConfig;
+use tokio::sync::OwnedSemaphorePermit;
 
 use crate::{
     clock,
+    memory::{self, Shortage},
     store::{ExperimentRecord, ExperimentState, ForkRecord, Imported, Store, StoreError},
 };
 
@@ -12,9 +14,17 @@ use super::{Control, ControlError};
 
 impl Control {
     /// Takes the experiment of a bundle in, once everything that follows from its log has been
-    /// checked. Returns the experiment, and whether it is new here.
-    pub async fn import(&self, bytes: Vec<u8>) -> Result<(ExperimentRecord, bool), ControlError> {
-        let imported = self.requests.check(move || check(&bytes)).await??;
+    /// checked. Returns the experiment, and whether it is new here. `place`: kept as long as the
+    /// bundle takes memory, which outlives a client that goes away.
+    pub async fn import(
+        &self,
+        bytes: Vec<u8>,
+        place: OwnedSemaphorePermit,
+    ) -> Result<(ExperimentRecord, bool), ControlError> {
+        let memory_budget = self.memory_budget;
+        let checked = self.requests.check(move || (check(&bytes, memory_budget), place));
+        let (imported, _place) = checked.await?;
+        let imported = imported?;
         let write = move |store: &mut Store| {
             let Some(imported) = with_parent(store, imported)? else { return Ok(None) };
             store.import(&imported, clock::unix_ms()).map(Some)
@@ -26,13 +36,16 @@ impl Control {
     }
 }
 
-/// Checks everything but the fitness itself; work for a CPU.
-fn check(bytes: &[u8]) -> Result<Imported, ControlError> {
+/// Checks everything but the fitness itself; work for a CPU. `memory_budget`: bytes that the
+/// evolution may take that is gone through.
+fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
     let invalid = |error: &dyn std::fmt::Display| ControlError::Invalid(error.to_string());
     let bundle = Bundle::read(bytes).map_err(|error| invalid(&error))?;
     let mut verification =
         Verification::begin(&bundle, Sample::Drawn(0)).map_err(|flaw| invalid(&flaw))?;
     let genotype_len = verification.simulation().genotype_len();
+    let needed = memory::estimate(&bundle.config_json, genotype_len as u64);
+    Shortage::check(needed, 0, memory_budget).map_err(ControlError::NoMemory)?;
     while verification.advance().map_err(|flaw| invalid(&flaw))?.is_some() {}
     let champion = verification.finish().champion;
     let state = ExperimentState::from_name(&bundle.manifest.state);

@@ -273,9 +273,9 @@ impl ExperimentService for Experiments {
         &self,
         request: Request<Streaming<ImportExperimentRequest>>,
     ) -> Result<Response<ImportExperimentResponse>, Status> {
-        let _place = self.place().await?;
+        let place = self.place().await?;
         let bytes = bundles::receive(request.into_inner()).await?;
-        let (experiment, is_new) = self.control.import(bytes).await?;
+        let (experiment, is_new) = self.control.import(bytes, place).await?;
         let experiment = Some(convert::experiment(experiment));
         Ok(Response::new(ImportExperimentResponse { experiment, is_new }))
     }

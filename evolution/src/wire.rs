@@ -1,0 +1,106 @@
+//! Values as bytes and back: a byte for the version of the format, and the rest as postcard has it.
+//!
+//! What is read may be anything. A list takes a byte where it is written and 24 where it is
+//! read, so a stranger's few bytes would take the memory of many: the number of such bytes
+//! is bounded. Numbers with a fraction take as many bytes in either place.
+
+use postcard::{Deserializer, de_flavors::Flavor};
+use serde::{Serialize, de::DeserializeOwned};
+
+use super::CheckpointError;
+
+/// Most lists, options and whole numbers of a value all together: more than a state of
+/// evolution has with the most individuals that there may be, in forty populations.
+const SMALL_MAX: usize = 4 << 20;
+
+/// A value in this version of its format.
+pub(crate) fn encode(version: u8, value: &impl Serialize) -> Vec<u8> {
+    postcard::to_extend(value, vec![version]).expect("numbers and lists serialise")
+}
+
+/// Reads what [`encode`] wrote.
+pub(crate) fn decode<T: DeserializeOwned>(
+    supported: u8,
+    bytes: &[u8],
+) -> Result<T, CheckpointError> {
+    decode_at_most(SMALL_MAX, supported, bytes)
+}
+
+fn decode_at_most<T: DeserializeOwned>(
+    n_small: usize,
+    supported: u8,
+    bytes: &[u8],
+) -> Result<T, CheckpointError> {
+    match bytes.split_first() {
+        Some((&found, rest)) if found == supported => {
+            let mut reader = Deserializer::from_flavor(Metered { rest, n_small });
+            Ok(T::deserialize(&mut reader)?)
+        }
+        Some((&found, _)) => Err(CheckpointError::Version { found, supported }),
+        None => Err(CheckpointError::Malformed(postcard::Error::DeserializeUnexpectedEnd)),
+    }
+}
+
+/// Bytes to be read, of which so many more may be the last ones of a length or a whole number.
+struct Metered<'a> {
+    rest: &'a [u8],
+    n_small: usize,
+}
+
+impl<'a> Flavor<'a> for Metered<'a> {
+    type Remainder = &'a [u8];
+    type Source = &'a [u8];
+
+    fn pop(&mut self) -> postcard::Result<u8> {
+        let (&byte, rest) =
+            self.rest.split_first().ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
+        // Of a number's bytes all but the last one have the highest bit.
+        if byte < 0x80 {
+            self.n_small =
+                self.n_small.checked_sub(1).ok_or(postcard::Error::DeserializeBadEncoding)?;
+        }
+        self.rest = rest;
+        Ok(byte)
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.rest.len())
+    }
+
+    fn try_take_n(&mut self, n: usize) -> postcard::Result<&'a [u8]> {
+        let parts = self.rest.split_at_checked(n);
+        let (taken, rest) = parts.ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
+        self.rest = rest;
+        Ok(taken)
+    }
+
+    fn finalize(self) -> postcard::Result<&'a [u8]> {
+        Ok(self.rest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_written_reads_back() {
+        let value = (vec![vec![0.1, -0.0], Vec::new()], Some(300_u64), true);
+        let bytes = encode(3, &value);
+        assert_eq!(decode::<(Vec<Vec<f64>>, Option<u64>, bool)>(3, &bytes).unwrap(), value);
+        for len in 0..bytes.len() {
+            assert!(decode::<(Vec<Vec<f64>>, Option<u64>, bool)>(3, &bytes[..len]).is_err());
+        }
+    }
+
+    #[test]
+    fn the_number_of_lists_is_bounded_and_that_of_their_numbers_is_not() {
+        let lists = |n_lists: usize, len: usize| encode(1, &vec![vec![0.5; len]; n_lists]);
+        let read = |n, bytes: &[u8]| decode_at_most::<Vec<Vec<f64>>>(n, 1, bytes);
+        // The length of the whole list is a number, too.
+        assert_eq!(read(8, &lists(7, 1000)).unwrap().len(), 7);
+        assert!(matches!(read(8, &lists(8, 0)), Err(CheckpointError::Malformed(_))));
+        let hostile = encode(1, &vec![Vec::<f64>::new(); SMALL_MAX]);
+        assert!(decode::<Vec<Vec<f64>>>(1, &hostile).is_err());
+    }
+}
