@@ -61,6 +61,12 @@ def name_of(value: Any, name: str) -> str:
     return value
 
 
+def callable_of(value: Any, name: str) -> None:
+    """That it is a function, or None."""
+    if value is not None and not callable(value):
+        raise ValueError(f"{name} is a function, not {reprlib.repr(value)}")
+
+
 def known(given: Iterable[str], names: Iterable[str], what: str) -> None:
     """That all that is given is among the names; else says which name is meant.
 
@@ -117,7 +123,8 @@ def array_of(value: Any, name: str, shape: tuple[int, ...], dtype: Any = np.floa
     if array.shape != shape:
         raise ValueError(f"{name}: an array {list(shape)} is needed, not {list(array.shape)}")
     if np.issubdtype(dtype, np.floating):
-        return array.astype(dtype)
+        with np.errstate(over="ignore"):
+            return array.astype(dtype)
     info = (0, 1) if dtype is np.bool_ else (np.iinfo(dtype).min, np.iinfo(dtype).max)
     fits = (array == np.floor(array)) & (array >= info[0]) & (array <= info[1])
     if not fits.all():

@@ -326,6 +326,8 @@ class Experiment:
 
         Under other conditions, knowingly, give the champion's ``genotype``, which says nothing of where it is from.
         """
+        if not isinstance(champion, Champion):
+            raise ValueError(f"a Champion is compared with an experiment, not {type(champion).__name__}")
         origin = champion.origin
         if origin is None:
             raise OtherExperimentError(

@@ -57,6 +57,8 @@ def connect(
 
     ``patience``: for how many seconds requests are repeated while the coordinator is away.
     """
+    if coordinator is not None:
+        arguments.name_of(coordinator, "coordinator")
     given = Settings(coordinator, token_file, tls_ca, tls_cert, tls_key, tls_domain, plaintext)
     return Client(Settings.find(given), patience)
 

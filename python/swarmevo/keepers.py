@@ -7,7 +7,7 @@ import os
 import re
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,11 @@ from . import _core
 from .champion import Champion, Judged, Selection
 from .evolution import Evolution, Generation, Judgement
 from .experiment import Experiment
+
+try:
+    import fcntl
+except ImportError:  # elsewhere than on Unix
+    fcntl = None  # type: ignore[assignment]
 
 Floats = NDArray[np.float64]
 
@@ -119,8 +124,13 @@ class InFile(Keeper):
         self._written_at = time.monotonic()
         self._is_new = False
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        if self.path.exists():
-            self._read()
+        self._lock = _lock(self.path.with_suffix(".lock"))
+        try:
+            if self.path.exists():
+                self._read()
+        except BaseException:
+            self._lock.close()
+            raise
 
     def _read(self) -> None:
         try:
@@ -149,8 +159,11 @@ class InFile(Keeper):
             self._write()
 
     def close(self) -> None:
-        if self._is_new:
-            self._write()
+        try:
+            if self._is_new:
+                self._write()
+        finally:
+            self._lock.close()
 
     def _write(self) -> None:
         """The file is always whole: another one takes its place."""
@@ -169,6 +182,18 @@ class InFile(Keeper):
             os.fsync(file.fileno())
         os.replace(unfinished, self.path)
         self._written_at, self._is_new = time.monotonic(), False
+
+
+def _lock(path: Path) -> IO[str]:
+    """The open file that keeps other runs of the same experiment out of the directory, where the system can."""
+    file = path.open("w")
+    if fcntl is not None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            raise OSError(f"{path.parent} is in use by another run of this experiment; stop it or choose another directory") from None
+    return file
 
 
 def _end_to(end: End) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Callable
 
+from . import arguments
 from .champion import Champion
 from .evolution import Evaluate, Evolution, Floats, compute
 from .experiment import Experiment, thread_count
@@ -106,6 +107,10 @@ def evolve(
     ``NAME-DIGEST.evolve.json``: no coordinator could go on with it. It is for one function: another one, which may
     be the same with changes, needs another directory.
     """
+    if not isinstance(experiment, Experiment):
+        raise ValueError(f"evolve takes an Experiment, such as Experiment.from_file gives, not {type(experiment).__name__}")
+    arguments.callable_of(evaluate, "evaluate")
+    arguments.callable_of(callback, "callback")
     if generations is not None:
         experiment = experiment.replace(generations=generations)
     n_threads = thread_count(threads)

@@ -99,6 +99,10 @@ class RecordedRun:
         self._latest: Any = None
         self._experiment: Experiment | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Messages are read again.
+        return self.__dict__ | {"_latest": None}
+
     def refresh(self) -> None:
         """Reads where it stands."""
         self._latest = self._records._call("GetExperiment", experiment_id=self.id)
@@ -221,6 +225,8 @@ class RecordedRun:
             self.refresh()
             chosen = list(range(self.message.generations_done))
         else:
+            if not isinstance(generations, Iterable):
+                raise ValueError(f"generations are a range or a list of numbers, not {generations!r}")
             chosen = [arguments.whole(it, "a generation") for it in generations]
         columns: dict[str, list[NDArray[Any]]] = {name: [] for name in ("generation", "individual", "trial", "fitness")}
         for generation, fitness in zip(chosen, self._records._fitness(self.id, chosen)):

@@ -245,4 +245,6 @@ def _adapter(where: Engine, slots: int) -> _Adapter:
         if where.__name__ != "ray":
             raise TypeError(f"workers run in an executor, a client of Dask or ray, not {where}")
         return _OfRay(where, slots)
+    if not callable(getattr(where, "submit", None)):
+        raise TypeError(f"workers run in an executor, a client of Dask or ray, not {where}")
     return _OfExecutor(cast(Submits, where))

@@ -164,6 +164,14 @@ def test_everything_else_can_be_copied(quickstart, way):
         assert type(other) is type(it) and repr(other) == repr(it)
 
 
+def test_a_recorded_run_can_be_copied(quickstart, tmp_path):
+    short = quickstart.replace(generations=1, evaluation_steps=5, champion_trials=1, judgement_trials=1)
+    swarmevo.evolve(short, progress=False, data_dir=tmp_path)
+    run = swarmevo.open(tmp_path).run(1)
+    for way in WAYS.values():
+        assert way(run).digest == run.digest and repr(way(run)) == repr(run)
+
+
 def send_asked(pipe, evolution):
     try:
         pipe.send(evolution.ask().tobytes())

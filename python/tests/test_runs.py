@@ -137,12 +137,25 @@ def test_another_seed_is_another_experiment_of_the_directory(short, tmp_path):
 
 
 def test_a_directory_that_is_in_use_is_refused_at_once(short, tmp_path):
-    def callback(*_):
-        with pytest.raises(OSError, match="in use by another"):
-            swarmevo.evolve(short, 1, progress=False, data_dir=tmp_path)
+    for evaluate in (None, noisy):
+        def run(callback=None, evaluate=evaluate):
+            swarmevo.evolve(short, 1, progress=False, data_dir=tmp_path, callback=callback, evaluate=evaluate)
 
-    swarmevo.evolve(short, 1, progress=False, data_dir=tmp_path, callback=callback)
-    swarmevo.evolve(short, 1, progress=False, data_dir=tmp_path)
+        def callback(*_, run=run):
+            with pytest.raises(OSError, match="in use by another"):
+                run()
+
+        run(callback)
+        run()
+
+
+@pytest.mark.parametrize("wrong", [{"evaluate": 3}, {"callback": "f"}, {"generations": 0}, {"threads": 0}])
+def test_arguments_that_do_not_fit_are_refused_before_anything_is_computed_or_kept(short, tmp_path, wrong):
+    with pytest.raises(ValueError):
+        swarmevo.evolve(short, progress=False, data_dir=tmp_path / "data", **wrong)
+    with pytest.raises(ValueError, match="takes an Experiment"):
+        swarmevo.evolve(short.to_dict(), progress=False, data_dir=tmp_path / "data")
+    assert not (tmp_path / "data").exists()
 
 
 def test_a_directory_that_cannot_be_used_is_an_error_of_the_system(short, tmp_path):
@@ -249,7 +262,7 @@ def test_a_run_with_fitness_from_elsewhere_is_kept_in_a_file(short, tmp_path, n)
     expected = swarmevo.evolve(short, progress=False, evaluate=noisy)
     with pytest.raises(swarmevo.Interrupted, match="the same call goes on"):
         swarmevo.evolve(short, progress=False, evaluate=noisy, data_dir=tmp_path, callback=stop_after(n))
-    assert [it.suffixes[-2:] for it in tmp_path.iterdir()] == [[".evolve", ".json"]]
+    assert {it.suffixes[-1] for it in tmp_path.iterdir()} == {".json", ".lock"}
     seen = []
     run = swarmevo.evolve(short, progress=False, evaluate=noisy, data_dir=tmp_path, callback=lambda it, _: seen.append(it.index))
     same(run, expected)
@@ -274,10 +287,10 @@ def test_an_exception_of_the_function_loses_nothing_that_is_kept(short, tmp_path
 
 def test_a_file_that_is_no_run_is_refused_and_left(short, tmp_path):
     swarmevo.evolve(short, 1, progress=False, evaluate=noisy, data_dir=tmp_path)
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.glob("*.evolve.json")
     content = json.loads(file.read_text())
     for wrong in ("", "[]", "{}", json.dumps(content | {"format": 2}), json.dumps(content | {"generations": []})):
         file.write_text(wrong)
         with pytest.raises(ValueError, match="is no run to go on with"):
             swarmevo.evolve(short, 1, progress=False, evaluate=noisy, data_dir=tmp_path)
-        assert file.read_text() == wrong and os.listdir(tmp_path) == [file.name]
+        assert file.read_text() == wrong and len(os.listdir(tmp_path)) == 2
