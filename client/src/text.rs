@@ -21,11 +21,12 @@ pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     let done = summary.generation + 1;
     let width = generations.to_string().len();
     format!(
-        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s",
+        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s  digest {}",
         summary.generation,
         fitness(summary),
         summary.min,
         episodes_per_s(summary),
+        short(&summary.digest),
     )
 }
 
@@ -67,7 +68,7 @@ pub fn percent(share: f64) -> String {
 pub fn log_line(experiment: &Experiment, event: &Event) -> String {
     let what = match &event.kind {
         Some(Kind::GenerationCompleted(summary)) => format!(
-            "generation {}: {}  min {:.3}  {:.0} episodes/s",
+            "generation {}: {}  min {:.3}  {:.0} episodes/s  digest {}",
             summary.generation,
             fitness(summary),
             summary.min,
@@ -196,7 +197,6 @@ pub fn end(
     experiment: &Experiment,
     first_best: Option<f64>,
     champion: Option<&GetChampionResponse>,
-    is_verbose: bool,
 ) -> String {
     let mut lines = vec![state_line(experiment)];
     if let Some(best) = first_best {
@@ -207,13 +207,7 @@ pub fn end(
     }
     if let Some(champion) = champion {
         lines.push(row("champion", &champion_line(champion)));
-        // Without a judgement, there is nothing else to say what it is worth.
-        if is_verbose || champion.judged.is_none() {
-            // Without a judgement, there is nothing else to say what it is worth.
-        if is_verbose || champion.judged.is_none() {
-            lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
-        }
-        }
+        lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
     }
     if !experiment.digest.is_empty() {
         lines.push(row("digest", &experiment.digest));
@@ -350,7 +344,7 @@ mod tests {
     fn a_generation_is_one_line() {
         assert_eq!(
             generation(&summary(11), 40),
-            "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s"
+            "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
         );
         assert!(generation(&summary(0), 100).starts_with("  1/100  generation   0  "));
     }
@@ -388,7 +382,7 @@ mod tests {
             }),
             ..GetChampionResponse::default()
         };
-        let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion), true);
+        let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion));
         assert_eq!(
             text,
             "experiment 3 (leader) completed after 12 of 40 generations\n  \
@@ -399,7 +393,7 @@ mod tests {
              digest                        1a2b3c4d5e6f7a8b"
         );
         let unjudged = GetChampionResponse { judged: None, held_out: None, ..champion };
-        let text = end(&experiment(ExperimentState::Cancelled), None, Some(&unjudged), false);
+        let text = end(&experiment(ExperimentState::Cancelled), None, Some(&unjudged));
         assert!(text.contains("champion                      not judged (individual 4"), "{text}");
         assert!(
             text.contains("champion, optimistic          2.000000 in its generation"),

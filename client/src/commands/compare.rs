@@ -6,12 +6,8 @@ mod samples;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
-use clap_complete::ArgValueCompleter;
 
 use crate::{
-    complete,
-    complete,
     connection::Connection,
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
@@ -41,7 +37,7 @@ const POINTS_MAX: usize = 200;
 pub struct CompareArgs {
     /// Names of groups, numbers of experiments, or files: histories (.csv) that `swarmctl
     /// history` wrote and champions (.json) that `swarmctl champion` wrote.
-    #[arg(required = true, value_name = "GROUP|ID|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
+    #[arg(required = true, value_name = "GROUP|ID|FILE")]
     pub runs: Vec<String>,
     /// Number of last generations of each run that are averaged.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]

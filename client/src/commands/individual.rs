@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
-use clap_complete::ArgValueCompleter;
 use coordinator::Who;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
@@ -27,7 +25,7 @@ pub struct IndividualArgs {
     /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
     /// ID@G/mean, the mean of the distribution after generation G; ID@G, all individuals
     /// of generation G, without their networks.
-    #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
+    #[arg(value_name = "ADDRESS")]
     address: NamedAddress,
     /// Read the database in this directory, of a coordinator or of `run`, instead of asking
     /// a coordinator. One may use it meanwhile.

@@ -5,8 +5,6 @@ mod draw;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
-use clap_complete::ArgValueCompleter;
 use coordinator::Address;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
@@ -27,7 +25,7 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct LineageArgs {
     /// Whom: ID@G/I, individual I of generation G of the experiment of that number or name.
-    #[arg(value_name = "ID@G/I", add = ArgValueCompleter::new(complete::experiments))]
+    #[arg(value_name = "ID@G/I")]
     address: NamedAddress,
     /// Number of generations to go back.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u32>(1..=1000))]

@@ -8,8 +8,6 @@ use std::{
 };
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
-use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 use sim_core::TrialSet;
 use swarm_web::{Episode, Replay, ReplayError, replay_file};
@@ -21,8 +19,6 @@ use crate::{
     archive::Archive,
     args::{SeedArg, StepsArg, whole},
     change::Change,
-    complete,
-    complete,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
     progress::Progress,
@@ -40,7 +36,7 @@ use crate::{
 pub struct ReplayArgs {
     /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
     /// ID@G/mean, the mean of the distribution after generation G.
-    #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
+    #[arg(required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
     address: Option<NamedAddress>,
     /// Experiment file, instead of that of an experiment; with --genotype.
     #[arg(long, value_name = "FILE", requires = "genotype")]

@@ -3,15 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap_complete::ArgValueCompleter;
-use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 
 use crate::{
     address::NamedAddress,
     args::{IsaArgs, StepsArg, whole},
-    complete,
-    complete,
 };
 
 /// Evaluate a genotype: many trials under several conditions, every step measured.
@@ -26,7 +22,7 @@ use crate::{
 pub struct EvaluateArgs {
     /// Whom to evaluate, with the file of its experiment: ID or NAME, the champion; ID@G/I,
     /// individual I of generation G; ID@G/mean, the mean of the distribution after it.
-    #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments), required_unless_present = "genotype")]
+    #[arg(value_name = "ADDRESS", required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
     /// Read the address from the database in this directory instead of asking a coordinator.
     #[arg(long, value_name = "DIR", requires = "address")]
