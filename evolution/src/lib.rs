@@ -61,6 +61,7 @@ mod real;
 mod reevaluation;
 mod replay;
 mod setup;
+mod stall;
 mod statistics;
 mod told;
 mod wire;
@@ -84,11 +85,13 @@ pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use replay::{Outcome, Replay, Round};
 pub use setup::{Setup, SetupError};
+pub use stall::Drifted;
 pub use statistics::{Statistics, between, deviation, finite_mean};
 pub use told::{End, Told};
 
 use algorithms::{Algorithm, Sample, Strategy as _};
 use distribution::stream_of;
+use stall::FlatGenerations;
 
 /// Genes in \[0, 1\].
 pub type Genotype = Vec<f64>;
@@ -113,6 +116,8 @@ pub struct Evolution {
     digest: Digest,
     /// Covers every re-evaluation so far, and the generations before it.
     champion_digest: Digest,
+    #[serde(skip)]
+    n_flat: FlatGenerations,
 }
 
 /// A generation whose fitness is to be computed.
@@ -135,12 +140,15 @@ pub struct GenerationSummary {
     pub statistics: Statistics,
     /// Individuals whose fitness is not finite; they rank last.
     pub n_non_finite: usize,
+    /// Generations up to this one in which all individuals had the same fitness, of those that
+    /// this evolution was told since it started or was restored; 0 if some differ.
+    pub n_flat: u64,
     /// Link of the digest chain.
     pub digest: Digest,
 }
 
 /// Why a generation cannot be learnt from.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EvolutionError {
     /// No individual has a finite fitness. The fitness function or the bounds of
     /// the genotype have to change.
@@ -152,6 +160,10 @@ pub enum EvolutionError {
         /// Index of the generation.
         generation: u64,
     },
+    /// It learns nothing, and its distribution is out of all bounds. [`Evolution::drifted`] says
+    /// so; [`Evolution::tell`] never does, so that whatever was told once can be told again.
+    #[error(transparent)]
+    Drifted(#[from] Drifted),
 }
 
 impl Evolution {
@@ -188,6 +200,7 @@ impl Evolution {
             challenger: None,
             digest,
             champion_digest: Digest::default(),
+            n_flat: FlatGenerations::default(),
         }
     }
 
@@ -286,10 +299,15 @@ impl Evolution {
         }
         self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
+        let statistics = Statistics::of(&fitness);
+        let n_non_finite = fitness.iter().filter(|value| !value.is_finite()).count();
+        let is_flat = n_non_finite == 0 && statistics.best == statistics.min && fitness.len() > 1;
+        self.n_flat = self.n_flat.next(is_flat);
         Ok(GenerationSummary {
             generation: index,
-            statistics: Statistics::of(&fitness),
-            n_non_finite: fitness.iter().filter(|value| !value.is_finite()).count(),
+            statistics,
+            n_non_finite,
+            n_flat: self.n_flat.0,
             digest: self.digest,
         })
     }

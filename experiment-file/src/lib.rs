@@ -93,7 +93,8 @@ use serde_json::json;
 pub use actuators::*;
 pub use algorithm::*;
 pub use description::{
-    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, Parameter, ParameterValue,
+    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, LearnsFrom, Parameter,
+    ParameterValue,
 };
 pub use encoding::*;
 pub use fitness::*;

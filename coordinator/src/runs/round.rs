@@ -207,24 +207,29 @@ fn learn(
     generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
 ) -> Result<UpdatedEvolution, EvolutionError> {
-    let record = evolution.tell(generation, &evaluated.values)?;
+    let widest_before = evolution.widest();
+    let summary = evolution.tell(generation, &evaluated.values)?;
+    if let Some(drifted) = evolution.drifted(&summary) {
+        return Err(drifted.into());
+    }
     let generation = GenerationRecord {
-        generation: record.generation,
-        statistics: record.statistics,
-        digest: record.digest.to_string(),
+        generation: summary.generation,
+        statistics: summary.statistics,
+        digest: summary.digest.to_string(),
         duration_ms: evaluated.duration.as_millis() as u64,
         episodes: evaluated.values.iter().map(|trials| trials.len() as u64).sum(),
         workers: evaluated.n_workers as u64,
         idle_share: evaluated.idle_share,
     };
     let mut notices = evaluated.notices.clone();
-    if record.n_non_finite > 0 {
+    if summary.n_non_finite > 0 {
         notices.push(format!(
             "generation {}: the fitness of {} individuals is not finite; they rank last",
-            record.generation, record.n_non_finite
+            summary.generation, summary.n_non_finite
         ));
     }
-    let completed = completion(config, evolution.n_generations(), record.statistics.mean.get());
+    let completed = completion(config, evolution.n_generations(), summary.statistics.mean.get());
+    notices.extend(evolution.remarks(widest_before, &summary, completed.is_some()));
     let told = Told::of(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }

@@ -4,14 +4,14 @@
 //! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772 (2016,
 //! revised 2023); equation numbers are its own.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, limits};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, limits};
 use nalgebra::DVector;
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
     Described, Sample, Strategy,
-    cumulation::{Cumulation, Rates, damping},
+    cumulation::{Cumulation, Rates, VARIANCE_MAX, damping},
     draw_normals,
     linalg::{Eigen, Symmetric},
     mirror,
@@ -43,6 +43,7 @@ impl Described for CmaEs {
         state: "d²/2",
         keeps: Keeps::Matrix,
         individuals_min: 2,
+        learns_from: LearnsFrom::Ranks,
         genes_max: Some(limits::GENES_OF_FULL_MATRIX),
         parameters: &[MU_INIT, SIGMA_INIT],
     };
@@ -116,6 +117,7 @@ impl Strategy for CmaEs {
 
         let sum_of_weights: f64 = weights.iter().sum();
         let keep = 1.0 + rates.c_1 * delta_h_sigma - rates.c_1 - rates.c_mu * sum_of_weights;
+        let covariance_before = self.covariance.clone();
         self.covariance.scale(keep);
         self.covariance.add_outer(rates.c_1, &self.cumulation.p_c);
         for (&i, &weight) in ranking.iter().zip(&weights) {
@@ -128,6 +130,9 @@ impl Strategy for CmaEs {
             self.covariance.add_outer(rates.c_mu * weight, &sample.steps[i]);
         }
         self.covariance.raise_diagonal(self.cumulation.variance_min());
+        if !self.covariance.is_within(VARIANCE_MAX) {
+            self.covariance = covariance_before;
+        }
     }
 }
 

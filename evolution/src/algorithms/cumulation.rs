@@ -11,6 +11,10 @@ use serde::{Deserialize, Serialize};
 /// that of a cube of side 1, ends at 1.
 pub const DEVIATION_MIN: f64 = 1e-10;
 
+/// Largest variance of C. Beyond it, sums of squares would overflow in the decomposition; selection
+/// that always takes the farthest drives C there.
+pub const VARIANCE_MAX: f64 = 1e150;
+
 /// Learning rates, for d genes and a population of lambda.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rates {

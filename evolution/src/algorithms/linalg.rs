@@ -48,6 +48,11 @@ impl Symmetric {
         }
     }
 
+    /// Whether no entry is larger, with or without its sign.
+    pub fn is_within(&self, max: f64) -> bool {
+        self.0.iter().flatten().all(|entry| entry.abs() <= max)
+    }
+
     /// All entries.
     pub fn to_dense(&self) -> DMatrix<f64> {
         let n = self.0.len();

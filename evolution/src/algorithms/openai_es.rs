@@ -5,7 +5,7 @@
 //! perturbations, centred ranks, and Adam (Kingma, Ba: arXiv 1412.6980,
 //! Algorithm 1) on the estimated gradient.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +53,7 @@ impl Described for OpenAiEs {
         state: "3 d",
         keeps: Keeps::Vectors,
         individuals_min: 2,
+        learns_from: LearnsFrom::Pairs,
         genes_max: None,
         parameters: &[MU_INIT, SIGMA, LEARNING_RATE, BETA1, BETA2, WEIGHT_DECAY],
     };

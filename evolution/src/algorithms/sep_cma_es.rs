@@ -4,13 +4,13 @@
 //! Ros, Hansen: "A simple modification in CMA-ES achieving linear time and space
 //! complexity", PPSN X (2008).
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
 use super::{
     Described, Sample, Strategy,
-    cumulation::{Cumulation, Rates, damping},
+    cumulation::{Cumulation, Rates, VARIANCE_MAX, damping},
     draw_normal, draw_normals, mirror,
     parameters::{MU_INIT, SIGMA_INIT},
 };
@@ -34,6 +34,7 @@ impl Described for SepCmaEs {
         state: "4 d",
         keeps: Keeps::Vectors,
         individuals_min: 2,
+        learns_from: LearnsFrom::Ranks,
         genes_max: None,
         parameters: &[MU_INIT, SIGMA_INIT],
     };
@@ -114,7 +115,7 @@ impl Strategy for SepCmaEs {
         for (j, c) in self.variances.iter_mut().enumerate() {
             let rank_one = rates.c_1 * self.cumulation.p_c[j] * self.cumulation.p_c[j];
             let rank_mu = rates.c_mu * z_squared_mean[j] * *c;
-            *c = (keep * *c + rank_one + rank_mu).max(variance_min);
+            *c = (keep * *c + rank_one + rank_mu).clamp(variance_min, VARIANCE_MAX);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! natural evolution strategies", GECCO 2011; Wierstra et al.: "Natural
 //! evolution strategies", JMLR 15 (2014); the thesis's Algorithm 3.
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,7 @@ impl Described for Snes {
         state: "2 d",
         keeps: Keeps::Vectors,
         individuals_min: 1,
+        learns_from: LearnsFrom::Ranks,
         genes_max: None,
         parameters: &[ETA_MU, ETA_SIGMA, MU_INIT, SIGMA_INIT],
     };

@@ -214,3 +214,20 @@ fn openai_es() {
         &[case((Rastrigin, 10), 51, 30.0, 12_000), case((Edge, 10), 21, 1e4, 3_800)],
     );
 }
+
+#[test]
+fn fast_rates_of_xnes_solve_in_8000_evaluations_what_those_of_the_paper_do_not() {
+    let missing = |rates: &str| {
+        let params = AlgorithmParams::default().with("rates", rates);
+        let mut evolution = Setup { params, ..Setup::new("xNES", 20) }.start().unwrap();
+        for _ in 0..400 {
+            let asked = evolution.ask();
+            let told: Vec<Vec<f64>> =
+                asked.genotypes.iter().map(|genes| vec![-Sphere.at(genes)]).collect();
+            evolution.tell(asked, &told).unwrap();
+        }
+        -evolution.champion().unwrap().fitness().unwrap()
+    };
+    let (fast, paper) = (missing("fast"), missing("paper"));
+    assert!(fast < 1e-9 && paper > 1e-3, "{fast:e} {paper:e}");
+}

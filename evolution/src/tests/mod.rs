@@ -1,5 +1,6 @@
 //! Evolution, and every algorithm, from outside.
 
+mod adversity;
 mod canonical;
 mod convergence;
 mod documentation;

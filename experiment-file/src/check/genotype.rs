@@ -23,8 +23,13 @@ pub(super) fn check(
     }
     let population_size = config.algorithm.population_size;
     let individuals_min = algorithm.map_or(1, |algorithm| algorithm.individuals_min);
+    let path = Path::from(["algorithm", "population_size"]);
+    if population_size >= individuals_min
+        && let Some(advice) = algorithm.and_then(|algorithm| algorithm.advice(population_size))
+    {
+        report.warning(&path, advice);
+    }
     if population_size < individuals_min {
-        let path = Path::from(["algorithm", "population_size"]);
         let message = || format!("this algorithm needs at least {individuals_min} individuals");
         report.conflict(&path, &[], message);
     }

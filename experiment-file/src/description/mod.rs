@@ -33,6 +33,8 @@ pub struct AlgorithmDescription {
     pub keeps: Keeps,
     /// Fewest individuals per generation, at least 1.
     pub individuals_min: u32,
+    /// How it makes use of the individuals of a generation.
+    pub learns_from: LearnsFrom,
     /// Most genes of all populations together; none: no limit of its own.
     pub genes_max: Option<u64>,
     /// In the order of the canonical form.
@@ -49,6 +51,18 @@ pub enum Keeps {
     /// A population.
     Population,
 }
+
+/// How an algorithm makes use of the individuals of a generation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LearnsFrom {
+    /// Of their ranks.
+    Ranks,
+    /// Of their ranks, individuals being drawn in pairs, on both sides of the mean.
+    Pairs,
+}
+
+/// So few individuals teach an algorithm next to nothing.
+const FEW_INDIVIDUALS: u32 = 4;
 
 /// One key of `params`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,6 +115,28 @@ impl AlgorithmDescription {
     /// The description of this name, if there is one.
     pub fn find<'a>(descriptions: &'a [Self], name: &str) -> Option<&'a Self> {
         descriptions.iter().find(|description| description.name == name)
+    }
+
+    /// What speaks against a population of this size, if it is accepted at all.
+    pub fn advice(&self, population_size: u32) -> Option<String> {
+        let name = self.name;
+        match population_size {
+            0 => None,
+            1 => Some(format!(
+                "with a single individual, {name} never learns, as there is nobody to compare it \
+                 with; take {FEW_INDIVIDUALS} individuals or more"
+            )),
+            size if size < FEW_INDIVIDUALS => Some(format!(
+                "{size} individuals teach {name} next to nothing; take {FEW_INDIVIDUALS} or more"
+            )),
+            size if self.learns_from == LearnsFrom::Pairs && size % 2 == 1 => Some(format!(
+                "{name} draws individuals in pairs, and of {size} the last one is the mean itself, \
+                 which teaches nothing; take {} or {}",
+                size - 1,
+                size + 1
+            )),
+            _ => None,
+        }
     }
 
     /// Whether the algorithm has a parameter of this key.

@@ -55,7 +55,9 @@ fn n_accepted_variants(index: u64) -> u64 {
             Ok((config, _)) => {
                 n_accepted += 1;
                 if variant == 0 {
-                    assert_eq!(accept(&config.to_canonical_json()), config);
+                    // A population may be so small that there is a warning.
+                    let again = read(&config.to_canonical_json()).map(|(config, _)| config);
+                    assert_eq!(again.unwrap(), config);
                 }
             }
             Err(error) => assert!(!error.problems.is_empty()),

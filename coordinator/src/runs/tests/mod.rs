@@ -1,5 +1,6 @@
 //! What becomes of runs when things happen too late, or at the same time.
 
+mod flat;
 mod histories;
 mod world;
 

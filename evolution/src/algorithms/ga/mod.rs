@@ -8,7 +8,7 @@ mod crossover;
 mod mutation;
 mod selection;
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, Parameter};
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
 use numeric::random::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +53,7 @@ impl Described for Ga {
         state: "P d",
         keeps: Keeps::Population,
         individuals_min: 1,
+        learns_from: LearnsFrom::Ranks,
         genes_max: None,
         parameters: &[
             selection::OPERATOR,

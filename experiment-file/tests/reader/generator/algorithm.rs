@@ -33,7 +33,7 @@ pub(super) fn algorithm(dice: &mut Dice, robot: &Robot, network: &Network) -> Va
     for (key, value) in [
         ("name", json!(name)),
         ("evolvable_object", json!("swarm")),
-        ("population_size", json!(10 + dice.below(100))),
+        ("population_size", json!(10 + 2 * dice.below(50))),
         ("generations", json!(dice.die(1000))),
         ("evaluation_steps", json!(100 + dice.die(500))),
         ("num_evaluations", json!(dice.die(5))),

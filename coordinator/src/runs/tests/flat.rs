@@ -1,0 +1,54 @@
+//! What becomes of runs whose fitness tells nobody apart, or next to nobody.
+
+use super::{super::round::*, world};
+use crate::engine::EvaluatedBatch;
+
+/// What a run says, and why it fails if it does, where all trials have the fitness that is given.
+fn run(name: &str, generations: u64, fitness: fn(usize) -> f64) -> (Vec<String>, Option<String>) {
+    let mut config = world::config(1, generations);
+    config.algorithm.name = name.into();
+    let mut round = Round::generation(world::evolution(&config));
+    let mut notices = Vec::new();
+    loop {
+        let genotypes = round.genotypes();
+        let n_trials = round.n_trials(&config) as usize;
+        let values =
+            (0..genotypes.len()).map(|i| (0..n_trials).map(|trial| fitness(i + trial)).collect());
+        let evaluated = EvaluatedBatch { values: values.collect(), ..world::evaluated(&[], 0) };
+        match round.conclude(&config, &evaluated) {
+            Err(error) => return (notices, Some(error.to_string())),
+            Ok(Next::Evaluate(next)) => round = *next,
+            Ok(Next::Commit(ready)) => {
+                notices.extend(ready.notices.iter().cloned());
+                match ready.next {
+                    Some(next) => round = next,
+                    None => return (notices, None),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_fitness_for_ten_generations_is_a_notice() {
+    let (notices, error) = run("SNES", 12, |_| 0.25);
+    assert_eq!(error, None);
+    let flat: Vec<&String> = notices.iter().filter(|it| it.contains("same fitness")).collect();
+    assert!(flat[0].starts_with("generations 0 to 9: all 4 individuals"), "{notices:?}");
+    assert!(flat[1].starts_with("generations 0 to 11: all 4 individuals"), "{notices:?}");
+    let (notices, _) = run("SNES", 12, |i| i as f64);
+    assert!(!notices.iter().any(|it| it.contains("same fitness")), "{notices:?}");
+}
+
+#[test]
+fn a_run_that_chance_drives_out_of_all_bounds_fails_with_the_reason() {
+    let (_, error) = run("xNES", 20_000, |_| 0.25);
+    let error = error.expect("the deviations of xNES grow");
+    assert!(error.starts_with("all individuals had the same fitness 0.25 in each of"), "{error}");
+}
+
+#[test]
+fn trials_within_the_smallest_numbers_are_judged() {
+    let (notices, _) = run("SNES", 2, |i| [0.0, 5e-324, 1e-323][i % 3]);
+    assert!(notices.iter().any(|it| it.starts_with("champion judged: ")), "{notices:?}");
+}

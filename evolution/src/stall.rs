@@ -1,0 +1,119 @@
+//! When evolution learns nothing: fitness that tells nobody apart, and distributions that have
+//! become as narrow as a point or far wider than the genes' range.
+//!
+//! Nothing of it changes a bit of a run. It is what a run is told in words, and what ends one
+//! that goes on by chance alone.
+
+use super::{Evolution, GenerationSummary, algorithms::Strategy as _};
+
+/// How many of the latest generations told nobody apart, as far as they were told here: what
+/// is restored begins anew. It is no part of the state, so all of them are equal.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct FlatGenerations(pub u64);
+
+impl FlatGenerations {
+    /// After another generation.
+    pub fn next(self, is_flat: bool) -> Self {
+        if is_flat { Self(self.0 + 1) } else { Self(0) }
+    }
+}
+
+impl PartialEq for FlatGenerations {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// So many generations without a difference are worth a word, and so are ten times as many.
+const FLAT_MIN: u64 = 10;
+
+/// After so many generations without a difference, a distribution that is wider than
+/// [`DEVIATION_MAX`] ends the run.
+const FLAT_MAX: u64 = 100;
+
+/// Deviations of genes, whose range is 1, of which nothing comes back: individuals are drawn
+/// from all of the range alike, wherever the mean is.
+const DEVIATION_MAX: f64 = 1e6;
+
+/// Deviations that are worth a word because all individuals are alike.
+const DEVIATION_NARROW: f64 = 1e-9;
+
+/// Deviations that are worth a word because individuals are drawn from all of the range alike.
+const DEVIATION_WIDE: f64 = 1e3;
+
+/// Evolution that learns nothing and whose distribution has been driven out of all bounds by
+/// chance.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "all individuals had the same fitness {fitness} in each of the last {n_generations} generations, \
+     and chance has driven the deviations of the genes, whose range is 1, to {deviation:.0e}; \
+     nothing can be learnt from here: let the task tell individuals apart, and submit it again"
+)]
+pub struct Drifted {
+    /// Fitness of everybody.
+    pub fitness: f64,
+    /// Generations without a difference.
+    pub n_generations: u64,
+    /// The widest of the genes' deviations.
+    pub deviation: f64,
+}
+
+impl Evolution {
+    /// The largest of the genes' standard deviations in distributions; none without one.
+    pub fn widest(&self) -> Option<f64> {
+        let of_each = self.populations.iter().filter_map(|it| it.deviations());
+        of_each.flatten().reduce(f64::max)
+    }
+
+    /// What is worth a word after a generation. `widest_before`: [`widest`](Self::widest) before
+    /// it; `is_last`: whether it is the last one of the run.
+    pub fn remarks(
+        &self,
+        widest_before: Option<f64>,
+        summary: &GenerationSummary,
+        is_last: bool,
+    ) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let n_flat = summary.n_flat;
+        let is_due = n_flat >= FLAT_MIN && n_flat.to_string().trim_end_matches('0') == "1";
+        if is_due || (is_last && n_flat > 1) {
+            remarks.push(self.flat(summary));
+        }
+        let (Some(was), Some(is)) = (widest_before, self.widest()) else { return remarks };
+        if was >= DEVIATION_NARROW && is < DEVIATION_NARROW {
+            remarks.push(format!(
+                "generation {}: the deviations of all genes are below {DEVIATION_NARROW:e}, so all \
+                 individuals are alike; end the run here, or start another one with a wider \
+                 `sigma_init`, another seed or more individuals",
+                summary.generation
+            ));
+        }
+        if was <= DEVIATION_WIDE && is > DEVIATION_WIDE {
+            remarks.push(format!(
+                "generation {}: the deviation of a gene is {is:.0e}, and its range is 1, so it is drawn \
+                 at random; fitness does not depend on it, or the learning rates are too large",
+                summary.generation
+            ));
+        }
+        remarks
+    }
+
+    fn flat(&self, summary: &GenerationSummary) -> String {
+        let (fitness, last) = (summary.statistics.best, summary.generation);
+        let first = last + 1 - summary.n_flat;
+        format!(
+            "generations {first} to {last}: all {} individuals have the same fitness {fitness}, so evolution drifts by \
+             chance; let the task reward steps towards its goal, or check that its fitness depends on \
+             what robots do (`swarmctl simulate`)",
+            self.population_size
+        )
+    }
+
+    /// Why a run should end that learns nothing; none if it may go on.
+    pub fn drifted(&self, summary: &GenerationSummary) -> Option<Drifted> {
+        let n_generations = summary.n_flat;
+        let deviation = self.widest().filter(|&it| it > DEVIATION_MAX)?;
+        let fitness = summary.statistics.best.get();
+        (n_generations >= FLAT_MAX).then_some(Drifted { fitness, n_generations, deviation })
+    }
+}
