@@ -160,3 +160,91 @@ impl LocalRun {
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use evolution::End;
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    /// The quickstart with this many generations, and no comparison before the end.
+    fn file(generations: u64) -> String {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
+        let mut file: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        file["algorithm"]["generations"] = json!(generations);
+        file["algorithm"]["champion_every"] = json!(1000);
+        file.to_string()
+    }
+
+    /// Goes on until so many generations are done; the last one of them all is judged.
+    fn compute(run: &mut LocalRun, until: u64, n_generations: u64) {
+        let mut evolution = run.evolution().unwrap();
+        while evolution.n_generations() < until {
+            let asked = evolution.ask();
+            let fitness: Vec<Vec<f64>> =
+                asked.genotypes.iter().map(|genes| vec![genes[0], genes[1]]).collect();
+            evolution.tell(asked, &fitness).unwrap();
+            let is_last = evolution.n_generations() == n_generations;
+            let judgement = if is_last { vec![0.5, 0.25] } else { Vec::new() };
+            let end = End { judgement, ..End::default() };
+            let told = Told { end, ..Told::of(fitness) };
+            let completed = is_last.then_some("");
+            let duration = Duration::from_millis(5);
+            run.commit(&Done {
+                evolution: &evolution,
+                told: &told,
+                duration,
+                n_workers: 1,
+                completed,
+            })
+            .unwrap();
+        }
+    }
+
+    #[test]
+    fn a_run_goes_on_where_it_was_left_to_the_same_bits() {
+        let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let mut run = LocalRun::open(whole.path(), file(5)).unwrap();
+        compute(&mut run, 5, 5);
+        let expected = run.record().unwrap();
+        for until in [2, 3, 5] {
+            let mut run = LocalRun::open(parts.path(), file(5)).unwrap();
+            assert!(matches!(
+                LocalRun::open(parts.path(), file(5)),
+                Err(LocalRunError::Store(StoreError::Locked { .. }))
+            ));
+            compute(&mut run, until, 5);
+        }
+        let run = LocalRun::open(parts.path(), file(5)).unwrap();
+        let found = run.record().unwrap();
+        assert_eq!((found.id, found.digest), (ExperimentId(1), expected.digest));
+        assert_eq!(found.state, ExperimentState::Completed);
+        assert_eq!(run.history().unwrap().len(), 5);
+        assert_eq!(run.champion().unwrap().unwrap().judged.unwrap().n_trials, 2);
+    }
+
+    #[test]
+    fn a_longer_run_goes_on_from_a_shorter_one_and_a_paused_one_is_resumed() {
+        let directory = tempfile::tempdir().unwrap();
+        compute(&mut LocalRun::open(directory.path(), file(2)).unwrap(), 2, 2);
+        let mut run = LocalRun::open(directory.path(), file(3)).unwrap();
+        assert_eq!((run.id(), run.evolution().unwrap().n_generations()), (ExperimentId(1), 2));
+        let (id, paused) = (run.id(), ExperimentState::Paused);
+        run.store.set_state(id, 0, paused, "lunch").unwrap();
+        drop(run);
+        let run = LocalRun::open(directory.path(), file(3)).unwrap();
+        assert_eq!(run.record().unwrap().state, ExperimentState::Running);
+    }
+
+    #[test]
+    fn a_file_with_problems_leaves_no_database() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = directory.path().join("data");
+        let refused = LocalRun::open(&at, file(0));
+        assert!(matches!(refused, Err(LocalRunError::Config(_))));
+        assert!(!at.exists());
+    }
+}
