@@ -86,7 +86,7 @@ Exit codes:
   8    no TLS connection: one side has no TLS, or the certificate is not trusted
   9    the server at the address is not a coordinator, or one of another version
   10   the experiment has not ended within wait --timeout
-  11   the database is damaged (doctor, backup)
+  11   the database is damaged
   12   the bundle is not what it says (verify)
   130  interrupted";
 
@@ -169,14 +169,6 @@ impl ExperimentArgs {
     }
 }
 
-/// The data directory of a coordinator.
-#[derive(Debug, ClapArgs)]
-pub struct DataDirArg {
-    /// The data directory of a coordinator, or of `run`.
-    #[arg(long, env = "SWARM_DATA_DIR", value_name = "DIR", default_value = "./swarm-data")]
-    pub data_dir: PathBuf,
-}
-
 /// A replacement of the file's seed.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct SeedArg {
@@ -246,7 +238,6 @@ mod tests {
         assert_eq!(args.experiment.config, PathBuf::from("a.json"));
         assert_eq!(args.experiment.overrides(), Overrides::default());
         assert_eq!(args.workers, None);
-        assert_eq!(args.data_dir, PathBuf::from("./swarm-data"));
     }
 
     #[test]

@@ -7,7 +7,13 @@ use clap_complete::CompletionCandidate;
 use swarm_proto::v1::Experiment;
 use tokio::time::timeout;
 
-use crate::{args::Args, connection::Connection, json::state_name};
+use crate::{
+    args::{Args, OutputFormat},
+    connection::Connection,
+    json::state_name,
+    place::Intent,
+    progress::Progress,
+};
 
 /// Nobody waits longer for a completion.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -29,8 +35,11 @@ fn fetch() -> Option<Vec<Experiment>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().ok()?;
     let args = Args::try_parse_from(["swarmctl", "list"]).ok()?;
     runtime.block_on(async {
-        let connection = Connection::open(args.settings).ok()?.with_patience(Duration::ZERO);
-        timeout(PATIENCE, connection.experiments()).await.ok()?.ok()
+        let silent = Progress::new(OutputFormat::Json).silent();
+        let connection = Connection::open(args.settings, Intent::Read, &silent);
+        let connection = timeout(PATIENCE, connection).await.ok()?.ok()?;
+        let asking = connection.with_patience(Duration::ZERO);
+        timeout(PATIENCE, asking.experiments()).await.ok()?.ok()
     })
 }
 

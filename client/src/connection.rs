@@ -1,7 +1,13 @@
-//! Requests to the coordinator, repeated while it cannot be reached.
+//! Requests to the coordinator, repeated while it cannot be reached; or to the same services in
+//! this process, on a data directory.
 
-use std::time::Duration;
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 
+use coordinator::{Door, InProcess, store::Holder};
 use experiment_file::suggestion;
 use swarm_proto::v1::{
     CompletedGeneration, EvaluateFitnessRequest, EvaluateRequest, EvaluateResponse, Event,
@@ -27,6 +33,8 @@ use worker::Backoff;
 use crate::{
     args::Subject,
     error::{Error, is_transient},
+    place::{Intent, Place},
+    progress::Progress,
     settings::Settings,
 };
 
@@ -34,6 +42,8 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(2);
 /// The same, while a command follows an experiment.
 pub const PATIENCE_WHILE_FOLLOWING: Duration = Duration::from_secs(60);
+/// Longest time of a call that is not a stream.
+const CALL_TIMEOUT: Duration = Duration::from_secs(30);
 /// Bytes of a bundle in one message.
 const PIECE_LEN: usize = 1 << 20;
 /// Number of events per request.
@@ -42,12 +52,33 @@ const EVENT_PAGE_LEN: u32 = 100;
 /// A channel on which every call carries the token, if there is one.
 type Authorised = InterceptedService<Channel, Bearer>;
 
-/// A coordinator's address and the clients of its services, which connect with the
-/// first request. All requests are safe to repeat.
+/// How the services are reached.
+#[derive(Debug, Clone)]
+enum Way {
+    /// Over the network.
+    Link(Box<Link>),
+    /// They are in this process.
+    Here(Arc<Here>),
+}
+
+/// A data directory, and the services on it.
+#[derive(Debug)]
+struct Here {
+    data_dir: PathBuf,
+    door: Door,
+    /// None if there are workers, too, and somebody else stops it all.
+    services: Option<InProcess>,
+    /// Numbers of the experiments that were set going here.
+    set_going: Mutex<Vec<u64>>,
+}
+
+/// A coordinator's address, or a data directory, and the clients of its services, which connect
+/// with the first request. All requests are safe to repeat.
 #[derive(Debug, Clone)]
 pub struct Connection {
+    /// The coordinator's address, or the data directory.
     address: String,
-    link: Link,
+    way: Way,
     client: ExperimentServiceClient<Authorised>,
     evaluations: EvaluationServiceClient<Authorised>,
     fleet: FleetServiceClient<Authorised>,
@@ -55,28 +86,115 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// A connection to the coordinator of the settings and the settings file.
-    pub fn open(settings: Settings) -> Result<Self, Error> {
-        let settings = settings.or_file()?;
-        Self::new(settings.address(), &settings.credentials()?)
+    /// A connection to the place of the settings, the environment and the settings file. One that
+    /// nobody has named is said.
+    pub async fn open(
+        settings: Settings,
+        intent: Intent,
+        progress: &Progress,
+    ) -> Result<Self, Error> {
+        let place = Place::of(settings).await?;
+        progress.found(&place);
+        Self::to(place, intent).await
+    }
+
+    /// A connection to a place: to a coordinator, or to the services on a data directory in this
+    /// process.
+    pub async fn to(place: Place, intent: Intent) -> Result<Self, Error> {
+        let path = match place {
+            Place::Coordinator(settings) => {
+                return Self::new(settings.address(), &settings.credentials()?);
+            }
+            Place::Directory { path, .. } => path,
+        };
+        let data_dir = &*path;
+        intent.check(data_dir)?;
+        let services = match intent {
+            Intent::Read => InProcess::read(data_dir).await,
+            _ => InProcess::write(data_dir).await,
+        };
+        let services = services.map_err(Error::from_start)?;
+        Ok(Self::here(data_dir, services.door().clone(), Some(services)))
+    }
+
+    /// A connection to the coordinator in this process that computes what is in a data directory.
+    pub fn computing(data_dir: &Path, door: Door) -> Self {
+        Self::here(data_dir, door, None)
+    }
+
+    fn here(data_dir: &Path, door: Door, services: Option<InProcess>) -> Self {
+        let channel = door.channel(Some(CALL_TIMEOUT));
+        let here = Here { data_dir: data_dir.into(), door, services, set_going: Mutex::default() };
+        let address = data_dir.display().to_string();
+        // What fails here fails again.
+        let this = Self::on(address, Way::Here(Arc::new(here)), &channel);
+        this.with_patience(Duration::ZERO)
     }
 
     /// A connection to the coordinator at an address.
     pub fn new(address: &str, credentials: &Credentials) -> Result<Self, Error> {
         let link =
             Link::new(address, credentials).map_err(|error| Error::Input(error.to_string()))?;
-        let channel = endpoint(&link).timeout(Duration::from_secs(30)).connect_lazy();
-        let fleet = FleetServiceClient::with_interceptor(channel.clone(), link.bearer.clone())
+        let channel = endpoint(&link).timeout(CALL_TIMEOUT).connect_lazy();
+        Ok(Self::on(address.into(), Way::Link(Box::new(link)), &channel))
+    }
+
+    fn on(address: String, way: Way, channel: &Channel) -> Self {
+        let (client, evaluations) = (way.experiments(channel), way.evaluations(channel));
+        let fleet = FleetServiceClient::with_interceptor(channel.clone(), way.bearer())
             .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
             .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        let evaluations =
-            EvaluationServiceClient::with_interceptor(channel.clone(), link.bearer.clone())
-                .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
-                .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        let client = ExperimentServiceClient::with_interceptor(channel, link.bearer.clone())
-            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
-            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
-        Ok(Self { address: address.into(), link, client, evaluations, fleet, patience: PATIENCE })
+        Self { address, way, client, evaluations, fleet, patience: PATIENCE }
+    }
+
+    /// Ends what was started for it.
+    pub async fn close(self) {
+        let Self { way, client, evaluations, fleet, .. } = self;
+        drop((client, evaluations, fleet));
+        if let Way::Here(here) = way
+            && let Some(Here { services: Some(services), .. }) = Arc::into_inner(here)
+        {
+            services.shutdown().await;
+        }
+    }
+
+    /// The data directory, if no coordinator is asked.
+    pub fn data_dir(&self) -> Option<&Path> {
+        match &self.way {
+            Way::Link(_) => None,
+            Way::Here(here) => Some(&here.data_dir),
+        }
+    }
+
+    /// Whether experiments are computed by this process, and by no other.
+    pub fn computes(&self) -> bool {
+        matches!(&self.way, Way::Here(here) if here.services.is_none())
+    }
+
+    /// Remembers that experiments are computed here, to say how to go on with them.
+    pub fn set_going(&self, experiments: &[Experiment]) {
+        if let Way::Here(here) = &self.way {
+            let ids = experiments.iter().map(|experiment| experiment.id);
+            here.set_going.lock().unwrap_or_else(PoisonError::into_inner).extend(ids);
+        }
+    }
+
+    /// Numbers of the experiments that were set going here.
+    pub fn going(&self) -> Vec<u64> {
+        match &self.way {
+            Way::Here(here) => {
+                here.set_going.lock().unwrap_or_else(PoisonError::into_inner).clone()
+            }
+            Way::Link(_) => Vec::new(),
+        }
+    }
+
+    /// The other program that uses the data directory, if there is one.
+    pub async fn holder(&self) -> Option<Holder> {
+        match &self.way {
+            Way::Here(here) => here.services.as_ref()?.holder().await,
+            Way::Link(_) => None,
+        }
     }
 
     /// The same connection, which repeats requests for this long.
@@ -84,7 +202,7 @@ impl Connection {
         Self { patience, ..self.clone() }
     }
 
-    /// The coordinator's address.
+    /// The coordinator's address, or the data directory.
     pub fn address(&self) -> &str {
         &self.address
     }
@@ -101,7 +219,11 @@ impl Connection {
 
     /// A status as this program's error.
     pub fn error(&self, status: &Status) -> Error {
-        match (Error::from_status(status, &self.address), self.link.hint(status)) {
+        let hint = match &self.way {
+            Way::Link(link) => link.hint(status),
+            Way::Here(_) => return Error::from_status_here(status, &self.address),
+        };
+        match (Error::from_status(status, &self.address), hint) {
             (Error::Unreachable { address, reason }, Some(hint)) => {
                 Error::Unreachable { address, reason: format!("{reason} ({hint})") }
             }
@@ -259,12 +381,7 @@ impl Connection {
 
     /// The fitness of genotypes in trials of an evolution, however long that takes.
     pub async fn fitness(&self, request: EvaluateFitnessRequest) -> Result<Vec<Vec<f64>>, Error> {
-        let evaluations = EvaluationServiceClient::with_interceptor(
-            endpoint(&self.link).connect_lazy(),
-            self.link.bearer.clone(),
-        )
-        .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
-        .max_encoding_message_size(TO_COORDINATOR_LEN_MAX);
+        let evaluations = self.way.evaluations(&self.way.patient_channel());
         let answer = self
             .with_patience(PATIENCE_WHILE_FOLLOWING)
             .retry(async || evaluations.clone().evaluate_fitness(request.clone()).await)
@@ -274,10 +391,7 @@ impl Connection {
 
     /// A client for requests that take the coordinator long.
     fn patient(&self) -> ExperimentServiceClient<Authorised> {
-        let channel = endpoint(&self.link).connect_lazy();
-        ExperimentServiceClient::with_interceptor(channel, self.link.bearer.clone())
-            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
-            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX)
+        self.way.experiments(&self.way.patient_channel())
     }
 
     /// Sends a request to the experiment service, again and again while the coordinator
@@ -316,11 +430,42 @@ impl Connection {
 
     /// If another server answers at the address, says so.
     async fn diagnose(&self, error: Error) -> Error {
-        let Error::Unreachable { .. } = error else { return error };
-        match banner(&self.link.authority()).await {
+        let (Error::Unreachable { .. }, Way::Link(link)) = (&error, &self.way) else {
+            return error;
+        };
+        match banner(&link.authority()).await {
             Some(banner) => Error::foreign(&self.address, &banner),
             None => error,
         }
+    }
+}
+
+impl Way {
+    fn bearer(&self) -> Bearer {
+        match self {
+            Self::Link(link) => link.bearer.clone(),
+            Self::Here(_) => Bearer::default(),
+        }
+    }
+
+    /// A channel whose calls may take as long as they like.
+    fn patient_channel(&self) -> Channel {
+        match self {
+            Self::Link(link) => endpoint(link).connect_lazy(),
+            Self::Here(here) => here.door.channel(None),
+        }
+    }
+
+    fn experiments(&self, channel: &Channel) -> ExperimentServiceClient<Authorised> {
+        ExperimentServiceClient::with_interceptor(channel.clone(), self.bearer())
+            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX)
+    }
+
+    fn evaluations(&self, channel: &Channel) -> EvaluationServiceClient<Authorised> {
+        EvaluationServiceClient::with_interceptor(channel.clone(), self.bearer())
+            .max_decoding_message_size(FROM_COORDINATOR_LEN_MAX)
+            .max_encoding_message_size(TO_COORDINATOR_LEN_MAX)
     }
 }
 
@@ -395,7 +540,7 @@ mod tests {
     #[tokio::test]
     async fn a_coordinator_has_no_banner() {
         let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
-        assert_eq!(banner(&connection.link.authority()).await, None);
+        assert_eq!(banner(connection.address().trim_start_matches("http://")).await, None);
     }
 
     #[tokio::test]

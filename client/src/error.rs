@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use coordinator::store::StoreError;
+use coordinator::{StartError, store::StoreError};
 use experiment_file::ConfigError;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
@@ -28,7 +28,7 @@ pub enum Error {
     },
     /// The coordinator of `run` does not start, because of the data directory.
     #[error(transparent)]
-    Start(#[from] coordinator::StartError),
+    Start(#[from] StartError),
     /// Some runs of a group were submitted before this error.
     #[error(
         "{n_submitted} of {n_runs} runs are submitted, the same command again adds the others: \
@@ -179,6 +179,25 @@ impl Error {
         }
     }
 
+    /// The error of opening a data directory to ask it.
+    pub fn from_start(error: StartError) -> Self {
+        match error {
+            StartError::Store(error) => Self::from_store(&error),
+            error => Self::Start(error),
+        }
+    }
+
+    /// The error of a failed call to the services on a data directory.
+    pub fn from_status_here(status: &Status, data_dir: &str) -> Self {
+        match status.code() {
+            Code::ResourceExhausted => Self::Input(status.message().into()),
+            Code::Unavailable | Code::Internal | Code::Unknown => {
+                Self::Internal(format!("{data_dir}: {}", reason(status)))
+            }
+            _ => Self::from_status(status, data_dir),
+        }
+    }
+
     /// The error of writing to standard output; a closed pipe ends the command quietly.
     pub fn from_stdout(source: io::Error) -> Self {
         match source.kind() {
@@ -204,6 +223,7 @@ impl Error {
             )),
             Code::NotFound | Code::FailedPrecondition => Self::NotFound(message.into()),
             Code::InvalidArgument => Self::Input(message.into()),
+            Code::DataLoss => Self::Damaged(message.into()),
             Code::Unauthenticated | Code::PermissionDenied => {
                 Self::Denied { address: address.into(), refusal: message.into() }
             }

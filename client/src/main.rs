@@ -3,7 +3,6 @@
 //! and checks files and simulates trials without a coordinator.
 
 mod address;
-mod archive;
 mod args;
 mod change;
 mod clock;
@@ -15,8 +14,10 @@ mod experiment_file;
 #[cfg(test)]
 mod fake_coordinator;
 mod figure;
+mod genotypes;
 mod interrupt;
 mod json;
+mod place;
 mod progress;
 mod recorded;
 mod resimulation;

@@ -18,6 +18,7 @@ use crate::{
     commands::Finding,
     error::Error,
     json,
+    place::Place,
     table::{self, Screen, Table},
     text,
 };
@@ -36,6 +37,8 @@ pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
     screen: Screen,
+    /// Whether remarks are left out.
+    is_silent: bool,
     /// Whether a bar can be shown.
     has_terminal: bool,
     /// Hidden unless an experiment is followed on a terminal.
@@ -70,11 +73,17 @@ impl Progress {
             format,
             stdout,
             screen: Screen::default(),
+            is_silent: false,
             has_terminal: false,
             bar: ProgressBar::hidden(),
             followed: BTreeMap::new(),
             durations_ms: VecDeque::new(),
         }
+    }
+
+    /// Makes no remarks.
+    pub fn silent(self) -> Self {
+        Self { is_silent: true, ..self }
     }
 
     /// Whether standard output is for programs.
@@ -126,12 +135,22 @@ impl Progress {
 
     /// A remark on standard error.
     pub fn remark(&self, text: &str) {
+        if self.is_silent {
+            return;
+        }
         let text = match self.screen.width {
             Some(width) => text::wrapped(text, width),
             None => text.to_owned(),
         };
         // If standard error is closed there is no place left to report to.
         let _ = self.stderr()().write_all(format!("{}\n", escape_lines(&text)).as_bytes());
+    }
+
+    /// Says which place is taken if nobody has named it.
+    pub fn found(&self, place: &Place) {
+        if let Place::Directory { path, is_found: true } = place {
+            self.remark(&text::found(path));
+        }
     }
 
     /// Makes writers to standard error that hide the bar while they write.

@@ -41,8 +41,10 @@ impl Resimulation {
         n_threads: Option<u16>,
         isa: IsaArgs,
     ) -> Result<Self, Error> {
-        if settings.coordinator.is_some() {
-            let connection = Box::new(Connection::open(settings)?);
+        if settings.data_dir.is_none() && settings.coordinator.is_some() {
+            let settings = settings.or_file()?;
+            let connection =
+                Box::new(Connection::new(settings.address(), &settings.credentials()?)?);
             return Ok(Self::Fleet { connection, config_json: config_json.to_owned() });
         }
         let n_threads = n_threads

@@ -6,16 +6,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::Args as ClapArgs;
+use clap::{Args as ClapArgs, ValueHint};
 use serde::Deserialize;
 use swarm_transport::{CredentialArgs, Credentials};
 
 use crate::error::Error;
 
 /// The coordinator's default address.
-const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
+pub const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
 /// The environment variable that holds the client token itself.
 const TOKEN_VARIABLE: &str = "SWARM_CLIENT_TOKEN";
+/// The environment variable that names the coordinator.
+pub const COORDINATOR_VARIABLE: &str = "SWARM_COORDINATOR";
 /// The environment variable that names the settings file.
 pub const FILE_VARIABLE: &str = "SWARM_CONFIG";
 /// The default settings file, relative to the user's configuration directory.
@@ -23,18 +25,22 @@ const FILE: &str = "swarmevo/config.json";
 
 /// Address of the coordinator and credentials, as far as they have been set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
-#[command(next_help_heading = "Connection to the coordinator")]
+#[command(next_help_heading = "Where experiments are")]
 pub struct Settings {
-    /// Address of the coordinator; `run` does not use it, because it starts its own
-    /// [default: http://127.0.0.1:7700]
+    /// Address of the coordinator to ask [default: http://127.0.0.1:7700]
     #[arg(
         long,
         global = true,
         value_name = "URL",
-        env = "SWARM_COORDINATOR",
+        env = COORDINATOR_VARIABLE,
         hide_env_values = true
     )]
     pub coordinator: Option<String>,
+    /// Work on the experiments in this directory, of `run` or of a coordinator, instead of asking
+    /// a coordinator [env: SWARM_DATA_DIR] [default: ./swarm-data if nothing listens at the
+    /// coordinator's default address]
+    #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub data_dir: Option<PathBuf>,
     /// File with the client token, if the coordinator requires one; alternatively
     /// SWARM_CLIENT_TOKEN holds the token itself.
     #[arg(
@@ -117,6 +123,7 @@ impl Settings {
         let (these, those) = (self.credentials, others.credentials);
         Self {
             coordinator: self.coordinator.or(others.coordinator),
+            data_dir: self.data_dir,
             token_file: self.token_file.or(others.token_file),
             credentials: CredentialArgs {
                 tls_ca: these.tls_ca.or(those.tls_ca),
@@ -135,6 +142,7 @@ impl SettingsFile {
         let beside = |path: Option<PathBuf>| path.map(|path| directory.join(path));
         Settings {
             coordinator: self.coordinator,
+            data_dir: None,
             token_file: beside(self.token_file),
             credentials: CredentialArgs {
                 tls_ca: beside(self.tls_ca),
@@ -197,6 +205,7 @@ mod tests {
         }"#;
         let expected = Settings {
             coordinator: Some("https://h:1".into()),
+            data_dir: None,
             token_file: Some("/home/ada/client.token".into()),
             credentials: CredentialArgs {
                 tls_ca: Some("/etc/ca.pem".into()),

@@ -8,9 +8,10 @@ use swarm_proto::v1::{
 };
 
 use console::truncate_str;
+use coordinator::store::Holder;
 use swarm_telemetry::escape;
 
-use crate::{clock, json::state_name};
+use crate::{clock, json::state_name, settings::DEFAULT_COORDINATOR};
 
 /// Number of hexadecimal digits of a digest that are shown.
 const DIGEST_DIGITS: usize = 12;
@@ -276,6 +277,44 @@ pub fn wrapped(text: &str, width: usize) -> String {
         textwrap::wrap(line, options).join("\n")
     };
     text.split('\n').map(wrap).collect::<Vec<_>>().join("\n")
+}
+
+/// Says that a data directory has no workers, and who uses it.
+pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
+    let data_dir = data_dir.display();
+    match holder {
+        Some(Holder { address: Some(address), .. }) => {
+            format!("{data_dir} is a data directory; ask its coordinator: --coordinator {address}")
+        }
+        Some(holder) => {
+            format!("{data_dir} is a data directory, in which {holder} computes; it has no fleet")
+        }
+        None => format!(
+            "{data_dir} is a data directory, in which no program computes; for a fleet, start: \
+             coordinator --data-dir {data_dir}"
+        ),
+    }
+}
+
+/// Says that nobody computes an experiment of a data directory, and what to do.
+pub fn deserted(experiment: &Experiment, data_dir: &Path) -> String {
+    format!(
+        "{}, and no program computes it; continue it with: {}",
+        state_line(experiment),
+        command_in("resume", experiment.id, data_dir)
+    )
+}
+
+/// A command about an experiment of a data directory.
+pub fn command_in(command: &str, id: u64, data_dir: &Path) -> String {
+    let id = id.to_string();
+    let words = ["swarmctl", command, &id, "--data-dir", &data_dir.to_string_lossy()];
+    shell_command(words.map(str::to_owned))
+}
+
+/// Says that a data directory is taken that nobody has named.
+pub fn found(data_dir: &Path) -> String {
+    format!("working on {}: nothing listens at {DEFAULT_COORDINATOR}", data_dir.display())
 }
 
 /// Text that is at most so wide.

@@ -7,13 +7,14 @@
 use std::{env, fs, path::Path, time::Instant};
 
 use coordinator::{
-    Offline,
+    BlockingReader,
     priority::Priority,
     store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
 use evolution::{ALGORITHMS, AlgorithmParams, Digest, Evolution, Told};
 use experiment_file::{ExperimentConfig, Keeps};
-use swarm_proto::v1::GetIndividualsRequest;
+use prost::Message as _;
+use swarm_proto::v1::{GetIndividualsRequest, GetIndividualsResponse};
 
 fn main() {
     let filter = env::args().skip(1).find(|argument| !argument.starts_with('-'));
@@ -131,9 +132,11 @@ fn measure(algorithm: &str, n_generations: u64) {
 /// Until an individual is there, its network decoded, from a database that nobody has opened.
 fn seconds(directory: &Path, address: &str) -> f64 {
     let started = Instant::now();
-    let offline = Offline::open(directory).expect("it is sound");
+    let reader = BlockingReader::open(directory).expect("it is sound");
     let request = GetIndividualsRequest { address: address.to_owned(), ..Default::default() };
-    let answer = offline.individuals(&request).expect("it is in the log");
+    let answer = reader.call("GetIndividuals", request.encode_to_vec());
+    let answer = GetIndividualsResponse::decode(&*answer.expect("it is in the log"));
+    let answer = answer.expect("it is an answer");
     let seconds = started.elapsed().as_secs_f64();
     assert_eq!(answer.individuals.len(), 1);
     seconds

@@ -46,7 +46,8 @@ mod text;
 
 pub use health_check::{Unhealthy, health_check};
 pub use queries::{Address, NotAnAddress, Who};
-pub use rpc::{Offline, PagesArchive};
+pub use rpc::PagesArchive;
 pub use server::{
-    Access, AccessError, Coordinator, CoordinatorConfig, Role, RunError, StartError, Tls, Tokens,
+    Access, AccessError, BlockingReader, Coordinator, CoordinatorConfig, Door, InProcess, Role,
+    RunError, StartError, Tls, Tokens,
 };

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use tokio::{sync::watch, task};
+use tokio::{sync::watch, task, time};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
@@ -69,6 +69,19 @@ impl SharedStore {
             trouble: Arc::default(),
             unusable: Arc::default(),
         }
+    }
+
+    /// Takes it from now on that another program may have written whenever so much time is over.
+    pub fn look_every(&self, interval: Duration) {
+        let news = Arc::downgrade(&self.news);
+        tokio::spawn(async move {
+            let mut looks = time::interval(interval);
+            loop {
+                looks.tick().await;
+                let Some(news) = news.upgrade() else { return };
+                news.send_modify(|count| *count += 1);
+            }
+        });
     }
 
     /// Waits until nothing must be written any more; says why.
@@ -161,7 +174,7 @@ impl SharedStore {
                     has_failed = true;
                     error!("{what} waits: {error}; trying again in {} s", delay.as_secs_f64());
                     tokio::select! {
-                        () = tokio::time::sleep(delay) => {}
+                        () = time::sleep(delay) => {}
                         () = shutdown.cancelled() => return Written::NotWanted,
                     }
                     delay = (2 * delay).min(RETRY_DELAY_MAX);

@@ -2,55 +2,43 @@
 
 use std::{
     path::Path,
+    process,
     sync::{Mutex, PoisonError},
 };
 
-use coordinator::Offline;
-use prost::Message;
+use coordinator::BlockingReader;
 use pyo3::{exceptions::PyOSError, prelude::*};
-use swarm_proto::v1::ListExperimentsResponse;
-use tonic::Status;
 
-use crate::{errors::refused, running::guarded};
+use crate::{
+    errors::{fork_error, refused},
+    running::guarded,
+};
 
 /// A data directory, which is only read. A coordinator may use it meanwhile.
 #[pyclass(frozen, module = "swarmevo._core")]
-pub struct Database(Mutex<Offline>);
+pub struct Database {
+    reader: Mutex<BlockingReader>,
+    process: u32,
+}
 
 #[pymethods]
 impl Database {
     #[new]
     fn new(directory: &str) -> PyResult<Self> {
-        let offline = Offline::open(Path::new(directory));
-        offline
-            .map(|it| Self(Mutex::new(it)))
-            .map_err(|error| PyOSError::new_err(error.to_string()))
+        let reader = BlockingReader::open(Path::new(directory));
+        let reader = reader.map_err(|error| PyOSError::new_err(error.to_string()))?;
+        Ok(Self { reader: Mutex::new(reader), process: process::id() })
     }
 
     /// A reading call of `ExperimentService`, by its name: request and response as they travel.
     fn call(&self, py: Python<'_>, name: &str, request: &[u8]) -> PyResult<Vec<u8>> {
+        if self.process != process::id() {
+            return Err(fork_error(py, "a data directory is opened again after a fork"));
+        }
         let answer = guarded(py, || {
-            let offline = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            match name {
-                "GetExperiment" => answer(request, |request| offline.experiment(request)),
-                "GetIndividuals" => answer(request, |request| offline.individuals(&request)),
-                "GetLineage" => answer(request, |request| offline.lineage(&request)),
-                "ListGenerations" => answer(request, |request| offline.generations(request)),
-                "ListExperiments" => answer(request, |()| {
-                    Ok(ListExperimentsResponse { experiments: offline.experiments()? })
-                }),
-                _ => Err(Status::unimplemented(format!("`{name}` needs a coordinator"))),
-            }
+            let reader = self.reader.lock().unwrap_or_else(PoisonError::into_inner);
+            reader.call(name, request.to_vec())
         })?;
         answer.map_err(|status| refused(py, &status))
     }
-}
-
-fn answer<Request: Message + Default, Response: Message>(
-    request: &[u8],
-    ask: impl FnOnce(Request) -> Result<Response, Status>,
-) -> Result<Vec<u8>, Status> {
-    let request = Request::decode(request);
-    let request = request.map_err(|error| Status::invalid_argument(error.to_string()))?;
-    Ok(ask(request)?.encode_to_vec())
 }

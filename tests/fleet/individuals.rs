@@ -105,7 +105,10 @@ fn refusals(coordinator: &CoordinatorProcess, ga: u64) {
         for args in
             [vec!["individual", &address], vec!["individual", &address, "--data-dir", data_dir]]
         {
-            let refused = coordinator.swarmctl(&args);
+            let refused = match args.len() {
+                2 => coordinator.swarmctl(&args),
+                _ => swarmctl(&args),
+            };
             assert_eq!(refused.code, Some(code), "{refused:#?}");
             assert!(refused.stderr.contains(what), "{}", refused.stderr);
             assert_eq!(refused.stdout, "");

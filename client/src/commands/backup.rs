@@ -1,12 +1,12 @@
 //! `swarmctl backup`: a copy of a data directory that is whole.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use coordinator::store::{self, Backup};
 
 use super::doctor::print_inspection;
-use crate::{args::DataDirArg, error::Error, progress::Progress};
+use crate::{error::Error, progress::Progress};
 
 /// Copy a data directory, whether or not a coordinator uses it.
 ///
@@ -16,8 +16,6 @@ use crate::{args::DataDirArg, error::Error, progress::Progress};
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct BackupArgs {
-    #[command(flatten)]
-    data_dir: DataDirArg,
     /// The copy: a directory that does not exist yet, or is empty.
     #[arg(value_name = "TO")]
     to: PathBuf,
@@ -31,8 +29,7 @@ Examples:
   coordinator --data-dir backups/2026-11-22      # to restore it";
 
 /// Makes the copy.
-pub fn backup(args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
-    let data_dir = &args.data_dir.data_dir;
+pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
     match store::backup(data_dir, &args.to).map_err(|error| Error::from_store(&error))? {
         Backup::Made(inspection) => print_inspection(&inspection, progress),
         Backup::Damaged(inspection) => {

@@ -12,6 +12,7 @@ use crate::{
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     json,
+    place::Intent,
     progress::Progress,
     recorded::Source,
     settings::Settings,
@@ -83,7 +84,7 @@ pub async fn compare(
     }
     samples.read(&files)?;
     if !subjects.is_empty() {
-        let connection = Connection::open(settings)?;
+        let connection = Connection::open(settings, Intent::Read, progress).await?;
         for subject in &subjects {
             samples.fetch(&connection, subject, progress).await?;
         }

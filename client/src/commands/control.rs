@@ -7,12 +7,13 @@ use swarm_proto::v1::{
     ResumeExperimentRequest, SetPriorityRequest,
 };
 
-use super::Remote;
+use super::{Remote, watch};
 use crate::{
     args::{Subject, Target, whole},
     connection::{Connection, present},
     error::Error,
     json::{self, has_ended},
+    place::Intent,
     progress::Progress,
     text,
 };
@@ -31,6 +32,10 @@ pub struct PauseArgs {
 }
 
 impl Remote for PauseArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let reason = self.reason.unwrap_or_default();
         let pause = async |experiment_id| {
@@ -58,6 +63,10 @@ pub struct ResumeArgs {
 }
 
 impl Remote for ResumeArgs {
+    fn intent(&self) -> Intent {
+        Intent::Continue
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let resume = async |experiment_id| {
             let request = ResumeExperimentRequest { experiment_id };
@@ -65,7 +74,7 @@ impl Remote for ResumeArgs {
             present(call.await?.experiment)
         };
         let changed = each(&self.target, connection, resume).await?;
-        print(&self.target, &changed, changed.iter().map(text::state_line), progress)
+        follow(&self.target, changed, connection, progress).await
     }
 }
 
@@ -83,6 +92,10 @@ pub struct PriorityArgs {
 }
 
 impl Remote for PriorityArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let Self { target, priority } = self;
         let set = async |experiment_id| {
@@ -104,6 +117,10 @@ pub struct CancelArgs {
 }
 
 impl Remote for CancelArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let cancel = async |experiment_id| {
             let request = CancelExperimentRequest { experiment_id };
@@ -150,6 +167,19 @@ pub async fn each_that<T>(
         true => Err(Error::NotFound(why_none.replace("NAME", name))),
         false => Ok(changed),
     }
+}
+
+/// Prints what goes on; follows it to its end if this process computes it.
+pub async fn follow(
+    target: &Target,
+    changed: Vec<Experiment>,
+    connection: &Connection,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    if !connection.computes() || !progress.is_json() {
+        print(target, &changed, changed.iter().map(text::state_line), progress)?;
+    }
+    if connection.computes() { watch::watch(connection, changed, progress).await } else { Ok(()) }
 }
 
 /// Prints what was changed, as lines or as JSON.

@@ -7,7 +7,7 @@ use coordinator::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
 use serde::Serialize;
 use swarm_telemetry::escape;
 
-use crate::{args::DataDirArg, error::Error, json, progress::Progress, text};
+use crate::{error::Error, json, progress::Progress, text};
 
 /// Check the database of a data directory, or keep what is sound in a damaged one.
 ///
@@ -18,8 +18,6 @@ use crate::{args::DataDirArg, error::Error, json, progress::Progress, text};
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct DoctorArgs {
-    #[command(flatten)]
-    data_dir: DataDirArg,
     /// Make a new data directory of everything that is sound. An experiment whose
     /// generations are damaged and whose configuration is sound begins again there, when
     /// it is resumed, and comes to the same bits.
@@ -67,8 +65,7 @@ struct RecoveredDocument<'a> {
 }
 
 /// Looks at a data directory, or makes a new one of it.
-pub fn doctor(args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
-    let data_dir = &args.data_dir.data_dir;
+pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(to) = &args.recover {
         let recovery = store::recover(data_dir, to).map_err(|error| Error::from_store(&error))?;
         return progress.print(&if progress.is_json() {

@@ -7,18 +7,16 @@ mod measured;
 mod statistics;
 mod summary;
 
-use std::thread;
-
 use swarm_proto::v1::EvaluateRequest;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    archive::Archive,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
     experiment_file::ExperimentFile,
     json,
+    place::{Intent, Place},
     progress::Progress,
     settings::Settings,
     table::{Column, Table},
@@ -32,7 +30,10 @@ use self::{
     summary::{Subject, Summary},
 };
 use super::{
-    run::{fleet::Fleet, log},
+    run::{
+        fleet::{Fleet, cores},
+        log,
+    },
     simulate::genotype::Genotype,
 };
 
@@ -62,9 +63,8 @@ async fn evaluate_all(
     args: &EvaluateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let (file, genotype) = subject(settings.clone(), args).await?;
-    let remote = (!args.local).then(|| Connection::open(settings)).transpose()?;
-    let remote = remote.map(|it| it.with_patience(PATIENCE_WHILE_FOLLOWING));
+    let (file, genotype) = subject(settings.clone(), args, progress).await?;
+    let remote = remote(settings, args, progress).await?;
     let conditions = conditions::all(&file, args)?;
     for condition in &conditions {
         condition.check(&genotype)?;
@@ -91,16 +91,38 @@ async fn evaluate_all(
     ))
 }
 
+/// The coordinator whose fleet computes; none if that happens here, as on a data directory.
+async fn remote(
+    settings: Settings,
+    args: &EvaluateArgs,
+    progress: &Progress,
+) -> Result<Option<Connection>, Error> {
+    if args.local {
+        return Ok(None);
+    }
+    match Place::of(settings).await? {
+        Place::Directory { .. } => {
+            progress.remark("computing in this process, as with --local");
+            Ok(None)
+        }
+        Place::Coordinator(settings) => {
+            let connection = Connection::new(settings.address(), &settings.credentials()?)?;
+            Ok(Some(connection.with_patience(PATIENCE_WHILE_FOLLOWING)))
+        }
+    }
+}
+
 /// The experiment file and the genes to evaluate.
 async fn subject(
     settings: Settings,
     args: &EvaluateArgs,
+    progress: &Progress,
 ) -> Result<(ExperimentFile, Vec<f64>), Error> {
     match (&args.address, &args.genotype, &args.config) {
         (Some(address), ..) => {
-            let archive = Archive::open(settings, args.data_dir.as_deref())?;
-            let address = archive.resolve(address).await?;
-            let found = archive.one(address).await?;
+            let connection = Connection::open(settings, Intent::Read, progress).await?;
+            let address = connection.resolve(address).await?;
+            let found = connection.genotype(address).await?;
             let name = format!("experiment {}", address.experiment);
             let file = ExperimentFile::new(name.into(), found.config_json);
             Ok((file, found.individual.genotype))
@@ -122,20 +144,16 @@ async fn compute_here(
     progress: &mut Progress,
 ) -> Result<Vec<Measured>, Error> {
     log::init(progress.stderr());
-    let n_workers = args
-        .workers
-        .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
+    let n_workers = args.workers.map_or_else(cores, usize::from);
     // An evaluation stores nothing, but its coordinator has a database.
     let data_dir = tempfile::tempdir()
         .map_err(|source| Error::Write { what: "a temporary directory".into(), source })?;
     let mut fleet = Fleet::start(data_dir.path(), n_workers, args.isa.get(), None).await?;
-    let result = match fleet.connection() {
-        Ok(connection) => tokio::select! {
-            biased;
-            result = ask_all(&connection, conditions, genotype, args, progress) => result,
-            error = fleet.failure() => Err(error),
-        },
-        Err(error) => Err(error),
+    let connection = fleet.connection();
+    let result = tokio::select! {
+        biased;
+        result = ask_all(&connection, conditions, genotype, args, progress) => result,
+        error = fleet.failure() => Err(error),
     };
     fleet.shutdown().await;
     result

@@ -16,7 +16,7 @@ use crate::{
     clock, complete,
     connection::{Connection, present},
     error::Error,
-    json,
+    json::{self, has_ended},
     progress::Progress,
     text,
 };
@@ -88,7 +88,12 @@ async fn explain(
     let request = ExplainExperimentRequest { experiment_id };
     let answer = connection.call(async |client| client.explain_experiment(request).await).await?;
     let experiment = present(answer.experiment.clone())?;
-    let findings = finding::findings(&experiment, &answer, connection.address());
+    let findings = match connection.data_dir() {
+        Some(data_dir) if !has_ended(experiment.state()) => {
+            vec![finding::in_directory(&experiment, data_dir, connection.holder().await.as_ref())]
+        }
+        _ => finding::findings(&experiment, &answer, connection.address()),
+    };
     Ok((answer, findings))
 }
 

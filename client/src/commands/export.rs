@@ -12,9 +12,15 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 use tempfile::NamedTempFile;
 
+use super::Remote;
 use crate::{
-    archive::Archive, args::Target, connection::present, error::Error, json, progress::Progress,
-    settings::Settings, tensorboard::EventFile, text,
+    args::{Subject, Target},
+    connection::{Connection, present},
+    error::Error,
+    json,
+    progress::Progress,
+    tensorboard::EventFile,
+    text,
 };
 
 /// Write an ended experiment to a file that others can verify and import.
@@ -36,10 +42,6 @@ pub struct ExportArgs {
     /// Write an event file for TensorBoard into a directory of its own in this one.
     #[arg(long, value_name = "DIR", conflicts_with = "to")]
     tensorboard: Option<PathBuf>,
-    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
-    /// a coordinator. One may use it meanwhile.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
 }
 
 const HELP: &str = "\
@@ -57,21 +59,29 @@ struct Written {
     sha256: String,
 }
 
+impl Remote for ExportArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        export(&self, connection, progress).await
+    }
+}
+
 /// Writes the file.
-pub async fn export(
-    settings: Settings,
+async fn export(
     args: &ExportArgs,
+    connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let archive = Archive::open(settings, args.data_dir.as_deref())?;
-    let id = archive.experiment_id(&args.target.subject).await?;
+    let id = match &args.target.subject {
+        Subject::Experiment(id) => *id,
+        subject => connection.one(subject).await?.id,
+    };
     let (path, bytes, next) = match (&args.to, &args.tensorboard) {
         (Some(path), _) => {
             let next = format!("check it with: swarmctl verify {}", path.display());
-            (path.clone(), archive.bundle(id).await?, next)
+            (path.clone(), connection.export(id).await?, next)
         }
         (None, Some(directory)) => {
-            let (path, bytes) = events(&archive, id, directory).await?;
+            let (path, bytes) = events(connection, id, directory).await?;
             (path, bytes, format!("open it with: tensorboard --logdir {}", directory.display()))
         }
         (None, None) => return Err(Error::Input("name a file to write with --to".into())),
@@ -89,10 +99,14 @@ pub async fn export(
 
 /// The history of an experiment as an event file, and where it belongs: TensorBoard takes each
 /// directory for a run.
-async fn events(archive: &Archive, id: u64, directory: &Path) -> Result<(PathBuf, Vec<u8>), Error> {
-    let (experiment, _) = archive.experiment(id).await?;
+async fn events(
+    connection: &Connection,
+    id: u64,
+    directory: &Path,
+) -> Result<(PathBuf, Vec<u8>), Error> {
+    let (experiment, _) = connection.stored(id).await?;
     let mut file = EventFile::new(experiment.submitted_at_ms);
-    for completed in archive.generations(id).await? {
+    for completed in connection.generations(id).await? {
         let of = present(completed.summary)?;
         let values = [
             ("fitness/best", of.best),

@@ -98,6 +98,10 @@ impl Remote for FleetArgs {
             let SlurmArgs { min, max, .. } = args;
             return Err(Error::Input(format!("--min {min} is more than --max {max}")));
         }
+        if let Some(data_dir) = connection.data_dir() {
+            let holder = connection.holder().await;
+            return Err(Error::Input(text::no_fleet(data_dir, holder.as_ref())));
+        }
         let connection = connection.with_patience(PATIENCE_WHILE_FOLLOWING);
         let address = connection.address();
         let slurm = Slurm {

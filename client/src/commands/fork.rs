@@ -13,6 +13,7 @@ use crate::{
     error::Error,
     experiment_file::{ExperimentFile, Overrides, random_request_id},
     json,
+    place::Intent,
     progress::Progress,
     text,
 };
@@ -57,6 +58,10 @@ Examples:
   swarmctl fork 3@499 --set world.objects.robotA.num_instances=20 --generations 1500 --watch";
 
 impl Remote for ForkArgs {
+    fn intent(&self) -> Intent {
+        Intent::Continue
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let Who::Generation(generation) = self.address.who else {
             return Err(Error::Input(format!(
@@ -78,17 +83,22 @@ impl Remote for ForkArgs {
         request.fork_of = Some(ForkPoint { experiment_id, generation });
         let response = connection.submit(request).await.map_err(|error| file.locate(error))?;
         let experiment = present(response.experiment)?;
+        let is_followed = self.watch || connection.computes();
         if !progress.is_json() {
             let mut lines = vec![text::submitted(&experiment)];
             lines.extend(text::origin(&experiment));
-            if !self.watch {
+            if !is_followed {
                 lines.push(format!("follow it with: swarmctl watch {}", experiment.id));
             }
             progress.print(&lines.join("\n"))?;
-        } else if !self.watch {
+        } else if !is_followed {
             progress.print(&json::document(&json::ExperimentDocument::from(&experiment)))?;
         }
-        if self.watch { watch::watch(connection, vec![experiment], progress).await } else { Ok(()) }
+        if is_followed {
+            watch::watch(connection, vec![experiment], progress).await
+        } else {
+            Ok(())
+        }
     }
 }
 

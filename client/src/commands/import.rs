@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Remote, export};
-use crate::{connection::Connection, error::Error, json, progress::Progress, text};
+use crate::{connection::Connection, error::Error, json, place::Intent, progress::Progress, text};
 
 /// Take the experiment of a bundle into the coordinator.
 ///
@@ -25,6 +25,10 @@ Examples:
   swarmctl import leader.zip --output json | jq .id";
 
 impl Remote for ImportArgs {
+    fn intent(&self) -> Intent {
+        Intent::Add
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let bytes = export::read(&self.file)?;
         let imported = connection.import(&bytes).await.map_err(|error| match error {

@@ -1,14 +1,12 @@
 //! `swarmctl individual`: any genotype that was ever evaluated, as JSON.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use coordinator::Who;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
+use super::Remote;
 use crate::{
-    address::NamedAddress, archive::Archive, error::Error, json, progress::Progress,
-    settings::Settings,
+    address::NamedAddress, connection::Connection, error::Error, json, progress::Progress,
 };
 
 /// Print a genotype and the network that it encodes, as JSON: the champion, or any
@@ -27,10 +25,6 @@ pub struct IndividualArgs {
     /// of generation G, without their networks.
     #[arg(value_name = "ADDRESS")]
     address: NamedAddress,
-    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
-    /// a coordinator. One may use it meanwhile.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
 }
 
 const HELP: &str = "\
@@ -40,22 +34,22 @@ Examples:
   swarmctl individual 3@0/17
   swarmctl individual 3@59/mean --data-dir swarm-data";
 
-/// Reads, and prints a document.
-pub async fn individual(
-    settings: Settings,
-    args: &IndividualArgs,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    let archive = Archive::open(settings, args.data_dir.as_deref())?;
-    let address = archive.resolve(&args.address).await?;
-    let (experiment, _) = archive.experiment(address.experiment.0).await?;
-    let mut answer = archive.individuals(address, 0).await?;
+impl Remote for IndividualArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        progress.print(&document(&self.address, connection).await?)
+    }
+}
+
+async fn document(address: &NamedAddress, connection: &Connection) -> Result<String, Error> {
+    let address = connection.resolve(address).await?;
+    let (experiment, _) = connection.stored(address.experiment.0).await?;
+    let mut answer = connection.individuals(address, 0).await?;
     let mut individuals = answer.individuals;
     while let Some(next) = answer.next_individual {
-        answer = archive.individuals(address, next).await?;
+        answer = connection.individuals(address, next).await?;
         individuals.append(&mut answer.individuals);
     }
-    let text = match (address.who, &individuals[..]) {
+    Ok(match (address.who, &individuals[..]) {
         (Who::Generation(generation), individuals) => {
             json::document(&json::PopulationDocument::new(&experiment, generation, individuals))
         }
@@ -65,8 +59,7 @@ pub async fn individual(
             json::document(&document.map_err(|error| not_json(&error))?)
         }
         _ => return Err(Error::Internal("the coordinator's answer is incomplete".into())),
-    };
-    progress.print(&text)
+    })
 }
 
 /// A champion as `individual` prints it and `run` stores it.

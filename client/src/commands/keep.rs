@@ -16,6 +16,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     json::has_ended,
+    place::Intent,
     progress::Progress,
     text,
 };
@@ -35,6 +36,10 @@ pub struct DeleteArgs {
 }
 
 impl Remote for DeleteArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let delete = async |experiment_id| {
             let request = DeleteExperimentRequest { experiment_id };
@@ -62,6 +67,10 @@ pub struct PruneArgs {
 }
 
 impl Remote for PruneArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let prune = async |experiment_id| {
             let request = PruneExperimentRequest { experiment_id };
@@ -90,6 +99,10 @@ pub struct ArchiveArgs {
 }
 
 impl Remote for ArchiveArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let Self { target, restore } = self;
         let archive = async |experiment_id| {
@@ -126,6 +139,10 @@ Examples:
   swarmctl label leader_selection_snes --remove purpose";
 
 impl Remote for LabelArgs {
+    fn intent(&self) -> Intent {
+        Intent::Change
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let set: std::collections::BTreeMap<String, String> =
             self.labels.into_iter().map(|Label { key, value }| (key, value)).collect();

@@ -2,16 +2,15 @@
 
 mod draw;
 
-use std::path::PathBuf;
-
 use clap::Args;
 use coordinator::Address;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
+use super::Remote;
 use crate::{
-    address::NamedAddress, archive::Archive, args::whole, error::Error, json, progress::Progress,
-    settings::Settings,
+    address::NamedAddress, args::whole, connection::Connection, error::Error, json,
+    progress::Progress,
 };
 
 /// Print whom an individual of a genetic algorithm descends from, and which genes it has from
@@ -33,10 +32,6 @@ pub struct LineageArgs {
     /// Print a graph for Graphviz instead of a tree.
     #[arg(long)]
     dot: bool,
-    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
-    /// a coordinator. One may use it meanwhile.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
 }
 
 const HELP: &str = "\
@@ -75,20 +70,16 @@ struct ParentDocument {
     genes: u32,
 }
 
-/// Prints the lineage.
-pub async fn lineage(
-    settings: Settings,
-    args: &LineageArgs,
-    progress: &mut Progress,
-) -> Result<(), Error> {
-    let archive = Archive::open(settings, args.data_dir.as_deref())?;
-    let address = archive.resolve(&args.address).await?;
-    let GetLineageResponse { populations } = archive.lineage(address, args.depth).await?;
-    progress.print(&match (args.dot, progress.is_json()) {
-        (true, _) => draw::graph(&populations),
-        (_, true) => json::document(&LineageDocument::new(address, &populations)),
-        _ => draw::trees(&populations, address.experiment.0),
-    })
+impl Remote for LineageArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let address = connection.resolve(&self.address).await?;
+        let GetLineageResponse { populations } = connection.lineage(address, self.depth).await?;
+        progress.print(&match (self.dot, progress.is_json()) {
+            (true, _) => draw::graph(&populations),
+            (_, true) => json::document(&LineageDocument::new(address, &populations)),
+            _ => draw::trees(&populations, address.experiment.0),
+        })
+    }
 }
 
 /// What was done to make an individual; none in the earliest generation of a lineage.

@@ -7,7 +7,7 @@
 
 mod merge;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -95,8 +95,31 @@ async fn print_events(
         if !args.follow || is_over {
             return Ok(());
         }
+        if let Some(data_dir) = connection.data_dir()
+            && connection.holder().await.is_none()
+        {
+            return deserted(&experiments, args.id.is_some(), data_dir, progress);
+        }
         news.next().await?;
         experiments = chosen(&connection, args.id.as_ref()).await?;
+    }
+}
+
+/// Nothing more will happen in a data directory: an error if an experiment that is followed has
+/// not ended.
+fn deserted(
+    experiments: &[Experiment],
+    is_of_some: bool,
+    data_dir: &Path,
+    progress: &Progress,
+) -> Result<(), Error> {
+    let unfinished = experiments.iter().find(|experiment| !has_ended(experiment.state()));
+    match unfinished.filter(|_| is_of_some) {
+        Some(unfinished) => Err(Error::NotFound(text::deserted(unfinished, data_dir))),
+        None => {
+            progress.remark(&text::no_fleet(data_dir, None));
+            Ok(())
+        }
     }
 }
 

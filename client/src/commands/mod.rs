@@ -3,8 +3,10 @@
 
 mod backup;
 mod bench;
+mod champion_file;
 mod compare;
 mod completions;
+mod compute;
 mod control;
 mod doctor;
 mod evaluate;
@@ -38,12 +40,14 @@ mod workers;
 pub use explain::Finding;
 
 use clap::Subcommand;
+use tokio_util::sync::CancellationToken;
 
 use crate::{
     args::{Args, OutputFormat},
     connection::Connection,
     error::Error,
     interrupt,
+    place::{Intent, Place, data_dir},
     progress::Progress,
 };
 
@@ -55,14 +59,10 @@ pub enum Command {
     Remote(RemoteCommand),
     Validate(validate::ValidateArgs),
     Schema(schema::SchemaArgs),
-    #[command(visible_alias = "champion")]
-    Individual(individual::IndividualArgs),
     Simulate(simulate::SimulateArgs),
     Replay(replay::ReplayArgs),
     Web(web::WebArgs),
     Evaluate(evaluate::EvaluateArgs),
-    Lineage(lineage::LineageArgs),
-    Export(export::ExportArgs),
     Verify(verify::VerifyArgs),
     Plot(plot::PlotArgs),
     Compare(compare::CompareArgs),
@@ -85,16 +85,26 @@ trait Remote: clap::Args {
     /// Whether its answer is a table, which can be printed as CSV.
     const HAS_TABLE: bool = false;
 
+    /// What it does with experiments.
+    fn intent(&self) -> Intent {
+        Intent::Read
+    }
+
+    /// Finds mistakes before anything is touched.
+    fn check(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
     /// Sends the requests and prints the answers.
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error>;
 }
 
 macro_rules! remote_commands {
-    ($($name:ident($args:ty),)*) => {
+    ($($(#[$attribute:meta])* $name:ident($args:ty),)*) => {
         /// The commands that are requests to a coordinator, in the order of the help.
         #[derive(Debug, Subcommand)]
         pub enum RemoteCommand {
-            $($name($args),)*
+            $($(#[$attribute])* $name($args),)*
         }
 
         impl RemoteCommand {
@@ -102,6 +112,20 @@ macro_rules! remote_commands {
             fn has_table(&self) -> bool {
                 match self {
                     $(Self::$name(_) => <$args as Remote>::HAS_TABLE,)*
+                }
+            }
+
+            /// What it does with experiments.
+            fn intent(&self) -> Intent {
+                match self {
+                    $(Self::$name(args) => args.intent(),)*
+                }
+            }
+
+            /// Finds mistakes before anything is touched.
+            fn check(&self) -> Result<(), Error> {
+                match self {
+                    $(Self::$name(args) => args.check(),)*
                 }
             }
 
@@ -136,6 +160,10 @@ remote_commands! {
     Extend(reopen::ExtendArgs),
     Retry(reopen::RetryArgs),
     Get(get::GetArgs),
+    #[command(visible_alias = "champion")]
+    Individual(individual::IndividualArgs),
+    Lineage(lineage::LineageArgs),
+    Export(export::ExportArgs),
     Label(keep::LabelArgs),
     Archive(keep::ArchiveArgs),
     Prune(keep::PruneArgs),
@@ -161,18 +189,17 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Simulate(args) => {
             return simulate::simulate(settings, &args, &mut progress).await;
         }
-        Command::Individual(args) => {
-            return individual::individual(settings, &args, &mut progress).await;
-        }
         Command::Replay(args) => return replay::replay(settings, &args, &mut progress).await,
-        Command::Lineage(args) => return lineage::lineage(settings, &args, &mut progress).await,
-        Command::Export(args) => return export::export(settings, &args, &mut progress).await,
         Command::Verify(args) => return verify::verify(settings, &args, &mut progress).await,
         Command::Plot(args) => return plot::plot(settings, &args, &mut progress).await,
         Command::Compare(args) => return compare::compare(settings, &args, &mut progress).await,
         Command::Bench(args) => return bench::bench(&args, &mut progress),
-        Command::Doctor(args) => return doctor::doctor(&args, &mut progress),
-        Command::Backup(args) => return backup::backup(&args, &mut progress),
+        Command::Doctor(args) => {
+            return doctor::doctor(&data_dir(&settings), &args, &mut progress);
+        }
+        Command::Backup(args) => {
+            return backup::backup(&data_dir(&settings), &args, &mut progress);
+        }
         Command::Completions(args) => return completions::completions(args.shell, &mut progress),
         Command::Man(args) => return man::man(&args, &mut progress),
         Command::Referee => {
@@ -183,24 +210,50 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Run(args) => {
             return run::run(settings, &args, progress, interrupt::token()?).await;
         }
-        Command::Web(args) => return web::web(&args, &mut progress, interrupt::token()?).await,
+        Command::Web(args) => {
+            return web::web(&settings, &args, &mut progress, interrupt::token()?).await;
+        }
         Command::Evaluate(args) => {
             return evaluate::evaluate(settings, &args, progress, interrupt::token()?).await;
         }
         Command::Remote(command) => command,
     };
-    let connection = Connection::open(settings)?;
     let interrupt = interrupt::token()?;
+    let intent = command.intent();
+    let place = Place::of(settings).await?;
+    progress.found(&place);
+    match place {
+        Place::Directory { path, .. } if intent.computes() => {
+            compute::compute(&path, command, &mut progress, interrupt).await
+        }
+        place => {
+            let connection = Connection::to(place, intent).await?;
+            ask(connection, command, &mut progress, interrupt).await
+        }
+    }
+}
+
+/// Executes a command that an interrupt may end at any time.
+async fn ask(
+    connection: Connection,
+    command: RemoteCommand,
+    progress: &mut Progress,
+    interrupt: CancellationToken,
+) -> Result<(), Error> {
     let result = tokio::select! {
         biased;
-        () = interrupt.cancelled() => {
-            Err(Error::Interrupted("a submitted experiment continues on the coordinator".into()))
-        }
-        result = command.execute(&connection, &mut progress) => result,
+        () = interrupt.cancelled() => Err(Error::Interrupted(match connection.data_dir() {
+            None => "a submitted experiment continues on the coordinator".into(),
+            Some(_) => "nothing is changed that was not printed".into(),
+        })),
+        result = command.execute(&connection, progress) => result,
     };
     progress.clear();
+    connection.close().await;
     result
 }
 
+#[cfg(test)]
+mod one_world;
 #[cfg(test)]
 mod tests;

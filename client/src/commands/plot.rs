@@ -14,6 +14,7 @@ use crate::{
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     json,
+    place::Intent,
     progress::Progress,
     recorded::{Run, Source},
     settings::Settings,
@@ -39,7 +40,10 @@ pub async fn plot(
     }
     let sources: Vec<Source> = args.runs.iter().map(|run| Source::parse(run)).collect();
     let remote = sources.iter().any(|source| matches!(source, Source::Coordinator(_)));
-    let connection = remote.then(|| Connection::open(settings)).transpose()?;
+    let connection = match remote {
+        true => Some(Connection::open(settings, Intent::Read, progress).await?),
+        false => None,
+    };
     let mut runs = Vec::new();
     for source in &sources {
         match source {

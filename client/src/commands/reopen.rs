@@ -6,14 +6,14 @@ use swarm_proto::v1::{ExperimentState, ExtendExperimentRequest, RetryExperimentR
 
 use super::{
     Remote,
-    control::{each_that, print},
+    control::{each_that, follow},
 };
 use crate::{
     args::{Target, whole},
     connection::{Connection, present},
     error::Error,
+    place::Intent,
     progress::Progress,
-    text,
 };
 
 /// Continue a completed experiment, or those of a group, to more generations.
@@ -32,6 +32,10 @@ pub struct ExtendArgs {
 }
 
 impl Remote for ExtendArgs {
+    fn intent(&self) -> Intent {
+        Intent::Continue
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let Self { target, generations } = self;
         let extend = async |experiment_id| {
@@ -42,7 +46,7 @@ impl Remote for ExtendArgs {
         let is_completed = |state| state == ExperimentState::Completed;
         let why_none = "no experiment of group `NAME` has completed";
         let changed = each_that(&target, connection, is_completed, why_none, extend).await?;
-        print(&target, &changed, changed.iter().map(text::state_line), progress)
+        follow(&target, changed, connection, progress).await
     }
 }
 
@@ -57,6 +61,10 @@ pub struct RetryArgs {
 }
 
 impl Remote for RetryArgs {
+    fn intent(&self) -> Intent {
+        Intent::Continue
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let retry = async |experiment_id| {
             let request = RetryExperimentRequest { experiment_id };
@@ -66,6 +74,6 @@ impl Remote for RetryArgs {
         let has_failed = |state| state == ExperimentState::Failed;
         let why_none = "no experiment of group `NAME` has failed";
         let changed = each_that(&self.target, connection, has_failed, why_none, retry).await?;
-        print(&self.target, &changed, changed.iter().map(text::state_line), progress)
+        follow(&self.target, changed, connection, progress).await
     }
 }

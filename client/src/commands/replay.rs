@@ -16,11 +16,12 @@ use self::picture::Moments;
 use super::simulate::genotype::Genotype;
 use crate::{
     address::NamedAddress,
-    archive::Archive,
     args::{SeedArg, StepsArg, whole},
     change::Change,
+    connection::Connection,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
+    place::Intent,
     progress::Progress,
     settings::Settings,
 };
@@ -45,10 +46,6 @@ pub struct ReplayArgs {
     /// such as a champion file; with --config.
     #[arg(long, value_name = "FILE", requires = "config")]
     genotype: Option<PathBuf>,
-    /// Read the database in this directory, of a coordinator or of `run`, instead of asking
-    /// a coordinator. One may use it meanwhile.
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
     #[command(flatten)]
     seed: SeedArg,
     /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
@@ -89,7 +86,7 @@ pub async fn replay(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let (path, format) = args.path()?;
-    let (file, genotype, generation) = args.subject(settings).await?;
+    let (file, genotype, generation) = args.subject(settings, progress).await?;
     let mut changes = Vec::new();
     for text in &args.set {
         let parsed = Change::parse_all(text);
@@ -143,15 +140,19 @@ fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error
 
 impl ReplayArgs {
     /// The experiment, who of it, and whose worlds.
-    async fn subject(&self, settings: Settings) -> Result<(ExperimentFile, Genotype, u64), Error> {
+    async fn subject(
+        &self,
+        settings: Settings,
+        progress: &Progress,
+    ) -> Result<(ExperimentFile, Genotype, u64), Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
             let file = ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error));
             return Ok((file?, Genotype::read(genotype)?, 0));
         }
         let address = self.address.as_ref().expect("clap requires an address or a file");
-        let archive = Archive::open(settings, self.data_dir.as_deref())?;
-        let address = archive.resolve(address).await?;
-        let found = archive.one(address).await?;
+        let connection = Connection::open(settings, Intent::Read, progress).await?;
+        let address = connection.resolve(address).await?;
+        let found = connection.genotype(address).await?;
         let name = format!("experiment {}", address.experiment);
         let file = ExperimentFile::new(name.into(), found.config_json.clone());
         let generation = found.individual.generation;

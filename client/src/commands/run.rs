@@ -4,16 +4,15 @@ pub mod fleet;
 pub mod log;
 
 use std::{
-    env, fs,
+    env,
     net::{Ipv4Addr, SocketAddr},
-    path::{Path, PathBuf},
-    thread,
+    path::Path,
     time::Duration,
 };
 
 use clap::Args;
 use evolution::Digest;
-use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse, ListWorkersRequest};
+use swarm_proto::v1::{Experiment, ExperimentState, ListWorkersRequest};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
@@ -21,24 +20,21 @@ use crate::{
     args::{ExperimentArgs, IsaArgs, whole},
     connection::Connection,
     error::Error,
-    json,
+    place::data_dir,
     progress::Progress,
     settings::Settings,
     sweep::{self, SweepRun},
     text,
 };
 
-use self::fleet::Fleet;
+use self::fleet::{Fleet, cores};
 use super::{
-    individual::champion_document,
     submit::{Manner, submit_all},
-    watch::{self, Followed},
+    watch,
 };
 
 /// How long a coordinator that may be running beside has to answer.
 const ANSWER_TIME: Duration = Duration::from_millis(300);
-/// Longest part of an experiment's name in a file's name, in characters.
-const FILE_NAME_CHARS_MAX: usize = 50;
 
 /// Run an experiment in this process, from file to champion.
 ///
@@ -54,9 +50,6 @@ pub struct RunArgs {
     /// Number of workers, each of one slot [default: the number of cores]
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     pub workers: Option<u16>,
-    /// Directory of the database and the champion file.
-    #[arg(long, value_name = "DIR", default_value = "./swarm-data")]
-    pub data_dir: PathBuf,
     /// Begin anew what has completed in this directory already, instead of showing it again.
     #[arg(long)]
     pub new: bool,
@@ -90,41 +83,34 @@ pub async fn run(
 ) -> Result<(), Error> {
     // A bad file is refused before the data directory is created.
     let mut runs = sweep::runs(&args.experiment)?;
+    let data_dir = data_dir(&settings);
     for run in &mut runs {
         // A run of a group is found by its request.
         run.request.resume_unfinished = run.group().is_none();
     }
-    let n_workers = args
-        .workers
-        .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
+    let n_workers = args.workers.map_or_else(cores, usize::from);
     log::init(progress.stderr());
     if let Some(remark) = running_coordinator(settings, &args.experiment.config).await {
         progress.remark(&remark);
     }
     let pages = args.web.then_some(PAGES);
-    let mut fleet = Fleet::start(&args.data_dir, n_workers, args.isa.get(), pages).await?;
+    let mut fleet = Fleet::start(&data_dir, n_workers, args.isa.get(), pages).await?;
     if let Some(address) = fleet.pages() {
         progress.remark(&format!("open in a browser: {address}"));
     }
-    let result = match fleet.connection() {
-        Ok(connection) => tokio::select! {
-            biased;
-            () = interrupt.cancelled() => Err(interrupted(&args.data_dir)),
-            result = evolve(&connection, &runs, args, &mut progress) => result,
-            error = fleet.failure() => Err(error),
-        },
-        Err(error) => Err(error),
+    let connection = fleet.connection();
+    let result = tokio::select! {
+        biased;
+        () = interrupt.cancelled() => Err(interrupted(&data_dir)),
+        result = evolve(&connection, &runs, args, &mut progress) => result,
+        error = fleet.failure() => Err(error),
     };
     progress.clear();
     if let (Ok(()), Some(address)) = (&result, fleet.pages()) {
         progress.remark(&format!("the pages stay until you press Ctrl-C: {address}"));
         interrupt.cancelled().await;
     }
-    if matches!(result, Err(Error::Interrupted(_))) {
-        progress
-            .remark("stopping when the running items are done; interrupt again to stop at once");
-    }
-    fleet.shutdown().await;
+    fleet.stop(&result, &progress).await;
     result
 }
 
@@ -158,26 +144,7 @@ async fn evolve(
         })?;
     }
 
-    let all = watch::follow(connection, submitted, progress).await?;
-    for Followed { experiment, champion, first_best } in &all {
-        let champion_file = match champion {
-            Some(champion) => Some(write_champion(&args.data_dir, experiment, champion)?),
-            None => None,
-        };
-        let champion_file = champion_file.as_deref();
-        progress.print(&if progress.is_json() {
-            let champion_file = champion_file.map(Path::to_string_lossy);
-            let end = json::EndLine::new(experiment, champion.as_ref());
-            json::line(&end.with_champion_file(champion_file.as_deref()))
-        } else {
-            format!(
-                "{}\n{}",
-                text::end(experiment, *first_best, champion.as_ref()),
-                text::files(&args.data_dir, champion_file)
-            )
-        })?;
-    }
-    all.iter().try_for_each(|followed| watch::success(&followed.experiment))
+    watch::watch(connection, submitted, progress).await
 }
 
 /// The experiment that has completed in the data directory with this file, seed and number of
@@ -221,7 +188,9 @@ fn already_completed(existing: &Experiment) -> String {
 
 /// Suggests the coordinator of the settings, if one answers there.
 async fn running_coordinator(settings: Settings, config: &Path) -> Option<String> {
-    let connection = Connection::open(settings).ok()?.with_patience(Duration::ZERO);
+    let settings = settings.or_file().ok()?;
+    let connection = Connection::new(settings.address(), &settings.credentials().ok()?);
+    let connection = connection.ok()?.with_patience(Duration::ZERO);
     let request = ListWorkersRequest {};
     let listing = connection.call_fleet(async |client| client.list_workers(request).await);
     let n_workers = timeout(ANSWER_TIME, listing).await.ok()?.ok()?.workers.len() as u64;
@@ -248,8 +217,10 @@ fn remarks(submitted: &[Experiment], unfinished: &[Experiment]) -> Vec<String> {
     });
     let company = others.iter().map(|other| {
         format!(
-            "{} in this data directory is also unfinished, and continues at the same time",
-            text::title(other)
+            "{} in this data directory is also unfinished, and stays so; continue it with: swarmctl \
+             resume {}",
+            text::title(other),
+            other.id
         )
     });
     continuing.chain(company).collect()
@@ -264,30 +235,6 @@ fn interrupted(data_dir: &Path) -> Error {
     ))
 }
 
-/// Writes the champion to a file in the data directory; returns its path.
-fn write_champion(
-    data_dir: &Path,
-    experiment: &Experiment,
-    champion: &GetChampionResponse,
-) -> Result<PathBuf, Error> {
-    let path = data_dir.join(champion_file_name(experiment));
-    fs::write(&path, champion_document(experiment, champion)? + "\n")
-        .map_err(|source| Error::Write { what: path.display().to_string(), source })?;
-    Ok(path)
-}
-
-/// `NAME-ID.champion.json`, with nothing in it that could leave the directory.
-fn champion_file_name(experiment: &Experiment) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
-    let name: String = experiment
-        .name
-        .chars()
-        .take(FILE_NAME_CHARS_MAX)
-        .map(|c| if is_plain(c) { c } else { '_' })
-        .collect();
-    format!("{name}-{}.champion.json", experiment.id)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,16 +247,6 @@ mod tests {
             generations: 40,
             ..Experiment::default()
         }
-    }
-
-    #[test]
-    fn names_of_experiments_make_harmless_names_of_files() {
-        let file_name = |name| champion_file_name(&experiment(3, name));
-        assert_eq!(file_name("leader"), "leader-3.champion.json");
-        assert_eq!(file_name("../a b/c"), ".._a_b_c-3.champion.json");
-        assert_eq!(file_name("größe"), "größe-3.champion.json");
-        // 255 bytes is what file systems allow.
-        assert!(file_name(&"𐐀".repeat(1000)).len() <= 255);
     }
 
     #[test]
@@ -332,20 +269,5 @@ mod tests {
         assert_eq!(lines[0], "continuing experiment 3 (a), 12 of 40 generations done");
         assert!(lines[1].contains("experiment 2 (b)"));
         assert_eq!(lines.len(), 2);
-    }
-
-    #[test]
-    fn a_champion_is_stored_as_it_is_printed() {
-        let dir = tempfile::tempdir().unwrap();
-        let champion = GetChampionResponse {
-            experiment_id: 3,
-            genotype: vec![0.1],
-            network_json: "{}".into(),
-            ..GetChampionResponse::default()
-        };
-        let experiment = experiment(3, "a");
-        let path = write_champion(dir.path(), &experiment, &champion).unwrap();
-        let stored = fs::read_to_string(path).unwrap();
-        assert_eq!(stored, champion_document(&experiment, &champion).unwrap() + "\n");
     }
 }

@@ -10,10 +10,11 @@ use serde::Serialize;
 use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
 
 use crate::{
-    archive::Archive,
+    connection::Connection,
     error::Error,
     experiment_file::{Compiled, ExperimentFile},
     json,
+    place::Intent,
     progress::Progress,
     settings::Settings,
     table::{Column, Screen, Table},
@@ -86,9 +87,9 @@ async fn subject(
                  and --experiment go with an experiment file"
             )));
         }
-        let archive = Archive::open(settings, args.data_dir.as_deref())?;
-        let address = archive.resolve(&address).await?;
-        let found = archive.one(address).await?;
+        let connection = Connection::open(settings, Intent::Read, progress).await?;
+        let address = connection.resolve(&address).await?;
+        let found = connection.genotype(address).await?;
         let name = format!("experiment {}", address.experiment);
         let compiled =
             args.compiled(&ExperimentFile::new(name.into(), found.config_json.clone()))?;
@@ -99,7 +100,7 @@ async fn subject(
     for warning in &compiled.warnings {
         progress.remark(&format!("warning: {}: {warning}", args.subject.display()));
     }
-    let genotype = Genotype::choose(settings, args, &compiled).await?;
+    let genotype = Genotype::choose(settings, args, &compiled, progress).await?;
     Ok(Subject { compiled, genotype, generation: args.generation.unwrap_or_default() })
 }
 

@@ -8,6 +8,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     json,
+    place::Intent,
     progress::Progress,
     sweep::{self, SweepRun},
     text,
@@ -46,6 +47,14 @@ Examples:
   swarmctl submit experiment.json --priority 200 --output json | jq .id";
 
 impl Remote for SubmitArgs {
+    fn intent(&self) -> Intent {
+        Intent::Submit
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        sweep::runs(&self.experiment).map(drop)
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         submit(&self, connection, progress).await
     }
@@ -65,8 +74,9 @@ async fn submit(
         progress,
     )
     .await?;
+    let is_followed = args.watch || connection.computes();
     match (progress.is_json(), group) {
-        (true, _) if args.watch => {}
+        (true, _) if is_followed => {}
         (true, Some(group)) => {
             progress.print(&json::experiments(&Subject::Group(group.to_owned()), &submitted))?;
         }
@@ -75,19 +85,19 @@ async fn submit(
         }
         (false, Some(group)) => {
             progress.print(&text::submitted_group(group, &submitted))?;
-            if !args.watch {
+            if !is_followed {
                 progress.print(&format!("follow it with: swarmctl watch {group}"))?;
             }
         }
         (false, None) => {
             let experiment = &submitted[0];
             progress.print(&text::submitted(experiment))?;
-            if !args.watch {
+            if !is_followed {
                 progress.print(&format!("follow it with: swarmctl watch {}", experiment.id))?;
             }
         }
     }
-    if args.watch { watch::watch(connection, submitted, progress).await } else { Ok(()) }
+    if is_followed { watch::watch(connection, submitted, progress).await } else { Ok(()) }
 }
 
 /// How runs are submitted.

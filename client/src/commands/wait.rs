@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use swarm_telemetry::parse_duration;
 use tokio::time::{Instant, timeout_at};
 
-use super::Remote;
+use super::{Remote, watch};
 use crate::{args::Target, connection::Connection, error::Error, json, progress::Progress, text};
 
 /// Wait until an experiment ends, or all experiments of a group.
@@ -51,7 +51,13 @@ impl Remote for WaitArgs {
         // One after the other: the last to end is waited for in any order.
         for experiment in connection.subject(&self.experiments.subject).await? {
             let id = experiment.id;
-            let ended = super::watch::ended(connection, experiment);
+            let of = [experiment.clone()];
+            let ended = async {
+                tokio::select! {
+                    ended = watch::ended(connection, experiment) => ended,
+                    error = watch::deserted(connection, &of) => Err(error),
+                }
+            };
             let experiment = match deadline {
                 Some(at) => timeout_at(at, ended).await.map_err(|_| Error::TimedOut { id })?,
                 None => ended.await,
@@ -62,7 +68,7 @@ impl Remote for WaitArgs {
                 text::state_line(&experiment)
             })?;
             if self.target == WaitFor::Completed {
-                success = success.and(super::watch::success(&experiment));
+                success = success.and(watch::success(&experiment));
             }
         }
         success

@@ -2,7 +2,7 @@
 
 mod situation;
 
-use std::{sync::Arc, time::Duration};
+use std::{future::pending, path::Path, sync::Arc, time::Duration};
 
 use clap::Args;
 use swarm_proto::v1::{
@@ -12,11 +12,11 @@ use swarm_telemetry::escape;
 use tokio::{
     sync::{Semaphore, mpsc},
     task::JoinSet,
-    time::{Instant, sleep},
+    time::{Instant, interval, sleep},
 };
 use tonic::Streaming;
 
-use super::{Remote, explain::Finding};
+use super::{Remote, champion_file, explain::Finding};
 use crate::{
     args::Target,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
@@ -32,6 +32,8 @@ const LASTING: Duration = Duration::from_secs(5);
 /// Most experiments of a group that are followed at the same time, each by a stream of the
 /// one connection, which has one more for their situation; others follow when one has ended.
 const STREAMS_MAX: usize = 64;
+/// How often it is looked whether somebody computes what is in a data directory.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
 /// News that may wait to be shown.
 const NEWS_MAX: usize = 16;
 
@@ -79,12 +81,27 @@ pub async fn watch(
     experiments: Vec<Experiment>,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let all = follow(connection, experiments, progress).await?;
+    let all = tokio::select! {
+        all = follow(connection, experiments.clone(), progress) => all?,
+        error = deserted(connection, &experiments) => return Err(error),
+    };
     for Followed { experiment, champion, first_best } in &all {
+        let data_dir = connection.data_dir().filter(|_| connection.computes());
+        let champion_file = match (data_dir, champion) {
+            (Some(data_dir), Some(champion)) => {
+                Some(champion_file::write(data_dir, experiment, champion)?)
+            }
+            _ => None,
+        };
         progress.print(&if progress.is_json() {
-            json::line(&json::EndLine::new(experiment, champion.as_ref()))
+            let file = champion_file.as_deref().map(Path::to_string_lossy);
+            let end = json::EndLine::new(experiment, champion.as_ref());
+            json::line(&end.with_champion_file(file.as_deref()))
         } else {
-            text::end(experiment, *first_best, champion.as_ref())
+            let mut lines = vec![text::end(experiment, *first_best, champion.as_ref())];
+            lines
+                .extend(data_dir.map(|directory| text::files(directory, champion_file.as_deref())));
+            lines.join("\n")
         })?;
     }
     all.iter().try_for_each(|followed| success(&followed.experiment))
@@ -97,6 +114,7 @@ pub async fn follow(
     experiments: Vec<Experiment>,
     progress: &mut Progress,
 ) -> Result<Vec<Followed>, Error> {
+    connection.set_going(&experiments);
     progress.begin(&experiments);
     let connection = connection.with_patience(PATIENCE);
     let (sender, mut news) = mpsc::channel(NEWS_MAX);
@@ -176,6 +194,30 @@ pub async fn ended(connection: &Connection, experiment: Experiment) -> Result<Ex
     let connection = connection.with_patience(PATIENCE);
     Follower { connection: connection.clone(), experiment_id, news: None }.run(next).await?;
     connection.experiment(experiment_id).await
+}
+
+/// Waits until nobody computes experiments of a data directory that have not ended; says so. For
+/// ever, if a coordinator is asked or this process computes.
+pub async fn deserted(connection: &Connection, experiments: &[Experiment]) -> Error {
+    let Some(data_dir) = connection.data_dir().filter(|_| !connection.computes()) else {
+        return pending().await;
+    };
+    let mut looks = interval(LOOK_EVERY);
+    loop {
+        looks.tick().await;
+        if connection.holder().await.is_some() {
+            continue;
+        }
+        for experiment in experiments {
+            match connection.experiment(experiment.id).await {
+                Ok(experiment) if has_ended(experiment.state()) => {}
+                Ok(experiment) => return Error::NotFound(text::deserted(&experiment, data_dir)),
+                Err(error) => return error,
+            }
+        }
+        // The last events are still to be shown.
+        return pending().await;
+    }
 }
 
 /// Success if the experiment completed; fails if it failed or was cancelled.

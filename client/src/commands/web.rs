@@ -1,6 +1,6 @@
 //! `swarmctl web`: the pages of a data directory, without a coordinator.
 
-use std::{net::SocketAddr, path::PathBuf, sync::Arc};
+use std::{net::SocketAddr, sync::Arc};
 
 use clap::Args;
 use coordinator::PagesArchive;
@@ -10,7 +10,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 use super::run::fleet::{login_address, random_token};
-use crate::{error::Error, progress::Progress};
+use crate::{error::Error, place::data_dir, progress::Progress, settings::Settings};
 
 /// Serve pages of the experiments in a data directory, to be looked at in a browser.
 ///
@@ -20,9 +20,6 @@ use crate::{error::Error, progress::Progress};
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WebArgs {
-    /// The data directory of a coordinator, or of `run`.
-    #[arg(long, env = "SWARM_DATA_DIR", value_name = "DIR", default_value = "./swarm-data")]
-    data_dir: PathBuf,
     /// Address to listen on, of this machine only; port 0 takes a free one.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:0", value_parser = listen_address)]
     web_listen: SocketAddr,
@@ -37,6 +34,7 @@ Examples:
 
 /// Serves until an interrupt.
 pub async fn web(
+    settings: &Settings,
     args: &WebArgs,
     progress: &mut Progress,
     interrupt: CancellationToken,
@@ -49,7 +47,7 @@ pub async fn web(
         )));
     }
     let archive =
-        PagesArchive::open_alone(&args.data_dir).map_err(|error| Error::from_store(&error))?;
+        PagesArchive::open_alone(&data_dir(settings)).map_err(|error| Error::from_store(&error))?;
     let cannot = |error| Error::Input(format!("cannot listen on {listen}: {error}"));
     let listener = TcpListener::bind(listen).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;

@@ -10,6 +10,7 @@ use crate::{
     clock,
     connection::Connection,
     error::Error,
+    place::Intent,
     progress::Progress,
     table::{Column, Table},
     text,
@@ -87,6 +88,10 @@ pub struct WorkersArgs {
 impl Remote for WorkersArgs {
     const HAS_TABLE: bool = true;
 
+    fn intent(&self) -> Intent {
+        if self.readmit.is_some() { Intent::Change } else { Intent::Read }
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         if let Some(name) = self.readmit {
             let request = ReadmitWorkerRequest { name };
@@ -99,10 +104,13 @@ impl Remote for WorkersArgs {
             connection.call_fleet(async |client| client.list_workers(request).await).await?;
         let workers = response.workers;
         let records: Vec<Record<'_>> = workers.iter().map(Into::into).collect();
-        let empty = format!(
-            "no worker is connected; start some with: worker --coordinator {}",
-            connection.address()
-        );
+        let empty = match connection.data_dir() {
+            Some(data_dir) => text::no_fleet(data_dir, connection.holder().await.as_ref()),
+            None => format!(
+                "no worker is connected; start some with: worker --coordinator {}",
+                connection.address()
+            ),
+        };
         progress.print_table(&table(&workers, clock::unix_ms()), &CSV_KEYS, &records, &empty)
     }
 }

@@ -59,6 +59,8 @@ pub struct Control {
     evaluations: Arc<Semaphore>,
     /// Unfinished experiments that are damaged, so that the driver does not know them.
     set_aside: Arc<Mutex<BTreeSet<ExperimentId>>>,
+    /// Unfinished experiments that nobody has asked for, so that the driver does not know them.
+    left_alone: Arc<Mutex<BTreeSet<ExperimentId>>>,
 }
 
 /// Why something is not done.
@@ -143,6 +145,7 @@ impl Control {
             experiment_files: Arc::default(),
             evaluations,
             set_aside: Arc::default(),
+            left_alone: Arc::default(),
         }
     }
 

@@ -33,6 +33,30 @@ impl Control {
         Ok(())
     }
 
+    /// Takes nothing up that is unfinished: [`Self::take_up`] does when it is asked for.
+    pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
+        let experiments = self.store.read(|store| store.experiments()).await?;
+        let unfinished = experiments.into_iter().filter(|it| it.state.is_unfinished());
+        let mut left = self.left_alone.lock().unwrap_or_else(PoisonError::into_inner);
+        left.extend(unfinished.map(|experiment| experiment.id));
+        Ok(())
+    }
+
+    /// Hands an experiment that was left alone to the driver. One that is damaged is paused.
+    pub async fn take_up_if_left(&self, id: ExperimentId) -> Result<(), ControlError> {
+        // Of two requests, one starts it.
+        if !self.left_alone.lock().unwrap_or_else(PoisonError::into_inner).remove(&id) {
+            return Ok(());
+        }
+        match self.restore(id).await {
+            Ok(Some(runnable)) => self.start(runnable).await,
+            Ok(None) => {}
+            Err(unsound @ StoreError::Unsound { .. }) => self.set_aside(id, &unsound).await?,
+            Err(error) => return Err(error.into()),
+        }
+        Ok(())
+    }
+
     /// Hands an experiment that was set aside to the driver, if it is sound by now.
     pub async fn take_up(&self, id: ExperimentId) -> Result<(), ControlError> {
         if !self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).contains(&id) {

@@ -59,6 +59,7 @@ impl Control {
         if !self.find(id).await?.state.is_unfinished() {
             return self.reopen(id, Reopening::Resume).await;
         }
+        self.take_up_if_left(id).await?;
         self.take_up(id).await?;
         self.change(id, Request::Resume).await
     }

@@ -79,6 +79,7 @@ impl Control {
         });
         let (id, identical) =
             placing.await.map_err(|_| ControlError::Panicked("storing the experiment"))??;
+        self.take_up_if_left(id).await?;
         Ok(Submitted { experiment: self.find(id).await?, warnings, identical })
     }
 }

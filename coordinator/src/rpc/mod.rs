@@ -7,7 +7,6 @@ mod evaluation_service;
 mod experiment_service;
 mod explain;
 mod fleet_service;
-mod offline;
 mod pages;
 mod status;
 mod worker_service;
@@ -16,7 +15,6 @@ pub use convert::WelcomeTimes;
 pub use evaluation_service::Evaluations;
 pub use experiment_service::Experiments;
 pub use fleet_service::Fleet;
-pub use offline::Offline;
 pub use pages::PagesArchive;
 pub use worker_service::Workers;
 

@@ -11,7 +11,7 @@ use swarm_proto::v1::{
 use swarm_web::{Action, Archive, Assignment, Control as WebControl};
 use tokio::{
     sync::{Semaphore, watch},
-    task, time,
+    task,
 };
 use tonic::{Request, Status, async_trait};
 
@@ -48,16 +48,10 @@ impl PagesArchive {
 
     /// The database in `directory`, to which a coordinator may write that is not here.
     pub fn open_alone(directory: &Path) -> Result<Self, StoreError> {
-        let (sender, news) = watch::channel(0);
-        let archive = Self::open(directory, news)?;
-        tokio::spawn(async move {
-            let mut looks = time::interval(LOOK_EVERY);
-            while !sender.is_closed() {
-                looks.tick().await;
-                sender.send_modify(|count| *count += 1);
-            }
-        });
-        Ok(archive)
+        let store = SharedStore::new(Store::open_read_only(directory)?);
+        store.look_every(LOOK_EVERY);
+        let news = store.news();
+        Ok(Self { store, reconstructions: Semaphore::new(RECONSTRUCTIONS_OF_PAGES_MAX), news })
     }
 }
 

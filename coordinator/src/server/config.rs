@@ -14,6 +14,11 @@ pub struct CoordinatorConfig {
     pub listen: SocketAddr,
     /// Directory of the database.
     pub data_dir: PathBuf,
+    /// Whether other programs that want the data directory are told the address.
+    pub is_announced: bool,
+    /// Whether unfinished experiments go on at once; else each does when somebody resumes it or
+    /// submits it again.
+    pub takes_up_unfinished: bool,
     /// How often workers give a sign of life.
     pub heartbeat_interval: Duration,
     /// Silence after which a worker loses its items.
@@ -42,6 +47,8 @@ impl CoordinatorConfig {
         Self {
             listen,
             data_dir,
+            is_announced: true,
+            takes_up_unfinished: true,
             heartbeat_interval: Duration::from_secs(2),
             lease: Duration::from_secs(10),
             audit_fraction: 0.0,
@@ -77,6 +84,9 @@ pub enum StartError {
     /// The store cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// There are no threads for it.
+    #[error("the system gives this program no threads: {0}")]
+    Runtime(io::Error),
     /// A thread ended that must not.
     #[error("opening the store panicked; please report this")]
     Panicked,

@@ -1,10 +1,14 @@
 //! A running coordinator: store, driver and gRPC server together.
 
 mod access;
+mod blocking;
 mod call_layer;
 pub mod calls;
 mod config;
+mod core;
+mod door;
 mod gate;
+mod in_process;
 pub mod listener;
 mod pages;
 mod services;
@@ -12,45 +16,39 @@ mod strangers;
 
 use std::{
     convert::Infallible,
-    net::SocketAddr,
+    net::{IpAddr, Ipv4Addr, SocketAddr},
     path::PathBuf,
-    sync::{Arc, Mutex},
 };
 
 use swarm_telemetry::Endpoint;
 use swarm_transport::tls_diagnosis;
-use tokio::{net::TcpListener, sync::Semaphore, task::JoinSet};
-use tokio_util::sync::CancellationToken;
+use tokio::{net::TcpListener, task::JoinSet};
 use tonic::transport::Server;
-use tracing::{error, info, warn};
+use tracing::{info, warn};
 
 use crate::{
-    control::Control,
-    driver::{self, Driver, DriverConfig},
-    engine::EngineConfig,
-    limits::{BUNDLES_MAX, RECONSTRUCTIONS_MAX, REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
-    metrics::{Instruments, Source},
-    referee::Referee,
-    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
+    limits::{CONNECTIONS_MAX, SHUTDOWN_GRACE},
     shared_store::{SharedStore, Unusable},
     store::Store,
 };
 
 pub use access::{Access, AccessError, Role, Tls, Tokens};
+pub use blocking::BlockingReader;
 pub use config::{CoordinatorConfig, RunError, StartError};
+pub use door::Door;
+pub use in_process::InProcess;
 
+use self::core::Core;
 use gate::Gate;
-use services::Services;
 
 /// A coordinator that runs in the background.
 #[derive(Debug)]
 pub struct Coordinator {
     local_addr: SocketAddr,
     web_addr: Option<SocketAddr>,
-    store: SharedStore,
-    shutdown: CancellationToken,
-    /// One task; none once its end is known. So is `server`.
-    driver: JoinSet<()>,
+    core: Core,
+    door: Door,
+    /// One task; none once its end is known.
     server: JoinSet<Result<(), tonic::transport::Error>>,
     /// Ends when it is dropped.
     _metrics: JoinSet<Infallible>,
@@ -79,68 +77,36 @@ impl Coordinator {
             None => None,
         };
         let store = open(config.data_dir.clone()).await?;
+        if config.is_announced {
+            let announced = announced(local_addr, is_encrypted);
+            store.read(move |store| store.announce(&announced)).await;
+        }
+        let mut core = Core::start(store, &config).await?;
+        match config.takes_up_unfinished {
+            true => core.control.run_unfinished().await?,
+            false => core.control.leave_unfinished().await?,
+        }
 
-        let shutdown = CancellationToken::new();
-        let (events, event_queue) = driver::channel();
-        let instruments = Instruments::default();
-        let engine = EngineConfig {
-            audit_fraction: config.audit_fraction,
-            ..EngineConfig::new(config.lease)
-        };
-        let referee = Referee::new(config.referee.clone(), REFEREE_IDLE_TIME);
-        let loop_ = Driver::new(
-            store.clone(),
-            event_queue,
-            DriverConfig {
-                engine,
-                memory_budget: config.memory_budget,
-                referee: referee.clone(),
-                quarantine: store.read(Store::quarantined).await?,
-                commit_duration: instruments.commit_duration.clone(),
-            },
-            shutdown.clone(),
-        );
-        let mut driver = JoinSet::new();
-        driver.spawn(loop_.run());
-        let control = Control::new(events.clone(), store.clone(), config.memory_budget);
-        control.run_unfinished().await?;
-
-        let calls = instruments.calls.clone();
         let mut metrics = JoinSet::new();
         if let Some(endpoint) = metrics_endpoint {
-            let (events, store) = (events.clone(), store.clone());
-            let source = Source { events, store, referee, instruments };
+            let source = core.metrics();
             metrics.spawn(endpoint.serve(move || source.clone().scrape()));
         }
-        let times =
-            WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
-        let experiments = || Experiments {
-            control: control.clone(),
-            store: store.clone(),
-            shutdown: shutdown.clone(),
-            reconstructions: Semaphore::new(RECONSTRUCTIONS_MAX),
-            bundles: Arc::new(Semaphore::new(BUNDLES_MAX)),
-        };
         let mut pages = JoinSet::new();
         let web_addr = web_listener.as_ref().map(|(_, address)| *address);
         if let Some((listener, _)) = web_listener {
-            let site = site.site(&config.data_dir, store.news(), experiments())?;
-            pages.spawn(pages::serve(site, listener, shutdown.clone()));
+            let site = site.site(&config.data_dir, core.store.news(), core.experiments())?;
+            pages.spawn(pages::serve(site, listener, core.shutdown.clone()));
         }
-        let services = Services {
-            workers: Workers {
-                events,
-                times,
-                shutdown: shutdown.clone(),
-                refusals: Mutex::default(),
-            },
-            fleet: Fleet { control: control.clone() },
-            evaluations: Evaluations { control: control.clone(), shutdown: shutdown.clone() },
-            experiments: experiments(),
-        };
         let mut server = JoinSet::new();
-        let gate = Gate::new(tokens);
-        server.spawn(services.serve(builder, listener, calls, gate, shutdown.clone()));
+        server.spawn(core.services().serve(
+            builder,
+            listener::accept(listener, CONNECTIONS_MAX, core.shutdown.clone()),
+            core.instruments.calls.clone(),
+            Gate::new(tokens),
+            core.shutdown.clone(),
+        ));
+        let door = core.open_door();
         info!(
             address = %local_addr, data_dir = %config.data_dir.display(),
             tls = is_encrypted, tokens = has_tokens,
@@ -152,7 +118,7 @@ impl Coordinator {
         if let Some(address) = web_addr {
             info!(%address, "pages are served");
         }
-        Ok(Self { local_addr, web_addr, store, shutdown, driver, server, _metrics: metrics, pages })
+        Ok(Self { local_addr, web_addr, core, door, server, _metrics: metrics, pages })
     }
 
     /// The address it listens on.
@@ -165,14 +131,19 @@ impl Coordinator {
         self.web_addr
     }
 
+    /// The way to its services for this process.
+    pub fn door(&self) -> &Door {
+        &self.door
+    }
+
     /// Waits for a part of it to end, which none does before [`Self::shutdown`].
     pub async fn failure(&mut self) -> RunError {
         tokio::select! {
-            unusable = self.store.unusable() => match unusable {
+            unusable = self.core.store.unusable() => match unusable {
                 Unusable::TakenOver(why) => RunError::TakenOver(why),
                 Unusable::Damaged(why) => RunError::Damaged(why),
             },
-            Some(ended) = self.driver.join_next() => RunError::Driver(match ended {
+            Some(ended) = self.core.driver.join_next() => RunError::Driver(match ended {
                 Ok(()) => "nobody asked it to".to_owned(),
                 Err(error) => error.to_string(),
             }),
@@ -189,10 +160,7 @@ impl Coordinator {
     /// was committed is lost; generations that were being evaluated are evaluated
     /// again at the next start.
     pub async fn shutdown(mut self) {
-        self.shutdown.cancel();
-        if let Some(Err(error)) = self.driver.join_next().await {
-            error!("the driver panicked: {error}; please report this");
-        }
+        self.core.stop().await;
         // If that takes too long, dropping the task ends it.
         let servers = async { tokio::join!(self.server.join_next(), self.pages.join_next()) };
         let _ = tokio::time::timeout(SHUTDOWN_GRACE, servers).await;
@@ -206,6 +174,14 @@ fn with_tls(server: Server, tls: Option<Tls>) -> Result<Server, StartError> {
         }
         None => Ok(server),
     }
+}
+
+/// The address for clients on this machine.
+fn announced(mut address: SocketAddr, is_encrypted: bool) -> String {
+    if address.ip().is_unspecified() {
+        address.set_ip(IpAddr::V4(Ipv4Addr::LOCALHOST));
+    }
+    format!("{}://{address}", if is_encrypted { "https" } else { "http" })
 }
 
 async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {

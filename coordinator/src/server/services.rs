@@ -1,5 +1,7 @@
 //! The gRPC server: all services, behind what every call has to pass.
 
+use std::io;
+
 use swarm_proto::{
     FILE_DESCRIPTOR_SET,
     v1::{
@@ -9,9 +11,10 @@ use swarm_proto::{
     },
 };
 use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX};
-use tokio::net::TcpListener;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::{Error, Server};
+use tonic::transport::{Error, Server, server::Connected};
 use tonic_health::{
     pb::health_server::{Health, HealthServer},
     server::health_reporter,
@@ -21,9 +24,9 @@ use tonic_reflection::pb::{
     v1::server_reflection_server as v1, v1alpha::server_reflection_server as v1alpha,
 };
 
-use super::{call_layer::CallLayer, calls::Calls, gate::Gate, listener};
+use super::{call_layer::CallLayer, calls::Calls, gate::Gate};
 use crate::{
-    limits::{CALLS_PER_CONNECTION_MAX, CONNECTIONS_MAX, HEADERS_LEN_MAX, KEEPALIVE},
+    limits::{CALLS_PER_CONNECTION_MAX, HEADERS_LEN_MAX, KEEPALIVE},
     rpc::{Evaluations, Experiments, Fleet, Workers},
 };
 
@@ -55,14 +58,18 @@ pub fn builder() -> Server {
 
 impl Services {
     /// Serves until shutdown. Every call is counted, and then has to pass the gate.
-    pub async fn serve(
+    pub async fn serve<IO>(
         self,
         server: Server,
-        listener: TcpListener,
+        connections: impl Stream<Item = io::Result<IO>> + Send + 'static,
         calls: Calls,
         gate: Gate,
         shutdown: CancellationToken,
-    ) -> Result<(), Error> {
+    ) -> Result<(), Error>
+    where
+        IO: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+        IO::ConnectInfo: Clone + Send + Sync + 'static,
+    {
         let Self { workers, fleet, experiments, evaluations } = self;
         let (reflection_v1, reflection_v1alpha) = reflection();
         server
@@ -75,10 +82,7 @@ impl Services {
             .add_service(limited!(FleetServiceServer, fleet))
             .add_service(limited!(ExperimentServiceServer, experiments))
             .add_service(limited!(EvaluationServiceServer, evaluations))
-            .serve_with_incoming_shutdown(
-                listener::accept(listener, CONNECTIONS_MAX, shutdown.clone()),
-                shutdown.cancelled_owned(),
-            )
+            .serve_with_incoming_shutdown(connections, shutdown.cancelled_owned())
             .await
     }
 }

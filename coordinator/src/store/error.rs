@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::file::Holder;
 use crate::ids::ExperimentId;
 
 /// What went wrong with the store.
@@ -24,12 +25,21 @@ pub enum StoreError {
     },
     /// Another coordinator uses the directory.
     #[error(
-        "the data directory {} is in use by another coordinator or `swarmctl run`; stop it or choose another directory",
-        path.display()
+        "the data directory {} is in use by another coordinator or `swarmctl run`{}; {}",
+        path.display(),
+        holder.as_ref().map_or_else(String::new, |holder| format!(" ({holder})")),
+        match holder.as_ref().and_then(|holder| holder.address.as_deref()) {
+            Some(address) => format!(
+                "ask it with --coordinator {address}, stop it or choose another directory"
+            ),
+            None => "stop it or choose another directory".to_owned(),
+        }
     )]
     Locked {
         /// The directory.
         path: PathBuf,
+        /// Who uses it, if that is known.
+        holder: Option<Holder>,
     },
     /// Another coordinator has opened the database meanwhile, and owns it now.
     #[error(

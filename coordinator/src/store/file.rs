@@ -2,15 +2,18 @@
 //! and never touched if it is not sound.
 
 use std::{
+    fmt,
     fs::{self, File, TryLockError},
-    io,
+    io::{self, Read as _, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
+    thread,
     time::Duration,
 };
 
 use rusqlite::{Connection, OpenFlags};
 
 use super::{Result, StoreError, schema, write_ahead_log};
+use crate::text::printable;
 
 const DATABASE_FILE: &str = "swarmevo.sqlite3";
 /// What a database is called until it is complete.
@@ -19,11 +22,77 @@ const LOCK_FILE: &str = "swarmevo.lock";
 /// How long an operation waits for another program that uses the database.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
+/// How long a lock is tried: another program may look for a moment whether it is taken.
+const LOCK_ATTEMPTS: u32 = 10;
+/// Pause between two attempts.
+const LOCK_PAUSE: Duration = Duration::from_millis(20);
+/// Longest text in a lock file, bytes.
+const HOLDER_LEN_MAX: u64 = 512;
+
 /// What keeps other coordinators out, for as long as it is kept.
 #[derive(Debug)]
 pub struct Locks {
-    _directory: File,
+    directory: File,
     _database: Option<File>,
+}
+
+/// The program that may write to a database.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Holder {
+    /// Number of its process, if it is known.
+    pub process: Option<u32>,
+    /// Where clients reach it, if it is a coordinator.
+    pub address: Option<String>,
+}
+
+impl Locks {
+    /// Says in the lock file whose it is. A lock without a name is as good.
+    pub fn announce(&self, address: Option<&str>) {
+        let text = format!("{}\n{}\n", std::process::id(), address.unwrap_or_default());
+        let mut file = &self.directory;
+        let written = file
+            .set_len(0)
+            .and_then(|()| file.seek(SeekFrom::Start(0)))
+            .and_then(|_| file.write_all(text.as_bytes()));
+        drop(written);
+    }
+}
+
+impl Holder {
+    /// Who is named in a lock file.
+    fn named(file: &File) -> Self {
+        let mut text = String::new();
+        let mut file = file;
+        // What cannot be read names nobody.
+        let _ = file.seek(SeekFrom::Start(0));
+        let _ = file.take(HOLDER_LEN_MAX).read_to_string(&mut text);
+        let mut lines = text.lines();
+        Self {
+            process: lines.next().and_then(|line| line.parse().ok()),
+            address: lines.next().filter(|line| !line.is_empty()).map(printable),
+        }
+    }
+}
+
+impl fmt::Display for Holder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.address, self.process) {
+            (Some(address), _) => write!(f, "the coordinator at {address}"),
+            (None, Some(process)) => write!(f, "process {process}"),
+            (None, None) => f.write_str("another program"),
+        }
+    }
+}
+
+/// The program that may write to the database in a directory, if one is there now.
+pub fn holder(directory: &Path) -> Option<Holder> {
+    let is_locked = |file: &File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+    let lock = File::open(directory.join(LOCK_FILE)).ok();
+    if let Some(lock) = lock.filter(is_locked) {
+        return Some(Holder::named(&lock));
+    }
+    let database = File::open(path_in(directory)).ok().filter(|_| cfg!(target_os = "linux"));
+    database.filter(is_locked).map(|_| Holder { process: None, address: None })
 }
 
 /// The database of a data directory.
@@ -41,13 +110,16 @@ pub fn unfinished_in(directory: &Path) -> PathBuf {
 pub fn open(directory: &Path) -> Result<(Connection, Locks)> {
     let unusable = |source| StoreError::Directory { path: directory.to_owned(), source };
     fs::create_dir_all(directory).map_err(unusable)?;
-    let file = File::create(directory.join(LOCK_FILE)).map_err(unusable)?;
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    let file = options.open(directory.join(LOCK_FILE)).map_err(unusable)?;
     let lock = lock(file, directory)?;
     let path = path_in(directory);
     if !path.try_exists().map_err(unusable)? {
         create(directory, unusable)?;
     }
-    let locks = Locks { _directory: lock, _database: lock_database(&path, directory)? };
+    let locks = Locks { directory: lock, _database: lock_database(&path, directory)? };
+    locks.announce(None);
     check(&path)?;
     let mut connection = Connection::open(&path)?;
     connection.busy_timeout(BUSY_TIMEOUT)?;
@@ -72,11 +144,19 @@ fn lock_database(path: &Path, directory: &Path) -> Result<Option<File>> {
 /// Locks a file of the data directory, or says that another has it.
 fn lock(file: File, directory: &Path) -> Result<File> {
     let path = directory.to_owned();
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
-        Err(TryLockError::Error(source)) => Err(StoreError::Directory { path, source }),
+    for attempt in 1.. {
+        match file.try_lock() {
+            Ok(()) => break,
+            Err(TryLockError::WouldBlock) if attempt < LOCK_ATTEMPTS => thread::sleep(LOCK_PAUSE),
+            Err(TryLockError::WouldBlock) => {
+                let lock = File::open(directory.join(LOCK_FILE)).ok();
+                let holder = lock.map(|file| Holder::named(&file));
+                return Err(StoreError::Locked { path, holder });
+            }
+            Err(TryLockError::Error(source)) => return Err(StoreError::Directory { path, source }),
+        }
     }
+    Ok(file)
 }
 
 /// Creates an empty database. Under another name at first, so that an empty file

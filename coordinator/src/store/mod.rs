@@ -31,6 +31,7 @@ use evolution::{Champion, Checkpoint};
 
 pub use error::StoreError;
 pub use evidence::Imported;
+pub use file::{Holder, holder};
 pub use fitness_log::Entry;
 pub use forks::ForkRecord;
 pub use inspection::{
@@ -64,7 +65,7 @@ struct Ownership {
     /// What the database says as long as this coordinator owns it.
     owner: Vec<u8>,
     /// Released after the connection.
-    _locks: Locks,
+    locks: Locks,
 }
 
 /// A generation to be committed.
@@ -84,6 +85,19 @@ pub struct GenerationCommit<'a> {
     pub completed: Option<&'a str>,
 }
 
+/// Whether there is a database in a directory.
+pub fn is_in(directory: &Path) -> bool {
+    file::path_in(directory).is_file()
+}
+
+/// Fails if there is no database in a directory.
+pub fn must_be_in(directory: &Path) -> Result<()> {
+    match is_in(directory) {
+        true => Ok(()),
+        false => Err(StoreError::NoDatabase { path: file::path_in(directory) }),
+    }
+}
+
 impl Store {
     /// Opens, and if need be creates, the database in `directory`, and takes it over
     /// from whoever owned it.
@@ -92,16 +106,14 @@ impl Store {
         let path = file::path_in(directory);
         let (owner, sealer) =
             claim(&connection).map_err(|error| StoreError::from(error).at(&path))?;
-        Ok(Self { connection, path, sealer, ownership: Some(Ownership { owner, _locks: locks }) })
+        Ok(Self { connection, path, sealer, ownership: Some(Ownership { owner, locks }) })
     }
 
     /// Opens the database in `directory` to read it, whether or not a coordinator uses it. It
     /// may be of an earlier version, but for those without seals.
     pub fn open_read_only(directory: &Path) -> Result<Self> {
+        must_be_in(directory)?;
         let path = file::path_in(directory);
-        if !path.is_file() {
-            return Err(StoreError::NoDatabase { path });
-        }
         let open = || {
             let connection = file::open_read_only(&path)?;
             let version = schema::version(&connection)?;
@@ -119,6 +131,13 @@ impl Store {
         };
         let (connection, sealer) = open().map_err(|error| error.at(&path))?;
         Ok(Self { connection, path, sealer, ownership: None })
+    }
+
+    /// Tells other programs that want the directory where clients reach this one.
+    pub fn announce(&self, address: &str) {
+        if let Some(Ownership { locks, .. }) = &self.ownership {
+            locks.announce(Some(address));
+        }
     }
 
     /// Adds an experiment. If `request_id` has been used before, nothing is

@@ -24,9 +24,6 @@ pub struct EvaluateArgs {
     /// individual I of generation G; ID@G/mean, the mean of the distribution after it.
     #[arg(value_name = "ADDRESS", required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
-    /// Read the address from the database in this directory instead of asking a coordinator.
-    #[arg(long, value_name = "DIR", requires = "address")]
-    pub data_dir: Option<PathBuf>,
     /// File with the genotype, such as a champion file.
     #[arg(long, value_name = "FILE", conflicts_with = "address", requires = "config")]
     pub genotype: Option<PathBuf>,

@@ -13,7 +13,6 @@ use crate::{
 fn args() -> EvaluateArgs {
     EvaluateArgs {
         address: None,
-        data_dir: None,
         genotype: None,
         config: None,
         trials: 3,

@@ -1,7 +1,8 @@
 //! The findings about an experiment's progress, with the next steps.
 
-use std::{borrow::Cow, fmt};
+use std::{borrow::Cow, fmt, path::Path};
 
+use coordinator::store::Holder;
 use serde::Serialize;
 use swarm_proto::v1::{
     Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,
@@ -47,6 +48,8 @@ pub enum Kind {
     Barrier,
     Computing,
     BetweenGenerations,
+    Deserted,
+    ComputedElsewhere,
 }
 
 impl fmt::Display for Finding {
@@ -96,6 +99,29 @@ pub fn stall(answer: &ExplainExperimentResponse, address: &str) -> Option<Findin
         stall.next_steps = vec![format!("see which workers have them: swarmctl explain {id}")];
     }
     Some(stall)
+}
+
+/// What a data directory says about an experiment that has not ended. `holder`: the program that
+/// uses the directory.
+pub fn in_directory(experiment: &Experiment, data_dir: &Path, holder: Option<&Holder>) -> Finding {
+    let address = holder.and_then(|holder| holder.address.as_deref());
+    match (holder, address) {
+        (_, Some(address)) => finding(
+            Kind::ComputedElsewhere,
+            format!("a coordinator uses {}", data_dir.display()),
+            [format!("ask it: swarmctl explain {} --coordinator {address}", experiment.id)],
+        ),
+        (Some(holder), None) => finding(
+            Kind::ComputedElsewhere,
+            format!("{holder} uses {}", data_dir.display()),
+            [format!("follow it: {}", text::command_in("watch", experiment.id, data_dir))],
+        ),
+        (None, _) => finding(
+            Kind::Deserted,
+            "no program computes it",
+            [format!("continue it: {}", text::command_in("resume", experiment.id, data_dir))],
+        ),
+    }
 }
 
 /// All findings about an experiment, the most important first.

@@ -39,15 +39,21 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
             experiments,
         }));
     }
-    let mut sections = vec![format!(
-        "{} with {}; {} not ended",
-        text::counted(workers.len() as u64, "worker"),
-        text::counted(slots, "slot"),
-        match explained.len() {
-            1 => "1 experiment has".to_owned(),
-            n => format!("{n} experiments have"),
+    let n_unfinished = match explained.len() {
+        1 => "1 experiment has".to_owned(),
+        n => format!("{n} experiments have"),
+    };
+    let mut sections = vec![match connection.data_dir() {
+        Some(data_dir) => {
+            let fleet = text::no_fleet(data_dir, connection.holder().await.as_ref());
+            format!("{fleet}\n{n_unfinished} not ended")
         }
-    )];
+        None => format!(
+            "{} with {}; {n_unfinished} not ended",
+            text::counted(workers.len() as u64, "worker"),
+            text::counted(slots, "slot"),
+        ),
+    }];
     // With an experiment, what the workers are for is known: only then they may be too few.
     let mut of_fleet: Vec<String> = Vec::new();
     let mut of_experiments = Vec::new();

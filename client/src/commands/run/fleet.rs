@@ -3,7 +3,8 @@
 
 use std::{
     net::{Ipv4Addr, SocketAddr},
-    path::Path,
+    path::{Path, PathBuf},
+    thread,
 };
 
 use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
@@ -13,10 +14,11 @@ use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use worker::{WorkerConfig, WorkerError};
 
-use crate::{connection::Connection, error::Error};
+use crate::{connection::Connection, error::Error, progress::Progress};
 
 /// A running fleet; [`Fleet::shutdown`] ends it in order.
 pub struct Fleet {
+    data_dir: PathBuf,
     coordinator: Coordinator,
     client_token: Token,
     workers: JoinSet<Result<(), WorkerError>>,
@@ -38,6 +40,10 @@ impl Fleet {
             Tokens::new(client_token.clone(), worker_token.clone()).expect("random tokens differ");
         let config = CoordinatorConfig {
             access: Access { tokens: Some(tokens), ..Access::default() },
+            // Nobody else has a token for it.
+            is_announced: false,
+            // Whoever computes one experiment here has not asked for the others.
+            takes_up_unfinished: false,
             // Whoever submits here owns the machine, too.
             memory_budget: u64::MAX,
             web_listen,
@@ -45,6 +51,7 @@ impl Fleet {
         };
         let coordinator = Coordinator::start(config).await?;
         let mut fleet = Self {
+            data_dir: data_dir.into(),
             coordinator,
             client_token,
             workers: JoinSet::new(),
@@ -62,8 +69,8 @@ impl Fleet {
     }
 
     /// A client's connection to the coordinator.
-    pub fn connection(&self) -> Result<Connection, Error> {
-        Connection::new(&self.address(), &credentials(&self.client_token))
+    pub fn connection(&self) -> Connection {
+        Connection::computing(&self.data_dir, self.coordinator.door().clone())
     }
 
     /// Where its pages are, with what lets a browser in, if it serves any.
@@ -93,6 +100,16 @@ impl Fleet {
         Error::Internal(format!("a worker ended: {reason}"))
     }
 
+    /// As [`Self::shutdown`]; says what it waits for if there was an interrupt.
+    pub async fn stop(self, result: &Result<(), Error>, progress: &Progress) {
+        if matches!(result, Err(Error::Interrupted(_))) {
+            progress.remark(
+                "stopping when the running items are done; interrupt again to stop at once",
+            );
+        }
+        self.shutdown().await;
+    }
+
     /// Lets the workers finish their items, then closes the store.
     pub async fn shutdown(self) {
         let Self { coordinator, mut workers, shutdown, .. } = self;
@@ -100,6 +117,11 @@ impl Fleet {
         while workers.join_next().await.is_some() {}
         coordinator.shutdown().await;
     }
+}
+
+/// As many workers as this machine has cores.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, Into::into)
 }
 
 fn credentials(token: &Token) -> Credentials {
@@ -128,7 +150,7 @@ mod tests {
         let fleet = Fleet::start(directory.path(), 1, Isa::best(), None).await.unwrap();
         let stranger = Connection::new(&fleet.address(), &Credentials::default()).unwrap();
         assert_eq!(stranger.experiments().await.unwrap_err().exit_code(), 7);
-        assert!(fleet.connection().unwrap().experiments().await.unwrap().is_empty());
+        assert!(fleet.connection().experiments().await.unwrap().is_empty());
         fleet.shutdown().await;
     }
 }

@@ -14,5 +14,7 @@ pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
         .with_ansi(false)
         .with_target(false)
         .without_time()
-        .init();
+        // Of two commands in one process, the first has set it up.
+        .try_init()
+        .unwrap_or_default();
 }

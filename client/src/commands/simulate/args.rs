@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use coordinator::Address;
 use experiment_file::limits;
 
 use super::trace::ExtraColumns;
@@ -37,10 +36,7 @@ pub struct SimulateArgs {
     /// Use a genotype of an experiment: 3 is the champion of experiment 3, 3@5/7 individual 7
     /// of its generation 5, 3@5/mean the mean of the distribution after that.
     #[arg(long, value_name = "ADDRESS")]
-    pub experiment: Option<Address>,
-    /// Read addresses from the database in this directory instead of asking a coordinator.
-    #[arg(long, value_name = "DIR")]
-    pub data_dir: Option<PathBuf>,
+    pub experiment: Option<NamedAddress>,
     #[command(flatten)]
     pub seed: SeedArg,
     /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an

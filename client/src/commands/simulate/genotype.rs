@@ -8,9 +8,12 @@ use serde_json::Value;
 
 use super::SimulateArgs;
 use crate::{
-    archive::{Archive, Found, described},
+    connection::Connection,
     error::Error,
     experiment_file::{Compiled, open},
+    genotypes::{Found, described},
+    place::Intent,
+    progress::Progress,
     settings::Settings,
 };
 
@@ -41,13 +44,15 @@ impl Genotype {
         settings: Settings,
         args: &SimulateArgs,
         compiled: &Compiled,
+        progress: &Progress,
     ) -> Result<Self, Error> {
         if let Some(path) = &args.genotype {
             return Self::read(path);
         }
-        if let Some(address) = args.experiment {
-            let archive = Archive::open(settings, args.data_dir.as_deref())?;
-            return Ok(Self::found(address, archive.one(address).await?));
+        if let Some(address) = &args.experiment {
+            let connection = Connection::open(settings, Intent::Read, progress).await?;
+            let address = connection.resolve(address).await?;
+            return Ok(Self::found(address, connection.genotype(address).await?));
         }
         Ok(Self { genes: random(compiled), source: "random genotype".into() })
     }

@@ -23,7 +23,6 @@ fn args() -> SimulateArgs {
         subject: quickstart(),
         genotype: None,
         experiment: None,
-        data_dir: None,
         seed: SeedArg { seed: Some(7) },
         generation: None,
         trials: Some(2),

@@ -1,0 +1,72 @@
+//! The champion of what was computed in a data directory, as a file there.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use swarm_proto::v1::{Experiment, GetChampionResponse};
+
+use super::individual::champion_document;
+use crate::error::Error;
+
+/// Longest part of an experiment's name in a file's name, in characters.
+const FILE_NAME_CHARS_MAX: usize = 50;
+
+/// Writes the champion to a file in the data directory; returns its path.
+pub fn write(
+    data_dir: &Path,
+    experiment: &Experiment,
+    champion: &GetChampionResponse,
+) -> Result<PathBuf, Error> {
+    let path = data_dir.join(champion_file_name(experiment));
+    fs::write(&path, champion_document(experiment, champion)? + "\n")
+        .map_err(|source| Error::Write { what: path.display().to_string(), source })?;
+    Ok(path)
+}
+
+/// `NAME-ID.champion.json`, with nothing in it that could leave the directory.
+fn champion_file_name(experiment: &Experiment) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
+    let name: String = experiment
+        .name
+        .chars()
+        .take(FILE_NAME_CHARS_MAX)
+        .map(|c| if is_plain(c) { c } else { '_' })
+        .collect();
+    format!("{name}-{}.champion.json", experiment.id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn experiment(id: u64, name: &str) -> Experiment {
+        Experiment { id, name: name.into(), ..Experiment::default() }
+    }
+
+    #[test]
+    fn names_of_experiments_make_harmless_names_of_files() {
+        let file_name = |name| champion_file_name(&experiment(3, name));
+        assert_eq!(file_name("leader"), "leader-3.champion.json");
+        assert_eq!(file_name("../a b/c"), ".._a_b_c-3.champion.json");
+        assert_eq!(file_name("größe"), "größe-3.champion.json");
+        // 255 bytes is what file systems allow.
+        assert!(file_name(&"𐐀".repeat(1000)).len() <= 255);
+    }
+
+    #[test]
+    fn a_champion_is_stored_as_it_is_printed() {
+        let dir = tempfile::tempdir().unwrap();
+        let champion = GetChampionResponse {
+            experiment_id: 3,
+            genotype: vec![0.1],
+            network_json: "{}".into(),
+            ..GetChampionResponse::default()
+        };
+        let experiment = experiment(3, "a");
+        let path = write(dir.path(), &experiment, &champion).unwrap();
+        let stored = fs::read_to_string(path).unwrap();
+        assert_eq!(stored, champion_document(&experiment, &champion).unwrap() + "\n");
+    }
+}

@@ -1,0 +1,303 @@
+//! Every command gives the same on a data directory as on a coordinator with the same database.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use clap::{CommandFactory as _, Parser as _};
+use coordinator::{Coordinator, CoordinatorConfig};
+use tokio::{task::JoinSet, time::timeout};
+use tokio_util::sync::CancellationToken;
+use worker::WorkerConfig;
+
+use super::execute;
+use crate::{args::Args, experiment_file::tests::quickstart, progress::tests::Captured};
+
+/// No command here takes so long, even on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Commands that only look at experiments, or change what is stored of them. TO is a file, which
+/// has to be the same, too.
+const ASKED: &[&str] = &[
+    "list",
+    "list --output json",
+    "watch 1",
+    "watch 1 --output json",
+    "wait two",
+    "wait 1 --output json",
+    "wait 9",
+    "logs",
+    "logs 1 --output json",
+    "history 1",
+    "history two --output csv",
+    "history 1 --dynamics",
+    "explain 1",
+    "explain 1 --output json",
+    "get 1",
+    "get none",
+    "individual 1@1/3",
+    "individual 1@1 --output json",
+    "individual two",
+    "individual 1@7/3",
+    "lineage 2@2/3",
+    "lineage 1@1/1",
+    "simulate 1@1/3",
+    "simulate two@0/0 --trace TO.csv",
+    "replay 1 --to TO.html",
+    "export 1 --to TO.zip",
+    "export 9 --to TO.zip",
+    "plot 1 two --to TO.svg",
+    "compare 1",
+    "label 1 user=ada",
+    "label two user=grace --output json",
+    "list --label user=ada --output csv",
+    "pause 3 --reason lunch",
+    "priority 3 300",
+    "cancel 3",
+    "cancel 1",
+    "cancel 9",
+    "archive 1",
+    "archive 1 --restore",
+    "prune 2",
+    "prune 2",
+    "delete 2",
+    "import exported.zip",
+    "retry 1",
+    "extend 1 --generations 2",
+];
+
+/// Commands that set something going: the experiments are the same in the end.
+const COMPUTED: &[(&str, &str)] = &[
+    ("submit FILE --generations 2 --seed 5", " --watch"),
+    ("submit FILE --generations 1 --seeds 0..1 --group seeds", " --watch"),
+    ("fork 1@1 --seed 9", " --watch"),
+    ("extend 1 --generations 4", "; wait 1"),
+    ("resume 3", "; wait 3"),
+    ("evaluate 1 --trials 2 --to TO.d", ""),
+    ("verify exported.zip --generations 1", ""),
+];
+
+/// What has no experiments of a place, or of one of the two only; it has tests of its own.
+const ALONE: &[&str] = &[
+    "backup",
+    "bench",
+    "completions",
+    "doctor",
+    "fleet",
+    "help",
+    "man",
+    "new",
+    "referee",
+    "run",
+    "schema",
+    "validate",
+    "web",
+    "workers",
+];
+
+/// What a command line printed, and how it ended.
+async fn output(line: &str, place: &[&str]) -> String {
+    let captured = Captured::default();
+    let words = ["swarmctl"].into_iter().chain(line.split(' ')).chain(place.iter().copied());
+    let args = Args::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+    let progress = captured.progress(args.output);
+    let result = timeout(PATIENCE, execute(args, progress)).await;
+    let result = result.unwrap_or_else(|_| panic!("{line} hangs: {:?}", captured.lines()));
+    let end = match result {
+        Ok(()) => String::new(),
+        Err(error) => format!("[exit code {}] {error}", error.exit_code()),
+    };
+    captured.lines().join("\n") + &end
+}
+
+/// A data directory with a run of SNES, one of a GA, and one that nobody computes.
+async fn data_dir(directory: &Path) -> PathBuf {
+    let path = directory.join("data");
+    let at = ["--data-dir", path.to_str().unwrap()];
+    let file = quickstart().display().to_string();
+    output(&format!("run {file} --generations 3"), &at).await;
+    let ga = fs::read_to_string(&file).unwrap();
+    let mut ga: serde_json::Value = serde_json::from_str(&ga).unwrap();
+    ga["name"] = "two".into();
+    ga["algorithm"]["name"] = "GA".into();
+    let ga_file = directory.join("two.json");
+    fs::write(&ga_file, ga.to_string()).unwrap();
+    output(&format!("run {} --generations 3", ga_file.display()), &at).await;
+    // Its submission is stored, and nobody computes it.
+    let place = crate::place::Place::Directory { path: path.clone(), is_found: false };
+    let connection =
+        crate::connection::Connection::to(place, crate::place::Intent::Submit).await.unwrap();
+    let overrides = crate::experiment_file::Overrides {
+        seed: Some(77),
+        generations: Some(2),
+        ..Default::default()
+    };
+    let file = crate::experiment_file::ExperimentFile::read(&quickstart()).unwrap();
+    connection.submit(file.request(&overrides, "three".into())).await.unwrap();
+    connection.close().await;
+    path
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+    }
+}
+
+/// A coordinator on a directory, and after some time a worker.
+struct Fleet {
+    coordinator: Coordinator,
+    workers: JoinSet<Result<(), worker::WorkerError>>,
+    shutdown: CancellationToken,
+}
+
+impl Fleet {
+    async fn start(data_dir: &Path) -> Self {
+        let listen = "127.0.0.1:0".parse().unwrap();
+        let config = CoordinatorConfig::new(listen, data_dir.into());
+        let coordinator = Coordinator::start(config).await.unwrap();
+        Self { coordinator, workers: JoinSet::new(), shutdown: CancellationToken::new() }
+    }
+
+    fn address(&self) -> String {
+        format!("http://{}", self.coordinator.local_addr())
+    }
+
+    fn add_worker(&mut self) {
+        let config = WorkerConfig::new(self.address(), "one", 1);
+        self.workers.spawn(worker::run(config, self.shutdown.clone()));
+    }
+
+    async fn stop(mut self) {
+        self.shutdown.cancel();
+        while self.workers.join_next().await.is_some() {}
+        self.coordinator.shutdown().await;
+    }
+}
+
+/// The same line in a place whose files have names of their own; and those that it wrote.
+async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> (String, Vec<u8>) {
+    let to = directory.join(name);
+    let file = quickstart().display().to_string();
+    let exported = directory.join("exported.zip").display().to_string();
+    let concrete = line.replace("TO", to.to_str().unwrap());
+    let concrete = concrete.replace("FILE", &file).replace("exported.zip", &exported);
+    let text = output(&concrete, place).await.replace(to.to_str().unwrap(), "TO");
+    let mut written = Vec::new();
+    for ending in ["csv", "html", "zip", "svg"] {
+        written.extend(fs::read(to.with_extension(ending)).unwrap_or_default());
+    }
+    written.extend(fs::read(to.with_extension("d").join("trials.csv")).unwrap_or_default());
+    (text, written)
+}
+
+/// Without what differs from one computation to the next.
+fn without_times(text: &str) -> String {
+    let mut value: serde_json::Value = serde_json::from_str(text).unwrap();
+    for experiment in value.as_array_mut().unwrap() {
+        let object = experiment.as_object_mut().unwrap();
+        object.retain(|key, _| !key.ends_with("_ms") && key != "latest" && key != "last_sequence");
+    }
+    value.to_string()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_command_gives_the_same_in_a_directory_as_on_a_coordinator() {
+    let temporary = tempfile::tempdir().unwrap();
+    let directory = temporary.path();
+    let here = data_dir(directory).await;
+    let there = directory.join("there");
+    copy(&here, &there);
+    let here = here.to_str().unwrap();
+    output(&format!("export 1 --to {}/exported.zip", directory.display()), &["--data-dir", here])
+        .await;
+    let mut fleet = Fleet::start(&there).await;
+    let address = fleet.address();
+    let (at_directory, at_coordinator) = (["--data-dir", here], ["--coordinator", &address]);
+    for line in ASKED {
+        let asked = output_at(line, &at_coordinator, directory, "there-TO").await;
+        let read = output_at(line, &at_directory, directory, "here-TO").await;
+        assert!(!read.0.is_empty(), "{line}");
+        assert_eq!(read, asked, "{line}");
+    }
+    fleet.add_worker();
+    for (line, follow) in COMPUTED {
+        let (first, then) = follow.split_once("; ").unwrap_or((follow, ""));
+        output_at(&format!("{line}{first}"), &at_coordinator, directory, "there-2").await;
+        if !then.is_empty() {
+            output(then, &at_coordinator).await;
+        }
+        let computed = output_at(line, &at_directory, directory, "here-2").await.0;
+        assert!(!computed.contains("exit code"), "{line}: {computed}");
+        let [asked, read] = [&at_coordinator, &at_directory]
+            .map(async |at| without_times(&output("list --all --output json", at).await));
+        assert_eq!(read.await, asked.await, "{line}");
+    }
+    fleet.stop().await;
+}
+
+#[test]
+fn no_command_is_forgotten() {
+    let definition = Args::command();
+    let names: BTreeSet<&str> = definition.get_subcommands().map(|it| it.get_name()).collect();
+    let lines = ASKED.iter().copied().chain(COMPUTED.iter().map(|(line, _)| *line));
+    let tried: BTreeSet<&str> = lines.filter_map(|line| line.split(' ').next()).collect();
+    let forgotten: Vec<_> =
+        names.iter().filter(|name| !tried.contains(*name) && !ALONE.contains(name)).collect();
+    assert!(forgotten.is_empty(), "{forgotten:?}");
+}
+
+#[tokio::test]
+async fn what_nobody_computes_is_not_waited_for() {
+    let temporary = tempfile::tempdir().unwrap();
+    let path = data_dir(temporary.path()).await;
+    let at = ["--data-dir", path.to_str().unwrap()];
+    let resume = format!("swarmctl resume 3 --data-dir {}", path.display());
+    for line in ["watch 3", "wait 3", "logs 3 --follow"] {
+        let text = output(line, &at).await;
+        assert!(text.contains("[exit code 3]") && text.contains(&resume), "{line}: {text}");
+    }
+    let text = output("explain 3", &at).await;
+    assert!(text.contains("no program computes it") && text.contains(&resume), "{text}");
+    for line in ["workers", "explain", "fleet slurm --max 2", "logs --follow"] {
+        let text = output(line, &at).await;
+        assert!(text.contains("coordinator --data-dir") || line == "logs --follow", "{text}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_directory_in_use_is_read_and_not_changed() {
+    let temporary = tempfile::tempdir().unwrap();
+    let path = data_dir(temporary.path()).await;
+    let at = ["--data-dir", path.to_str().unwrap()];
+    let fleet = Fleet::start(&path).await;
+    assert!(output("history 1", &at).await.contains("generation"));
+    for line in ["label 1 user=ada", "cancel 3", "extend 1 --generations 9", "resume 3"] {
+        let text = output(line, &at).await;
+        assert!(text.contains("[exit code 2]"), "{line}: {text}");
+        assert!(text.contains(&format!("--coordinator {}", fleet.address())), "{line}: {text}");
+    }
+    let explained = output("explain 3", &at).await;
+    assert!(explained.contains(&fleet.address()), "{explained}");
+    fleet.stop().await;
+}
+
+#[tokio::test]
+async fn a_directory_that_is_not_there_is_made_by_what_adds_to_it_alone() {
+    let temporary = tempfile::tempdir().unwrap();
+    let path = temporary.path().join("none");
+    let at = ["--data-dir", path.to_str().unwrap()];
+    for line in ["list", "label 1 user=ada", "extend 1 --generations 9", "resume 1", "watch 1"] {
+        let text = output(line, &at).await;
+        assert!(text.contains("[exit code 2] there is no database"), "{line}: {text}");
+        assert!(!path.exists(), "{line}");
+    }
+    let file = quickstart().display().to_string();
+    let text = output(&format!("submit {file} --generations 1"), &at).await;
+    assert!(text.contains("completed after 1 of 1 generations"), "{text}");
+}

@@ -1,0 +1,84 @@
+//! Genotypes by their addresses, as a place has them.
+
+use coordinator::{Address, Who};
+use swarm_proto::v1::{
+    Experiment, GetChampionResponse, GetExperimentRequest, GetIndividualsRequest,
+    GetIndividualsResponse, GetLineageRequest, GetLineageResponse,
+};
+
+use crate::{
+    address::NamedAddress,
+    args::Subject,
+    connection::{Connection, present},
+    error::Error,
+};
+
+/// A genotype, and what it was evolved with.
+#[derive(Debug)]
+pub struct Found {
+    /// The file of its experiment in canonical form.
+    pub config_json: String,
+    pub individual: GetChampionResponse,
+}
+
+impl Connection {
+    /// One experiment, and its file in canonical form.
+    pub async fn stored(&self, experiment_id: u64) -> Result<(Experiment, String), Error> {
+        let request = GetExperimentRequest { experiment_id };
+        let response = self.call(async |client| client.get_experiment(request).await).await?;
+        Ok((present(response.experiment)?, response.config_json))
+    }
+
+    /// Those at an address; of a whole generation, some from an index on.
+    pub async fn individuals(
+        &self,
+        address: Address,
+        from_individual: u32,
+    ) -> Result<GetIndividualsResponse, Error> {
+        let address = address.to_string();
+        let request = GetIndividualsRequest { address, from_individual, page_size: 0 };
+        self.call(async |client| client.get_individuals(request.clone()).await).await
+    }
+
+    /// The lineage of an individual.
+    pub async fn lineage(&self, address: Address, depth: u32) -> Result<GetLineageResponse, Error> {
+        let request = GetLineageRequest { address: address.to_string(), depth };
+        self.call(async |client| client.get_lineage(request.clone()).await).await
+    }
+
+    /// An address whose experiment has its number.
+    pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
+        Ok(address.of(match &address.experiment {
+            Subject::Experiment(id) => *id,
+            subject => self.one(subject).await?.id,
+        }))
+    }
+
+    /// The one at an address, and its experiment.
+    pub async fn genotype(&self, address: Address) -> Result<Found, Error> {
+        if let Who::Generation(_) = address.who {
+            return Err(Error::Input(format!(
+                "`{address}` is a whole generation; name one of it, such as {address}/0"
+            )));
+        }
+        let (_, config_json) = self.stored(address.experiment.0).await?;
+        let answer = self.individuals(address, 0).await?;
+        let individual = present(answer.individuals.into_iter().next())?;
+        Ok(Found { config_json, individual })
+    }
+}
+
+/// "champion of experiment 3", "individual 7 of generation 5 of experiment 3".
+pub fn described(address: Address) -> String {
+    let id = address.experiment;
+    match address.who {
+        Who::Champion => format!("champion of experiment {id}"),
+        Who::Generation(generation) => format!("generation {generation} of experiment {id}"),
+        Who::Individual(generation, individual) => {
+            format!("individual {individual} of generation {generation} of experiment {id}")
+        }
+        Who::Mean(generation) => {
+            format!("mean of the distribution after generation {generation} of experiment {id}")
+        }
+    }
+}

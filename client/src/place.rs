@@ -1,0 +1,118 @@
+//! Where a command finds experiments: at a coordinator, or in a data directory.
+
+use std::{
+    env,
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use coordinator::store;
+use tokio::{net::TcpStream, time::timeout};
+
+use crate::{
+    error::Error,
+    settings::{COORDINATOR_VARIABLE, Settings},
+};
+
+/// Where `run` and a coordinator keep their data unless told otherwise.
+const DEFAULT_DATA_DIR: &str = "./swarm-data";
+/// The environment variable that names the data directory.
+const DATA_DIR_VARIABLE: &str = "SWARM_DATA_DIR";
+/// Where a coordinator listens unless told otherwise.
+const DEFAULT_LISTEN: ([u8; 4], u16) = ([127, 0, 0, 1], 7700);
+/// How long somebody who listens there has to answer.
+const ANSWER_TIME: Duration = Duration::from_millis(300);
+
+/// What a command does with experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Intent {
+    /// It reads them; another program may use a data directory meanwhile.
+    Read,
+    /// It changes what is stored of them; no other program may use a data directory meanwhile.
+    Change,
+    /// It adds some; a data directory that is not there yet is made.
+    Add,
+    /// It has some go on, which in a data directory happens here.
+    Continue,
+    /// It adds some that are to be computed, which in a data directory happens here.
+    Submit,
+}
+
+impl Intent {
+    /// Whether somebody has to compute afterwards.
+    pub fn computes(self) -> bool {
+        matches!(self, Self::Continue | Self::Submit)
+    }
+
+    /// Refuses a data directory without a database, unless one is to be made.
+    pub fn check(self, data_dir: &Path) -> Result<(), Error> {
+        match self {
+            Self::Add | Self::Submit => Ok(()),
+            Self::Read | Self::Change | Self::Continue => {
+                store::must_be_in(data_dir).map_err(|error| Error::from_store(&error))
+            }
+        }
+    }
+}
+
+/// Where experiments are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// At the coordinator of these settings.
+    Coordinator(Settings),
+    /// In a data directory. `is_found`: nobody has named it.
+    Directory { path: PathBuf, is_found: bool },
+}
+
+impl Place {
+    /// The place that the command line names, else the environment, else the settings file; else
+    /// the coordinator at the default address if something listens there, else the default data
+    /// directory if it is there.
+    pub async fn of(settings: Settings) -> Result<Self, Error> {
+        match Self::named(settings)? {
+            Self::Coordinator(settings) if settings.coordinator.is_none() => {
+                if store::is_in(Path::new(DEFAULT_DATA_DIR)) && !is_answered().await {
+                    return Ok(Self::Directory { path: DEFAULT_DATA_DIR.into(), is_found: true });
+                }
+                Ok(Self::Coordinator(settings))
+            }
+            named => Ok(named),
+        }
+    }
+
+    /// The place that somebody has named; a coordinator without an address if nobody has.
+    fn named(mut settings: Settings) -> Result<Self, Error> {
+        let directory = settings.data_dir.take();
+        let directory = directory.map(|path| Self::Directory { path, is_found: false });
+        if let Some(directory) = directory {
+            let of_environment = env::var(COORDINATOR_VARIABLE).ok();
+            return match settings.coordinator {
+                Some(named) if Some(&named) != of_environment.as_ref() => Err(Error::Input(
+                    "give --coordinator or --data-dir: a command works in one place".into(),
+                )),
+                _ => Ok(directory),
+            };
+        }
+        let is_named = settings.coordinator.as_ref().is_some_and(|address| !address.is_empty());
+        match env::var_os(DATA_DIR_VARIABLE).filter(|path| !path.is_empty() && !is_named) {
+            Some(path) => Ok(Self::Directory { path: path.into(), is_found: false }),
+            None => Ok(Self::Coordinator(settings.or_file()?)),
+        }
+    }
+}
+
+/// The data directory for commands that work on files alone: the one of the command line, else of
+/// the environment, else the default one.
+pub fn data_dir(settings: &Settings) -> PathBuf {
+    let named = settings.data_dir.clone();
+    let of_environment =
+        || env::var_os(DATA_DIR_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
+    named.or_else(of_environment).unwrap_or_else(|| DEFAULT_DATA_DIR.into())
+}
+
+/// Whether something listens at the default address.
+async fn is_answered() -> bool {
+    let connecting = TcpStream::connect(SocketAddr::from(DEFAULT_LISTEN));
+    timeout(ANSWER_TIME, connecting).await.is_ok_and(|connected| connected.is_ok())
+}
