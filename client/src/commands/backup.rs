@@ -1,6 +1,9 @@
 //! `swarmctl backup`: a copy of a data directory that is whole.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use coordinator::store::{self, Backup};
@@ -22,7 +25,9 @@ pub struct BackupArgs {
 }
 
 const HELP: &str = "\
-Exit code 11, and no copy, if the database is damaged.
+Exit code 11 if something is damaged. Experiments that are damaged are named, and are in the
+copy as they are, beside all that are sound. If the database as a whole is damaged, there is
+no copy.
 
 Examples:
   swarmctl backup --data-dir ./swarm-data backups/$(date +%F)
@@ -31,7 +36,20 @@ Examples:
 /// Makes the copy.
 pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
     match store::backup(data_dir, &args.to).map_err(|error| Error::from_store(&error))? {
-        Backup::Made(inspection) => print_inspection(&inspection, progress),
+        Backup::Made(inspection) => {
+            print_inspection(&inspection, progress)?;
+            let damaged: BTreeSet<u64> =
+                inspection.findings.iter().filter_map(|it| Some(it.experiment?.0)).collect();
+            if damaged.is_empty() {
+                return Ok(());
+            }
+            let damaged: Vec<String> = damaged.iter().map(ToString::to_string).collect();
+            Err(Error::Damaged(format!(
+                "the copy is made, and in it these experiments are damaged, as they are in {}: {}",
+                data_dir.display(),
+                damaged.join(", ")
+            )))
+        }
         Backup::Damaged(inspection) => {
             print_inspection(&inspection, progress)?;
             let database = inspection.path.display();

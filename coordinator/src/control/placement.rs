@@ -190,7 +190,7 @@ fn resume(
                 return Ok(Some(Placement::Runs(Box::new(runnable))));
             }
             // It is computed anew instead.
-            Err(error @ StoreError::Unsound { .. }) => {
+            Err(error @ (StoreError::Unsound { .. } | StoreError::NoCheckpoint(_))) => {
                 warn!("{error}; a new experiment begins in its place");
             }
             Err(error) => return Err(error),

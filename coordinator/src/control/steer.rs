@@ -82,6 +82,7 @@ impl Control {
         }
         let keyframe = match self.keyframe(id).await {
             Ok(keyframe) => Some(keyframe),
+            Err(ControlError::Query(QueryError::Store(StoreError::NoCheckpoint(_)))) => None,
             // Of what ended early, older versions kept nothing to go on from.
             Err(ControlError::Query(QueryError::Store(StoreError::Unsound { .. })))
                 if !experiment.can_be_continued() =>

@@ -22,7 +22,7 @@ pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
         return Err(QueryError::NoGeneration { experiment: id, generation, n_generations });
     }
     if experiment.log_from > generation {
-        let why = Gap::before(&experiment, generation);
+        let why = Gap::before(store, &experiment, generation);
         return Err(QueryError::NotInLog { experiment: id, generation, why });
     }
     let Evidence { history, log, keyframes, champion } = store.evidence(&experiment)?;

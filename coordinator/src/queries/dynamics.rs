@@ -33,7 +33,7 @@ impl StoredDynamics {
         let own = experiment.fork.as_ref().map_or(0, |fork| fork.generation + 1);
         let first = from.max(own);
         if first < experiment.log_from {
-            let why = Gap::before(&experiment, first);
+            let why = Gap::before(store, &experiment, first);
             return Err(QueryError::NotInLog { experiment: id, generation: first, why });
         }
         if first >= n_generations {

@@ -6,7 +6,7 @@ use evolution::{Checkpoint, Evolution, Generation, Told};
 
 use crate::{
     ids::ExperimentId,
-    store::{ExperimentRecord, GenerationRecord, LogGap, Store},
+    store::{ExperimentRecord, ForkRecord, GenerationRecord, LogGap, Store},
 };
 
 use super::{QueryError, experiment};
@@ -37,7 +37,7 @@ impl StoredGeneration {
     /// Reads what a generation is computed from.
     pub fn read(store: &Store, id: ExperimentId, generation: u64) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?;
-        check_in_log(&experiment, generation)?;
+        check_in_log(store, &experiment, generation)?;
         let (checkpoint, of, told) = store
             .generation_in_log(id, generation)?
             .ok_or(QueryError::DamagedLog { experiment: id, generation })?;
@@ -69,6 +69,7 @@ impl StoredGeneration {
 
 /// That the fitness log of an experiment has a generation.
 pub(super) fn check_in_log(
+    store: &Store,
     experiment: &ExperimentRecord,
     generation: u64,
 ) -> Result<(), QueryError> {
@@ -77,7 +78,7 @@ pub(super) fn check_in_log(
         return Err(QueryError::NoGeneration { experiment: id, generation, n_generations });
     }
     if generation < experiment.log_from {
-        let why = Gap::before(experiment, generation);
+        let why = Gap::before(store, experiment, generation);
         return Err(QueryError::NotInLog { experiment: id, generation, why });
     }
     Ok(())
@@ -89,17 +90,21 @@ pub struct Gap {
     /// The first generation that is.
     first: u64,
     gap: LogGap,
-    /// Where it is found instead.
-    elsewhere: Option<String>,
+    /// The parent of a fork, and the generation there.
+    elsewhere: Option<(ExperimentId, u64)>,
+    /// Whether that is in the database.
+    is_there: bool,
 }
 
 impl Gap {
-    pub(super) fn before(experiment: &ExperimentRecord, generation: u64) -> Self {
-        let elsewhere = experiment.fork.as_ref().filter(|fork| generation <= fork.generation);
+    pub(super) fn before(store: &Store, experiment: &ExperimentRecord, generation: u64) -> Self {
+        let fork = experiment.fork.as_ref().filter(|fork| generation <= fork.generation);
+        let is_there = |fork: &ForkRecord| matches!(store.experiment(fork.parent), Ok(Some(_)));
         Self {
             first: experiment.log_from,
             gap: experiment.log_gap,
-            elsewhere: elsewhere.map(|fork| format!("{}@{generation}", fork.parent)),
+            elsewhere: fork.map(|fork| (fork.parent, generation)),
+            is_there: fork.is_some_and(is_there),
         }
     }
 }
@@ -108,7 +113,14 @@ impl fmt::Display for Gap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let first = self.first;
         match (&self.elsewhere, self.gap) {
-            (Some(elsewhere), _) => write!(f, "it is that of the parent: ask for {elsewhere}"),
+            (Some((parent, generation)), _) if self.is_there => {
+                write!(f, "it is that of the parent: ask for {parent}@{generation}")
+            }
+            (Some((parent, _)), _) => write!(
+                f,
+                "it was that of the parent, experiment {parent}, which is deleted; its own \
+                 generations begin with {first}"
+            ),
             (None, LogGap::Pruned) => {
                 write!(f, "its fitness log was pruned before generation {first}")
             }

@@ -38,7 +38,7 @@ impl StoredLineage {
             )));
         };
         let experiment = experiment(store, id)?;
-        check_in_log(&experiment, generation)?;
+        check_in_log(store, &experiment, generation)?;
         let first = generation.saturating_sub(depth.into()).max(experiment.log_from);
         let damaged = || QueryError::DamagedLog { experiment: id, generation };
         let (checkpoint, ..) = store.generation_in_log(id, first)?.ok_or_else(damaged)?;

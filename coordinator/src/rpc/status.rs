@@ -22,9 +22,11 @@ impl From<StoreError> for Status {
         match error {
             // Not UNAVAILABLE, which is what clients make up when there is no coordinator.
             StoreError::Unavailable(_) => Self::resource_exhausted(text),
-            StoreError::Ended(_) | StoreError::Unfinished(_) | StoreError::Unsound { .. } => {
-                Self::failed_precondition(text)
-            }
+            StoreError::Ended(_)
+            | StoreError::Unfinished(_)
+            | StoreError::NeededByForks { .. }
+            | StoreError::NoCheckpoint(_)
+            | StoreError::Unsound { .. } => Self::failed_precondition(text),
             StoreError::TakenOver { .. } => Self::unavailable(text),
             StoreError::Corrupt(_) => Self::data_loss(text),
             _ => Self::internal(text),

@@ -1,9 +1,9 @@
 //! The table of champions.
 
-use rusqlite::{Connection, OptionalExtension, Row, Transaction, params};
+use rusqlite::{Connection, OptionalExtension, Row, Transaction, params, types::ValueRef};
 
 use crate::ids::ExperimentId;
-use evolution::{Champion, ChampionSource, HeldOut, Judged};
+use evolution::{Champion, ChampionSource, HeldOut, Judged, Real};
 
 use super::{
     StoreError,
@@ -33,8 +33,10 @@ pub fn put(
                  judged_low, judged_high, judged_trials, judged_generation)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
     )?;
-    let (trial_fitness, genotype) = (to_json(&champion.trial_fitness), to_json(&champion.genotype));
-    let seal = seal_of(sealer, id, champion, &trial_fitness, &genotype, latest, digest);
+    let trial_fitness = to_json(&champion.trial_fitness)?;
+    let genotype = to_json(&champion.genotype)?;
+    let bounds = bounds(champion);
+    let seal = seal_of(sealer, id, champion, bounds, &trial_fitness, &genotype, latest, digest);
     statement.execute(params![
         id.0,
         champion.generation,
@@ -55,12 +57,21 @@ pub fn put(
     Ok(())
 }
 
-/// The seal of a champion, whose lists are given as they are stored. It covers the end of
+/// The ends of a champion's intervals.
+fn bounds(champion: &Champion) -> [f64; 3] {
+    let ci95 = champion.held_out.map_or(0.0, |it| it.ci95.get());
+    let (low, high) = champion.judged.map_or((0.0, 0.0), |it| (it.low.get(), it.high.get()));
+    [ci95, low, high]
+}
+
+/// The seal of a champion, whose lists and intervals are given as they are stored. It covers the end of
 /// the history, too, which has no checkpoint any more once the experiment has ended.
+#[expect(clippy::too_many_arguments, reason = "each is a part of what is sealed")]
 fn seal_of(
     sealer: &Sealer,
     id: ExperimentId,
     champion: &Champion,
+    [ci95, low, high]: [f64; 3],
     trial_fitness: &str,
     genotype: &str,
     latest: Option<u64>,
@@ -76,12 +87,12 @@ fn seal_of(
     if let ChampionSource::Individual(individual) = champion.source {
         seal = seal.text(b"individual").number(individual.into());
     }
-    if let Some(HeldOut { mean, ci95, n_trials, generation }) = champion.held_out {
-        seal = seal.text(b"held out").real(mean.get()).real(ci95.get());
+    if let Some(HeldOut { mean, n_trials, generation, .. }) = champion.held_out {
+        seal = seal.text(b"held out").real(mean.get()).real(ci95);
         seal = seal.number(n_trials).number(generation);
     }
-    if let Some(Judged { mean, low, high, n_trials, generation }) = champion.judged {
-        seal = seal.text(b"judged").real(mean.get()).real(low.get()).real(high.get());
+    if let Some(Judged { mean, n_trials, generation, .. }) = champion.judged {
+        seal = seal.text(b"judged").real(mean.get()).real(low).real(high);
         seal = seal.number(n_trials.into()).number(generation);
     }
     seal.finish()
@@ -94,6 +105,9 @@ struct Stored {
     trial_fitness: String,
     genotype: String,
     seal: Vec<u8>,
+    /// Which of the ends of its intervals are NULL: older versions wrote that where they
+    /// could not compute one.
+    are_unknown: [bool; 3],
     /// The experiment's latest generation and the digest of everything so far.
     latest: Option<u64>,
     digest: String,
@@ -117,7 +131,7 @@ impl Stored {
         let held_out = match row.get::<_, Option<f64>>(4)? {
             Some(_) => Some(HeldOut {
                 mean: real(row, 4)?,
-                ci95: real(row, 5)?,
+                ci95: bound(row, 5, f64::INFINITY)?,
                 n_trials: row.get(6)?,
                 generation: row.get(7)?,
             }),
@@ -126,13 +140,18 @@ impl Stored {
         let judged = match row.get::<_, Option<f64>>(11)? {
             Some(_) => Some(Judged {
                 mean: real(row, 11)?,
-                low: real(row, 12)?,
-                high: real(row, 13)?,
+                low: bound(row, 12, f64::NEG_INFINITY)?,
+                high: bound(row, 13, f64::INFINITY)?,
                 n_trials: row.get(14)?,
                 generation: row.get(15)?,
             }),
             None => None,
         };
+        let is_null =
+            |column: usize| Ok::<_, rusqlite::Error>(row.get_ref(column)? == ValueRef::Null);
+        let (has_held_out, has_judged) = (held_out.is_some(), judged.is_some());
+        let are_unknown =
+            [has_held_out && is_null(5)?, has_judged && is_null(12)?, has_judged && is_null(13)?];
         let champion = Champion {
             generation: row.get(0)?,
             source: individual.map_or(ChampionSource::Mean, ChampionSource::Individual),
@@ -146,6 +165,7 @@ impl Stored {
             trial_fitness: row.get(2)?,
             genotype: row.get(3)?,
             seal: row.get(8)?,
+            are_unknown,
             digest: row.get(9)?,
             latest: row.get(10)?,
         })
@@ -153,8 +173,25 @@ impl Stored {
 
     /// The seal that it should have.
     fn expected_seal(&self, sealer: &Sealer, id: ExperimentId) -> Seal {
+        self.seal_with(f64::NAN, sealer, id)
+    }
+
+    /// Whether it is what was stored.
+    fn is_sound(&self, sealer: &Sealer, id: ExperimentId) -> bool {
+        // Processors differ in the sign of what is not a number.
+        [f64::NAN, -f64::NAN].iter().any(|&nan| self.seal_with(nan, sealer, id)[..] == self.seal)
+    }
+
+    /// The seal that it has if the ends that are NULL were this.
+    fn seal_with(&self, unknown: f64, sealer: &Sealer, id: ExperimentId) -> Seal {
         let Self { champion, trial_fitness, genotype, latest, digest, .. } = self;
-        seal_of(sealer, id, champion, trial_fitness, genotype, *latest, digest)
+        let mut bounds = bounds(champion);
+        for (bound, is_unknown) in bounds.iter_mut().zip(self.are_unknown) {
+            if is_unknown {
+                *bound = unknown;
+            }
+        }
+        seal_of(sealer, id, champion, bounds, trial_fitness, genotype, *latest, digest)
     }
 }
 
@@ -183,7 +220,7 @@ pub fn get(
         StoreError::Corrupt(format!("the champion of experiment {id}: {why}"))
     };
     let Some(stored) = Stored::read(connection, id)? else { return Ok(None) };
-    if sealer.is_some_and(|sealer| stored.expected_seal(sealer, id)[..] != stored.seal) {
+    if sealer.is_some_and(|sealer| !stored.is_sound(sealer, id)) {
         return Err(corrupt(&"it, or the end of the history, is not what was stored"));
     }
     let list = |text: &str| serde_json::from_str(text).map_err(|error| corrupt(&error));
@@ -191,6 +228,19 @@ pub fn get(
     Ok(Some(Champion { trial_fitness, genotype, ..stored.champion }))
 }
 
-fn to_json(values: &[f64]) -> String {
-    serde_json::to_string(values).expect("numbers serialise")
+/// The end of an interval; `unknown`: what an end that is NULL is as far as anybody knows.
+fn bound(row: &Row<'_>, column: usize, unknown: f64) -> rusqlite::Result<Real> {
+    match row.get_ref(column)? {
+        ValueRef::Null => Ok(Real::new(unknown).expect("infinity is a number")),
+        _ => real(row, column),
+    }
+}
+
+/// JSON has no number for what is not finite, and its `null` could not be read again.
+fn to_json(values: &[f64]) -> rusqlite::Result<String> {
+    if !values.iter().all(|value| value.is_finite()) {
+        let what = "a list with a value that is not finite is not stored";
+        return Err(rusqlite::Error::ToSqlConversionFailure(what.into()));
+    }
+    Ok(serde_json::to_string(values).expect("numbers serialise"))
 }

@@ -2,7 +2,7 @@
 
 use rusqlite::Transaction;
 
-use super::{Result, Store, StoreError, experiments, fitness_log};
+use super::{Result, Store, StoreError, experiments, fitness_log, forks};
 use crate::ids::ExperimentId;
 
 /// The tables with rows of experiments, those that others refer to last.
@@ -11,13 +11,16 @@ const TABLES: [&str; 6] =
 
 impl Store {
     /// Deletes an experiment that has ended, with all that belongs to it; its number is not
-    /// used again. Returns how many bytes of the database that frees.
+    /// used again. [`StoreError::NeededByForks`] if it has forks. Returns how many bytes of the
+    /// database that frees.
     pub fn delete(&mut self, id: ExperimentId) -> Result<u64> {
         self.write(|transaction, _| {
             let Some(found) = experiments::get(transaction, id)? else { return Ok(0) };
             if found.state.is_unfinished() {
                 return Err(StoreError::Unfinished(id));
             }
+            // Forks of forks lead here, too, so it is kept even if its own log is gone.
+            forks::check_unneeded(transaction, id, 0)?;
             let free_before = free_len(transaction)?;
             for table in TABLES {
                 let sql = format!("DELETE FROM {table} WHERE experiment_id = ?1");

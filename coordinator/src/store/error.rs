@@ -112,6 +112,12 @@ pub enum StoreError {
         /// The database.
         path: PathBuf,
     },
+    /// An experiment that has ended is sound, and has nothing to go on from.
+    #[error(
+        "experiment {0} has ended, and nothing is left that it could go on from: its fitness log was \
+         damaged, or an older version kept none; submit its file again to have it computed anew"
+    )]
+    NoCheckpoint(ExperimentId),
     /// There is nothing to look at or to copy.
     #[error("there is no database {}; give the coordinator's --data-dir", path.display())]
     NoDatabase {
@@ -147,6 +153,20 @@ pub enum StoreError {
     /// The experiment has not ended, and goes on from its fitness log.
     #[error("experiment {0} has not ended, and goes on from its fitness log; prune it afterwards")]
     Unfinished(ExperimentId),
+    /// Forks of the experiment share generations with it that are nowhere else.
+    #[error(
+        "experiment {id} has generations of its {} in its fitness log, and nothing else has them; \
+         to lose them, delete {} first: {}",
+        named(forks, "fork", "forks"),
+        if forks.len() == 1 { "that" } else { "those" },
+        forks.iter().map(|fork| format!("swarmctl delete {fork}")).collect::<Vec<_>>().join("; ")
+    )]
+    NeededByForks {
+        /// The experiment.
+        id: ExperimentId,
+        /// Its forks, the latest first.
+        forks: Vec<ExperimentId>,
+    },
     /// Anything else is a bug.
     #[error("the database refuses an operation: {0}; please report this")]
     Bug(rusqlite::Error),
@@ -182,6 +202,16 @@ impl From<rusqlite::Error> for StoreError {
         ) {
             return Self::Corrupt(error.to_string());
         }
+        // Statements are right for the schema: tables of another one are damage, or another
+        // program's. What SQLite says begins with the fault, and ends with the whole statement.
+        let missing = match &error {
+            rusqlite::Error::SqlInputError { msg, .. } => Some(msg),
+            rusqlite::Error::SqliteFailure(_, Some(msg)) if msg.starts_with("no such") => Some(msg),
+            _ => None,
+        };
+        if let Some(what) = missing {
+            return Self::Corrupt(format!("its tables are not those of its version: {what}"));
+        }
         match error.sqlite_error_code() {
             Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
             Some(
@@ -190,6 +220,13 @@ impl From<rusqlite::Error> for StoreError {
             _ => Self::Bug(error),
         }
     }
+}
+
+/// "fork 3", "forks 4, 3".
+fn named(ids: &[ExperimentId], one: &str, several: &str) -> String {
+    let what = if ids.len() == 1 { one } else { several };
+    let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+    format!("{what} {}", ids.join(", "))
 }
 
 /// The directory of a database.

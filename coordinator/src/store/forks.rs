@@ -21,6 +21,17 @@ pub struct ForkRecord {
     pub changes: Vec<String>,
 }
 
+/// Checks that no fork shares a generation from `first` on with an experiment.
+pub fn check_unneeded(connection: &Connection, id: ExperimentId, first: u64) -> Result<()> {
+    let mut statement = connection.prepare_cached(
+        "SELECT experiment_id FROM forks WHERE parent_id = ?1 AND generation >= ?2
+         ORDER BY experiment_id DESC",
+    )?;
+    let forks = statement.query_map(params![id.0, first], |row| row.get(0).map(ExperimentId))?;
+    let forks: Vec<ExperimentId> = forks.collect::<rusqlite::Result<_>>()?;
+    if forks.is_empty() { Ok(()) } else { Err(StoreError::NeededByForks { id, forks }) }
+}
+
 /// Adds where an experiment comes from.
 pub fn put(
     transaction: &Transaction<'_>,

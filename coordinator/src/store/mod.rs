@@ -309,7 +309,8 @@ impl Store {
         })
     }
 
-    /// Deletes the fitness log of an experiment that has ended. `keyframe`: evolution as it is
+    /// Deletes the fitness log of an experiment that has ended, unless forks share generations
+    /// of it ([`StoreError::NeededByForks`]). `keyframe`: evolution as it is
     /// now, from which more generations would continue. Returns how many bytes are free.
     pub fn prune(&mut self, id: ExperimentId, keyframe: Option<&[u8]>, now_ms: u64) -> Result<u64> {
         self.write(|transaction, sealer| {
@@ -321,6 +322,7 @@ impl Store {
             if found.log_from >= n_generations {
                 return Ok(0);
             }
+            forks::check_unneeded(transaction, id, found.log_from)?;
             let n_deleted = fitness_log::delete(transaction, id)?;
             fitness_log::begin_at(transaction, id, n_generations, LogGap::Pruned)?;
             if let Some(state) = keyframe {

@@ -122,6 +122,12 @@ pub struct ExperimentRecord {
 }
 
 impl ExperimentRecord {
+    /// Whether it has ended, and neither log nor keyframe was kept of it.
+    pub fn has_no_log(&self) -> bool {
+        let has_gap = matches!(self.log_gap, LogGap::Damaged | LogGap::Older);
+        !self.state.is_unfinished() && has_gap && self.log_from >= self.n_generations()
+    }
+
     /// Completed generations, with those that a fork shares with its parent.
     pub fn n_generations(&self) -> u64 {
         self.latest.as_ref().map_or(0, |latest| latest.generation + 1)

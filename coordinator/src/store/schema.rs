@@ -279,7 +279,7 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     if found < MIGRATIONS.len() {
         let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         for statements in &MIGRATIONS[found..] {
-            transaction.execute_batch(statements)?;
+            transaction.execute_batch(statements).map_err(of_other_tables)?;
         }
         // What seals cover is read from the latest tables.
         if (found as i64) < SEALED {
@@ -298,6 +298,30 @@ pub fn migrate(connection: &mut Connection) -> Result<(), StoreError> {
     }
     connection.pragma_update(None, "foreign_keys", true)?;
     Ok(())
+}
+
+/// What a database of the latest version, or read as if it were, lacks of its tables.
+pub fn missing(connection: &Connection) -> Option<String> {
+    let tables =
+        ["experiments", "generations", "events", "champions", "fitness_log", "keyframes", "forks"];
+    tables.iter().find_map(|table| {
+        let key = if *table == "experiments" { "id" } else { "experiment_id" };
+        let looked = connection.prepare(&format!("SELECT {key} FROM {table} LIMIT 0"));
+        match looked.err()? {
+            rusqlite::Error::SqlInputError { msg, .. } => Some(msg),
+            error => Some(error.to_string()),
+        }
+    })
+}
+
+/// Why a database cannot be migrated: what is a bug elsewhere is another schema here.
+fn of_other_tables(error: rusqlite::Error) -> StoreError {
+    let error = match StoreError::from(error) {
+        StoreError::Bug(error) => error.to_string(),
+        other => return other,
+    };
+    let what = error.lines().next().unwrap_or_default();
+    StoreError::Corrupt(format!("its tables are not those of its version: {what}"))
 }
 
 /// Lets a database of an older version be read as if it were of the latest, without

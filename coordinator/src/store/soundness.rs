@@ -1,41 +1,30 @@
 //! What a run continues from, and whether it is what was stored.
 
 use evolution::Checkpoint;
-use rusqlite::params;
+use rusqlite::{Connection, params};
 
 use super::{
     ExperimentRecord, ExperimentState, Result, Store, StoreError, add_notice, add_state_event,
-    experiments, fitness_log, forks, seals,
+    experiments, fitness_log, forks,
+    seals::{self, Sealer},
 };
 use crate::ids::ExperimentId;
 
 impl Store {
     /// An experiment and its checkpoint, both as they were stored;
-    /// [`StoreError::Unsound`] if one of them is not.
+    /// [`StoreError::Unsound`] if one of them is not, [`StoreError::NoCheckpoint`] if it has ended
+    /// and kept none.
     pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, Checkpoint)> {
         self.read(|connection| {
-            let unsound = |what: &str| self.unsound(id, what.to_owned());
-            let found = match experiments::get(connection, id) {
-                Err(StoreError::Corrupt(what)) => return Err(self.unsound(id, what)),
-                other => other?.ok_or_else(|| unsound("it is not there"))?,
+            let what = match resumable(connection, &self.sealer, id)? {
+                Ok(found) => return Ok(found),
+                Err(what) => what,
             };
-            let (seal, expected) = seals::experiment_seal(connection, &self.sealer, id)?;
-            if seal != expected {
-                return Err(unsound("its configuration is not what was stored"));
+            // Where nothing was kept, nothing is damaged.
+            match experiments::get(connection, id) {
+                Ok(Some(ended)) if ended.has_no_log() => Err(StoreError::NoCheckpoint(id)),
+                _ => Err(self.unsound(id, what)),
             }
-            // Its seal.
-            if let Err(StoreError::Corrupt(what)) = forks::get(connection, Some(&self.sealer), id) {
-                return Err(unsound(&what));
-            }
-            let n_generations = found.latest.as_ref().map_or(0, |latest| latest.generation + 1);
-            let sealer = Some(&self.sealer);
-            let is_whole = fitness_log::ends_at(connection, id, n_generations)?;
-            let checkpoint = fitness_log::checkpoint(connection, sealer, id, n_generations)?
-                .filter(|_| is_whole)
-                .ok_or_else(|| {
-                    unsound("its checkpoint, or the end of its history, is not what was stored")
-                })?;
-            Ok((found, checkpoint))
         })
     }
 
@@ -62,6 +51,35 @@ impl Store {
             Ok(())
         })
     }
+}
+
+/// An experiment and its checkpoint, or what of them is not what was stored: the verdict of a
+/// coordinator that goes on, and of whoever looks at the database.
+pub fn resumable(
+    connection: &Connection,
+    sealer: &Sealer,
+    id: ExperimentId,
+) -> Result<Result<(ExperimentRecord, Checkpoint), String>> {
+    let found = match experiments::get(connection, id) {
+        Err(StoreError::Corrupt(what)) => return Ok(Err(what)),
+        other => other?,
+    };
+    let Some(found) = found else { return Ok(Err("it is not there".to_owned())) };
+    let (seal, expected) = seals::experiment_seal(connection, sealer, id)?;
+    if seal != expected {
+        return Ok(Err("its configuration is not what was stored".to_owned()));
+    }
+    // Its seal.
+    if let Err(StoreError::Corrupt(what)) = forks::get(connection, Some(sealer), id) {
+        return Ok(Err(what));
+    }
+    let n_generations = found.latest.as_ref().map_or(0, |latest| latest.generation + 1);
+    let is_whole = fitness_log::ends_at(connection, id, n_generations)?;
+    let checkpoint = fitness_log::checkpoint(connection, Some(sealer), id, n_generations)?;
+    Ok(match checkpoint.filter(|_| is_whole) {
+        Some(checkpoint) => Ok((found, checkpoint)),
+        None => Err("its checkpoint, or the end of its history, is not what was stored".to_owned()),
+    })
 }
 
 #[cfg(test)]

@@ -15,9 +15,10 @@ use super::{
 /// What became of a backup.
 #[derive(Debug)]
 pub enum Backup {
-    /// The copy is where it was wanted, and sound.
+    /// The copy is where it was wanted. Experiments that are damaged are in it as they are, and
+    /// are findings; everything else is sound.
     Made(Inspection),
-    /// The database is damaged, so that there is no copy.
+    /// The database as a whole is damaged, so that there is no copy.
     Damaged(Inspection),
 }
 
@@ -42,7 +43,8 @@ pub fn backup(directory: &Path, to: &Path) -> Result<Backup> {
             return Err(error);
         }
     };
-    if !inspection.findings.is_empty() {
+    // A damaged experiment takes no other one's backup.
+    if inspection.findings.iter().any(|finding| finding.experiment.is_none()) {
         abandon(to);
         return Ok(Backup::Damaged(Inspection { path: from, ..inspection }));
     }

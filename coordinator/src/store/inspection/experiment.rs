@@ -9,11 +9,12 @@ use super::{
         ExperimentState, ForkRecord, GenerationRecord, LogGap, StoreError, champions, forks,
         history,
         seals::{self, Sealer},
+        soundness,
     },
     log::{self, SoundLog},
     source::Source,
 };
-use crate::ids::ExperimentId;
+use crate::{ids::ExperimentId, runs::restore_evolution};
 
 /// What there is of an experiment. A part that is none is damaged.
 #[derive(Debug)]
@@ -132,6 +133,11 @@ impl Inspected {
                         .is_some());
         }
         let events = keep(&mut problems, read_events(connection, id, history.as_deref()));
+        // The coordinator's own verdict. Of what ended, it goes on only if it is asked to.
+        let is_unfinished = row.as_ref().is_some_and(ExperimentRow::is_unfinished);
+        if let (true, true, Some(sealer)) = (is_unfinished, can_go_on, sealer) {
+            can_go_on = keep(&mut problems, check_resumable(connection, sealer, id)).is_some();
+        }
         let mut inspected = Self { id, row, history, champion, log, can_go_on, events, problems };
         inspected.find_what_is_missing();
         inspected
@@ -170,6 +176,21 @@ impl Inspected {
             self.problems.push("its champion is gone".to_owned());
         }
     }
+}
+
+/// What a coordinator that starts looks at before an experiment goes on.
+fn check_resumable(
+    connection: &Connection,
+    sealer: &Sealer,
+    id: ExperimentId,
+) -> Result<(), String> {
+    let resumable = soundness::resumable(connection, sealer, id);
+    let (experiment, checkpoint) = resumable.map_err(|error| error.to_string())??;
+    // Another version of the simulation lets it wait.
+    if experiment.fingerprint == sim_core::FINGERPRINT {
+        restore_evolution(&experiment, &checkpoint)?;
+    }
+    Ok(())
 }
 
 /// A part, or none and what is wrong with it.

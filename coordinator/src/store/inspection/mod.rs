@@ -87,3 +87,5 @@ fn inspect_file(path: &Path, restore: &str) -> Result<Inspection> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod verdicts;

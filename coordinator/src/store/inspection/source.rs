@@ -68,6 +68,13 @@ impl Source {
         if (1..schema::VERSION).contains(&version) {
             schema::read_as_latest(&connection, version)?;
         }
+        if damage.is_empty() {
+            damage.extend(
+                schema::missing(&connection).map(|what| {
+                    format!("its tables are not those of its version, {version}: {what}")
+                }),
+            );
+        }
         Ok(Self { connection, version, sealer, damage })
     }
 

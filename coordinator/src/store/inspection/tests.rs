@@ -18,7 +18,7 @@ use crate::store::{
 };
 
 /// Commits a generation of a real evolution, whose fitness is its index.
-fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
+pub fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
     advance_to(false, store, id, completed);
 }
 
@@ -63,18 +63,18 @@ fn store_in(directory: &Path) -> Store {
     store
 }
 
-fn data_directory() -> TempDir {
+pub fn data_directory() -> TempDir {
     let directory = tempfile::tempdir().unwrap();
     drop(store_in(directory.path()));
     directory
 }
 
-fn edit(directory: &Path, sql: &str) {
+pub fn edit(directory: &Path, sql: &str) {
     let database = Connection::open(file::path_in(directory)).unwrap();
     database.execute_batch(sql).unwrap();
 }
 
-fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
+pub fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
     let findings = inspect(directory).unwrap().findings;
     findings.into_iter().map(|f| (f.experiment.map(|id| id.0), f.what)).collect()
 }
@@ -389,10 +389,10 @@ fn an_interrupted_backup_is_made_again() {
 #[test]
 fn there_is_no_backup_of_a_damaged_database() {
     let directory = data_directory();
-    edit(directory.path(), "UPDATE keyframes SET state = x'7b7d' WHERE experiment_id = 2");
+    edit(directory.path(), "PRAGMA foreign_keys = off; DELETE FROM experiments WHERE id = 3");
     let to = directory.path().join("backup");
     let Backup::Damaged(inspection) = backup(directory.path(), &to).unwrap() else { panic!() };
-    assert_eq!(inspection.findings[0].experiment, Some(ExperimentId(2)));
+    assert!(inspection.findings.iter().any(|finding| finding.experiment.is_none()));
     assert!(!to.exists());
     let nothing = directory.path().join("nothing");
     assert!(matches!(backup(&nothing, &to), Err(StoreError::NoDatabase { .. })));
