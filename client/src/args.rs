@@ -34,6 +34,9 @@ pub struct Args {
         value_name = "FORMAT"
     )]
     pub output: OutputFormat,
+    /// Say more while experiments are followed: digests of generations, and what is optimistic.
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
     #[command(flatten)]
     pub settings: Settings,
     /// The command.

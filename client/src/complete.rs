@@ -1,9 +1,9 @@
 //! Numbers and names of experiments, for a shell that completes them.
 
-use std::{collections::BTreeMap, ffi::OsStr, thread, time::Duration};
+use std::{collections::BTreeMap, env, ffi::OsStr, thread, time::Duration};
 
 use clap::Parser as _;
-use clap_complete::CompletionCandidate;
+use clap_complete::{CompletionCandidate, PathCompleter, engine::ValueCompleter as _};
 use swarm_proto::v1::Experiment;
 use tokio::time::timeout;
 
@@ -18,8 +18,8 @@ use crate::{
 /// Nobody waits longer for a completion.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What a word may become that stands for an experiment or a group: what the coordinator of
-/// the environment and the settings file has; nothing if it does not answer.
+/// What a word may become that stands for an experiment or a group: what there is in the place of
+/// the command line, the environment and the settings file; nothing if it does not answer.
 pub fn experiments(word: &OsStr) -> Vec<CompletionCandidate> {
     // The shell asks from within this program's runtime, which nothing may block.
     let all = thread::spawn(fetch).join().ok().flatten().unwrap_or_default();
@@ -31,9 +31,32 @@ pub fn experiments(word: &OsStr) -> Vec<CompletionCandidate> {
         .collect()
 }
 
+/// The same, and files.
+pub fn experiments_and_files(word: &OsStr) -> Vec<CompletionCandidate> {
+    let mut all = experiments(word);
+    all.extend(PathCompleter::file().complete(word));
+    all
+}
+
+/// What the command line says so far of the place.
+fn place() -> Vec<String> {
+    let words: Vec<String> = env::args().collect();
+    let mut found = vec!["swarmctl".to_owned(), "list".to_owned()];
+    for (i, word) in words.iter().enumerate() {
+        match word.split('=').next() {
+            Some("--data-dir" | "--coordinator") if word.contains('=') => found.push(word.clone()),
+            Some("--data-dir" | "--coordinator") => {
+                found.extend(words.get(i..=i + 1).unwrap_or_default().iter().cloned());
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
 fn fetch() -> Option<Vec<Experiment>> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().ok()?;
-    let args = Args::try_parse_from(["swarmctl", "list"]).ok()?;
+    let args = Args::try_parse_from(place()).ok()?;
     runtime.block_on(async {
         let silent = Progress::new(OutputFormat::Json).silent();
         let connection = Connection::open(args.settings, Intent::Read, &silent);

@@ -33,7 +33,7 @@ use worker::Backoff;
 use crate::{
     args::Subject,
     error::{Error, is_transient},
-    place::{Intent, Place},
+    place::{DEFAULT_DATA_DIR, Intent, Place},
     progress::Progress,
     settings::Settings,
 };
@@ -164,6 +164,12 @@ impl Connection {
             Way::Link(_) => None,
             Way::Here(here) => Some(&here.data_dir),
         }
+    }
+
+    /// The data directory, if commands do not find it by themselves.
+    pub fn named_place(&self) -> Option<String> {
+        let data_dir = self.data_dir().filter(|path| *path != Path::new(DEFAULT_DATA_DIR))?;
+        Some(data_dir.display().to_string())
     }
 
     /// Whether experiments are computed by this process, and by no other.

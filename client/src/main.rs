@@ -45,7 +45,7 @@ async fn main() -> ExitCode {
     // Answers a shell that asks what a command line may become, and ends then.
     CompleteEnv::with_factory(Args::command).complete();
     let args = Args::try_parse().unwrap_or_else(|error| with_suggestions(error).exit());
-    let progress = Progress::new(args.output);
+    let progress = Progress::new(args.output).with_details(args.verbose);
     let result = commands::execute(args, progress).await;
     let Err(error) = result else { return ExitCode::SUCCESS };
     if let Some(report) = error.report() {

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Where `run` and a coordinator keep their data unless told otherwise.
-const DEFAULT_DATA_DIR: &str = "./swarm-data";
+pub const DEFAULT_DATA_DIR: &str = "./swarm-data";
 /// The environment variable that names the data directory.
 const DATA_DIR_VARIABLE: &str = "SWARM_DATA_DIR";
 /// Where a coordinator listens unless told otherwise.

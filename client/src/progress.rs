@@ -23,8 +23,12 @@ use crate::{
     text,
 };
 
+/// How a notice ends that is about trials which have selected somebody.
+const OPTIMISTIC: &str = ", optimistic";
 /// Generations over which the estimate of the remaining time averages.
 const ETA_WINDOW: usize = 20;
+/// A shorter rest is not worth a word where there is no bar.
+const ETA_MIN: Duration = Duration::from_secs(10);
 /// On narrower terminals there is no bar, and no name before it: only numbers.
 const BAR_SCREEN_WIDTH: usize = 70;
 /// Names before the bar are cut to this width.
@@ -39,14 +43,14 @@ pub struct Progress {
     screen: Screen,
     /// Whether remarks are left out.
     is_silent: bool,
+    /// Whether everything is said of experiments that are followed.
+    is_verbose: bool,
     /// Whether a bar can be shown.
     has_terminal: bool,
     /// Hidden unless an experiment is followed on a terminal.
     bar: ProgressBar,
     /// The experiments that are followed, by their numbers.
     followed: BTreeMap<u64, Followed>,
-    /// The latest generations' durations, of one experiment.
-    durations_ms: VecDeque<u64>,
 }
 
 /// What is shown of an experiment that is followed.
@@ -57,6 +61,16 @@ struct Followed {
     /// What tells it apart from the others.
     label: String,
     has_ended: bool,
+    /// The latest generations' durations.
+    durations_ms: VecDeque<u64>,
+}
+
+impl Followed {
+    /// Time that the rest will take if its generations are as fast as the latest ones.
+    fn remaining(&self) -> Duration {
+        let n_left = if self.has_ended { 0 } else { self.generations.saturating_sub(self.done) };
+        remaining(&self.durations_ms, n_left)
+    }
 }
 
 impl Progress {
@@ -74,11 +88,21 @@ impl Progress {
             stdout,
             screen: Screen::default(),
             is_silent: false,
+            is_verbose: false,
             has_terminal: false,
             bar: ProgressBar::hidden(),
             followed: BTreeMap::new(),
-            durations_ms: VecDeque::new(),
         }
+    }
+
+    /// Says everything of experiments that are followed, or what matters at once.
+    pub fn with_details(self, is_verbose: bool) -> Self {
+        Self { is_verbose, ..self }
+    }
+
+    /// Whether everything is said of experiments that are followed.
+    pub fn is_verbose(&self) -> bool {
+        self.is_verbose
     }
 
     /// Makes no remarks.
@@ -166,6 +190,7 @@ impl Progress {
             done: 0,
             label: text::run_label(experiment),
             has_ended: false,
+            durations_ms: VecDeque::new(),
         };
         self.followed = experiments.iter().map(|it| (it.id, followed(it))).collect();
         if self.has_terminal && !self.is_json() {
@@ -193,12 +218,12 @@ impl Progress {
         experiment_id: u64,
         summary: &GenerationSummary,
     ) -> Result<(), Error> {
-        self.durations_ms.truncate(ETA_WINDOW - 1);
-        self.durations_ms.push_front(summary.duration_ms);
         let is_alone = self.followed.len() == 1;
         let (mut generations, mut label) = (0, String::new());
         if let Some(followed) = self.followed.get_mut(&experiment_id) {
             followed.done = summary.generation + 1;
+            followed.durations_ms.truncate(ETA_WINDOW - 1);
+            followed.durations_ms.push_front(summary.duration_ms);
             generations = followed.generations;
             label.clone_from(&followed.label);
         }
@@ -210,20 +235,37 @@ impl Progress {
                 let done = self.followed.values().map(|followed| followed.done).sum();
                 let fitness = text::fitness(summary);
                 self.bar.set_position(done);
+                let eta = format!("ETA {}", FormattedDuration(self.remaining()));
                 let parts = if is_alone {
-                    let eta = remaining(&self.durations_ms, generations.saturating_sub(done));
-                    [format!("ETA {}", FormattedDuration(eta)), fitness, String::new()]
+                    [eta, fitness, String::new(), String::new()]
                 } else {
                     let n_ended = self.followed.values().filter(|it| it.has_ended).count();
                     let ended = format!("{n_ended} of {} runs ended", self.followed.len());
-                    [ended, label, fitness]
+                    [eta, ended, label, fitness]
                 };
                 self.set_message(&parts);
                 Ok(())
             }
-            _ if is_alone => self.print(&text::generation(summary, generations)),
-            _ => self.print(&format!("{label}  {}", text::generation(summary, generations))),
+            _ => {
+                let mut line = text::generation(summary, generations);
+                if !is_alone {
+                    line = format!("{label}  {line}");
+                }
+                let eta = self.remaining();
+                if eta >= ETA_MIN {
+                    line += &format!("  ETA {}", FormattedDuration(eta));
+                }
+                if self.is_verbose {
+                    line += &format!("  digest {}", text::short(&summary.digest));
+                }
+                self.print(&line)
+            }
         }
+    }
+
+    /// Time until all have ended that are followed: they are computed side by side.
+    fn remaining(&self) -> Duration {
+        self.followed.values().map(Followed::remaining).max().unwrap_or_default()
     }
 
     /// Shows how much of something long is done, if there is a terminal.
@@ -241,6 +283,9 @@ impl Progress {
 
     /// A remark about an experiment that is followed.
     pub fn notice(&self, experiment_id: u64, text: &str) {
+        if !self.is_verbose && text.ends_with(OPTIMISTIC) {
+            return;
+        }
         match self.followed.get(&experiment_id) {
             Some(followed) if self.followed.len() > 1 => {
                 self.remark(&format!("{}  {text}", followed.label));
@@ -410,12 +455,42 @@ pub mod tests {
         assert_eq!(remaining(&[1500, 2500].into(), 10), Duration::from_secs(20));
         assert_eq!(remaining(&VecDeque::new(), 10), Duration::ZERO);
         let mut progress = Captured::default().progress(OutputFormat::Json);
+        let run = |id| Experiment { id, generations: 1000, ..Experiment::default() };
+        progress.begin(&[run(1), run(2)]);
         for duration_ms in 0..100 {
             let summary = GenerationSummary { duration_ms, ..Default::default() };
             progress.generation(1, &summary).unwrap();
         }
-        assert_eq!(progress.durations_ms.len(), ETA_WINDOW);
-        assert_eq!(progress.durations_ms.front(), Some(&99));
+        assert_eq!(progress.followed[&1].durations_ms.len(), ETA_WINDOW);
+        assert_eq!(progress.followed[&1].durations_ms.front(), Some(&99));
+        // Of several, the last to end.
+        let slow = GenerationSummary { duration_ms: 60_000, ..Default::default() };
+        progress.generation(2, &slow).unwrap();
+        assert_eq!(progress.remaining(), Duration::from_secs(999 * 60));
+    }
+
+    #[test]
+    fn digests_and_what_is_optimistic_are_for_those_who_ask() {
+        let summary = GenerationSummary { digest: "ab".repeat(32), ..Default::default() };
+        for (is_verbose, n_digests) in [(false, 0), (true, 1)] {
+            let captured = Captured::default();
+            let mut progress = captured.progress(OutputFormat::Table).with_details(is_verbose);
+            progress.begin(&[Experiment { id: 1, generations: 1, ..Experiment::default() }]);
+            progress.generation(1, &summary).unwrap();
+            let lines = captured.lines();
+            let with_digest = lines.iter().filter(|line| line.contains("digest abab"));
+            assert_eq!(with_digest.count(), n_digests, "{lines:?}");
+        }
+    }
+
+    #[test]
+    fn a_long_rest_is_said_without_a_bar() {
+        let captured = Captured::default();
+        let mut progress = captured.progress(OutputFormat::Table);
+        progress.begin(&[Experiment { id: 1, generations: 61, ..Experiment::default() }]);
+        let summary = GenerationSummary { duration_ms: 1000, ..Default::default() };
+        progress.generation(1, &summary).unwrap();
+        assert!(captured.lines()[0].ends_with("ETA 00:01:00"), "{:?}", captured.lines());
     }
 
     #[test]

@@ -22,12 +22,11 @@ pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     let done = summary.generation + 1;
     let width = generations.to_string().len();
     format!(
-        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s  digest {}",
+        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s",
         summary.generation,
         fitness(summary),
         summary.min,
         episodes_per_s(summary),
-        short(&summary.digest),
     )
 }
 
@@ -198,6 +197,7 @@ pub fn end(
     experiment: &Experiment,
     first_best: Option<f64>,
     champion: Option<&GetChampionResponse>,
+    is_verbose: bool,
 ) -> String {
     let mut lines = vec![state_line(experiment)];
     if let Some(best) = first_best {
@@ -208,7 +208,10 @@ pub fn end(
     }
     if let Some(champion) = champion {
         lines.push(row("champion", &champion_line(champion)));
-        lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
+        // Without a judgement, there is nothing else to say what it is worth.
+        if is_verbose || champion.judged.is_none() {
+            lines.extend(selection_line(champion).map(|line| row("champion, optimistic", &line)));
+        }
     }
     if !experiment.digest.is_empty() {
         lines.push(row("digest", &experiment.digest));
@@ -383,7 +386,7 @@ mod tests {
     fn a_generation_is_one_line() {
         assert_eq!(
             generation(&summary(11), 40),
-            "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s  digest 1a2b3c4d5e6f"
+            "12/40  generation 11  best 1.234  mean 0.456  min 0.000  1234 episodes/s"
         );
         assert!(generation(&summary(0), 100).starts_with("  1/100  generation   0  "));
     }
@@ -421,7 +424,7 @@ mod tests {
             }),
             ..GetChampionResponse::default()
         };
-        let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion));
+        let text = end(&experiment(ExperimentState::Completed), Some(0.5), Some(&champion), true);
         assert_eq!(
             text,
             "experiment 3 (leader) completed after 12 of 40 generations\n  \
@@ -432,7 +435,7 @@ mod tests {
              digest                        1a2b3c4d5e6f7a8b"
         );
         let unjudged = GetChampionResponse { judged: None, held_out: None, ..champion };
-        let text = end(&experiment(ExperimentState::Cancelled), None, Some(&unjudged));
+        let text = end(&experiment(ExperimentState::Cancelled), None, Some(&unjudged), false);
         assert!(text.contains("champion                      not judged (individual 4"), "{text}");
         assert!(
             text.contains("champion, optimistic          2.000000 in its generation"),

@@ -6,8 +6,11 @@ mod samples;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 
 use crate::{
+    args::Subject,
+    complete,
     connection::Connection,
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
@@ -24,6 +27,8 @@ use self::{
     samples::{Sample, Samples},
 };
 
+/// Number of last generations of each run that are averaged, unless another is wanted.
+const LAST: u64 = 50;
 /// Points of a curve: an interval costs ten thousand draws.
 const POINTS_MAX: usize = 200;
 
@@ -38,10 +43,10 @@ const POINTS_MAX: usize = 200;
 pub struct CompareArgs {
     /// Names of groups, numbers of experiments, or files: histories (.csv) that `swarmctl
     /// history` wrote and champions (.json) that `swarmctl champion` wrote.
-    #[arg(required = true, value_name = "GROUP|ID|FILE")]
+    #[arg(required = true, value_name = "GROUP|ID|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub runs: Vec<String>,
     /// Number of last generations of each run that are averaged.
-    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = LAST, value_parser = clap::value_parser!(u64).range(1..))]
     pub last: u64,
     /// Also compare how many generations and episodes it takes until the mean fitness of a
     /// generation first reaches F. A run that does not reach it counts as infinitely long.
@@ -99,6 +104,18 @@ pub async fn compare(
     } else {
         report.to_text(progress.screen())
     })
+}
+
+/// Prints the comparison of the runs of a group.
+pub async fn of_group(
+    connection: &Connection,
+    group: &str,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let mut samples = Samples::default();
+    samples.fetch(connection, &Subject::Group(group.to_owned()), progress).await?;
+    let samples = samples.finish()?;
+    progress.print(&Report::new(&samples, LAST, None).to_text(progress.screen()))
 }
 
 /// The course of the samples, as far as all runs of a sample went.

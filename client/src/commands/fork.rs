@@ -1,6 +1,7 @@
 //! `swarmctl fork`: an experiment that goes on from a generation of another one.
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use coordinator::Who;
 use experiment_file::limits;
 use swarm_proto::v1::{ForkPoint, GetExperimentRequest};
@@ -9,6 +10,7 @@ use crate::{
     address::NamedAddress,
     args::{SeedArg, whole},
     change::{self, Change, Json},
+    complete,
     connection::{Connection, present},
     error::Error,
     experiment_file::{ExperimentFile, Overrides, random_request_id},
@@ -31,7 +33,7 @@ use super::{Remote, watch};
 #[command(after_help = HELP)]
 pub struct ForkArgs {
     /// Where: ID@G or NAME@G, after generation G of an experiment.
-    #[arg(value_name = "ID@G")]
+    #[arg(value_name = "ID@G", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
     /// Change the experiment file; may be given several times.
     #[arg(long, value_name = "PATH=VALUE[;...]")]

@@ -1,12 +1,13 @@
 //! `swarmctl individual`: any genotype that was ever evaluated, as JSON.
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use coordinator::Who;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::Remote;
 use crate::{
-    address::NamedAddress, connection::Connection, error::Error, json, progress::Progress,
+    address::NamedAddress, complete, connection::Connection, error::Error, json, progress::Progress,
 };
 
 /// Print a genotype and the network that it encodes, as JSON: the champion, or any
@@ -23,7 +24,7 @@ pub struct IndividualArgs {
     /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
     /// ID@G/mean, the mean of the distribution after generation G; ID@G, all individuals
     /// of generation G, without their networks.
-    #[arg(value_name = "ADDRESS")]
+    #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
 }
 

@@ -3,13 +3,14 @@
 mod draw;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use coordinator::Address;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
 use super::Remote;
 use crate::{
-    address::NamedAddress, args::whole, connection::Connection, error::Error, json,
+    address::NamedAddress, args::whole, complete, connection::Connection, error::Error, json,
     progress::Progress,
 };
 
@@ -24,7 +25,7 @@ use crate::{
 #[command(after_help = HELP)]
 pub struct LineageArgs {
     /// Whom: ID@G/I, individual I of generation G of the experiment of that number or name.
-    #[arg(value_name = "ID@G/I")]
+    #[arg(value_name = "ID@G/I", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
     /// Number of generations to go back.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u32>(1..=1000))]

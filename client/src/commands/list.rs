@@ -3,12 +3,13 @@
 mod filter;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use console::Style;
 use swarm_proto::v1::Experiment;
 
 use super::Remote;
 use crate::{
-    clock,
+    clock, complete,
     connection::Connection,
     error::Error,
     json::{ExperimentDocument, state_name},
@@ -49,6 +50,7 @@ const CSV_KEYS: [&str; 16] = [
 #[command(visible_alias = "ls", after_help = HELP)]
 pub struct ListArgs {
     /// Name of a group of experiments [default: all experiments]
+    #[arg(value_name = "GROUP", add = ArgValueCompleter::new(complete::experiments))]
     group: Option<String>,
     #[command(flatten)]
     filter: Filter,

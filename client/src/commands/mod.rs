@@ -173,7 +173,7 @@ remote_commands! {
 
 /// Executes the command of a command line.
 pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
-    let Args { settings, output, command } = args;
+    let Args { settings, output, command, .. } = args;
     let has_table = matches!(&command, Command::Remote(command) if command.has_table());
     if output == OutputFormat::Csv && !has_table {
         return Err(Error::Input(

@@ -8,8 +8,10 @@ use std::{
 };
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 use sim_core::TrialSet;
+use swarm_proto::v1::JudgedFitness;
 use swarm_web::{Episode, Replay, ReplayError, replay_file};
 
 use self::picture::Moments;
@@ -18,6 +20,7 @@ use crate::{
     address::NamedAddress,
     args::{SeedArg, StepsArg, whole},
     change::Change,
+    complete,
     connection::Connection,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
@@ -37,7 +40,7 @@ use crate::{
 pub struct ReplayArgs {
     /// Whom: ID or NAME, the champion of an experiment; ID@G/I, individual I of generation G;
     /// ID@G/mean, the mean of the distribution after generation G.
-    #[arg(required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
+    #[arg(add = ArgValueCompleter::new(complete::experiments), required_unless_present = "config", conflicts_with_all = ["config", "genotype"])]
     address: Option<NamedAddress>,
     /// Experiment file, instead of that of an experiment; with --genotype.
     #[arg(long, value_name = "FILE", requires = "genotype")]
@@ -52,9 +55,13 @@ pub struct ReplayArgs {
     /// experiment file]
     #[arg(long, value_name = "G", value_parser = whole(0..=u64::MAX))]
     generation: Option<u64>,
-    /// Which world of the generation.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(0..=limits::TRIALS - 1))]
-    trial: u32,
+    /// Which world of the generation [default: of a champion, the trial that is the median of those
+    /// by which it was judged; else 0]
+    #[arg(long, value_name = "N", value_parser = whole(0..=limits::TRIALS - 1))]
+    trial: Option<u32>,
+    /// Which of the trials by which a champion was judged.
+    #[arg(long, value_name = "N", conflicts_with_all = ["trial", "generation", "genotype"])]
+    judged: Option<u32>,
     #[command(flatten)]
     steps: StepsArg,
     /// Change values of the experiment file, such as world.objects.robot.num_instances=20.
@@ -86,7 +93,7 @@ pub async fn replay(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let (path, format) = args.path()?;
-    let (file, genotype, generation) = args.subject(settings, progress).await?;
+    let Subject { file, genotype, generation, judged } = args.subject(settings, progress).await?;
     let mut changes = Vec::new();
     for text in &args.set {
         let parsed = Change::parse_all(text);
@@ -103,7 +110,20 @@ pub async fn replay(
         genotype: &genotype.genes,
         name: &name,
         trial_set: TrialSet::Generation(args.generation.unwrap_or(generation)),
-        trial: args.trial,
+        trial: args.trial.unwrap_or_default(),
+    };
+    let episode = match judged {
+        Some(judged) if args.trial.is_none() && args.generation.is_none() => {
+            let (trial, what) = judged_trial(&episode, &judged, args.judged)?;
+            progress.remark(&what);
+            Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
+        }
+        None if args.judged.is_some() => {
+            return Err(Error::Input(format!(
+                "the {name} has not been judged; name a world of its generation with --trial"
+            )));
+        }
+        _ => episode,
     };
     let bytes = match format {
         Format::Html => html(&episode)?.into_bytes(),
@@ -112,6 +132,48 @@ pub async fn replay(
     fs::write(&path, bytes)
         .map_err(|error| Error::Input(format!("cannot write {}: {error}", path.display())))?;
     progress.print(&path.display().to_string())
+}
+
+/// What plays.
+struct Subject {
+    file: ExperimentFile,
+    genotype: Genotype,
+    /// Whose worlds.
+    generation: u64,
+    judged: Option<JudgedFitness>,
+}
+
+/// The trial of a judgement that is wanted, or the median one; and what is to be said of it.
+fn judged_trial(
+    episode: &Episode<'_>,
+    judged: &JudgedFitness,
+    wanted: Option<u32>,
+) -> Result<(u32, String), Error> {
+    let JudgedFitness { generation, trials: n, .. } = *judged;
+    if let Some(trial) = wanted {
+        if trial >= n {
+            let last = n.saturating_sub(1);
+            return Err(Error::Input(format!("--judged {trial}: the trials are 0 to {last}")));
+        }
+        return Ok((trial, format!("playing trial {trial} of the {n} by which it was judged")));
+    }
+    let trial_set = TrialSet::Judgement(generation);
+    let fitness = episode.simulation.evaluate(episode.genotype, trial_set, 0..n);
+    let fitness = fitness.map_err(|error| Error::Input(format!("{}: {error}", episode.name)))?;
+    let trial = median(&fitness);
+    let value = fitness.get(trial as usize).copied().unwrap_or_default();
+    let what = format!(
+        "playing trial {trial} of the {n} by which it was judged, the median: fitness {value:.6}; \
+         others: --judged N, or --trial N of its generation"
+    );
+    Ok((trial, what))
+}
+
+/// Where the median is; of two, the lower one.
+fn median(fitness: &[f64]) -> u32 {
+    let mut order: Vec<u32> = (0..fitness.len() as u32).collect();
+    order.sort_by(|&a, &b| fitness[a as usize].total_cmp(&fitness[b as usize]));
+    order.get(fitness.len().saturating_sub(1) / 2).copied().unwrap_or_default()
 }
 
 /// What a file holds.
@@ -140,14 +202,11 @@ fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error
 
 impl ReplayArgs {
     /// The experiment, who of it, and whose worlds.
-    async fn subject(
-        &self,
-        settings: Settings,
-        progress: &Progress,
-    ) -> Result<(ExperimentFile, Genotype, u64), Error> {
+    async fn subject(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
             let file = ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error));
-            return Ok((file?, Genotype::read(genotype)?, 0));
+            let genotype = Genotype::read(genotype)?;
+            return Ok(Subject { file: file?, genotype, generation: 0, judged: None });
         }
         let address = self.address.as_ref().expect("clap requires an address or a file");
         let connection = Connection::open(settings, Intent::Read, progress).await?;
@@ -156,7 +215,8 @@ impl ReplayArgs {
         let name = format!("experiment {}", address.experiment);
         let file = ExperimentFile::new(name.into(), found.config_json.clone());
         let generation = found.individual.generation;
-        Ok((file, Genotype::found(address, found), generation))
+        let judged = found.individual.judged.filter(|judged| judged.trials > 0);
+        Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
     }
 
     /// The file to write.

@@ -16,7 +16,7 @@ use tokio::{
 };
 use tonic::Streaming;
 
-use super::{Remote, champion_file, explain::Finding};
+use super::{Remote, champion_file, compare, explain::Finding};
 use crate::{
     args::Target,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
@@ -98,13 +98,44 @@ pub async fn watch(
             let end = json::EndLine::new(experiment, champion.as_ref());
             json::line(&end.with_champion_file(file.as_deref()))
         } else {
-            let mut lines = vec![text::end(experiment, *first_best, champion.as_ref())];
+            let mut lines =
+                vec![text::end(experiment, *first_best, champion.as_ref(), progress.is_verbose())];
             lines
                 .extend(data_dir.map(|directory| text::files(directory, champion_file.as_deref())));
             lines.join("\n")
         })?;
     }
+    compare_group(connection, &all, progress).await?;
     all.iter().try_for_each(|followed| success(&followed.experiment))
+}
+
+/// Compares the runs of a group, and says what else there is to see of them.
+async fn compare_group(
+    connection: &Connection,
+    all: &[Followed],
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let has_completed = |it: &&Followed| it.experiment.state() == ExperimentState::Completed;
+    let group = all.first().map_or("", |first| &*first.experiment.group);
+    let is_one = all.iter().all(|followed| followed.experiment.group == group);
+    let n_completed = all.iter().filter(has_completed).count();
+    if progress.is_json() || group.is_empty() || !is_one || n_completed < 2 {
+        return Ok(());
+    }
+    progress.print("")?;
+    compare::of_group(connection, group, progress).await?;
+    let mut next = String::from("\nnext:");
+    for words in [
+        vec!["compare", group, "--to", "comparison.svg"],
+        vec!["plot", group, "--to", "fitness.svg"],
+        vec!["list", group],
+    ] {
+        let words = ["swarmctl"].into_iter().chain(words).map(str::to_owned);
+        let place = connection.named_place().map(|dir| vec!["--data-dir".to_owned(), dir]);
+        let words = words.chain(place.unwrap_or_default());
+        next += &format!("\n  {}", text::shell_command(words));
+    }
+    progress.print(&next)
 }
 
 /// Shows the events of experiments until all of them have ended. They are returned in the

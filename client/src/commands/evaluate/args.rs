@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 
 use crate::{
     address::NamedAddress,
     args::{IsaArgs, StepsArg, whole},
+    complete,
 };
 
 /// Evaluate a genotype: many trials under several conditions, every step measured.
@@ -22,7 +24,7 @@ use crate::{
 pub struct EvaluateArgs {
     /// Whom to evaluate, with the file of its experiment: ID or NAME, the champion; ID@G/I,
     /// individual I of generation G; ID@G/mean, the mean of the distribution after it.
-    #[arg(value_name = "ADDRESS", required_unless_present = "genotype")]
+    #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments), required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
     /// File with the genotype, such as a champion file.
     #[arg(long, value_name = "FILE", conflicts_with = "address", requires = "config")]

@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
+
+use crate::complete;
 
 /// Draw the fitness of runs against their generations.
 ///
@@ -14,7 +17,7 @@ use clap::Args;
 pub struct PlotArgs {
     /// Numbers of the coordinator's experiments, names of groups, or files written by
     /// `swarmctl history ID --output csv`; at most 14 runs.
-    #[arg(required_unless_present = "steps", value_name = "ID|GROUP|FILE")]
+    #[arg(required_unless_present = "steps", value_name = "ID|GROUP|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub runs: Vec<String>,
     /// Draw an evaluation instead, from the directory that `swarmctl evaluate` wrote.
     ///

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 
 use super::trace::ExtraColumns;
 use crate::{
     address::NamedAddress,
     args::{IsaArgs, SeedArg, StepsArg, whole},
+    complete,
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
 };
@@ -20,10 +22,10 @@ use crate::{
 #[derive(Debug, Clone, Args)]
 #[command(after_help = HELP)]
 pub struct SimulateArgs {
-    /// The experiment file; or an address, such as 3@5/7, individual 7 of generation 5 of
-    /// experiment 3, which is simulated with the file of its experiment, in the worlds of its
-    /// generation.
-    #[arg(value_name = "CONFIG|ADDRESS")]
+    /// The experiment file; or an address, which is simulated with the file of its experiment,
+    /// in the worlds of its generation: ID or NAME, the champion; ID@G/I, individual I of
+    /// generation G; ID@G/mean, the mean of the distribution after it.
+    #[arg(value_name = "CONFIG|ADDRESS", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub subject: PathBuf,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
     /// such as a champion file.
@@ -33,9 +35,9 @@ pub struct SimulateArgs {
     /// the first individual of a GA.
     #[arg(long, value_name = "FILE", conflicts_with = "experiment")]
     pub genotype: Option<PathBuf>,
-    /// Use a genotype of an experiment: 3 is the champion of experiment 3, 3@5/7 individual 7
-    /// of its generation 5, 3@5/mean the mean of the distribution after that.
-    #[arg(long, value_name = "ADDRESS")]
+    /// Use a genotype of an experiment: ID or NAME, the champion; ID@G/I, individual I of
+    /// generation G; ID@G/mean, the mean of the distribution after it.
+    #[arg(long, value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
     pub experiment: Option<NamedAddress>,
     #[command(flatten)]
     pub seed: SeedArg,
