@@ -67,6 +67,8 @@ pub enum Purpose {
     Control = 14,
     /// Movement of ground areas; stream = area.
     AreaMovement = 15,
+    /// What robots draw whose sensors a script reads; stream = robot.
+    Sensing = 16,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::communication::Mode;
 use crate::perturbations::Perturbations;
-use crate::sensors::{Noise, NoiseStream, Surroundings};
+use crate::sensors::{Noise, NoiseStream, Sensor, Surroundings};
 use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::RobotGroup;
@@ -167,11 +167,28 @@ impl Senses {
                 let deviation = mounted.sensor.noise().deviation;
                 self.noise[source].add(deviation, *reading_len, readings, is_wanted);
             }
-            let range = mounted.sensor.value_range();
-            for value in readings.iter_mut() {
-                *value = value.clamp(*range.start(), *range.end());
+            clip(&*mounted.sensor, readings);
+        }
+    }
+
+    /// Takes what a script says of a robot of the group, its `index` among them, as the reading of
+    /// its `script_sensor`.
+    pub fn take(&mut self, group: &RobotGroup, index: usize, reading: &[f64]) {
+        for (mounted, state) in group.sensors.iter().zip(&mut self.sensors) {
+            if state.query == SensorQuery::Script {
+                let own = &mut state.readings[index * state.reading_len..][..state.reading_len];
+                own.copy_from_slice(reading);
+                clip(&*mounted.sensor, own);
             }
         }
+    }
+}
+
+/// Keeps values of a reading within the sensor's range.
+fn clip(sensor: &dyn Sensor, values: &mut [f64]) {
+    let range = sensor.value_range();
+    for value in values {
+        *value = value.clamp(*range.start(), *range.end());
     }
 }
 

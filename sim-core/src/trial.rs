@@ -265,7 +265,19 @@ impl<'a> Trial<'a> {
             };
             state.senses.update(group, &self.swarm, &surroundings);
         }
+        self.sense_by_script(step)?;
         self.run_script(step, ScriptRun::control)?;
+        Ok(())
+    }
+
+    /// The script says what robots with a `script_sensor` sense.
+    fn sense_by_script(&mut self, step: u32) -> Result<(), EvaluateError> {
+        self.run_script(step, ScriptRun::sense)?;
+        for (robot, reading) in self.script.iter().flat_map(ScriptRun::sensed) {
+            let number = self.world.group_of(robot);
+            let group = &self.world.groups[number];
+            self.groups[number].senses.take(group, robot - group.robots.start, reading);
+        }
         Ok(())
     }
 

@@ -3,7 +3,8 @@
 use crate::report::{Path, Report};
 use crate::{
     ActuatorQuery, ExperimentConfig, InhibitedStimulus, Initializer, LightController, ObjectConfig,
-    RobotConfig, RobotController, SensorQuery, TopologyConfig, WirelessTransmitterConfig, limits,
+    RobotConfig, RobotController, ScriptSensorConfig, SensorQuery, TopologyConfig,
+    WirelessTransmitterConfig, limits,
 };
 
 pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
@@ -23,19 +24,22 @@ pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
                     RobotController::BraitenbergLightFollower => {
                         braitenberg_ports(robot, &path, report);
                     }
-                    RobotController::ScriptController => script(config, "control", &path, report),
+                    RobotController::ScriptController => {
+                        script(config, "control", &path.key("controller"), report);
+                    }
                 }
+                script_sensor(config, robot, &path, report);
                 perturbations(robot, &path, report);
             }
             ObjectConfig::LightSource(light) => {
                 if light.controller == (LightController::ScriptController {}) {
-                    script(config, "move", &path, report);
+                    script(config, "move", &path.key("controller"), report);
                 }
                 initializer(&light.initializers.positions, n, &positions, report);
             }
             ObjectConfig::GroundArea(area) => {
                 if area.controller.is_some() {
-                    script(config, "move", &path, report);
+                    script(config, "move", &path.key("controller"), report);
                 }
                 initializer(&area.initializers.positions, n, &positions, report);
             }
@@ -140,10 +144,20 @@ fn braitenberg_ports(robot: &RobotConfig, path: &Path, report: &Report<'_>) {
     }
 }
 
-/// There is a script that says what the object does.
+/// What the script senses has a range.
+fn script_sensor(config: &ExperimentConfig, robot: &RobotConfig, path: &Path, report: &Report<'_>) {
+    let Some(ScriptSensorConfig { low, high, .. }) = &robot.sensors.script_sensor else { return };
+    let path = path.key("sensors").key("script_sensor");
+    script(config, "sense", &path, report);
+    if low >= high {
+        report.conflict(&path, &[], || format!("`low` {low} is not below `high` {high}"));
+    }
+}
+
+/// There is a script that has what `path` leaves to it.
 fn script(config: &ExperimentConfig, function: &str, path: &Path, report: &Report<'_>) {
     if config.task.is_none() {
-        report.conflict(&path.key("controller"), &[&Path::from(["task"])], || {
+        report.conflict(path, &[&Path::from(["task"])], || {
             format!("needs a `task` whose `script` has a function `{function}`")
         });
     }

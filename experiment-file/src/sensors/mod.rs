@@ -9,6 +9,7 @@ mod light;
 mod neighborhood;
 mod plain;
 mod receiver;
+mod script;
 
 pub use distance::DistanceSensorConfig;
 pub use ground::GroundSensorConfig;
@@ -16,6 +17,7 @@ pub use light::LightSensorConfig;
 pub use neighborhood::NeighborhoodSensorConfig;
 pub use plain::PlainSensorConfig;
 pub use receiver::{SendingDirection, WirelessReceiverConfig};
+pub use script::ScriptSensorConfig;
 
 use std::f64::consts::PI;
 
@@ -199,6 +201,11 @@ sensors! {
     neighborhood_pos_sensor: NeighborhoodSensorConfig {
         /// x and y, cm, and heading, radians, of the nearest robots; 3 `n_neighbors` values.
         "neighborhood_pos_sensor" = NeighborhoodPos: |sensor| 3 * sensor.n_neighbors,
+    }
+    /// What the function `sense` of a script says.
+    script_sensor: ScriptSensorConfig {
+        /// The numbers that the function `sense` of the script returns; `n` values.
+        "script_sensor" = Script: |sensor| sensor.n,
     }
 }
 

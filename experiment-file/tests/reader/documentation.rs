@@ -19,7 +19,7 @@ const OF_POPULATION: [&str; 4] = ["objects", "min_vals", "max_vals", "params"];
 const IGNORED: &str = "Accepted and ignored.";
 
 /// Parts of the schema in the order of a file: each with its heading.
-const PARTS: [(&str, &str); 40] = [
+const PARTS: [(&str, &str); 41] = [
     ("WorldConfig", "world"),
     ("ObjectConfig", "world.objects.NAME"),
     ("LightParams", "params of a light"),
@@ -31,6 +31,7 @@ const PARTS: [(&str, &str); 40] = [
     ("DistanceSensorConfig", "sensors.distance_sensor"),
     ("GroundSensorConfig", "sensors.ground_sensor"),
     ("NeighborhoodSensorConfig", "sensors.neighborhood_pos_sensor"),
+    ("ScriptSensorConfig", "sensors.script_sensor"),
     ("ActuatorsConfig", "actuators"),
     ("WheelActuatorConfig", "actuators.wheel_actuator"),
     ("WirelessTransmitterConfig", "actuators.wireless_transmitter"),

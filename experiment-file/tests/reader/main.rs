@@ -8,6 +8,7 @@ mod hostile;
 mod problems;
 mod reference;
 mod schema;
+mod sensors;
 mod shipped;
 mod validator;
 mod values;

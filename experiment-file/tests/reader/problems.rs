@@ -119,7 +119,7 @@ const MISTAKES: &[(&str, &str, &str)] = &[
     (r#""sensors": {"wireless_receiver": {}, "#, r#""sensors": {"wireless_receiver": {}, "neighbors_state_sensor": {}, "#,
      "line 55: world.objects.bots.sensors.neighbors_state_sensor: not supported"),
     (r#""sensor": "light_sensor""#, r#""sensor": "wireless_receiver:n_hops""#,
-     "line 6: topology.stimuli.LIGHT.sensor: not supported: `wireless_receiver:n_hops`; known: `wireless_receiver:msg`, `wireless_receiver:signal`, `wireless_receiver:receiving_direction`, `wireless_receiver:sending_direction`, `wireless_receiver:state`, `light_sensor`, `distance_sensor`, `ground_sensor`, `food_area_sensor`, `nest_sensor`, `food_sensor`, `own_position_sensor`, `own_orientation_sensor`, `neighborhood_pos_sensor`"),
+     "line 6: topology.stimuli.LIGHT.sensor: not supported: `wireless_receiver:n_hops`; known: `wireless_receiver:msg`, `wireless_receiver:signal`, `wireless_receiver:receiving_direction`, `wireless_receiver:sending_direction`, `wireless_receiver:state`, `light_sensor`, `distance_sensor`, `ground_sensor`, `food_area_sensor`, `nest_sensor`, `food_sensor`, `own_position_sensor`, `own_orientation_sensor`, `neighborhood_pos_sensor`, `script_sensor`"),
     (r#""neurons:tau:H""#, r#""encoders:weights:all""#,
      "line 45: algorithm.populations.neurons.objects[1]: covers nothing that can evolve"),
     (r#""neurons:tau:H""#, r#""encoders:weights:LIGTH""#,

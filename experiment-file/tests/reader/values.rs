@@ -221,7 +221,8 @@ fn sensors_of_the_original_have_their_lengths() {
 }
 
 /// A script that says whatever there is to say.
-const TASK: &str = r#""task": {"script": {"name": "t.star", "text": "pass"}}, "world": {"#;
+pub(super) const TASK: &str =
+    r#""task": {"script": {"name": "t.star", "text": "pass"}}, "world": {"#;
 
 #[test]
 fn robots_lights_and_areas_may_be_left_to_the_script() {

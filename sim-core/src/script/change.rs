@@ -16,6 +16,8 @@ const COLORS: i64 = 255;
 pub(crate) enum May<'a> {
     /// Nothing.
     Look,
+    /// Nothing: what the robot senses is what the function returns.
+    Sense { robot: usize, stream: &'a mut Stream },
     /// What one robot does in this step.
     Act { robot: usize, plan: &'a mut Plan, stream: &'a mut Stream },
     /// Nothing: where the light or area goes is what the function returns.
@@ -29,6 +31,7 @@ impl May<'_> {
     fn advice(&self) -> &'static str {
         match self {
             Self::Look => "what is to be remembered goes into `state`, a dict",
+            Self::Sense { .. } => "`sense` returns a list of numbers, and `state` is a dict",
             Self::Act { .. } => {
                 "`control` sets `left`, `right`, `led`, `mode` and `message` of its own robot, and \
                  `state` is a dict"

@@ -1,8 +1,10 @@
 //! The task that an experiment brings as a script: compiled once, executed in every trial.
-//! `names` is what scripts can name, `view` what they see, `change` what they change.
+//! `names` is what scripts can name, `view` what they see, `change` what they change, `sensing`
+//! what robots sense by them.
 
 mod change;
 mod names;
+mod sensing;
 mod view;
 
 pub(crate) use change::May;
@@ -18,6 +20,7 @@ use crate::problems::Problems;
 use crate::record::{MeasureName, Measures};
 use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
+use sensing::Sensing;
 use view::{Kept, Kind};
 
 /// Largest absolute value that a function may return: sums and squares of it are finite.
@@ -28,7 +31,8 @@ const WORK: u64 = 2_000_000;
 const MEMORY: usize = 256 << 10;
 const MEMORY_PER_ROBOT: usize = 4 << 10;
 
-/// The functions that a script may have, with their arguments.
+/// The functions that a script may have, with their arguments; beside `sense`, which is one where
+/// robots have the sensor.
 const FUNCTIONS: [(&str, usize); 6] =
     [("fitness", 1), ("final", 1), ("measures", 1), ("control", 1), ("move", 1), ("react", 1)];
 
@@ -67,12 +71,8 @@ impl ScriptTask {
         };
         let function = |name: &str| program.function(name);
         for (name, n_arguments) in FUNCTIONS {
-            let Some(function) = function(name) else { continue };
-            let (_, n_found) = program.signature(function);
-            if n_found != n_arguments {
-                let message = format!("takes {n_arguments} argument, not {n_found}");
-                wrong(program.problem(function, message).to_string());
-            }
+            let takes = function(name).and_then(|function| takes(&program, function, n_arguments));
+            takes.into_iter().for_each(|error| wrong(error.to_string()));
         }
         let measures = function("measures");
         let measure_names = measures.map(|measures| program.returned_keys(measures));
@@ -84,8 +84,9 @@ impl ScriptTask {
         let measure_names = measure_names.flatten().unwrap_or_default();
         let measure_names = measure_names.iter().map(|name| name.clone().into()).collect();
         let (fitness, last) = (function("fitness"), function("final"));
-        if !FUNCTIONS.iter().any(|(name, _)| function(name).is_some()) {
-            let known = FUNCTIONS.map(|(name, _)| format!("`{name}`")).join(", ");
+        let known = FUNCTIONS.map(|(name, _)| name).into_iter().chain(["sense"]);
+        if !known.clone().any(|name| function(name).is_some()) {
+            let known = known.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
             wrong(format!("{}: has none of the functions {known}", config.name));
         }
         let [control, move_, react] = ["control", "move", "react"].map(function);
@@ -118,6 +119,7 @@ impl ScriptTask {
         robots.filter(scripted).for_each(|group| needs(self.control, "control", &group.site));
         let things = world.lights.iter().chain(&world.areas).filter(|things| things.by_script);
         things.for_each(|things| needs(self.move_, "move", &things.site));
+        self.check_sensors(file, world, problems);
     }
 
     /// Whether the script computes fitness.
@@ -129,6 +131,13 @@ impl ScriptTask {
     pub fn measure_names(&self) -> &[MeasureName] {
         &self.measure_names
     }
+}
+
+/// The problem of a function that takes another number of arguments.
+fn takes(program: &Program, function: FunctionId, n_arguments: usize) -> Option<ScriptError> {
+    let (_, n_found) = program.signature(function);
+    let message = || format!("takes {n_arguments} argument, not {n_found}");
+    (n_found != n_arguments).then(|| program.problem(function, message()))
 }
 
 /// Where problems of scripts are reported.
@@ -144,6 +153,8 @@ pub(crate) struct ScriptRun<'a> {
     actors: Vec<Actor>,
     /// Lights, then ground areas that it moves.
     movers: Vec<Mover>,
+    /// Robots that it senses for, by their numbers.
+    sensing: Vec<Sensing>,
 }
 
 /// A robot whose actions the script decides.
@@ -196,6 +207,7 @@ impl<'a> ScriptRun<'a> {
             script,
             actors,
             movers: moved,
+            sensing: sensing::start(world, stream),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Scripts in episodes: the built-in tasks as scripts, to the same bits, and what goes wrong.
 
 mod acting;
+mod sensing;
 
 use experiment_file::{
     ExperimentConfig, FitnessFunction, LightController, ScriptConfig, TaskConfig,

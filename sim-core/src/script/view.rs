@@ -264,13 +264,16 @@ impl<'a> View<'a> {
     /// The stream of the thing that the script decides for.
     fn own_stream(&mut self, object: Object) -> Result<&mut Stream, String> {
         match &mut self.may {
-            May::Act { robot, stream, .. }
+            May::Act { robot, stream, .. } | May::Sense { robot, stream }
                 if Kind::of(object) == Kind::Robot && *robot == object.index as usize =>
             {
                 Ok(stream)
             }
             May::Move { thing, stream } if *thing == object => Ok(stream),
-            _ => Err("draws for itself in `control` or `move` only; elsewhere `world` does".into()),
+            _ => {
+                Err("draws for itself in `control`, `move` or `sense` only; elsewhere `world` does"
+                    .into())
+            }
         }
     }
 

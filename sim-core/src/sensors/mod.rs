@@ -9,6 +9,7 @@ mod ground;
 mod light;
 mod neighborhood;
 mod own;
+mod scripted;
 
 use std::fmt::Debug;
 use std::ops::{Range, RangeInclusive};
@@ -19,6 +20,7 @@ use ground::GroundSensor;
 use light::LightSensor;
 use neighborhood::NeighborhoodSensor;
 use own::{FoodSensor, OwnOrientationSensor, OwnPositionSensor};
+use scripted::ScriptSensor;
 
 use crate::neighbours::Neighbours;
 use crate::objects::{StaticObjects, Switches};
@@ -131,6 +133,7 @@ pub(crate) fn mount(
         own_position_sensor,
         own_orientation_sensor,
         neighborhood_pos_sensor,
+        script_sensor,
     } = config;
     let mut mounted = Vec::new();
     let mut mount = |query, sensor: Arc<dyn Sensor>| mounted.push(MountedSensor { query, sensor });
@@ -160,6 +163,9 @@ pub(crate) fn mount(
     }
     if let Some(config) = neighborhood_pos_sensor {
         mount(SensorQuery::NeighborhoodPos, Arc::new(NeighborhoodSensor::new(config)));
+    }
+    if let Some(config) = script_sensor {
+        mount(SensorQuery::Script, Arc::new(ScriptSensor::new(config)));
     }
     mounted
 }

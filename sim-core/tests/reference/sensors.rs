@@ -53,6 +53,7 @@ impl Readings {
             // Nothing but a script has robots carry anything.
             SensorQuery::Food => vec![0.0],
             SensorQuery::NeighborhoodPos => self.neighborhood.clone(),
+            SensorQuery::Script => panic!("no equation is given"),
         }
     }
 }

@@ -36,7 +36,7 @@ fn controlled(text: &str, n_steps: u32) -> ExperimentConfig {
 }
 
 /// All steps of a trial.
-fn watch(config: &ExperimentConfig) -> Vec<StepRecord> {
+pub(super) fn watch(config: &ExperimentConfig) -> Vec<StepRecord> {
     let simulation = Simulation::compile(config).unwrap();
     let genotype = genotype(simulation.genotype_len(), 1);
     let mut steps = Vec::new();
@@ -46,7 +46,7 @@ fn watch(config: &ExperimentConfig) -> Vec<StepRecord> {
 }
 
 /// Why an episode ends.
-fn failure(config: &ExperimentConfig) -> String {
+pub(super) fn failure(config: &ExperimentConfig) -> String {
     let simulation = Simulation::compile(config).unwrap();
     let genotype = vec![0.5; simulation.genotype_len()];
     simulation.evaluate(&genotype, TrialSet::Generation(3), 1..2).unwrap_err().to_string()
@@ -284,7 +284,7 @@ fn what_goes_wrong_says_where_why_and_for_whom() {
         ("robot.sense('light')", "have no reading `light`; did you mean `light_sensor`?"),
         ("robot.sense(1)", "`sense` takes the name of a reading"),
         ("return 1", "returns a int; a robot acts by what is assigned"),
-        ("robot.world.lights[0].random()", "draws for itself in `control` or `move` only"),
+        ("robot.world.lights[0].random()", "draws for itself in `control`, `move` or `sense` only"),
         ("[0 for i in range(999) for j in range(999) if False]", "does too much"),
     ] {
         let text = format!("def control(robot):\n    {body}\n{fitness}");
