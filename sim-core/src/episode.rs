@@ -21,7 +21,8 @@ use numeric::random::TrialSet;
 const MAX_LANES: usize = 256;
 
 /// Simulates one episode per trial and shows each of its steps to `recorder`.
-/// `keep_going` is asked before every step; false if it has said no.
+/// `keep_going` is asked before every step, and every few milliseconds of a script; false if it
+/// has said no.
 pub(crate) fn run(
     simulation: &Simulation,
     phenotype: &Phenotype,
@@ -33,17 +34,37 @@ pub(crate) fn run(
     let first = trials.start;
     for trials in side_by_side(simulation, trials) {
         let first = (trials.start - first) as usize;
-        let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials)?;
-        for step in 0..simulation.n_steps {
-            if !keep_going() {
-                return Ok(false);
-            }
-            episodes.step(step, first, recorder)?;
+        match run_together(simulation, phenotype, trial_set, trials, first, keep_going, recorder) {
+            Ok(true) => {}
+            Ok(false) => return Ok(false),
+            // What went wrong may be that it was stopped; it has no result either way.
+            Err(EvaluateError::Script { .. }) if !keep_going() => return Ok(false),
+            Err(error) => return Err(error),
         }
-        for (episode, trial) in (first..).zip(&mut episodes.trials) {
-            trial.end()?;
-            recorder.end(episode, trial);
+    }
+    Ok(true)
+}
+
+/// The same of trials that are simulated side by side; the first episode has the number `first`.
+fn run_together(
+    simulation: &Simulation,
+    phenotype: &Phenotype,
+    trial_set: TrialSet,
+    trials: Range<u32>,
+    first: usize,
+    keep_going: &dyn Fn() -> bool,
+    recorder: &mut impl Recorder,
+) -> Result<bool, EvaluateError> {
+    let mut episodes = Episodes::new(simulation, phenotype, trial_set, trials, keep_going)?;
+    for step in 0..simulation.n_steps {
+        if !keep_going() {
+            return Ok(false);
         }
+        episodes.step(step, first, recorder)?;
+    }
+    for (episode, trial) in (first..).zip(&mut episodes.trials) {
+        trial.end()?;
+        recorder.end(episode, trial);
     }
     Ok(true)
 }
@@ -70,8 +91,9 @@ impl<'a> Episodes<'a> {
         phenotype: &Phenotype,
         trial_set: TrialSet,
         trials: Range<u32>,
+        keep_going: &'a dyn Fn() -> bool,
     ) -> Result<Self, EvaluateError> {
-        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
+        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial, keep_going));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
         let groups = 0..simulation.world.groups.len();
         let controller = |group| GroupController::new(simulation, group, phenotype, &trials);

@@ -113,6 +113,7 @@ pub use output::Output;
 pub use record::{EpisodeSummary, MeasureName, Measures, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};
 pub use specified::{SpecifiedSimulation, panic_to_failure};
+pub use starts::{TRYING_TIME_MAX, Tried};
 pub use stepping::{Actions, Policy, StepError, Stepper};
 pub use torus::Vec2;
 

@@ -12,7 +12,7 @@ use crate::problems::Problems;
 use crate::record::Measures;
 use crate::record::{EpisodeSummary, MeasureName, StepRecord};
 use crate::script::{self, ScriptTask};
-use crate::trial::Trial;
+use crate::trial::try_places;
 use crate::world::World;
 use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
 use numeric::{Isa, random::TrialSet};
@@ -135,7 +135,7 @@ impl Simulation {
         let mut problems = Problems::default();
         for trial in 0..simulation.n_trials.min(N_TRIED_TRIALS) {
             if let Err(EvaluateError::Unplaceable { object, index, .. }) =
-                Trial::new(&simulation, TrialSet::Generation(0), trial)
+                try_places(&simulation, TrialSet::Generation(0), trial)
             {
                 let path = format!("world.objects.{object}.initializers.positions");
                 problems.add(path, format!("no place for number {index} in trial {trial}"));
@@ -185,8 +185,9 @@ impl Simulation {
         Ok(fitness.expect("nothing stopped it"))
     }
 
-    /// As [`evaluate`](Self::evaluate), but asks before every environment step
-    /// whether to go on; none if it was stopped.
+    /// As [`evaluate`](Self::evaluate), but asks before every environment step, and every few
+    /// milliseconds of a script, whether to go on; none if it was stopped. So a clock or another
+    /// thread may end it, and decides no bit of a result.
     pub fn evaluate_while(
         &self,
         genotype: &[f64],
@@ -246,12 +247,27 @@ impl Simulation {
         trial: u32,
         observe: &mut dyn FnMut(&StepRecord),
     ) -> Result<EpisodeSummary, EvaluateError> {
+        let summary = self.simulate_while(genotype, trial_set, trial, &|| true, observe)?;
+        Ok(summary.expect("nothing stopped it"))
+    }
+
+    /// As [`simulate`](Self::simulate), but asks as [`evaluate_while`](Self::evaluate_while) does
+    /// whether to go on; none if it was stopped.
+    pub fn simulate_while(
+        &self,
+        genotype: &[f64],
+        trial_set: impl Into<TrialSet>,
+        trial: u32,
+        keep_going: &dyn Fn() -> bool,
+        observe: &mut dyn FnMut(&StepRecord),
+    ) -> Result<Option<EpisodeSummary>, EvaluateError> {
         let phenotype = self.phenotype(genotype)?;
         let trials = trial..trial.saturating_add(1);
         self.check_trials(&trials)?;
         let mut recorder = Viewer::new(observe);
-        episode::run(self, &phenotype, trial_set.into(), trials, &|| true, &mut recorder)?;
-        Ok(recorder.summary())
+        let done =
+            episode::run(self, &phenotype, trial_set.into(), trials, keep_going, &mut recorder)?;
+        Ok(done.then(|| recorder.summary()))
     }
 
     /// The network that a genotype encodes, as JSON: stimuli, neurons with

@@ -1,5 +1,7 @@
 //! Whether the world can hold its objects: by trying, as nobody can tell from sizes.
 
+use std::time::Duration;
+
 use experiment_file::{AlgorithmConfig, ConfigError};
 use numeric::random::TrialSet;
 
@@ -18,18 +20,52 @@ const N_TRIED_STEPS: u32 = 50;
 /// Pairs of robots whose distances a check may take, about.
 const N_PAIRS_MAX: u64 = 50_000_000;
 
+/// After so long, whoever checks an experiment ends trying it. What was not tried is a warning, so
+/// no clock decides whether an experiment is accepted.
+pub const TRYING_TIME_MAX: Duration = Duration::from_secs(2);
+
+/// How far an experiment was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
+pub enum Tried {
+    /// As far as it ever is.
+    All,
+    /// Until it was stopped; nothing was wrong so far.
+    InPart,
+}
+
+impl Tried {
+    /// What people should know of it.
+    pub fn warning(self) -> Option<&'static str> {
+        match self {
+            Self::All => None,
+            Self::InPart => Some(
+                "its start takes long, so that not all of it was tried: a mistake of the script, or \
+                 a world too small for its objects, may only show when it runs",
+            ),
+        }
+    }
+}
+
 impl Simulation {
     /// Tries where objects start in trials of a run: those of the judgement at its end,
     /// then those of its first generations, as far as that is quick. One where an
     /// object finds no place would end the run.
     ///
     /// A script is executed for an episode's first steps, so that what it gets wrong is
-    /// known before anything is computed.
-    pub fn check_starts(&self, algorithm: &AlgorithmConfig) -> Result<(), ConfigError> {
-        self.try_script()?;
+    /// known before anything is computed. When `goes_on` says no, as a clock may, trying ends:
+    /// the answer is then what was tried.
+    pub fn check_starts(
+        &self,
+        algorithm: &AlgorithmConfig,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Tried, ConfigError> {
+        if !self.try_script(goes_on)? {
+            return Ok(Tried::InPart);
+        }
         let n_pairs: u64 = self.world.sites().map(n_pairs_of_a_draw).sum();
         if n_pairs == 0 {
-            return Ok(());
+            return Ok(Tried::All);
         }
         let n_starts = (N_PAIRS_MAX / n_pairs).clamp(1, N_STARTS_MAX);
         let last = algorithm.generations.saturating_sub(1);
@@ -41,6 +77,9 @@ impl Simulation {
         });
         let mut problems = Problems::default();
         for (trial_set, trial) in judgement.chain(generations).take(n_starts as usize) {
+            if !goes_on() {
+                return Ok(Tried::InPart);
+            }
             if let Err(EvaluateError::Unplaceable { object, index, .. }) =
                 trial::try_places(self, trial_set, trial)
             {
@@ -53,23 +92,25 @@ impl Simulation {
                 break;
             }
         }
-        problems.check()
+        problems.check()?;
+        Ok(Tried::All)
     }
 
-    /// Executes the script in a short episode, measures included.
-    fn try_script(&self) -> Result<(), ConfigError> {
+    /// Executes the script in a short episode, measures included; false if it was stopped.
+    fn try_script(&self, goes_on: &dyn Fn() -> bool) -> Result<bool, ConfigError> {
         if self.script.is_none() {
-            return Ok(());
+            return Ok(true);
         }
         let mut short = self.clone();
         short.n_steps = self.n_steps.min(N_TRIED_STEPS);
         let genotype = vec![0.5; self.genotype_len()];
-        let tried = short.measure_while(&genotype, TrialSet::Generation(0), 0..1, &|| true);
+        let tried = short.measure_while(&genotype, TrialSet::Generation(0), 0..1, goes_on);
         let mut problems = Problems::default();
-        if let Err(error @ EvaluateError::Script { .. }) = tried {
+        if let Err(error @ EvaluateError::Script { .. }) = &tried {
             problems.add(script::PATH, error.to_string());
         }
-        problems.check()
+        problems.check()?;
+        Ok(!matches!(tried, Ok(None)))
     }
 }
 
@@ -111,7 +152,7 @@ mod tests {
             let config = config(n_robots);
             // The first trial of the first generation, in which there is a place for all.
             let Ok(simulation) = Simulation::compile(&config) else { continue };
-            let Err(error) = simulation.check_starts(&config.algorithm) else { continue };
+            let Err(error) = simulation.check_starts(&config.algorithm, &|| true) else { continue };
             n_found += 1;
             let text = error.to_string();
             assert!(text.contains("initializers.positions: no place for number"), "{text}");
@@ -131,6 +172,7 @@ mod tests {
     #[test]
     fn a_world_with_room_is_not_refused() {
         let roomy = config(3);
-        Simulation::compile(&roomy).unwrap().check_starts(&roomy.algorithm).unwrap();
+        let tried = Simulation::compile(&roomy).unwrap().check_starts(&roomy.algorithm, &|| true);
+        assert_eq!(tried, Ok(Tried::All));
     }
 }

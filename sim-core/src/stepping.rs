@@ -127,7 +127,7 @@ impl<'a> Stepper<'a> {
         trials: Range<u32>,
     ) -> Result<Self, EvaluateError> {
         simulation.check_trials(&trials)?;
-        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial));
+        let trials = trials.map(|trial| Trial::new(simulation, trial_set, trial, &|| true));
         let trials = trials.collect::<Result<Vec<_>, _>>()?;
         let mut n_agents = 0;
         let groups = simulation.world.groups.iter().enumerate().map(|(index, group)| {

@@ -44,6 +44,8 @@ pub(crate) struct Trial<'a> {
     /// None: the script computes it.
     fitness: Option<Box<dyn Fitness>>,
     script: Option<ScriptRun<'a>>,
+    /// Whether to go on; a script that is stopped fails.
+    goes_on: &'a dyn Fn() -> bool,
     n_steps: u32,
     /// Fitness of the last step, 0 if it does not count.
     reward: f64,
@@ -151,11 +153,12 @@ pub(crate) fn try_places(
 }
 
 impl<'a> Trial<'a> {
-    /// The trial before its first step.
+    /// The trial before its first step. When `goes_on` says no, a script fails at once.
     pub fn new(
         simulation: &'a Simulation,
         trial_set: TrialSet,
         trial: u32,
+        goes_on: &'a dyn Fn() -> bool,
     ) -> Result<Self, EvaluateError> {
         let world = &simulation.world;
         let address = Address { seed: simulation.seed, trial_set, trial };
@@ -217,11 +220,12 @@ impl<'a> Trial<'a> {
             script: match &simulation.script {
                 Some(task) => {
                     let stream = |purpose, number| address.stream(purpose, number);
-                    let started = ScriptRun::start(task, world, stream);
+                    let started = ScriptRun::start(task, world, goes_on, stream);
                     Some(started.map_err(|error| address.failed(error, 0))?)
                 }
                 None => None,
             },
+            goes_on,
             n_steps: simulation.n_steps,
             reward: 0.0,
             fitness_sum: 0.0,
@@ -401,10 +405,20 @@ impl<'a> Trial<'a> {
         run: impl FnOnce(&mut ScriptRun<'a>, View<'_>) -> Result<T, ScriptError>,
     ) -> Result<Option<T>, EvaluateError> {
         let Some(script) = &mut self.script else { return Ok(None) };
-        let Self { world, swarm, lights, areas, switches, groups, n_steps, .. } = self;
-        let n_steps = *n_steps;
-        let (may, kept) = (May::Look, None);
-        let view = View { world, swarm, lights, areas, switches, groups, step, n_steps, may, kept };
+        let Self { world, swarm, lights, areas, switches, groups, n_steps, goes_on, .. } = self;
+        let view = View {
+            world,
+            swarm,
+            lights,
+            areas,
+            switches,
+            groups,
+            step,
+            n_steps: *n_steps,
+            may: May::Look,
+            goes_on: *goes_on,
+            kept: None,
+        };
         run(script, view).map(Some).map_err(|error| self.address.failed(error, step))
     }
 

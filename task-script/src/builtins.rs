@@ -6,26 +6,26 @@ use std::rc::Rc;
 use crate::code::{Binary, Builtin, Method};
 use crate::error::{Fault, Outcome, shortened};
 use crate::key::Key;
-use crate::meter::Meter;
-use crate::value::{Dict, List, Value};
+use crate::meter::{Meter, cost};
+use crate::value::{Dict, ELEMENT, List, Value};
 
 /// The result of an operator of two numbers, or of what else it takes.
 pub(crate) fn binary(operator: Binary, a: &Value, b: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
     if let (Value::Int(a), Value::Int(b)) = (a, b) {
-        return integers(operator, *a, *b);
+        return integers(operator, *a, *b, meter);
     }
     if let (Some(a), Some(b)) = (a.number(), b.number()) {
-        return floats(operator, a, b);
+        return floats(operator, a, b, meter);
     }
     Ok(match operator {
         Binary::Equal => Value::Bool(a.equals(b, meter)?),
         Binary::NotEqual => Value::Bool(!a.equals(b, meter)?),
         Binary::In => Value::Bool(contains(b, a, meter)?),
         Binary::NotIn => Value::Bool(!contains(b, a, meter)?),
-        Binary::Less => Value::Bool(order(a, b)?.is_lt()),
-        Binary::LessOrEqual => Value::Bool(order(a, b)?.is_le()),
-        Binary::Greater => Value::Bool(order(a, b)?.is_gt()),
-        Binary::GreaterOrEqual => Value::Bool(order(a, b)?.is_ge()),
+        Binary::Less => Value::Bool(order(a, b, meter)?.is_lt()),
+        Binary::LessOrEqual => Value::Bool(order(a, b, meter)?.is_le()),
+        Binary::Greater => Value::Bool(order(a, b, meter)?.is_gt()),
+        Binary::GreaterOrEqual => Value::Bool(order(a, b, meter)?.is_ge()),
         Binary::Add => return add(a, b, meter),
         _ => return Err(not_for(operator, a, b)),
     })
@@ -36,7 +36,7 @@ fn not_for(operator: Binary, a: &Value, b: &Value) -> Fault {
     format!("`{symbol}` does not take {} and {}", a.kind(), b.kind()).into()
 }
 
-fn integers(operator: Binary, a: i64, b: i64) -> Outcome<Value> {
+fn integers(operator: Binary, a: i64, b: i64, meter: &Meter) -> Outcome<Value> {
     let value = match operator {
         Binary::Add => a.checked_add(b),
         Binary::Subtract => a.checked_sub(b),
@@ -54,7 +54,7 @@ fn integers(operator: Binary, a: i64, b: i64) -> Outcome<Value> {
         Binary::LessOrEqual => return Ok(Value::Bool(a <= b)),
         Binary::Greater => return Ok(Value::Bool(a > b)),
         Binary::GreaterOrEqual => return Ok(Value::Bool(a >= b)),
-        _ => return floats(operator, a as f64, b as f64),
+        _ => return floats(operator, a as f64, b as f64, meter),
     };
     match value {
         Some(value) => Ok(Value::Int(value)),
@@ -65,7 +65,7 @@ fn integers(operator: Binary, a: i64, b: i64) -> Outcome<Value> {
     }
 }
 
-fn floats(operator: Binary, a: f64, b: f64) -> Outcome<Value> {
+fn floats(operator: Binary, a: f64, b: f64, meter: &Meter) -> Outcome<Value> {
     Ok(match operator {
         Binary::Add => Value::Float(a + b),
         Binary::Subtract => Value::Float(a - b),
@@ -76,6 +76,7 @@ fn floats(operator: Binary, a: f64, b: f64) -> Outcome<Value> {
         Binary::Divide => Value::Float(a / b),
         Binary::FloorDivide => Value::Float((a / b).floor()),
         Binary::Remainder => {
+            meter.spend(cost::FUNCTION + exponent(a).saturating_sub(exponent(b)))?;
             let rest = libm::fmod(a, b);
             let rest = if rest != 0.0 && (rest < 0.0) != (b < 0.0) { rest + b } else { rest };
             Value::Float(rest)
@@ -92,16 +93,20 @@ fn floats(operator: Binary, a: f64, b: f64) -> Outcome<Value> {
     })
 }
 
+/// The exponent of a number as it is stored; `fmod` goes through the difference of two bit by bit.
+fn exponent(value: f64) -> usize {
+    (value.to_bits() >> 52 & 0x7ff) as usize
+}
+
 fn add(a: &Value, b: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
     match (a, b) {
         (Value::Text(_), Value::Text(_)) => {
-            let (a, b) = (a.as_text().unwrap_or_default(), b.as_text().unwrap_or_default());
-            meter.work((a.len() + b.len()) / 64)?;
+            let (a, b) = (a.read_text()?.unwrap_or_default(), b.read_text()?.unwrap_or_default());
             Ok(Value::text(&[a, b].concat(), meter)?)
         }
         (Value::List(a_list), Value::List(b_list)) if a.kind() == b.kind() => {
-            let mut items = all(a_list, meter)?;
-            items.extend(all(b_list, meter)?);
+            let mut items = a_list.items()?;
+            items.extend(b_list.items()?);
             let new = if a.kind() == "tuple" { Value::tuple } else { Value::list };
             Ok(new(items, meter)?)
         }
@@ -109,23 +114,17 @@ fn add(a: &Value, b: &Value, meter: &Rc<Meter>) -> Outcome<Value> {
     }
 }
 
-/// The elements of a list, which is work.
-fn all(list: &List, meter: &Meter) -> Outcome<Vec<Value>> {
-    meter.work(list.len())?;
-    Ok(list.items())
-}
-
 fn contains(container: &Value, value: &Value, meter: &Rc<Meter>) -> Outcome<bool> {
     match container {
         Value::List(list) => {
-            for item in all(list, meter)? {
+            for item in list.items()? {
                 if item.equals(value, meter)? {
                     return Ok(true);
                 }
             }
             Ok(false)
         }
-        Value::Dict(dict) => Ok(dict.get(&Key::new(value)?).is_some()),
+        Value::Dict(dict) => Ok(dict.get(&Key::new(value)?)?.is_some()),
         Value::Text(_) => {
             let text = container.as_text().unwrap_or_default();
             meter.work(text.len())?;
@@ -139,32 +138,41 @@ fn contains(container: &Value, value: &Value, meter: &Rc<Meter>) -> Outcome<bool
 }
 
 /// The order of two numbers, or of two texts.
-pub(crate) fn order(a: &Value, b: &Value) -> Outcome<Ordering> {
+pub(crate) fn order(a: &Value, b: &Value, meter: &Meter) -> Outcome<Ordering> {
     match (a, b) {
         (Value::Int(a), Value::Int(b)) => return Ok(a.cmp(b)),
-        (Value::Text(_), Value::Text(_)) => return Ok(a.as_text().cmp(&b.as_text())),
+        (Value::Text(_), Value::Text(_)) => {
+            let (a, b) = (a.as_text().unwrap_or_default(), b.as_text().unwrap_or_default());
+            meter.read(a.len().min(b.len()))?;
+            return Ok(a.cmp(b));
+        }
         _ => {}
     }
     match (a.number(), b.number()) {
-        (Some(a), Some(b)) => {
-            a.partial_cmp(&b).ok_or_else(|| "not a number (NaN) has no order".into())
-        }
-        _ => Err(format!("a {} and a {} have no order", a.kind(), b.kind()).into()),
+        (Some(x), Some(y)) => x.partial_cmp(&y).ok_or_else(|| without_order(a, b)),
+        _ => Err(without_order(a, b)),
+    }
+}
+
+/// Why two values have no order.
+pub(crate) fn without_order(a: &Value, b: &Value) -> Fault {
+    match (a.number(), b.number()) {
+        (Some(_), Some(_)) => "not a number (NaN) has no order".into(),
+        _ => format!("a {} and a {} have no order", a.kind(), b.kind()).into(),
     }
 }
 
 /// The elements that a loop goes through: of a list, or the keys of a dict.
 pub(crate) fn elements(value: &Value, meter: &Rc<Meter>) -> Outcome<Vec<Value>> {
     match value {
-        Value::List(list) => all(list, meter),
+        Value::List(list) => Ok(list.items()?),
         Value::Dict(dict) => keys(dict, meter),
         _ => Err(format!("expected a list, found {}", value.kind()).into()),
     }
 }
 
 fn keys(dict: &Dict, meter: &Rc<Meter>) -> Outcome<Vec<Value>> {
-    meter.work(dict.len())?;
-    let keys = dict.keys();
+    let keys = dict.keys()?;
     Ok(keys.iter().map(|key| key.value(meter)).collect::<Result<_, _>>()?)
 }
 
@@ -189,7 +197,7 @@ pub(crate) fn element(container: &Value, index: &Value) -> Outcome<Value> {
             let place = place(index, list.len())?;
             Ok(list.get(place).expect("its place is below its length"))
         }
-        Value::Dict(dict) => dict.get(&Key::new(index)?).ok_or_else(|| {
+        Value::Dict(dict) => dict.get(&Key::new(index)?)?.ok_or_else(|| {
             format!("the dict has no key {}", shortened(&format!("{index:?}"))).into()
         }),
         _ => Err(format!("a {} has no elements", container.kind()).into()),
@@ -211,7 +219,7 @@ pub(crate) fn slice(value: &Value, from: &Value, to: &Value, meter: &Rc<Meter>) 
         _ => Err(Fault::from(format!("an index is a whole number, not a {}", bound.kind()))),
     };
     let (from, to) = (bound(from, 0)?, bound(to, n)?);
-    let items = all(list, meter)?;
+    let items = list.items()?;
     let part = items.get(from..to.max(from)).unwrap_or_default().to_vec();
     let new = if value.kind() == "tuple" { Value::tuple } else { Value::list };
     Ok(new(part, meter)?)
@@ -258,7 +266,7 @@ fn list_method(
             return list.remove(place(index, list.len())?);
         }
         (Method::Index, [value]) => {
-            for (index, item) in all(list, meter)?.iter().enumerate() {
+            for (index, item) in list.items()?.iter().enumerate() {
                 if item.equals(value, meter)? {
                     return Ok(Value::Int(index as i64));
                 }
@@ -281,16 +289,16 @@ fn dict_method(
     meter: &Rc<Meter>,
 ) -> Outcome<Value> {
     Ok(match (method, arguments) {
-        (Method::Get, [key]) => dict.get(&Key::new(key)?).unwrap_or(Value::Nothing),
+        (Method::Get, [key]) => dict.get(&Key::new(key)?)?.unwrap_or(Value::Nothing),
         (Method::Get, [key, default]) => {
-            dict.get(&Key::new(key)?).unwrap_or_else(|| default.clone())
+            dict.get(&Key::new(key)?)?.unwrap_or_else(|| default.clone())
         }
         (Method::Keys, []) => Value::list(keys(dict, meter)?, meter)?,
         (Method::Values | Method::Items, []) => {
-            meter.work(2 * dict.len())?;
             let mut items = Vec::new();
-            for key in dict.keys() {
-                let value = dict.get(&key).expect("it is one of its keys");
+            for key in dict.keys()? {
+                meter.work(1)?;
+                let value = dict.get(&key)?.expect("it is one of its keys");
                 items.push(match method {
                     Method::Values => value,
                     _ => Value::tuple(vec![key.value(meter)?, value], meter)?,
@@ -299,7 +307,6 @@ fn dict_method(
             Value::list(items, meter)?
         }
         (Method::Pop, [key] | [key, _]) => {
-            meter.work(dict.len() / 8)?;
             match (dict.remove(&Key::new(key)?)?, arguments.get(1)) {
                 (Some(value), _) => value,
                 (None, Some(default)) => default.clone(),
@@ -324,6 +331,7 @@ fn wrong_arguments(name: &str, arguments: &[Value]) -> Fault {
 /// A function that every script has.
 pub(crate) fn builtin(function: Builtin, arguments: &[Value], meter: &Rc<Meter>) -> Outcome<Value> {
     let name = function.name();
+    meter.spend(cost::FUNCTION)?;
     Ok(match (function, arguments) {
         (Builtin::Abs, [Value::Int(value)]) => match value.checked_abs() {
             Some(value) => Value::Int(value),
@@ -354,7 +362,7 @@ pub(crate) fn builtin(function: Builtin, arguments: &[Value], meter: &Rc<Meter>)
             let wanted = if function == Builtin::Min { Ordering::Less } else { Ordering::Greater };
             let mut best = first;
             for value in rest {
-                if order(value, best)? == wanted {
+                if order(value, best, meter)? == wanted {
                     best = value;
                 }
             }
@@ -428,7 +436,9 @@ fn range(from: &Value, to: &Value, step: &Value, meter: &Rc<Meter>) -> Outcome<V
     let (first, last) = if *step > 0 { (from, to) } else { (to, from) };
     let distance = u64::try_from(i128::from(*last) - i128::from(*first)).unwrap_or(0);
     let n = distance.div_ceil(step.unsigned_abs());
-    meter.work(usize::try_from(n).unwrap_or(usize::MAX))?;
+    let n_elements = usize::try_from(n).unwrap_or(usize::MAX);
+    meter.work(n_elements)?;
+    meter.check_room(n_elements.saturating_mul(ELEMENT))?;
     let numbers =
         (0..n as i64).map(|index| Value::Int(from.wrapping_add(index.wrapping_mul(*step))));
     Ok(Value::list(numbers.collect(), meter)?)

@@ -1,5 +1,6 @@
 //! Executes code.
 
+use std::cmp::Ordering;
 use std::rc::Rc;
 
 use crate::builtins;
@@ -8,7 +9,7 @@ use crate::code::{
 };
 use crate::error::{Fault, Outcome};
 use crate::key::Key;
-use crate::meter::Meter;
+use crate::meter::{Meter, cost};
 use crate::value::Value;
 use crate::{Host, Program};
 
@@ -42,6 +43,7 @@ enum Flow {
 impl Machine<'_> {
     /// Executes the statements outside functions.
     pub(crate) fn start(&mut self) -> Outcome<()> {
+        self.ask()?;
         self.stack.clear();
         self.stack.resize_with(self.program.n_start_locals, || None);
         for statement in &self.program.start {
@@ -51,8 +53,18 @@ impl Machine<'_> {
         Ok(())
     }
 
+    /// Calls a function of the script for the host.
+    pub(crate) fn begin_with(
+        &mut self,
+        function: &Function,
+        arguments: &[Value],
+    ) -> Outcome<Value> {
+        self.ask()?;
+        self.call(function, arguments)
+    }
+
     /// Calls a function of the script.
-    pub(crate) fn call(&mut self, function: &Function, arguments: &[Value]) -> Outcome<Value> {
+    fn call(&mut self, function: &Function, arguments: &[Value]) -> Outcome<Value> {
         self.enter(function, |stack| {
             stack.extend(arguments.iter().cloned().map(Some));
             Ok(())
@@ -64,7 +76,8 @@ impl Machine<'_> {
         function: &Function,
         push_arguments: impl FnOnce(&mut Vec<Option<Value>>) -> Outcome<()>,
     ) -> Outcome<Value> {
-        self.meter.work(1)?;
+        self.begin()?;
+        self.meter.spend(function.n_locals)?;
         if self.n_calls == CALLS {
             return Err(format!("more than {CALLS} calls within each other").into());
         }
@@ -83,6 +96,20 @@ impl Machine<'_> {
         }
     }
 
+    /// A statement, iteration or call begins: it is work, and now and then the host says whether
+    /// to go on.
+    #[inline]
+    fn begin(&mut self) -> Result<(), String> {
+        self.meter.work(1)?;
+        if self.meter.is_question_due() { self.ask() } else { Ok(()) }
+    }
+
+    /// Asks the host whether to go on.
+    fn ask(&mut self) -> Result<(), String> {
+        self.meter.ask_later();
+        if self.host.goes_on() { Ok(()) } else { Err("was stopped".into()) }
+    }
+
     fn block(&mut self, block: &[Stmt]) -> Outcome<Flow> {
         for statement in block {
             match self.execute(statement)? {
@@ -95,7 +122,7 @@ impl Machine<'_> {
 
     fn execute(&mut self, statement: &Stmt) -> Outcome<Flow> {
         let line = statement.line;
-        self.meter.work(1).map_err(|message| Fault::new(line, message))?;
+        self.begin().map_err(|message| Fault::new(line, message))?;
         match &statement.kind {
             StmtKind::Expr(expr) => {
                 self.eval(expr)?;
@@ -119,7 +146,7 @@ impl Machine<'_> {
                 let list = self.eval(list)?;
                 let elements = builtins::elements(&list, self.meter);
                 for value in elements.map_err(|fault| fault.at(line))? {
-                    self.meter.work(1).map_err(|message| Fault::new(line, message))?;
+                    self.begin().map_err(|message| Fault::new(line, message))?;
                     self.assign(target, value).map_err(|fault| fault.at(line))?;
                     match self.block(body)? {
                         Flow::Next | Flow::Continue => {}
@@ -225,6 +252,7 @@ impl Machine<'_> {
 
     fn operation(&mut self, op: &Op) -> Outcome<Value> {
         let meter = self.meter;
+        meter.spend(cost::OPERATION)?;
         Ok(match op {
             Op::Local(slot) => {
                 let value = self.stack[self.base + slot].clone();
@@ -298,7 +326,7 @@ impl Machine<'_> {
                 let values = self.all(arguments)?;
                 match (&thing, called.host, called.container) {
                     (Value::Object(object), Some(name), _) => {
-                        meter.work(1)?;
+                        self.begin()?;
                         self.host.call(*object, name, &values, meter)?
                     }
                     (_, _, Some(method)) => builtins::method(&thing, method, &values, meter)?,
@@ -359,7 +387,7 @@ impl Machine<'_> {
             [Clause::For(target, list), rest @ ..] => {
                 let list = self.eval(list)?;
                 for value in builtins::elements(&list, self.meter)? {
-                    self.meter.work(1)?;
+                    self.begin()?;
                     self.assign(target, value)?;
                     self.comprehend(rest, each)?;
                 }
@@ -397,7 +425,7 @@ impl Machine<'_> {
             let is_better = match &best {
                 None => true,
                 Some((best, _)) => {
-                    let order = builtins::order(&key, best)?;
+                    let order = builtins::order(&key, best, self.meter)?;
                     if *which == Which::First { order.is_lt() } else { order.is_gt() }
                 }
             };
@@ -410,22 +438,58 @@ impl Machine<'_> {
 
     /// Values in the order of their keys; equal ones keep theirs.
     fn sorted(&mut self, mut keyed: Vec<(Value, Value)>, is_reverse: bool) -> Outcome<Value> {
-        self.meter.work(keyed.len() * keyed.len().max(1).ilog2() as usize)?;
-        let mut fault = None;
+        let n_rounds = keyed.len().max(1).ilog2() as usize;
+        self.meter.work(keyed.len() * n_rounds)?;
+        let keys = Keys::of(&keyed)?;
+        self.meter.read(2 * n_rounds * keys.n_bytes)?;
         keyed.sort_by(|(a, _), (b, _)| {
-            let order = builtins::order(a, b).unwrap_or_else(|wrong| {
-                fault.get_or_insert(wrong);
-                std::cmp::Ordering::Equal
-            });
+            let order = keys.order(a, b);
             if is_reverse { order.reverse() } else { order }
         });
-        match fault {
-            Some(fault) => Err(fault),
-            None => {
-                let values = keyed.into_iter().map(|(_, value)| value).collect();
-                Ok(Value::list(values, self.meter)?)
+        let values = keyed.into_iter().map(|(_, value)| value).collect();
+        Ok(Value::list(values, self.meter)?)
+    }
+}
+
+/// Keys that have a total order, as sorting needs it: all are numbers, or all are texts.
+struct Keys {
+    are_texts: bool,
+    /// Bytes of all texts.
+    n_bytes: usize,
+}
+
+impl Keys {
+    fn of(keyed: &[(Value, Value)]) -> Outcome<Self> {
+        let Some((first, _)) = keyed.first() else {
+            return Ok(Self { are_texts: false, n_bytes: 0 });
+        };
+        let are_texts = first.as_text().is_some();
+        let mut n_bytes = 0;
+        for (key, _) in keyed {
+            match (key.as_text(), key.number()) {
+                (Some(text), _) if are_texts => n_bytes += text.len(),
+                (_, Some(number)) if !are_texts && !number.is_nan() => {}
+                // A single one needs no order.
+                _ if keyed.len() == 1 => {}
+                _ => return Err(builtins::without_order(first, key)),
             }
         }
+        Ok(Self { are_texts, n_bytes })
+    }
+
+    fn order(&self, a: &Value, b: &Value) -> Ordering {
+        if self.are_texts {
+            return a.as_text().cmp(&b.as_text());
+        }
+        let number = |value: &Value| value.number().unwrap_or_default();
+        // As floats, and those that are one float as whole numbers: whole numbers beyond 2^53 have
+        // floats between them.
+        let exact = |value: &Value| match value {
+            Value::Int(value) => i128::from(*value),
+            other => number(other) as i128,
+        };
+        let order = number(a).partial_cmp(&number(b)).unwrap_or(Ordering::Equal);
+        order.then_with(|| exact(a).cmp(&exact(b)))
     }
 }
 

@@ -34,9 +34,9 @@ impl Key {
                 Some(value) => Self::Int(value),
                 None => Self::Float(value.to_bits()),
             },
-            Value::Text(_) => Self::Text(value.as_text().unwrap_or_default().to_owned()),
+            Value::Text(_) => Self::Text(value.read_text()?.unwrap_or_default().to_owned()),
             Value::List(list) if list.is_tuple() && depth > 0 => {
-                let keys = list.items();
+                let keys = list.items()?;
                 let keys = keys.iter().map(|value| Self::within(value, depth - 1));
                 Self::Tuple(keys.collect::<Result<_, _>>()?)
             }

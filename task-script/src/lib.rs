@@ -82,6 +82,12 @@ pub trait Host {
     /// `object.name = value`.
     fn set(&mut self, object: Object, name: Name, value: Value) -> Result<(), String>;
 
+    /// Whether to go on; asked every few milliseconds of a call, which fails if not. The answer may
+    /// come from a clock or from another thread, so a call that was stopped has no result.
+    fn goes_on(&mut self) -> bool {
+        true
+    }
+
     /// `object.name(arguments)`. What takes longer with more things is to be told to the
     /// meter as work.
     fn call(
@@ -215,7 +221,7 @@ impl Script {
     ) -> Result<Value, ScriptError> {
         self.stack.clear();
         let function = &program.functions[function.0];
-        let called = self.machine(program, host).call(function, arguments);
+        let called = self.machine(program, host).begin_with(function, arguments);
         called.map_err(|fault| fault.at(function.line).into_error(&program.file))
     }
 

@@ -121,6 +121,15 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Notes a name that means nothing, with what it may have been. Looking for that compares it
+    /// with all names there are, so it is done for those that are reported only.
+    fn unknown(&mut self, line: u32, what: &str, name: &str, known: impl Fn(&Self) -> Vec<&str>) {
+        if self.problems.len() < PROBLEMS {
+            let suggestion = suggestion(name, &known(self));
+            self.problem(line, format!("{what} `{}`; {suggestion}", shortened(name)));
+        }
+    }
+
     /// Takes an operator, if it is next.
     fn accept(&mut self, operator: &'static str) -> bool {
         let is_next = *self.kind() == Kind::Operator(operator);
@@ -233,12 +242,12 @@ impl<'a> Parser<'a> {
     /// Reports names that are read and mean nothing.
     fn report_unknown(&mut self, scope: &Scope<'a>) {
         for (name, line) in scope.never_assigned() {
-            let known = self.known_names(scope);
-            let message = match REFUSED.iter().find(|(word, _)| *word == name) {
-                Some((_, advice)) => (*advice).to_owned(),
-                None => format!("unknown name `{}`; {}", shortened(name), suggestion(name, &known)),
-            };
-            self.problem(line, message);
+            match REFUSED.iter().find(|(word, _)| *word == name) {
+                Some((_, advice)) => self.problem(line, *advice),
+                None => {
+                    self.unknown(line, "unknown name", name, |parser| parser.known_names(scope))
+                }
+            }
         }
     }
 

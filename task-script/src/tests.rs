@@ -197,6 +197,26 @@ fn what_goes_wrong_is_said_with_its_line() {
 }
 
 #[test]
+fn what_has_no_order_is_not_sorted_and_large_numbers_are() {
+    // Long enough for the sort to see that an order contradicts itself.
+    let nan =
+        "n = math.inf - math.inf\n    l = [n if i % 7 == 3 else (i * 31) % 50 for i in range(90)]";
+    for (l, expected) in [
+        (nan, "not a number (NaN) has no order"),
+        ("l = [str_of[i % 2] for i in range(90)]", "a int and a string have no order"),
+        ("l = [[i] for i in range(90)]", "a list and a list have no order"),
+    ] {
+        let l = l.replace("str_of", "[1, 'a']");
+        let error = run(&format!("def f(x):\n    {l}\n    return sorted(l)")).unwrap_err();
+        assert!(error.message.contains(expected), "{l}: {error}");
+    }
+    // Neighbours as whole numbers, one and the same as floats.
+    let large =
+        "b = 9007199254740992\nl = [b + i % 3 if i % 2 else (b + i % 3) * 1.0 for i in range(90)]";
+    assert!(holds(large, "sorted(l)[0] == b and sorted([2, 1.5, 1]) == [1, 1.5, 2]"));
+}
+
+#[test]
 fn what_runs_away_ends() {
     for body in [
         "for i in range(1000):\n        for j in range(1000):\n            x",

@@ -9,10 +9,10 @@ use indexmap::IndexMap;
 
 use crate::error::Outcome;
 use crate::key::Key;
-use crate::meter::Meter;
+use crate::meter::{Meter, cost};
 
 /// Bytes that an element of a list takes, at most.
-const ELEMENT: usize = 2 * size_of::<Value>();
+pub(crate) const ELEMENT: usize = 2 * size_of::<Value>();
 /// Bytes that an entry of a dict takes, at most.
 const ENTRY: usize = 2 * (size_of::<(Key, Value)>() + 16);
 /// Bytes that a list, dict or text takes without its content, at most.
@@ -148,9 +148,10 @@ impl List {
         items
     }
 
-    /// A copy of its elements.
-    pub fn items(&self) -> Vec<Value> {
-        self.items.borrow().clone()
+    /// A copy of its elements, which is the work of as many statements.
+    pub fn items(&self) -> Result<Vec<Value>, String> {
+        self.meter.work(self.len())?;
+        Ok(self.items.borrow().clone())
     }
 
     /// Number of elements.
@@ -241,12 +242,19 @@ impl Dict {
         self.entries.borrow().get(&Key::Text(key.to_owned())).cloned()
     }
 
-    pub(crate) fn get(&self, key: &Key) -> Option<Value> {
-        self.entries.borrow().get(key).cloned()
+    pub(crate) fn get(&self, key: &Key) -> Result<Option<Value>, String> {
+        self.pay_for(key)?;
+        Ok(self.entries.borrow().get(key).cloned())
+    }
+
+    /// The work of finding a key.
+    fn pay_for(&self, key: &Key) -> Result<(), String> {
+        self.meter.spend(cost::ENTRY + key.bytes() / cost::BYTES)
     }
 
     pub(crate) fn set(self: &Rc<Self>, key: Key, value: Value) -> Outcome<()> {
         self.check_mutable()?;
+        self.pay_for(&key)?;
         let state = self.state.get();
         if value.is_container() && !state.is_noted {
             self.state.set(State { is_noted: true, ..state });
@@ -262,8 +270,11 @@ impl Dict {
         Ok(())
     }
 
+    /// Those behind it move up.
     pub(crate) fn remove(&self, key: &Key) -> Outcome<Option<Value>> {
         self.check_mutable()?;
+        self.meter.work(self.len() / 8)?;
+        self.pay_for(key)?;
         let value = self.entries.borrow_mut().shift_remove(key);
         if value.is_some() {
             self.meter.release(ENTRY + key.bytes());
@@ -277,8 +288,12 @@ impl Dict {
         Ok(())
     }
 
-    pub(crate) fn keys(&self) -> Vec<Key> {
-        self.entries.borrow().keys().cloned().collect()
+    /// Copies of its keys, which is the work of as many statements.
+    pub(crate) fn keys(&self) -> Result<Vec<Key>, String> {
+        self.meter.work(self.len())?;
+        let entries = self.entries.borrow();
+        self.meter.read(entries.keys().map(Key::bytes).sum())?;
+        Ok(entries.keys().cloned().collect())
     }
 
     fn check_mutable(&self) -> Result<(), String> {
@@ -292,6 +307,8 @@ impl Dict {
 impl Value {
     /// A text.
     pub fn text(text: &str, meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.spend(cost::CONTAINER)?;
+        meter.read(text.len())?;
         meter.take(OVERHEAD + text.len())?;
         Ok(Self::Text(Rc::new(Text { text: text.to_owned(), meter: Rc::clone(meter) })))
     }
@@ -307,6 +324,7 @@ impl Value {
     }
 
     fn sequence(items: Vec<Self>, is_tuple: bool, meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.spend(cost::CONTAINER)?;
         meter.take(OVERHEAD + ELEMENT * items.len())?;
         let (items, meter) = (RefCell::new(items), Rc::clone(meter));
         Ok(Self::List(Rc::new(List { items, is_tuple, state: Cell::default(), meter })))
@@ -314,6 +332,7 @@ impl Value {
 
     /// An empty dict.
     pub fn dict(meter: &Rc<Meter>) -> Result<Self, String> {
+        meter.spend(cost::CONTAINER)?;
         meter.take(OVERHEAD)?;
         let (entries, meter) = (RefCell::default(), Rc::clone(meter));
         Ok(Self::Dict(Rc::new(Dict { entries, state: Cell::default(), meter })))
@@ -329,9 +348,17 @@ impl Value {
         }
     }
 
-    /// The text, if it is one.
+    /// The text, if it is one. Comparing it with few short names is no work; what reads all of a
+    /// text asks for [`read_text`](Self::read_text).
     pub fn as_text(&self) -> Option<&str> {
         if let Self::Text(text) = self { Some(&text.text) } else { None }
+    }
+
+    /// The text, if it is one, and the work of reading it once.
+    pub(crate) fn read_text(&self) -> Result<Option<&str>, String> {
+        let Self::Text(text) = self else { return Ok(None) };
+        text.meter.read(text.text.len())?;
+        Ok(Some(&text.text))
     }
 
     /// Whether a condition holds: all but `None`, `False`, zero and what is empty.
@@ -371,16 +398,20 @@ impl Value {
     pub fn freeze(&self) {
         let mut pending = vec![self.clone()];
         while let Some(value) = pending.pop() {
-            let (state, inner) = match &value {
-                Self::List(list) => (&list.state, list.items()),
-                Self::Dict(dict) => {
-                    (&dict.state, dict.entries.borrow().values().cloned().collect())
-                }
+            let state = match &value {
+                Self::List(list) => &list.state,
+                Self::Dict(dict) => &dict.state,
                 _ => continue,
             };
-            if !state.get().is_frozen {
-                state.set(State { is_frozen: true, ..state.get() });
-                pending.extend(inner);
+            if state.get().is_frozen {
+                continue;
+            }
+            state.set(State { is_frozen: true, ..state.get() });
+            // Once for each list or dict, so it is work that making them has paid for.
+            match &value {
+                Self::List(list) => pending.extend(list.items.borrow().iter().cloned()),
+                Self::Dict(dict) => pending.extend(dict.entries.borrow().values().cloned()),
+                _ => {}
             }
         }
     }
@@ -397,7 +428,10 @@ impl Value {
             (Self::Bool(a), Self::Bool(b)) => a == b,
             (Self::Int(a), Self::Int(b)) => a == b,
             (Self::Text(a), Self::Text(b)) => {
-                meter.work(a.text.len() / 64)?;
+                if a.text.len() != b.text.len() {
+                    return Ok(false);
+                }
+                meter.read(a.text.len())?;
                 a.text == b.text
             }
             (Self::Object(a), Self::Object(b)) => a == b,

@@ -104,7 +104,7 @@ impl Plan {
         if list.len() != len {
             return Err(format!("{}, not of {}", expected(), list.len()));
         }
-        for (component, value) in self.message.iter_mut().zip(list.items()) {
+        for (component, value) in self.message.iter_mut().zip(list.items()?) {
             *component = within(0.0, number(&value)?, "a component of a message")?;
         }
         Ok(())

@@ -25,8 +25,8 @@ use view::{Kept, Kind};
 
 /// Largest absolute value that a function may return: sums and squares of it are finite.
 const LARGEST: f64 = 1e100;
-/// Units of work in a call.
-const WORK: u64 = 2_000_000;
+/// Work of a call, in statements: less than a second, whatever the script does.
+const WORK: u64 = 3_000_000;
 /// Memory that a trial may keep, bytes, beside [`MEMORY_PER_ROBOT`].
 const MEMORY: usize = 256 << 10;
 const MEMORY_PER_ROBOT: usize = 4 << 10;
@@ -179,10 +179,12 @@ impl<'a> ScriptRun<'a> {
     pub fn start(
         task: &'a ScriptTask,
         world: &World,
+        goes_on: &dyn Fn() -> bool,
         stream: impl Fn(Purpose, usize) -> Stream,
     ) -> Result<Self, ScriptError> {
         let memory = MEMORY + MEMORY_PER_ROBOT * world.n_robots();
-        let script = task.program.start(Limits { work: WORK, memory }, &mut view::Nothing)?;
+        let script =
+            task.program.start(Limits { work: WORK, memory }, &mut view::Nothing(goes_on))?;
         let actor = |robot| Actor {
             robot,
             plan: Plan::new(world.message_len),

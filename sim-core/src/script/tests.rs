@@ -103,6 +103,24 @@ fn a_script_that_goes_wrong_ends_its_item_with_file_line_and_reason() {
 }
 
 #[test]
+fn a_script_is_stopped_in_the_middle_of_a_step_and_has_no_result() {
+    let burn = "for i in range(1000):\n            for j in range(1000): x = sorted([j, i, 2, 1])";
+    let text =
+        format!("def fitness(world):\n    if world.step >= 3:\n        {burn}\n    return 1.0\n");
+    let simulation = Simulation::compile(&with_script(experiment_a(), "t.star", &text)).unwrap();
+    let genotype = vec![0.5; simulation.genotype_len()];
+    let n_asked = std::cell::Cell::new(0);
+    // Steps 0 to 3 begin, and so do the calls in them.
+    let keep_going = || n_asked.replace(n_asked.get() + 1) < 20;
+    let stopped = simulation.evaluate_while(&genotype, 0, 0..1, &keep_going);
+    assert_eq!(stopped, Ok(None));
+    assert!(n_asked.get() < 25, "asked {} times", n_asked.get());
+    // Nobody stops what uses up its budget: that is the script's failure.
+    let failed = simulation.evaluate(&genotype, 0, 0..1).unwrap_err();
+    assert!(failed.to_string().contains("does too much"), "{failed}");
+}
+
+#[test]
 fn scripts_that_cannot_work_are_refused_with_all_that_is_wrong() {
     for (text, expected) in [
         ("def fitnes(world): return 1", "t.star: has none of the functions `fitness`"),

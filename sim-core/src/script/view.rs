@@ -81,6 +81,8 @@ pub(crate) struct View<'a> {
     /// Steps of the episode.
     pub n_steps: u32,
     pub may: May<'a>,
+    /// Whether to go on.
+    pub goes_on: &'a dyn Fn() -> bool,
     /// Set by the caller of the script.
     pub kept: Option<&'a mut Kept>,
 }
@@ -100,6 +102,7 @@ impl<'a> View<'a> {
             step: self.step,
             n_steps: self.n_steps,
             may,
+            goes_on: self.goes_on,
             kept: None,
         }
     }
@@ -292,12 +295,11 @@ impl<'a> View<'a> {
         Value::list(near.filter(|value| !itself(value)).collect(), meter)
     }
 
-    fn points(&self, list: &Value, meter: &Rc<Meter>) -> Result<Vec<Vec2>, String> {
+    fn points(&self, list: &Value) -> Result<Vec<Vec2>, String> {
         let Value::List(list) = list else {
             return Err(format!("expected a list of things, not a {}", list.kind()));
         };
-        meter.work(list.len())?;
-        list.items().iter().map(|value| self.point(value)).collect()
+        list.items()?.iter().map(|value| self.point(value)).collect()
     }
 
     fn call_world(&mut self, name: Named, arguments: &[Value], meter: &Rc<Meter>) -> Answer {
@@ -313,7 +315,7 @@ impl<'a> View<'a> {
             (Named::Turn, [from, to]) => {
                 Value::Float(wrap_angle(number(to)? - number(from)? + PI) - PI)
             }
-            (Named::Centroid, [list]) => pair(torus.centroid(&self.points(list, meter)?), meter)?,
+            (Named::Centroid, [list]) => pair(torus.centroid(&self.points(list)?), meter)?,
             (Named::Neighbours, [of, range]) => self.neighbours(of, number(range)?, meter)?,
             (Named::Border, []) => {
                 let evaluated = self.world.evaluated();
@@ -363,6 +365,10 @@ impl<'a> View<'a> {
 }
 
 impl Host for View<'_> {
+    fn goes_on(&mut self) -> bool {
+        (self.goes_on)()
+    }
+
     fn get(&mut self, object: Object, name: Name, meter: &Rc<Meter>) -> Answer {
         let kind = Kind::of(object);
         match (Named::numbered(name), kind) {
@@ -403,10 +409,14 @@ impl Host for View<'_> {
     }
 }
 
-/// What a script sees outside functions.
-pub(super) struct Nothing;
+/// What a script sees outside functions, and whether to go on.
+pub(super) struct Nothing<'a>(pub &'a dyn Fn() -> bool);
 
-impl Host for Nothing {
+impl Host for Nothing<'_> {
+    fn goes_on(&mut self) -> bool {
+        (self.0)()
+    }
+
     fn get(&mut self, _: Object, _: Name, _: &Rc<Meter>) -> Answer {
         Err(OUTSIDE.into())
     }

@@ -45,7 +45,7 @@ fn a_frame_crosses_a_line_one_hop_per_step_and_dies_at_max_hops() {
     let mut config = line(14);
     observe_sending_direction(&mut config);
     let simulation = Simulation::compile(&config).unwrap();
-    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     let mut modes = [Mode::Relay; 14];
     modes[0] = Mode::Send;
     step(&mut trial, &modes, [1.0, 0.0]);
@@ -83,7 +83,7 @@ fn the_sending_direction_is_that_of_the_robot_that_is_heard_or_of_the_originator
         let headings = [0.0, FRAC_PI_2, 0.0].map(|heading| vec![heading]);
         robot.initializers.orientations = Initializer::Fixed { values: headings.to_vec() };
         let simulation = Simulation::compile(&config).unwrap();
-        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+        let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
         for _ in 0..3 {
             step(&mut trial, &[Mode::Send, Mode::Relay, Mode::Relay], [1.0, 0.0]);
         }
@@ -98,7 +98,7 @@ fn the_sending_direction_is_that_of_the_robot_that_is_heard_or_of_the_originator
 #[test]
 fn nothing_is_heard_in_the_first_step_and_everyone_sends_in_the_first_ten() {
     let simulation = Simulation::compile(&line(2)).unwrap();
-    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     for step in 0..12 {
         trial.sense(step).unwrap();
         // On the air: the frames of step - 1.
@@ -117,7 +117,7 @@ fn robots_may_be_heard_from_the_first_step_on_and_send_for_longer() {
     let transmitter = transmitter.as_mut().unwrap();
     (transmitter.initial_frame, transmitter.sending_steps) = (true, 11);
     let simulation = Simulation::compile(&config).unwrap();
-    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     for step in 0..13 {
         trial.sense(step).unwrap();
         let received = trial.swarm.received[0];
@@ -138,7 +138,7 @@ fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
     let mut config = line(2);
     observe_sending_direction(&mut config);
     let simulation = Simulation::compile(&config).unwrap();
-    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     let read_value = |trial: &Trial<'_>, query, value| {
         let mut row = [7.0; 2];
         trial.groups[0].senses.write(query, value, 0..2, &trial.swarm, &mut row);
@@ -166,7 +166,7 @@ fn readings_without_a_frame_are_zero_and_the_state_is_the_mode() {
 #[test]
 fn the_chosen_frame_is_uniform_among_the_sectors_with_a_valid_one() {
     let simulation = Simulation::compile(&line(3)).unwrap();
-    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0).unwrap();
+    let mut trial = Trial::new(&simulation, TrialSet::Generation(0), 0, &|| true).unwrap();
     step(&mut trial, &[Mode::Send; 3], [0.0; 2]);
     let mut from_right = 0;
     for _ in 0..2000 {

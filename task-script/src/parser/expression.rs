@@ -188,10 +188,9 @@ impl<'a> Parser<'a> {
         let container = if is_call { Method::named(name) } else { None };
         if host.is_none() && container.is_none() {
             let methods: &[&str] = if is_call { Method::NAMES } else { &[] };
-            let known: Vec<&str> = self.vocabulary.names.iter().chain(methods).copied().collect();
-            let message =
-                format!("nothing has a `{}`; {}", shortened(name), suggestion(name, &known));
-            self.problem(line, message);
+            self.unknown(line, "nothing has a", name, |parser| {
+                parser.vocabulary.names.iter().chain(methods).copied().collect()
+            });
         }
         if !is_call {
             return self.expr(line, Op::Attribute(Box::new(value), host.unwrap_or_default()));
@@ -327,15 +326,13 @@ impl<'a> Parser<'a> {
         if let Some(builtin) = Builtin::named(name) {
             return self.expr(line, Op::Builtin(builtin, values));
         }
-        let functions = self.signatures.iter().map(|(name, _)| *name);
-        let known: Vec<&str> = functions.chain(Builtin::NAMES.iter().copied()).collect();
-        let message = match REFUSED.iter().find(|(word, _)| *word == name) {
-            Some((_, advice)) => (*advice).to_owned(),
-            None => {
-                format!("no function is named `{}`; {}", shortened(name), suggestion(name, &known))
-            }
-        };
-        self.problem(line, message);
+        match REFUSED.iter().find(|(word, _)| *word == name) {
+            Some((_, advice)) => self.problem(line, *advice),
+            None => self.unknown(line, "no function is named", name, |parser| {
+                let functions = parser.signatures.iter().map(|(name, _)| *name);
+                functions.chain(Builtin::NAMES.iter().copied()).collect()
+            }),
+        }
         self.expr(line, Op::Nothing)
     }
 
