@@ -33,6 +33,7 @@ use worker::Backoff;
 use crate::{
     args::Subject,
     error::{Error, is_transient},
+    interrupt,
     place::{DEFAULT_DATA_DIR, Intent, Place},
     progress::Progress,
     settings::Settings,
@@ -242,6 +243,7 @@ impl Connection {
         &self,
         request: SubmitExperimentRequest,
     ) -> Result<SubmitExperimentResponse, Error> {
+        interrupt::submitting();
         self.call(async |client| client.submit_experiment(request.clone()).await).await
     }
 

@@ -11,13 +11,14 @@ use evolution::ALGORITHMS;
 use experiment_file::{
     ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, script_path,
 };
-use sim_core::Simulation;
+use sim_core::{Simulation, TRYING_TIME_MAX};
 use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::{
     change::{Change, Json, apply_all},
+    clock,
     error::{Error, prefix_lines},
-    json,
+    interrupt, json,
 };
 
 /// The text of an experiment file.
@@ -100,8 +101,12 @@ impl ExperimentFile {
 
     /// Checks the experiment as the coordinator will.
     pub fn check(&self, overrides: &Overrides) -> Result<Compiled, ConfigError> {
-        let compiled = self.compile(overrides)?;
-        compiled.experiment.check_starts(&compiled.config.algorithm)?;
+        let mut compiled = self.compile(overrides)?;
+        let started = clock::now();
+        let goes_on =
+            || interrupt::goes_on() && clock::now().duration_since(started) < TRYING_TIME_MAX;
+        let tried = compiled.experiment.check_starts(&compiled.config.algorithm, &goes_on)?;
+        compiled.warnings.extend(tried.warning().map(str::to_owned).map(unlocated));
         Ok(compiled)
     }
 

@@ -13,7 +13,7 @@ use crate::{
     change::Change,
     error::Error,
     experiment_file::{ExperimentFile, Overrides, random_request_id},
-    json,
+    interrupt, json,
 };
 
 /// Most runs of one sweep: as many as a coordinator has unfinished.
@@ -115,6 +115,9 @@ pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
                 }
             }
         }
+    }
+    if !interrupt::goes_on() {
+        return Err(interrupt::error());
     }
     if !problems.is_empty() {
         let mut seen = BTreeSet::new();

@@ -68,7 +68,7 @@ impl LocalRun {
     /// unfinished, has completed, or has completed fewer generations; else begins it. Keeps others
     /// out of the directory until it is dropped.
     pub fn open(directory: &Path, config_json: String) -> Result<Self, LocalRunError> {
-        let new = Submission { config_json, ..Submission::default() }.check()?.new;
+        let new = Submission { config_json, ..Submission::default() }.check(&|| true)?.new;
         let mut store = Store::open(directory)?;
         let existing = Existing { resume_unfinished: true, reuse: true };
         let id = match place(&mut store, new, existing, u64::MAX)?.0 {

@@ -56,8 +56,9 @@ pub struct CheckedSubmission {
 }
 
 impl Submission {
-    /// Checks everything about a submission; it can run if this succeeds.
-    pub fn check(self) -> Result<CheckedSubmission, ConfigError> {
+    /// Checks everything about a submission; it can run if this succeeds. When `goes_on` says
+    /// no, it ends trying how the experiment begins, and warns of that.
+    pub fn check(self, goes_on: &dyn Fn() -> bool) -> Result<CheckedSubmission, ConfigError> {
         let (mut config, warnings) =
             ExperimentConfig::from_json(&self.config_json, &self.default_name, ALGORITHMS)?;
         if self.seed.is_some() || self.generations.is_some() {
@@ -69,7 +70,7 @@ impl Submission {
                 ExperimentConfig::from_json(&config.to_canonical_json(), &name, ALGORITHMS)?;
         }
         let experiment = Simulation::compile(&config)?;
-        experiment.check_starts(&config.algorithm)?;
+        let tried = experiment.check_starts(&config.algorithm, goes_on)?;
         let (evolution, fork) = match self.parent {
             Some(parent) => {
                 let (evolution, fork) = parent.fork(&config, &experiment)?;
@@ -82,6 +83,7 @@ impl Submission {
         };
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         warnings.extend(experiment.uncovered_parameters().iter().cloned());
+        warnings.extend(tried.warning().map(str::to_owned));
         let new = NewExperiment {
             request_id: self.request_id,
             config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),

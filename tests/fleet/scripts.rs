@@ -170,3 +170,58 @@ fn the_tutorial_does_what_it_says() {
     let header = fs::read_to_string(trace).unwrap().lines().next().unwrap().to_owned();
     assert!(header.contains("touching"), "{header}");
 }
+
+/// Harmless for the steps in which a script is tried; then it does what it may in every call, so
+/// that a trial takes many minutes.
+const BURNS: &str = "
+def fitness(world):
+    if world.step < 60:
+        return 1.0
+    x = 0
+    for i in range(20000):
+        x = sorted([i, 2, 1])[0] + sum(range(30))
+    return x
+";
+
+#[test]
+fn a_script_that_burns_time_is_ended_by_cancelling_it_and_by_signals() {
+    let mut coordinator = CoordinatorProcess::start();
+    let mut workers = WorkerProcess::start_many(&coordinator, 2);
+    let burning = scripted(3, BURNS).edit(|experiment| {
+        experiment["algorithm"]["evaluation_steps"] = json!(100_000);
+    });
+    let id = coordinator.submit(&burning.path());
+    let is_busy = |worker: &serde_json::Value| worker["items_in_flight"].as_u64() > Some(0);
+    let wait_until_busy = |coordinator: &CoordinatorProcess| loop {
+        let workers = coordinator.swarmctl(&["workers", "--output", "json"]).json();
+        let workers = workers["workers"].as_array().unwrap().clone();
+        if !workers.is_empty() && workers.iter().all(is_busy) {
+            return;
+        }
+    };
+    wait_until_busy(&coordinator);
+    coordinator.swarmctl(&["cancel", &id.to_string()]).expect_success();
+    // The workers are free for another experiment.
+    let experiment = Experiment::tiny(2);
+    let other = coordinator.watch(coordinator.submit(&experiment.path())).finish();
+    assert_eq!(other.digests(), undisturbed(&experiment));
+    // One that is told to stop in the middle of an item does so.
+    coordinator.submit(&burning.path());
+    wait_until_busy(&coordinator);
+    let mut stopped = workers.pop().unwrap();
+    stopped.process.signal("TERM");
+    assert_eq!(stopped.process.wait().code(), Some(0));
+    coordinator.process.signal("TERM");
+    assert_eq!(coordinator.process.wait().code(), Some(0));
+}
+
+#[test]
+fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
+    let coordinator = CoordinatorProcess::start();
+    let experiment = scripted(3, &BURNS.replace("world.step < 60", "False"));
+    let path = experiment.path();
+    let validated = swarmctl(["validate", path.to_str().unwrap()]).expect_success();
+    assert!(validated.stderr.contains("its start takes long"), "{}", validated.stderr);
+    let submitted = coordinator.swarmctl(&["submit", path.to_str().unwrap()]).expect_success();
+    assert!(submitted.stderr.contains("its start takes long"), "{}", submitted.stderr);
+}

@@ -180,6 +180,15 @@ pub(crate) fn heartbeat() -> v1::WorkRequest {
     request(Message::Heartbeat(v1::Heartbeat {}))
 }
 
+/// Whether an experiment brings a script; false if the file cannot be read.
+pub(crate) fn has_script(config_json: &str) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Brings {
+        task: Option<serde::de::IgnoredAny>,
+    }
+    serde_json::from_str(config_json).is_ok_and(|Brings { task }| task.is_some())
+}
+
 pub(crate) fn draining() -> v1::WorkRequest {
     request(Message::Draining(v1::Draining {}))
 }

@@ -62,6 +62,9 @@ pub struct WorkerConfig {
     pub stats: Arc<Stats>,
     /// Where [`health_check`] looks whether there is a session with the coordinator.
     pub session_file: Option<PathBuf>,
+    /// Ends items of scripts that it is still computing after `shutdown`, as they may take any
+    /// time; other workers compute them again.
+    pub give_up: CancellationToken,
 }
 
 impl WorkerConfig {
@@ -78,9 +81,13 @@ impl WorkerConfig {
             isa: Isa::best(),
             stats: Arc::default(),
             session_file: None,
+            give_up: CancellationToken::new(),
         }
     }
 }
+
+/// How long a worker that a signal stops goes on with items of scripts.
+pub const FINISHING_TIME: Duration = Duration::from_millis(700);
 
 /// Why a worker gave up. What may pass (a coordinator that is down, a broken
 /// connection) is retried and never gets here.
@@ -162,7 +169,7 @@ impl WorkerError {
 }
 
 /// Works for the coordinator until `shutdown` is cancelled: then it finishes
-/// what it is computing, delivers that, and returns.
+/// what it is computing, delivers that, and returns. [`WorkerConfig::give_up`] ends items of scripts.
 ///
 /// A coordinator that is not up, or goes away, is tried again without end, after
 /// random delays that grow; only another service, where a coordinator has never been
@@ -204,7 +211,7 @@ async fn run_with(
                     "connected"
                 );
                 let worker_id = session.worker_id();
-                let session = session.serve(&pool, &shutdown, &evaluator);
+                let session = session.serve(&pool, &shutdown, &config.give_up, &evaluator);
                 let ended = match &session_file {
                     None => session.await,
                     Some(file) => {

@@ -20,7 +20,9 @@ use tokio::{
 };
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
-use worker::{Expired, Lifetime, Stats, Watchdog, WorkerConfig, WorkerError, metrics};
+use worker::{
+    Expired, FINISHING_TIME, Lifetime, Stats, Watchdog, WorkerConfig, WorkerError, metrics,
+};
 
 const EXIT_INTERNAL: u8 = 1;
 const EXIT_INPUT: u8 = 2;
@@ -102,7 +104,8 @@ async fn main() -> ExitCode {
         return EXIT_INPUT.into();
     }
     let shutdown = CancellationToken::new();
-    if let Err(error) = stop_on_signals(shutdown.clone()) {
+    let give_up = CancellationToken::new();
+    if let Err(error) = stop_on_signals(shutdown.clone(), give_up.clone()) {
         error!("cannot listen for signals: {error}");
         return EXIT_INTERNAL.into();
     }
@@ -122,6 +125,7 @@ async fn main() -> ExitCode {
         experiments: args.experiments,
         isa,
         session_file: args.session_file,
+        give_up,
         ..WorkerConfig::new(args.coordinator, name, slots)
     };
     if let Some(address) = args.metrics.metrics_listen {
@@ -195,8 +199,9 @@ fn report_health(session_file: &Path) -> ExitCode {
     }
 }
 
-/// The first signal asks the worker to finish, the second ends the process.
-fn stop_on_signals(shutdown: CancellationToken) -> std::io::Result<()> {
+/// The first signal asks the worker to finish, items of scripts within [`FINISHING_TIME`]; the
+/// second ends the process.
+fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> std::io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {
@@ -209,6 +214,11 @@ fn stop_on_signals(shutdown: CancellationToken) -> std::io::Result<()> {
                 std::process::exit(EXIT_INTERRUPTED);
             }
             shutdown.cancel();
+            let give_up = give_up.clone();
+            tokio::spawn(async move {
+                sleep(FINISHING_TIME).await;
+                give_up.cancel();
+            });
         }
     });
     Ok(())

@@ -118,11 +118,13 @@ impl Session {
     }
 
     /// Computes what the coordinator sends, until the stream breaks, or until
-    /// `shutdown` and everything that was being computed then is delivered.
+    /// `shutdown` and everything that was being computed then is delivered, or dropped if it is
+    /// an item of a script when `give_up` is cancelled.
     pub(crate) async fn serve(
         self,
         pool: &Pool,
         shutdown: &CancellationToken,
+        give_up: &CancellationToken,
         evaluator: &(dyn Fn(String) -> Evaluator + Sync),
     ) -> Ended {
         let Self { welcome, mut inbound, outbound } = self;
@@ -141,6 +143,7 @@ impl Session {
         let mut worked = false;
         let mut computed = Vec::new();
         let mut all_computed = false;
+        let mut has_given_up = false;
 
         while !(all_computed && state.ready.is_empty()) {
             // Results that the network does not take stop the intake of more.
@@ -152,6 +155,10 @@ impl Session {
                     if outbound.send(convert::draining()).await.is_err() {
                         return Ended::Lost { reason: STOPPED_READING.into(), worked };
                     }
+                }
+                () = give_up.cancelled(), if state.is_draining() && !has_given_up => {
+                    has_given_up = true;
+                    state.give_up();
                 }
                 _ = heartbeat.tick() => {
                     worked = true;
@@ -214,6 +221,8 @@ const STOPPED_READING: &str = "the coordinator stopped reading";
 /// What assignments of a job need beside themselves.
 struct Job {
     evaluator: Evaluator,
+    /// Whether items may take any time, as a script says what is done in them.
+    has_script: bool,
     /// What genotypes of its latest generation are drawn from.
     distribution: Option<Arc<Distribution>>,
 }
@@ -243,6 +252,16 @@ impl SessionState<'_> {
         info!(dropped, "draining");
     }
 
+    fn give_up(&self) {
+        let has_script = |assignment: &crate::assignment::Assignment| {
+            self.jobs.get(&assignment.job).is_none_or(|job| job.has_script)
+        };
+        let dropped = self.pool.cancel(has_script);
+        if dropped > 0 {
+            info!(dropped, "items of scripts are dropped: other workers compute them");
+        }
+    }
+
     /// Results of short items wait until there are as many of them as items in the queue, so
     /// that few messages are sent and slots do not run out of items.
     fn on_computed(&mut self, computed: impl Iterator<Item = ItemResult>) {
@@ -260,8 +279,9 @@ impl SessionState<'_> {
         match message {
             Message::Spec(v1::JobSpec { job, config_json }) => {
                 if let Some(job) = convert::job(job) {
+                    let has_script = convert::has_script(&config_json);
                     let evaluator = (self.evaluator)(config_json);
-                    self.jobs.insert(job, Job { evaluator, distribution: None });
+                    self.jobs.insert(job, Job { evaluator, has_script, distribution: None });
                 }
             }
             Message::Distribution(v1::Distribution { job, distribution }) => {
@@ -301,7 +321,7 @@ impl SessionState<'_> {
             let read = common
                 .as_ref()
                 .map_err(|message| convert::failure(assignment.assignment_id, message.clone()));
-            let read = read.and_then(|(common, Job { evaluator, distribution })| {
+            let read = read.and_then(|(common, Job { evaluator, distribution, .. })| {
                 let assignment = convert::assignment(common, distribution.as_ref(), assignment)?;
                 let (evaluator, reply) = (Arc::clone(evaluator), reply.clone());
                 Ok(Queued { assignment, evaluator, reply })

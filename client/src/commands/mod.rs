@@ -242,10 +242,10 @@ async fn ask(
 ) -> Result<(), Error> {
     let result = tokio::select! {
         biased;
-        () = interrupt.cancelled() => Err(Error::Interrupted(match connection.data_dir() {
-            None => "a submitted experiment continues on the coordinator".into(),
-            Some(_) => "nothing is changed that was not printed".into(),
-        })),
+        () = interrupt.cancelled() => Err(match connection.data_dir() {
+            None => interrupt::error(),
+            Some(_) => Error::Interrupted("nothing is changed that was not printed".into()),
+        }),
         result = command.execute(&connection, progress) => result,
     };
     progress.clear();

@@ -111,7 +111,7 @@ impl Control {
         order: EvaluationOrder,
     ) -> Result<CheckedEvaluation, ControlError> {
         let place = self.requests.enter(order.len())?;
-        self.requests.check(move || order.check(place)).await?
+        self.requests.check(self.client, move |_| order.check(place)).await?
     }
 
     /// Has the fleet evaluate a genotype, once few enough others are evaluated.

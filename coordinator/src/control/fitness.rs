@@ -70,7 +70,8 @@ impl Control {
     pub async fn fitness(&self, order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
         let _place = self.requests.enter(order.len())?;
         let files = Arc::clone(&self.experiment_files);
-        let evaluation = Box::new(self.requests.check(move || order.check(&files)).await??);
+        let evaluation =
+            Box::new(self.requests.check(self.client, move |_| order.check(&files)).await??);
         let permits = Arc::clone(&self.evaluations);
         let _permit = permits.acquire_owned().await.expect("nobody closes the semaphore");
         let result = self.ask(|reply| DriverEvent::EvaluationRequested(evaluation, reply));

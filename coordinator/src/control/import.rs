@@ -22,7 +22,8 @@ impl Control {
         place: OwnedSemaphorePermit,
     ) -> Result<(ExperimentRecord, bool), ControlError> {
         let memory_budget = self.memory_budget;
-        let checked = self.requests.check(move || (check(&bytes, memory_budget), place));
+        let checked =
+            self.requests.check(self.client, move |_| (check(&bytes, memory_budget), place));
         let (imported, _place) = checked.await?;
         let imported = imported?;
         let write = move |store: &mut Store| {

@@ -16,6 +16,7 @@ mod requests;
 mod restart;
 mod steer;
 mod submit;
+mod turns;
 mod watch;
 
 use std::{
@@ -25,6 +26,7 @@ use std::{
 
 use experiment_file::ConfigError;
 use tokio::sync::{Semaphore, oneshot};
+use tokio_util::sync::CancellationToken;
 
 use crate::{
     driver::{DriverEvent, EventSender},
@@ -45,6 +47,7 @@ pub use explain::Explanation;
 pub use fitness::FitnessOrder;
 pub use placement::{Existing, Placement, place};
 pub use submit::Submitted;
+pub use turns::Client;
 
 /// The way to a running coordinator.
 #[derive(Debug, Clone)]
@@ -54,6 +57,8 @@ pub struct Control {
     /// Bytes that all unfinished experiments may take together.
     memory_budget: u64,
     requests: Requests,
+    /// Who asks.
+    client: Client,
     experiment_files: Arc<ExperimentFiles>,
     /// One for each evaluation that is computed.
     evaluations: Arc<Semaphore>,
@@ -134,19 +139,30 @@ impl From<StoreError> for ControlError {
 
 impl Control {
     /// The way to the coordinator with this driver and store. `memory_budget`: bytes that
-    /// all unfinished experiments may take together.
-    pub fn new(events: EventSender, store: SharedStore, memory_budget: u64) -> Self {
+    /// all unfinished experiments may take together. `shutdown` ends what is being checked.
+    pub fn new(
+        events: EventSender,
+        store: SharedStore,
+        memory_budget: u64,
+        shutdown: CancellationToken,
+    ) -> Self {
         let evaluations = Arc::new(Semaphore::new(EVALUATIONS_MAX));
         Self {
             events,
             store,
             memory_budget,
-            requests: Requests::default(),
+            requests: Requests::new(shutdown),
+            client: Client::default(),
             experiment_files: Arc::default(),
             evaluations,
             set_aside: Arc::default(),
             left_alone: Arc::default(),
         }
+    }
+
+    /// The same for a client: what it has checked waits for its turn among those of all clients.
+    pub fn for_client(&self, client: Client) -> Self {
+        Self { client, ..self.clone() }
     }
 
     /// The connected workers, in the order in which they joined.

@@ -1,15 +1,22 @@
 //! The memory and the processors that requests of clients take before anything runs.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     task,
+    time::sleep,
 };
+use tokio_util::sync::CancellationToken;
+
+use sim_core::TRYING_TIME_MAX;
 
 use crate::limits::{CHECKS_MAX, REQUESTS_LEN_MAX};
 
-use super::ControlError;
+use super::{
+    ControlError,
+    turns::{Client, Turns},
+};
 
 /// Bytes that are counted together; every request counts as one at least.
 const UNIT: usize = 16 << 10;
@@ -19,7 +26,9 @@ const UNIT: usize = 16 << 10;
 pub struct Requests {
     /// A permit per unit.
     room: Arc<Semaphore>,
-    checks: Arc<Semaphore>,
+    checks: Turns,
+    /// Ends all checks.
+    shutdown: CancellationToken,
 }
 
 /// The room that a request takes, until it is dropped.
@@ -28,16 +37,16 @@ pub struct RequestPlace {
     _room: OwnedSemaphorePermit,
 }
 
-impl Default for Requests {
-    fn default() -> Self {
+impl Requests {
+    /// Nothing has been asked for yet; `shutdown` ends all checks.
+    pub fn new(shutdown: CancellationToken) -> Self {
         Self {
             room: Arc::new(Semaphore::new(REQUESTS_LEN_MAX / UNIT)),
-            checks: Arc::new(Semaphore::new(CHECKS_MAX)),
+            checks: Turns::new(CHECKS_MAX),
+            shutdown,
         }
     }
-}
 
-impl Requests {
     /// Takes room for a request of `len` bytes, if there is any.
     pub fn enter(&self, len: usize) -> Result<RequestPlace, ControlError> {
         let n_units = u32::try_from(1 + len / UNIT).unwrap_or(u32::MAX);
@@ -46,28 +55,57 @@ impl Requests {
     }
 
     /// Checks something on a thread of its own, as that is work for a processor, and
-    /// takes memory: not for many at the same time.
+    /// takes memory: not for many at the same time, and clients take turns. The check asks its
+    /// argument whether to go on: not when it has taken long, when nobody waits for its answer, or
+    /// when the coordinator stops.
     pub async fn check<T: Send + 'static>(
         &self,
-        check: impl FnOnce() -> T + Send + 'static,
+        client: Client,
+        check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
     ) -> Result<T, ControlError> {
-        let turn = Arc::clone(&self.checks).acquire_owned().await.expect("nobody closes it");
+        self.check_within(TRYING_TIME_MAX, client, check).await
+    }
+
+    async fn check_within<T: Send + 'static>(
+        &self,
+        time: Duration,
+        client: Client,
+        check: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
+    ) -> Result<T, ControlError> {
+        let turn = self.checks.wait(client).await;
+        // Ends with the coordinator, and when the client goes away.
+        let end = self.shutdown.child_token();
+        let ended_in_time = end.clone().drop_guard();
         let checking = task::spawn_blocking(move || {
             // Goes on to count if the client goes away.
             let _turn = turn;
-            check()
+            check(&|| !end.is_cancelled())
         });
-        checking.await.map_err(|_| ControlError::Panicked("checking the configuration"))
+        let ending = async {
+            sleep(time).await;
+            drop(ended_in_time);
+            std::future::pending().await
+        };
+        tokio::select! {
+            checked = checking => checked.map_err(|_| ControlError::Panicked("checking the configuration")),
+            never = ending => never,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc;
+
     use super::*;
+
+    fn requests() -> Requests {
+        Requests::new(CancellationToken::new())
+    }
 
     #[test]
     fn one_request_too_many_is_refused_until_another_ends() {
-        let requests = Requests::default();
+        let requests = requests();
         let quarter = REQUESTS_LEN_MAX / 4;
         let mut places: Vec<_> = (0..3).map(|_| requests.enter(quarter).unwrap()).collect();
         let error = requests.enter(quarter).unwrap_err();
@@ -78,23 +116,57 @@ mod tests {
         assert!(requests.enter(usize::MAX).is_err());
     }
 
+    /// A check that does nothing until it is told to end, and says that it was.
+    fn endless(goes_on: &dyn Fn() -> bool) -> &'static str {
+        while goes_on() {
+            std::thread::yield_now();
+        }
+        "was ended"
+    }
+
     #[tokio::test]
     async fn few_checks_are_under_way_at_the_same_time() {
-        let requests = Requests::default();
-        let (release, released) = std::sync::mpsc::channel::<()>();
-        let busy = requests.check(move || released.recv());
+        let requests = requests();
+        let (release, released) = mpsc::channel::<()>();
+        let busy = requests.check(Client::default(), move |_| released.recv());
         let mut busy = Box::pin(busy);
-        let _others: Vec<_> = {
-            // All turns but one.
-            let turns = (1..CHECKS_MAX).map(|_| Arc::clone(&requests.checks).try_acquire_owned());
-            turns.map(Result::unwrap).collect()
-        };
         assert!(is_pending(&mut busy).await);
-        let mut next = Box::pin(requests.check(|| ()));
+        let mut others = Vec::new();
+        for _ in 1..CHECKS_MAX {
+            others.push(requests.checks.wait(Client::default()).await);
+        }
+        let mut next = Box::pin(requests.check(Client::default(), |_| ()));
         assert!(is_pending(&mut next).await, "there is no turn left");
         release.send(()).unwrap();
         busy.await.unwrap().unwrap();
         next.await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_check_is_told_to_end_when_it_takes_long() {
+        let requests = requests();
+        let ended = requests.check_within(Duration::ZERO, Client::default(), endless).await;
+        assert_eq!(ended.unwrap(), "was ended");
+    }
+
+    #[tokio::test]
+    async fn a_check_is_told_to_end_when_the_coordinator_stops() {
+        let requests = requests();
+        requests.shutdown.cancel();
+        let ended = requests.check_within(Duration::MAX, Client::default(), endless).await;
+        assert_eq!(ended.unwrap(), "was ended");
+    }
+
+    #[tokio::test]
+    async fn a_check_is_told_to_end_when_its_client_goes_away() {
+        let requests = requests();
+        let (say, said) = mpsc::channel();
+        let check = move |goes_on: &dyn Fn() -> bool| say.send(endless(goes_on));
+        let mut checking = Box::pin(requests.check_within(Duration::MAX, Client::default(), check));
+        assert!(is_pending(&mut checking).await);
+        drop(checking);
+        let ended = task::spawn_blocking(move || said.recv()).await.unwrap();
+        assert_eq!(ended, Ok("was ended"));
     }
 
     /// Polls once.

@@ -56,7 +56,7 @@ impl Control {
             }
             None => None,
         };
-        let check = move || {
+        let check = move |goes_on: &dyn Fn() -> bool| {
             let parent = match stored {
                 Some(stored) => {
                     let evolution = stored.replay()?.after;
@@ -64,9 +64,9 @@ impl Control {
                 }
                 None => None,
             };
-            Ok::<_, QueryError>(Submission { parent, ..submission }.check())
+            Ok::<_, QueryError>(Submission { parent, ..submission }.check(goes_on))
         };
-        let checked = self.requests.check(check).await??;
+        let checked = self.requests.check(self.client, check).await??;
         let CheckedSubmission { new, warnings } = checked?;
         // In a task of its own: what is stored must reach the driver even if the
         // client goes away meanwhile.

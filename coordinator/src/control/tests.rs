@@ -18,7 +18,7 @@ async fn what_is_stored_runs_although_its_client_is_gone() {
     events.send(filler).await.unwrap();
 
     let mut news = store.news();
-    let control = Control::new(events, store, u64::MAX);
+    let control = Control::new(events, store, u64::MAX, CancellationToken::new());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
     let config_json = fs::read_to_string(path).unwrap();
     let submission = Submission { config_json, ..Submission::default() };

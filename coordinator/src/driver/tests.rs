@@ -29,7 +29,7 @@ impl Rig {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
         let config_json = fs::read_to_string(path).unwrap();
         let submission = Submission { config_json, ..Submission::default() };
-        let CheckedSubmission { new, .. } = submission.check().unwrap();
+        let CheckedSubmission { new, .. } = submission.check(&|| true).unwrap();
         store.create(&new, 0).unwrap();
         let (_events, queue) = channel();
         let mut driver = Driver::new(

@@ -20,7 +20,7 @@ use crate::{
     priority::Priority,
 };
 
-use super::{convert, shutting_down};
+use super::{client, convert, shutting_down};
 
 /// The service.
 #[derive(Debug)]
@@ -41,10 +41,11 @@ impl EvaluationService for Evaluations {
         &self,
         request: Request<EvaluateRequest>,
     ) -> Result<Response<Self::EvaluateStream>, Status> {
+        let control = self.control.for_client(client(&request));
         let EvaluateRequest { config_json, genotype, trial_count, priority } = request.into_inner();
         let priority = priority.map_or(Ok(Priority::default()), convert::priority)?;
         let order = EvaluationOrder { config_json, genotype, n_trials: trial_count, priority };
-        let checked = self.control.check_evaluation(order).await?;
+        let checked = control.check_evaluation(order).await?;
         // There is always room for what is measured, and to say how it ends.
         let (outbox, inbox) = mpsc::channel(2);
         let final_slot = outbox.clone().try_reserve_owned().expect("a new channel has room");
@@ -68,6 +69,7 @@ impl EvaluationService for Evaluations {
         &self,
         request: Request<EvaluateFitnessRequest>,
     ) -> Result<Response<EvaluateFitnessResponse>, Status> {
+        let control = self.control.for_client(client(&request));
         let request = request.into_inner();
         let order = FitnessOrder {
             config_json: request.config_json,
@@ -78,7 +80,7 @@ impl EvaluationService for Evaluations {
         };
         let fitness = tokio::select! {
             () = self.shutdown.cancelled() => return Err(shutting_down()),
-            fitness = self.control.fitness(order) => fitness?,
+            fitness = control.fitness(order) => fitness?,
         };
         let fitness = fitness.into_iter().map(|values| FitnessOfTrials { values }).collect();
         Ok(Response::new(EvaluateFitnessResponse { fitness }))

@@ -40,7 +40,7 @@ use crate::{
     submission::Submission,
 };
 
-use super::{bundles, convert, explain, status};
+use super::{bundles, client, convert, explain, status};
 
 /// The service.
 #[derive(Debug)]
@@ -95,6 +95,7 @@ impl ExperimentService for Experiments {
         &self,
         request: Request<SubmitExperimentRequest>,
     ) -> Result<Response<SubmitExperimentResponse>, Status> {
+        let control = self.control.for_client(client(&request));
         let request = request.into_inner();
         let group = Some(request.group).filter(|group| !group.is_empty());
         let membership = group.map(|group| Membership::new(&group, &request.variant)).transpose();
@@ -115,7 +116,7 @@ impl ExperimentService for Experiments {
         }
         let existing =
             Existing { resume_unfinished: request.resume_unfinished, reuse: request.reuse };
-        let submitted = self.control.submit(submission, existing, fork_of).await?;
+        let submitted = control.submit(submission, existing, fork_of).await?;
         let Submitted { experiment, warnings, identical } = submitted;
         let experiment = Some(convert::experiment(experiment));
         let identical = identical.map_or(0, |id| id.0);
@@ -274,8 +275,9 @@ impl ExperimentService for Experiments {
         request: Request<Streaming<ImportExperimentRequest>>,
     ) -> Result<Response<ImportExperimentResponse>, Status> {
         let place = self.place().await?;
+        let control = self.control.for_client(client(&request));
         let bytes = bundles::receive(request.into_inner()).await?;
-        let (experiment, is_new) = self.control.import(bytes, place).await?;
+        let (experiment, is_new) = control.import(bytes, place).await?;
         let experiment = Some(convert::experiment(experiment));
         Ok(Response::new(ImportExperimentResponse { experiment, is_new }))
     }

@@ -19,6 +19,15 @@ pub use pages::PagesArchive;
 pub use worker_service::Workers;
 
 use status::shutting_down;
+use tonic::Request;
+
+use crate::{control::Client, server::listener::Peer};
+
+/// Who sent a request, as far as clients take turns.
+fn client<T>(request: &Request<T>) -> Client {
+    let peer = request.extensions().get::<Peer>();
+    Client(peer.map(|peer| peer.address().ip().to_canonical()))
+}
 
 #[cfg(test)]
 mod tests;

@@ -43,7 +43,7 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     let service = Experiments {
         reconstructions: Semaphore::new(1),
         bundles: Arc::new(Semaphore::new(1)),
-        control: Control::new(events, store.clone(), u64::MAX),
+        control: Control::new(events, store.clone(), u64::MAX, shutdown.clone()),
         store,
         shutdown,
     };

@@ -109,7 +109,7 @@ mod tests {
     fn stored() -> (ExperimentRecord, Checkpoint) {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
         let config_json = fs::read_to_string(path).unwrap();
-        let new = Submission { config_json, ..Submission::default() }.check().unwrap().new;
+        let new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
         let experiment = ExperimentRecord {
             id: ExperimentId(1),
             config_json: new.config.to_canonical_json(),
@@ -165,7 +165,7 @@ mod tests {
             seed: Some(2),
             ..Submission::default()
         };
-        let keyframe = of_other_seed.check().unwrap().new.keyframe;
+        let keyframe = of_other_seed.check(&|| true).unwrap().new.keyframe;
         let other = Checkpoint { keyframe, log: Vec::new() };
         let what = Runnable::restore(&sound, &other).unwrap_err();
         assert!(what.contains("its history has 0 generations"), "{what}");

@@ -66,7 +66,8 @@ impl Core {
         );
         let mut driver = JoinSet::new();
         driver.spawn(loop_.run());
-        let control = Control::new(events.clone(), store.clone(), config.memory_budget);
+        let control =
+            Control::new(events.clone(), store.clone(), config.memory_budget, shutdown.clone());
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let doors = JoinSet::new();

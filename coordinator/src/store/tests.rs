@@ -18,7 +18,7 @@ pub fn new_experiment(request_id: Option<&str>) -> NewExperiment {
         seed: Some(u64::MAX),
         ..Submission::default()
     };
-    submission.check().unwrap().new
+    submission.check(&|| true).unwrap().new
 }
 
 fn real(value: f64) -> Real {

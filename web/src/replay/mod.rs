@@ -48,6 +48,9 @@ pub enum ReplayError {
     /// It cannot be simulated.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
+    /// Whoever asked for it did not wait.
+    #[error("it was stopped")]
+    Stopped,
     /// It does not fit into a browser.
     #[error(
         "a replay has at most {} million values of robots, this one would have {}; simulate fewer \
@@ -83,6 +86,14 @@ struct Header<'a> {
 impl Replay {
     /// Simulates the episode.
     pub fn simulate(episode: &Episode<'_>) -> Result<Self, ReplayError> {
+        Self::simulate_while(episode, &|| true)
+    }
+
+    /// The same, unless `keep_going` says no on the way.
+    pub fn simulate_while(
+        episode: &Episode<'_>,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Self, ReplayError> {
         let Episode { simulation, genotype, trial_set, trial, .. } = *episode;
         let scene = Scene::new(episode);
         let per_robot: usize = ROBOT_COLUMNS.iter().map(|it| (it.n_components)(&scene)).sum();
@@ -91,9 +102,10 @@ impl Replay {
             return Err(ReplayError::TooLong { n_values });
         }
         let mut columns = Columns::new(&scene);
-        let summary = simulation.simulate(genotype, trial_set, trial, &mut |step| {
-            columns.record(&scene, step);
-        })?;
+        let mut observe = |step: &StepRecord| columns.record(&scene, step);
+        let summary =
+            simulation.simulate_while(genotype, trial_set, trial, keep_going, &mut observe)?;
+        let summary = summary.ok_or(ReplayError::Stopped)?;
         Ok(Self { scene, summary, columns: columns.into_vec() })
     }
 

@@ -1,5 +1,7 @@
 //! Episodes for the player, simulated when they are asked for.
 
+use std::sync::Arc;
+
 use axum::{
     extract::{Path, Query, State},
     http::{StatusCode, header::CONTENT_TYPE},
@@ -32,9 +34,14 @@ pub async fn replay(
         return Err(Problem::new(StatusCode::CONFLICT, why));
     }
     let stopping = || Problem::new(StatusCode::SERVICE_UNAVAILABLE, "the server stops");
-    let _permit = shared.replays.acquire().await.map_err(|_| stopping())?;
+    let permit = Arc::clone(&shared.replays).acquire_owned().await.map_err(|_| stopping())?;
+    // Ends with the server, and when the browser goes away.
+    let end = shared.shutdown.child_token();
+    let _ended_with_the_request = end.clone().drop_guard();
     let simulating = tokio::task::spawn_blocking(move || {
-        simulate(&found.config_json, &individual, &address, &what_if)
+        let _permit = permit;
+        let keep_going = || !end.is_cancelled();
+        simulate(&found.config_json, &individual, &address, &what_if, &keep_going)
     });
     let packed = simulating.await.map_err(|_| {
         Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "simulating panicked; please report this")
@@ -47,6 +54,7 @@ fn simulate(
     individual: &GetChampionResponse,
     address: &str,
     what_if: &WhatIf,
+    keep_going: &dyn Fn() -> bool,
 ) -> Result<Vec<u8>, Problem> {
     let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
     let (config, _) =
@@ -54,14 +62,15 @@ fn simulate(
     let config = what_if.apply(config).map_err(|error| bad(&error))?;
     let simulation = Simulation::compile(&config).map_err(|error| bad(&error))?;
     let generation = what_if.generation.unwrap_or(individual.generation);
-    let replay = Replay::simulate(&Episode {
+    let episode = Episode {
         config: &config,
         simulation: &simulation,
         genotype: &individual.genotype,
         name: &name(address, individual),
         trial_set: TrialSet::Generation(generation),
         trial: what_if.trial,
-    });
+    };
+    let replay = Replay::simulate_while(&episode, keep_going);
     Ok(replay.map_err(|error| bad(&error))?.encode())
 }
 

@@ -4,7 +4,11 @@ mod stage;
 
 use std::{
     collections::BTreeSet,
-    sync::{Mutex, mpsc as std_mpsc},
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, Ordering::Relaxed},
+        mpsc as std_mpsc,
+    },
 };
 
 use sim_core::TrialSet;
@@ -314,6 +318,40 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
     permit.send(()).unwrap();
     assert_eq!(fitness(&coordinator.results(1).await[0]), [1.0]);
     assert_eq!(coordinator.next().await, None);
+    drop(coordinator);
+    stage.worker.await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn a_worker_that_gives_up_drops_items_of_scripts_and_finishes_others() {
+    let (start, mut starts) = mpsc::unbounded_channel();
+    let dropped = Arc::new(AtomicBool::new(false));
+    // The item of the script ends when it is dropped; the other one, when that has happened.
+    let evaluator = move |config_json: String| -> Evaluator {
+        let (start, dropped) = (start.clone(), Arc::clone(&dropped));
+        let is_script = config_json.contains("script");
+        Arc::new(move |assignment, keep_going| {
+            start.send(()).unwrap();
+            while if is_script { keep_going() } else { !dropped.load(Relaxed) } {
+                std::thread::yield_now();
+            }
+            dropped.store(true, Relaxed);
+            Ok(keep_going().then(|| vec![assignment.id as f64]))
+        })
+    };
+    let mut stage = Stage::new(2, evaluator).await;
+    let mut coordinator = stage.conversation().await;
+    coordinator.welcome(LONG).await;
+    coordinator.send_spec(1, r#"{"task": {"script": {}}}"#).await;
+    coordinator.send_spec(2, "{}").await;
+    coordinator.send_assignments(1, [1]).await;
+    coordinator.send_assignments(2, [2]).await;
+    assert_eq!((starts.recv().await, starts.recv().await), (Some(()), Some(())));
+    stage.shutdown.cancel();
+    assert!(matches!(coordinator.next().await, Some(work_request::Message::Draining(_))));
+    stage.give_up.cancel();
+    assert_eq!(coordinator.results(1).await[0].assignment_id, 2);
+    assert_eq!(coordinator.next().await, None, "it says nothing of what it dropped");
     drop(coordinator);
     stage.worker.await.unwrap().unwrap();
 }

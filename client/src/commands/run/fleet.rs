@@ -10,9 +10,9 @@ use std::{
 use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
 use sim_core::Isa;
 use swarm_transport::{Credentials, Token};
-use tokio::task::JoinSet;
+use tokio::{task::JoinSet, time::timeout};
 use tokio_util::sync::CancellationToken;
-use worker::{WorkerConfig, WorkerError};
+use worker::{FINISHING_TIME, WorkerConfig, WorkerError};
 
 use crate::{connection::Connection, error::Error, progress::Progress};
 
@@ -23,6 +23,8 @@ pub struct Fleet {
     client_token: Token,
     workers: JoinSet<Result<(), WorkerError>>,
     shutdown: CancellationToken,
+    /// Ends what workers are still computing after `shutdown`.
+    give_up: CancellationToken,
 }
 
 impl Fleet {
@@ -56,11 +58,13 @@ impl Fleet {
             client_token,
             workers: JoinSet::new(),
             shutdown: CancellationToken::new(),
+            give_up: CancellationToken::new(),
         };
         for i in 1..=n_workers {
             let config = WorkerConfig {
                 credentials: credentials(&worker_token),
                 isa,
+                give_up: fleet.give_up.clone(),
                 ..WorkerConfig::new(fleet.address(), format!("local-{i}"), 1)
             };
             fleet.workers.spawn(worker::run(config, fleet.shutdown.clone()));
@@ -110,11 +114,16 @@ impl Fleet {
         self.shutdown().await;
     }
 
-    /// Lets the workers finish their items, then closes the store.
+    /// Lets the workers finish their items, those of scripts within [`FINISHING_TIME`], then
+    /// closes the store.
     pub async fn shutdown(self) {
-        let Self { coordinator, mut workers, shutdown, .. } = self;
+        let Self { coordinator, mut workers, shutdown, give_up, .. } = self;
         shutdown.cancel();
-        while workers.join_next().await.is_some() {}
+        let finished = async { while workers.join_next().await.is_some() {} };
+        if timeout(FINISHING_TIME, finished).await.is_err() {
+            give_up.cancel();
+            while workers.join_next().await.is_some() {}
+        }
         coordinator.shutdown().await;
     }
 }

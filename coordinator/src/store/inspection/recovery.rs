@@ -178,7 +178,7 @@ fn write_whole(
 /// An experiment before its first generation, if this program can compute it.
 fn beginning(row: &ExperimentRow) -> Option<NewExperiment> {
     let config_json = row.config.clone();
-    let checked = Submission { config_json, ..Submission::default() }.check().ok()?;
+    let checked = Submission { config_json, ..Submission::default() }.check(&|| true).ok()?;
     (checked.new.config_digest.to_string() == row.config_digest).then_some(checked.new)
 }
 

@@ -130,6 +130,7 @@ impl<F: Fn(String) -> Evaluator + Send + Sync + 'static> MakesEvaluators for F {
 pub(super) struct Stage {
     pub(super) conversations: mpsc::Receiver<Conversation>,
     pub(super) shutdown: CancellationToken,
+    pub(super) give_up: CancellationToken,
     pub(super) worker: JoinHandle<Result<(), WorkerError>>,
 }
 
@@ -149,9 +150,9 @@ impl Stage {
         let mut config = WorkerConfig::new(format!("http://{address}"), "ada", slots);
         config.retry_delay_min = Duration::from_millis(1);
         config.retry_delay_max = Duration::from_millis(20);
-        let shutdown = CancellationToken::new();
+        let (shutdown, give_up) = (CancellationToken::new(), config.give_up.clone());
         let worker = tokio::spawn(run_with(config, shutdown.clone(), evaluator));
-        Self { conversations: mpsc::channel(1).1, shutdown, worker }
+        Self { conversations: mpsc::channel(1).1, shutdown, give_up, worker }
     }
 
     pub(super) async fn conversation(&mut self) -> Conversation {
