@@ -25,9 +25,9 @@ pub struct BackupArgs {
 }
 
 const HELP: &str = "\
-Exit code 11 if something is damaged. Experiments that are damaged are named, and are in the
-copy as they are, beside all that are sound. If the database as a whole is damaged, there is
-no copy.
+Exit code 11 if something is damaged. Experiments that are damaged are named,
+and are in the copy as they are, beside all that are sound. If the database as a
+whole is damaged, there is no copy.
 
 Examples:
   swarmctl backup --data-dir ./swarm-data backups/$(date +%F)
