@@ -3,6 +3,9 @@
 
 import { shortest } from "swarm/episode.js";
 
+/** Images of a place, to each side of the nearest one, that are drawn at most. */
+const IMAGES_MAX = 3;
+
 export class Camera {
   constructor(episode) {
     this.episode = episode;
@@ -49,8 +52,9 @@ export class Camera {
     Object.assign(this, { x, y, across, along, zoom: 1 });
   }
 
+  /** What has no size keeps the one that it had: the scale is never 0. */
   resize(width, height) {
-    Object.assign(this, { width, height });
+    if (width > 0 && height > 0) Object.assign(this, { width, height });
   }
 
   /** Pixels per cm. */
@@ -88,16 +92,23 @@ export class Camera {
   }
 
   /** Calls `draw` with the pixels of every image of a place that is in view, or so close to
-   *  it that something of `radius` pixels is. */
+   *  it that something of `radius` pixels is. They are few whatever the numbers are. */
   eachImage(x, y, radius, draw) {
     const { width, height } = this.episode;
     const [halfX, halfY] = this.halves.map((half) => (half + radius) / this.scale);
-    const first = (value, centre, half, period) => Math.ceil((centre - half - value) / period);
-    const last = (value, centre, half, period) => Math.floor((centre + half - value) / period);
-    for (let i = first(x, this.x, halfX, width); i <= last(x, this.x, halfX, width); i++) {
-      for (let k = first(y, this.y, halfY, height); k <= last(y, this.y, halfY, height); k++) {
-        draw(...this.toScreen(x + i * width, y + k * height));
-      }
+    const [columns, rows] = [images(x - this.x, halfX, width), images(y - this.y, halfY, height)];
+    for (const i of columns) {
+      for (const k of rows) draw(...this.toScreen(x + i * width, y + k * height));
     }
   }
+}
+
+/** The numbers of the images of a coordinate within `half` of the centre; `offset`: from there. */
+function images(offset, half, period) {
+  const nearest = -Math.round(offset / period);
+  const found = [];
+  for (let i = -IMAGES_MAX; i <= IMAGES_MAX; i++) {
+    if (Math.abs(offset + (nearest + i) * period) <= half) found.push(nearest + i);
+  }
+  return found;
 }

@@ -4,6 +4,7 @@
 export function element(tag, properties = {}, ...children) {
   const node = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
+    if (name === "id" && !value) continue;
     if (name.includes("-")) node.setAttribute(name, value);
     else node[name] = value;
   }
@@ -16,33 +17,44 @@ export function color(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Calls back when the page changes between dark and light. */
+/** Calls back when the page changes between dark and light, before canvases are drawn again. */
 export function onTheme(changed) {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", changed);
+  themed.push(changed);
 }
 
-/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes. */
+const themed = [];
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  for (const changed of themed) changed();
+  // Only those that are shown: what was removed is not kept for this.
+  for (const node of document.querySelectorAll("canvas")) (node.repaint ?? node.redraw)?.();
+});
+
+/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes.
+ *  While it has no size, as in a hidden frame or after it was removed, nothing is drawn: `draw`
+ *  is called with a width and a height of at least one pixel. */
 export function canvas(draw, label) {
   const node = element("canvas", { "aria-label": label, role: "img" });
-  const fit = () => {
+  let size = null;
+  node.redraw = () => {
+    if (size) draw(node.getContext("2d"), ...size);
+  };
+  new ResizeObserver(() => {
     const ratio = devicePixelRatio || 1;
     const { width, height } = node.getBoundingClientRect();
-    node.width = Math.max(1, Math.round(width * ratio));
-    node.height = Math.max(1, Math.round(height * ratio));
-    const context = node.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    draw(context, width, height);
-  };
-  new ResizeObserver(fit).observe(node);
-  node.redraw = () => {
-    const ratio = devicePixelRatio || 1;
-    draw(node.getContext("2d"), node.width / ratio, node.height / ratio);
-  };
+    size = width >= 1 && height >= 1 ? [width, height] : null;
+    if (!size) return;
+    node.width = Math.round(width * ratio);
+    node.height = Math.round(height * ratio);
+    node.getContext("2d").setTransform(ratio, 0, 0, ratio, 0, 0);
+    node.redraw();
+  }).observe(node);
   return node;
 }
 
-/** A number with so many decimals, and a true minus sign. */
+/** A number with so many decimals, and a true minus sign. What has no use for them, because it is
+ *  tiny or huge, is written with a power of ten. */
 export function decimals(value, n) {
   if (!Number.isFinite(value)) return "–";
-  return value.toFixed(n).replace("-", "−");
+  const isPlain = n <= 12 && Math.abs(value) < 1e9;
+  return (isPlain ? value.toFixed(n) : value.toExponential(3)).replaceAll("-", "−");
 }

@@ -1,6 +1,6 @@
 // Who computed what lately: a row for each worker, a lane for each of its slots.
 
-import { canvas, color, decimals, element, onTheme } from "swarm/dom.js";
+import { canvas, color, decimals, element } from "swarm/dom.js";
 import { span } from "swarm/page.js";
 
 /** Rows of workers that are drawn at most. */
@@ -173,7 +173,6 @@ export function fleetTimeline() {
       top += height(row) + GAP;
     }
   });
-  onTheme(() => picture.redraw());
   node.show = (latest, workers) => {
     // Who points at something wants it to stay.
     if (picture.matches(":hover")) return;

@@ -1,7 +1,7 @@
 // The fitness of every individual of every generation; a click on a cell plays it.
 
-import { canvas, decimals, element, onTheme } from "swarm/dom.js";
-import { ask, complain } from "swarm/page.js";
+import { canvas, decimals, element } from "swarm/dom.js";
+import { ask, complain, resolve } from "swarm/page.js";
 
 /** Pixels of a cell: least and most along the generations, least among the individuals. */
 const CELL_MIN = 14;
@@ -116,9 +116,11 @@ export function heatMap(id) {
       if (from === 0 || start > from) first = Math.max(first, start);
       n_individuals = Math.max(n_individuals, individuals);
       pictures.clear();
+      resolve("map");
       resize();
     } catch (error) {
-      complain(error);
+      asked.delete(key);
+      complain(error, "map");
     }
   };
 
@@ -152,7 +154,6 @@ export function heatMap(id) {
     const found = cell(event);
     if (found) location.assign(`/replay/${id}@${found.generation}/${found.individual}`);
   });
-  onTheme(() => picture.redraw());
   node.update = (n) => {
     if (n === n_generations) return;
     n_generations = n;

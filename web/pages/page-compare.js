@@ -2,7 +2,7 @@
 
 import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
-import { askJson, bar, complain, main } from "swarm/page.js";
+import { askJson, bar, complain, main, resolve } from "swarm/page.js";
 
 const COLORS = ["#4269d0", "#ff725c", "#3ca951", "#a463f2", "#efb118", "#6cc5b0", "#ff8ab7", "#9c6b4e", "#97bbf5", "#9498a0"];
 /** What runs are laid along: its name, and its value after each generation. */
@@ -84,8 +84,9 @@ async function show() {
       });
     }
     picture.show(content);
+    resolve("compare");
   } catch (error) {
-    complain(error);
+    complain(error, "compare");
   }
 }
 

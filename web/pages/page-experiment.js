@@ -5,7 +5,7 @@ import { chart } from "swarm/charts.js";
 import { whatItDoes } from "swarm/doing.js";
 import { dynamicsPanel } from "swarm/dynamics.js";
 import { heatMap } from "swarm/heat-map.js";
-import { askJson, bar, complain, listen, main, order, remaining, span, stateMark } from "swarm/page.js";
+import { askJson, bar, complain, endPage, listen, main, oneByOne, order, remaining, resolve, span, stateMark } from "swarm/page.js";
 
 /** Time between two looks at what does not come with every generation, ms. */
 const LOOK_EVERY = 2000;
@@ -29,16 +29,42 @@ const dynamics = dynamicsPanel(id);
 const doing = element("section", { className: "panel" });
 const eventList = element("ol", { className: "events" });
 const file = element("pre", { className: "file" });
+/** Why there is nothing to see, or no more. */
+const standing = element("section", { className: "panel standing", hidden: true });
+const diversity = element("section", { className: "panel" }, element("h2", {}, "Diversity"),
+  element("p", { className: "muted small" }, "standard deviation of fitness among the individuals"), spread);
+/** What there is once a generation is complete. */
+const results = [element("section", { className: "panel" }, element("h2", {}, "Fitness"), fitness), map, championBox, diversity, dynamics];
+for (const part of results) part.hidden = true;
 main.replaceChildren(
-  element("header", { className: "row" }, title, state, element("span", { className: "space" }), actions), facts,
-  element("section", { className: "panel" }, element("h2", {}, "Fitness"), fitness),
-  map,
-  element("div", { className: "columns" }, championBox, doing,
-    element("section", { className: "panel" }, element("h2", {}, "Diversity"),
-      element("p", { className: "muted small" }, "standard deviation of fitness among the individuals"), spread),
+  element("header", { className: "row" }, title, state, element("span", { className: "space" }), actions), facts, standing,
+  results[0], map,
+  element("div", { className: "columns" }, championBox, doing, diversity,
     element("section", { className: "panel" }, element("h2", {}, "Events"), eventList)),
   dynamics,
   element("details", { className: "panel" }, element("summary", {}, "Experiment file"), file));
+
+/** What to do next with an experiment that does not go on, and what there is of it. */
+const NEXT = {
+  running: () => "The first generation is being computed: the curve and the map of individuals begin when it is complete.",
+  unfinished: () => "No generation is complete, and these files do not say whether anybody computes: `swarmctl run FILE` goes on with it.",
+  paused: () => "It is paused: resume lets it go on, and what was computed is kept.",
+  cancelled: (it) => `It was cancelled${it.generations_done ? ": its generations and its champion stay" : " before a generation was complete"}. To compute it after all, submit its file, which is below, again.`,
+  failed: (it) => `${it.generations_done ? "Its generations stay." : "No generation was complete."} The events say what came before; \`swarmctl explain ${id}\` says more, and \`swarmctl retry ${id}\` lets it go on when the cause is gone.`,
+};
+
+/** Says where the experiment stands, unless the curve does. */
+function drawStanding() {
+  const it = experiment;
+  const isEmpty = it.generations_done === 0;
+  for (const part of results) part.hidden = isEmpty;
+  const says = NEXT[it.state];
+  standing.hidden = !says || (!isEmpty && ["running", "unfinished"].includes(it.state));
+  if (standing.hidden) return;
+  const title = { running: "Before the first generation", unfinished: "Before the first generation" }[it.state] ?? `${it.state[0].toUpperCase()}${it.state.slice(1)}`;
+  standing.replaceChildren(element("h2", {}, title),
+    it.reason ? element("p", { className: it.state === "failed" ? "bad" : "" }, it.reason) : null, element("p", {}, says(it)));
+}
 
 function draw() {
   if (!experiment) return;
@@ -49,8 +75,9 @@ function draw() {
   facts.textContent = [
     `${it.generations_done} of ${it.generations} generations of ${it.population_size} by ${it.algorithm}`,
     `${it.genotype_len} genes`, `seed ${it.seed}`, it.group && `group ${it.group} ${it.variant}`, it.forked_from && `fork of ${it.forked_from}`,
-    left !== null && `${span(left)} left`, it.reason,
+    left !== null && `${span(left)} left`,
   ].filter(Boolean).join(" · ");
+  drawStanding();
   const points = (column) => generations.map((row) => [row[0], row[column]]);
   const marks = champion?.judged
     ? [{ name: "champion, 95 %", value: champion.judged[0], low: champion.judged[1], high: champion.judged[2], color: "var(--good)" }]
@@ -66,19 +93,27 @@ function draw() {
   dynamics.update(it.generations_done);
 }
 
-function drawActions(hasCoordinator) {
+let offered = "";
+
+/** Buttons are made anew only when others are due: focus and clicks are not lost. */
+function drawActions() {
+  const due = [hasCoordinator, experiment.state, experiment.generations_done > 0].join();
+  if (due === offered) return;
+  offered = due;
   const isUnfinished = ["running", "paused"].includes(experiment.state);
   const act = async (what, body, question) => {
     if (question && !confirm(question)) return;
     try {
       const changed = await (await order(`/api/experiments/${id}/${what}`, body)).json();
+      resolve("order");
       if (what === "fork") location.assign(`/experiment/${changed.id}`);
-      else await load();
+      else await look();
     } catch (error) {
-      complain(error);
+      complain(error, "order");
     }
   };
   const name = `experiment ${id} (${experiment.name})`;
+  const held = document.activeElement?.closest(".actions") ? document.activeElement.id : "";
   const button = (text, onclick) => element("button", { onclick, id: `do-${text}` }, text);
   const buttons = [];
   if (hasCoordinator && isUnfinished) {
@@ -99,6 +134,7 @@ function drawActions(hasCoordinator) {
     }));
   }
   actions.replaceChildren(...buttons);
+  if (held) (document.getElementById(held) ?? buttons[0])?.focus();
 }
 
 function drawChampion() {
@@ -121,13 +157,17 @@ function drawChampion() {
   championBox.replaceChildren(...parts);
 }
 
-async function drawDoing(hasCoordinator) {
+async function drawDoing() {
   doing.hidden = !hasCoordinator || experiment.state !== "running";
   if (!doing.hidden) doing.replaceChildren(element("h2", {}, "Now"), ...whatItDoes(await askJson(`/api/experiments/${id}/explain`)));
 }
 
+let eventsUpTo = null;
+
 async function drawEvents() {
+  if (experiment.last_sequence === eventsUpTo) return;
   const { events } = await askJson(`/api/experiments/${id}/events`);
+  eventsUpTo = experiment.last_sequence;
   eventList.replaceChildren(...events.slice(-30).reverse().map((event) =>
     element("li", {}, element("time", { className: "muted" }, new Date(event.at_ms).toLocaleString()), ` ${event.text}`)));
   if (events.length === 0) eventList.append(element("li", { className: "muted" }, "none but generations"));
@@ -139,39 +179,54 @@ let hasCoordinator = false;
 async function load() {
   const answer = await askJson(`/api/experiments/${id}`);
   ({ experiment, champion } = answer);
-  file.textContent = JSON.stringify(answer.config, null, 2);
+  const text = JSON.stringify(answer.config, null, 2);
+  if (file.textContent !== text) file.textContent = text;
   draw();
   drawChampion();
-  drawActions(hasCoordinator);
-  await Promise.all([drawEvents(), drawDoing(hasCoordinator)]);
+  drawActions();
+  await Promise.all([drawEvents(), drawDoing()]);
+}
+
+/** It is not there, or not any more. */
+function end(refusal) {
+  isOver = true;
+  clearTimeout(next);
+  stopListening();
+  if (refusal.status !== 401) endPage(`There is no experiment ${id}`, `${refusal.message}. It may have been deleted, or belong to another coordinator.`, ["/", "All experiments"]);
 }
 
 let next = null;
+let isOver = false;
+let stopListening = () => {};
 
-/** Looks again and again, as long as something happens. */
-async function follow() {
+/** Looks now, and again and again as long as something happens. */
+const look = oneByOne(async () => {
   clearTimeout(next);
   try {
     await load();
-    document.getElementById("problem")?.remove();
+    resolve("look");
   } catch (error) {
-    complain(error);
+    if ([400, 401, 404].includes(error.status)) return end(error);
+    complain(error, "look");
   }
-  clearTimeout(next);
-  if (["running", "unfinished", "paused"].includes(experiment?.state)) next = setTimeout(follow, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
-}
+  const isFollowed = !experiment || ["running", "unfinished", "paused"].includes(experiment.state);
+  if (isFollowed && !isOver) next = setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
+  return undefined;
+});
 
-try {
+async function start() {
   hasCoordinator = (await askJson("/api/session")).has_coordinator;
-  await follow();
-  listen(`/api/experiments/${id}/live?from=0`, (news) => {
+  await look();
+  if (isOver) return;
+  stopListening = listen(`/api/experiments/${id}/live?from=0`, (news) => {
     // After a new connection the server may say again what is known.
     for (const row of news.generations) if (row[0] === generations.length + (generations[0]?.[0] ?? row[0])) generations.push(row);
     const before = experiment;
     experiment = news.experiment;
     draw();
-    if (before.state !== experiment.state) follow();
-  });
-} catch (error) {
-  complain(error);
+    drawActions();
+    if (before?.state !== experiment.state || (before.generations_done === 0) !== (experiment.generations_done === 0)) look();
+  }, end);
 }
+
+start().catch((error) => complain(error, "start"));

@@ -3,7 +3,7 @@
 import { decimals, element } from "swarm/dom.js";
 import { whatItDoes } from "swarm/doing.js";
 import { fleetTimeline } from "swarm/fleet-timeline.js";
-import { askJson, bar, complain, counted, main, span } from "swarm/page.js";
+import { askJson, bar, complain, counted, main, resolve, span } from "swarm/page.js";
 
 /** Between two looks, ms. */
 const LOOK_EVERY = 2000;
@@ -53,9 +53,9 @@ async function look() {
     rows.replaceChildren(...workers.slice(0, 1000).map(row));
     timeline.show(await askJson("/api/timeline"), workers);
     await explain((await askJson("/api/experiments")).experiments);
-    document.getElementById("problem")?.remove();
+    resolve("look");
   } catch (error) {
-    complain(error);
+    complain(error, "look");
   }
   // The next look begins when this one has ended: a slow server gets fewer.
   setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);

@@ -3,21 +3,26 @@
 import { element } from "swarm/dom.js";
 import { complain, main } from "swarm/page.js";
 
-const hash = decodeURIComponent(location.hash.slice(1));
-// What follows # is where to go then, or a token from the address that a program printed.
-const target = hash.startsWith("/") && !hash.startsWith("//") ? hash : "/";
+// This page stands in for any other one, whose address stays: what somebody was sent is not lost.
+const isStandIn = location.pathname !== "/login";
+/** The token in the address that a program printed. */
+const printed = isStandIn ? "" : decodeURIComponent(location.hash.slice(1));
 
 async function login(token) {
-  const response = await fetch("/login", {
-    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ token }),
-  });
-  if (response.ok) return location.replace(target);
-  const { error } = await response.json().catch(() => ({ error: response.statusText }));
-  complain(new Error(error));
+  try {
+    const response = await fetch("/login", {
+      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ token }),
+    });
+    if (response.ok) return isStandIn ? location.reload() : location.replace("/");
+    const { error } = await response.json().catch(() => ({ error: `${response.status} ${response.statusText}` }));
+    complain(new Error(error), "login");
+  } catch {
+    complain(new Error("the server does not answer"), "login");
+  }
 }
 
 document.title = "Log in – swarmevo";
-const field = element("input", { type: "password", id: "token", autocomplete: "current-password", required: true });
+const field = element("input", { type: "password", id: "token", autocomplete: "current-password", "aria-label": "token", required: true });
 const form = element("form", {
   className: "panel login",
   onsubmit: (event) => {
@@ -30,7 +35,7 @@ const form = element("form", {
   field, element("button", { type: "submit" }, "Log in"));
 main.replaceChildren(form);
 field.focus();
-if (hash && !hash.startsWith("/")) {
+if (printed) {
   history.replaceState(null, "", "/login");
-  login(hash);
+  login(printed);
 }

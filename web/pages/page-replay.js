@@ -3,8 +3,8 @@
 
 import { element } from "swarm/dom.js";
 import { unpack } from "swarm/episode.js";
-import { ask, bar, complain, main } from "swarm/page.js";
-import { Player, heading } from "swarm/player.js";
+import { ask, bar, complain, main, resolve } from "swarm/page.js";
+import { NOWHERE, Player, heading, readAddress } from "swarm/player.js";
 
 const address = decodeURIComponent(location.pathname.slice("/replay/".length));
 const [id, at] = address.split("@");
@@ -31,7 +31,7 @@ const form = element("form", { className: "panel what-if" }, element("b", {}, "W
   ...FIELDS.map(([name, text]) => element("label", {}, text, inputs[name])),
   element("label", {}, "nobody gets", choice("inhibit", INHIBIT)), element("label", {}, "trouble", choice("perturb", PERTURB)),
   element("button", { type: "submit", id: "again" }, "Simulate"),
-  element("button", { type: "button", id: "beside", title: "the one above, and the changed one next to it", onclick: () => beside() }, "Side by side"));
+  element("button", { type: "button", id: "beside", title: "the one above, and the changed one next to it", onclick: () => go(true) }, "Side by side"));
 const stage = element("div", { className: "replays" });
 const neighbours = element("p", { className: "row" }, element("a", { href: `/experiment/${id}` }, `experiment ${id}`));
 main.replaceChildren(neighbours, stage, form);
@@ -46,8 +46,9 @@ if (at?.includes("/") && !at.endsWith("mean")) {
   neighbours.append(element("a", { href: `/replay/${id}` }, "champion"));
 }
 
+/** What the form says, without what is left to the experiment. */
 function query() {
-  const filled = Object.entries(inputs).map(([name, input]) => [name, input.value]).filter(([, value]) => value !== "");
+  const filled = Object.entries(inputs).map(([name, input]) => [name, input.value.trim()]).filter(([, value]) => value !== "");
   return new URLSearchParams(filled);
 }
 
@@ -56,43 +57,50 @@ async function simulated(words) {
   return unpack(await response.arrayBuffer());
 }
 
-let shown = null;
+/** Those that are shown, with one clock. */
+let players = [];
+/** Counts what was asked for: only the latest answer is shown. */
+let asked = 0;
 
-async function show(words) {
+/** Shows the episode of the address: changed, or as it was with the changed one beside it. */
+async function show(words, isBeside) {
+  const mine = ++asked;
   stage.setAttribute("aria-busy", "true");
   try {
-    const episode = await simulated(words);
-    shown?.pause();
-    shown = new Player(episode);
-    stage.replaceChildren(element("div", {}, heading(episode), shown.node));
-    stage.classList.remove("two");
-    shown.node.focus({ preventScroll: true });
-    document.getElementById("problem")?.remove();
+    const wanted = isBeside ? [new URLSearchParams(), words] : [words];
+    const episodes = await Promise.all(wanted.map(simulated));
+    if (mine !== asked) return;
+    const old = players[0];
+    old?.clock.pause();
+    const first = new Player(episodes[0]);
+    const others = episodes.slice(1).map((episode) => new Player(episode, { place: NOWHERE, clock: first.clock, suffix: "-beside" }));
+    players = [first, ...others];
+    stage.replaceChildren(...players.map((player) => element("div", {}, heading(player.episode, player.suffix), player.node)));
+    stage.classList.toggle("two", isBeside);
+    // Who fills in the form goes on with that.
+    if (!form.contains(document.activeElement)) first.node.focus({ preventScroll: true });
+    resolve("replay");
   } catch (error) {
-    complain(error);
+    if (mine === asked) complain(error, "replay");
   }
-  stage.removeAttribute("aria-busy");
+  if (mine === asked) stage.removeAttribute("aria-busy");
 }
 
-/** The same steps of both; the first one leads. */
-async function beside() {
-  try {
-    const other = new Player(await simulated(query()), { read: () => ({ step: shown.view.step }), write: () => {} });
-    shown.followers = [other];
-    stage.replaceChildren(...[shown, other].map((player) => element("div", {}, heading(player.episode), player.node)));
-    stage.classList.add("two");
-    document.getElementById("problem")?.remove();
-  } catch (error) {
-    complain(error);
-  }
+/** Shows what the form says, and keeps it in the address. */
+function go(isBeside) {
+  if (!form.reportValidity()) return undefined;
+  const words = query();
+  const shown = new URLSearchParams([...words, ...(isBeside ? [["beside", 1]] : [])]);
+  history.replaceState(null, "", `${location.pathname}?${shown}${location.hash}`);
+  return show(words, isBeside);
 }
 
 form.addEventListener("submit", (event) => {
   event.preventDefault();
-  history.replaceState(null, "", `${location.pathname}?${query()}`);
-  show(query());
+  go(false);
 });
+addEventListener("hashchange", () => players[0]?.goTo(readAddress()));
 // Somebody clicked an individual to see it move; an address with a step is to be looked at.
 const plays = location.hash === "" && !matchMedia("(prefers-reduced-motion: reduce)").matches;
-await show(words);
-if (plays) shown?.toggle();
+await show(query(), words.has("beside"));
+if (plays) players[0]?.clock.toggle();

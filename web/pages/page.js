@@ -16,21 +16,27 @@ export function bar(title, current) {
     element("span", { className: "space" }), status));
 }
 
-/** What a server says that cannot do what was asked. */
-export class Refusal extends Error {}
+/** What a server says that cannot do what was asked, and its status; 0: there was no answer. */
+export class Refusal extends Error {
+  constructor(message, status) {
+    super(message);
+    this.status = status;
+  }
+}
 
 /** Asks the server, and returns its answer. */
 export async function ask(path, options = {}) {
-  const response = await fetch(path, options);
-  if (response.status === 401) {
-    location.assign(`/login#${encodeURIComponent(location.pathname + location.search)}`);
-    throw new Refusal("log in again");
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch {
+    throw new Refusal("the server does not answer", 0);
   }
-  if (!response.ok) {
-    const { error } = await response.json().catch(() => ({ error: response.statusText }));
-    throw new Refusal(error);
-  }
-  return response;
+  if (response.ok) return response;
+  const { error } = await response.json().catch(() => ({ error: `${response.status} ${response.statusText}` }));
+  // The server asks for the token in place of this page, whose address stays.
+  if (response.status === 401) location.reload();
+  throw new Refusal(error, response.status);
 }
 
 export async function askJson(path) {
@@ -43,23 +49,45 @@ export async function order(path, body = {}) {
   return ask(path, { method: "POST", headers, body: JSON.stringify(body) });
 }
 
+/** Time until a connection is tried again that the browser has given up, ms. */
+const AGAIN_AFTER = 2000;
+
 /** News from the server, whenever there are some; the browser connects again by itself, and
- *  says which event was the last. */
-export function listen(path, onData) {
+ *  says which event was the last. `onEnd(refusal)`: the server is there, and will not have more. */
+export function listen(path, onData, onEnd = (refusal) => complain(refusal, "news")) {
   let source = null;
+  let isOver = false;
   const connect = () => {
+    if (isOver) return;
     source = new EventSource(path);
     source.onopen = () => setStatus("live", "");
     source.onmessage = (event) => onData(JSON.parse(event.data), event.lastEventId);
     source.onerror = () => {
       setStatus("connecting again", "bad");
-      // After some answers a browser gives up; this does not.
-      if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
+      if (source.readyState === EventSource.CLOSED) look();
     };
   };
+  // After some answers a browser gives up, without a word on the answer.
+  const look = async () => {
+    try {
+      (await ask(path, { headers: { Accept: "text/event-stream" } })).body.cancel();
+      connect();
+    } catch (refusal) {
+      const isFinal = refusal.status >= 400 && refusal.status < 500 && refusal.status !== 429;
+      if (!isFinal) return void setTimeout(look, AGAIN_AFTER);
+      isOver = true;
+      setStatus("ended", "bad");
+      onEnd(refusal);
+    }
+  };
   connect();
+  // A page that comes back from the history of a browser goes on.
   addEventListener("pagehide", () => source.close());
-  return () => source.close();
+  addEventListener("pageshow", (event) => event.persisted && connect());
+  return () => {
+    isOver = true;
+    source.close();
+  };
 }
 
 function setStatus(text, className) {
@@ -67,11 +95,53 @@ function setStatus(text, className) {
   if (status) Object.assign(status, { textContent: `● ${text}`, className: className || "good" });
 }
 
-/** Shows that something went wrong, with what the server says. */
-export function complain(error) {
-  const box = document.getElementById("problem") ?? element("p", { id: "problem", role: "alert" });
-  box.textContent = error.message;
-  if (!box.isConnected) main.prepend(box);
+/** What is wrong, by what has gone wrong. */
+const problems = new Map();
+
+/** Shows that something went wrong, with what the server says, until it is resolved or somebody
+ *  has read it. `what`: which attempt failed; its next success resolves it. */
+export function complain(error, what = "page") {
+  const text = error.message;
+  const known = problems.get(what);
+  if (known?.dataset.text === text) return;
+  known?.remove();
+  const close = element("button", { type: "button", title: "I have read it", "aria-label": "dismiss", onclick: () => resolve(what) }, "×");
+  const line = element("p", { className: "problem" }, element("span", {}, text), element("span", { className: "space" }), close);
+  line.dataset.text = text;
+  problems.set(what, line);
+  let box = document.getElementById("problem");
+  if (!box) document.querySelector("main").before(box = element("div", { id: "problem", role: "alert" }));
+  box.append(line);
+}
+
+/** What had gone wrong works again, or somebody has read of it. */
+export function resolve(what) {
+  problems.get(what)?.remove();
+  problems.delete(what);
+  if (problems.size === 0) document.getElementById("problem")?.remove();
+}
+
+/** Says in place of the page that what it shows is not there, and where to go on. */
+export function endPage(title, text, ...links) {
+  main.replaceChildren(element("section", { className: "panel end" }, element("h1", {}, title), element("p", {}, text),
+    element("p", { className: "row" }, ...links.map(([href, name]) => element("a", { className: "play", href }, name)))));
+}
+
+/** Does one thing at a time: what is asked for meanwhile is done once more, after it. */
+export function oneByOne(work) {
+  let running = null;
+  let isWanted = false;
+  const run = async () => {
+    do {
+      isWanted = false;
+      await work();
+    } while (isWanted);
+  };
+  return () => {
+    if (running) isWanted = true;
+    else running = run().finally(() => (running = null));
+    return running;
+  };
 }
 
 /** "1 item", "2 items" */

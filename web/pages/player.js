@@ -1,12 +1,10 @@
 // Plays an episode: the world, its controls, the robot that is followed, the timeline.
 
+import { Clock, clamp } from "swarm/clock.js";
 import { decimals, element } from "swarm/dom.js";
 import { robotPanel } from "swarm/robot-panel.js";
 import { timeline } from "swarm/timeline.js";
 import { World } from "swarm/world.js";
-
-/** Steps per second. */
-const SPEEDS = [2, 5, 10, 20, 40, 80, 160, 320];
 
 const HELP = [
   ["Space", "play, pause"], ["← →", "one step; with Shift, ten"], ["Home End", "first, last step"],
@@ -15,55 +13,68 @@ const HELP = [
   ["W", "whole world, or the swarm"],
 ];
 
+/** The player that keys are for: the one that was touched last. */
+let active = null;
+document.addEventListener("keydown", (event) => {
+  if (active?.node.isConnected) active.key(event);
+});
+
 export class Player {
-  /** `place`: where step and robot are remembered, such as the page's address. */
-  constructor(episode, place = addressPlace()) {
+  /** `place`: where step and robot are remembered, such as the page's address. `clock`: that of
+   *  the player which this one is shown beside. `suffix`: what tells its ids from the other's. */
+  constructor(episode, { place = addressPlace(), clock = null, suffix = "" } = {}) {
     this.episode = episode;
     this.place = place;
+    this.suffix = suffix;
     const { step = 0, robot = null } = place.read();
+    this.clock = clock ?? new Clock(step);
     this.view = {
-      steps: episode.steps, step: clamp(step, episode.steps), share: 0,
-      robot: robot !== null && robot < episode.n_robots ? robot : null,
+      steps: episode.steps, step: 0, share: 0, robot: this.known(robot),
       trails: true, radio: episode.has_radio, reach: false, numbers: true,
     };
-    this.speed = SPEEDS.indexOf(20);
-    this.isPlaying = false;
     this.seesWorld = false;
-    /** Players that show the same step. */
-    this.followers = [];
     this.build();
-    this.redraw();
+    this.clock.join(this, episode.steps);
+    this.tick();
+    if (!active?.node.isConnected) active = this;
+  }
+
+  /** A robot's number, if there is such a robot. */
+  known(robot) {
+    return robot !== null && robot !== undefined && robot < this.episode.n_robots ? robot : null;
   }
 
   build() {
-    const { episode, view } = this;
-    const seek = (step) => this.seek(step);
+    const { episode, view, clock, suffix } = this;
+    const seek = (step) => clock.seek(step);
     const choose = (robot) => this.choose(robot);
+    const id = (name) => (name ? name + suffix : "");
     this.world = new World(episode, view, choose);
-    this.panel = robotPanel(episode, view, seek, choose);
+    this.panel = robotPanel(episode, view, seek, choose, id);
     this.timeline = timeline(episode, view, seek);
-    const button = (text, title, onclick, id = "") => element("button", { title, onclick, id, "aria-label": title }, text);
-    this.playButton = button("▶", "play (Space)", () => this.toggle(), "play");
+    const button = (text, title, onclick, name = "") => element("button", { type: "button", title, onclick, id: id(name), className: name, "aria-label": title }, text);
+    this.playButton = button("▶", "play (Space)", () => clock.toggle(), "play");
     this.slider = element("input", {
-      type: "range", min: 0, max: episode.steps - 1, step: 1, id: "step-slider", "aria-label": "step",
-      oninput: () => this.seek(Number(this.slider.value)),
+      type: "range", min: 0, max: episode.steps - 1, step: 1, id: id("step-slider"), "aria-label": "step",
+      oninput: () => clock.seek(Number(this.slider.value)),
     });
-    this.stepText = element("output", { id: "step" });
-    this.speedText = element("output", { id: "speed", title: "steps per second" });
+    // Not an <output>: nobody wants to hear twenty numbers a second.
+    this.stepText = element("span", { id: id("step"), className: "step" });
+    this.speedText = element("span", { id: id("speed"), className: "pace", title: "steps per second" });
     const toggle = (name, text, title) => {
-      const box = element("input", { type: "checkbox", checked: view[name], id: `show-${name}`, onchange: () => this.show(name, box.checked) });
+      const box = element("input", { type: "checkbox", checked: view[name], id: id(`show-${name}`), onchange: () => this.show(name, box.checked) });
       this.boxes = { ...this.boxes, [name]: box };
       return element("label", { title }, box, text);
     };
     const controls = element("div", { className: "controls" },
-      button("|◀", "first step (Home)", () => this.seek(0)),
+      button("|◀", "first step (Home)", () => clock.seek(0)),
       button("◀", "one step back (←)", () => this.step(-1), "back"),
       this.playButton,
       button("▶︎|", "one step on (→)", () => this.step(1), "forward"),
       this.slider, this.stepText,
       element("span", { className: "speed" },
-        button("−", "slower (↓)", () => this.changeSpeed(-1)), this.speedText,
-        button("+", "faster (↑)", () => this.changeSpeed(1))));
+        button("−", "slower (↓)", () => clock.changeSpeed(-1)), this.speedText,
+        button("+", "faster (↑)", () => clock.changeSpeed(1))));
     const options = element("div", { className: "options" },
       toggle("trails", "trails", "where robots were in the last 60 steps (T)"),
       episode.has_radio ? toggle("radio", "who hears whom", "frames of the last steps; a colour per symbol (R)") : null,
@@ -72,10 +83,9 @@ export class Player {
       button("world", "whole world, or the swarm (W)", () => this.toggleWorld(), "camera"),
       element("span", { className: "space" }),
       this.legend(), this.help());
-    this.node = element("div", { className: "player", tabIndex: 0 },
+    this.node = element("div", { className: "player", tabIndex: 0, role: "group", "aria-label": episode.name },
       element("div", { className: "stage" }, this.world.node, controls, options), this.panel.node, this.timeline.node);
-    this.node.addEventListener("keydown", (event) => this.key(event));
-    this.changeSpeed(0);
+    for (const kind of ["pointerdown", "focusin"]) this.node.addEventListener(kind, () => (active = this));
   }
 
   /** What the marks in the world mean. */
@@ -97,20 +107,20 @@ export class Player {
   }
 
   key(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.target.tagName === "INPUT" && event.target.type !== "range" && event.target.type !== "checkbox") return;
-    const { n_robots, steps } = this.episode;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.defaultPrevented || isTyped(event)) return;
+    const { n_robots } = this.episode;
+    const { clock } = this;
     const next = (by) => this.choose(((this.view.robot ?? (by > 0 ? -1 : n_robots)) + by + n_robots) % n_robots);
     const flip = (name) => this.boxes[name] && this.show(name, !this.view[name]);
     const actions = {
-      " ": () => this.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1),
-      ArrowRight: () => this.step(event.shiftKey ? 10 : 1), Home: () => this.seek(0), End: () => this.seek(steps - 1),
-      ArrowUp: () => this.changeSpeed(1), ArrowDown: () => this.changeSpeed(-1), "[": () => next(-1), "]": () => next(1),
+      " ": () => clock.toggle(), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1),
+      ArrowRight: () => this.step(event.shiftKey ? 10 : 1), Home: () => clock.seek(0), End: () => clock.seek(clock.steps - 1),
+      ArrowUp: () => clock.changeSpeed(1), ArrowDown: () => clock.changeSpeed(-1), "[": () => next(-1), "]": () => next(1),
       Escape: () => this.choose(null), t: () => flip("trails"), r: () => flip("radio"), a: () => flip("reach"),
       n: () => flip("numbers"), w: () => this.toggleWorld(),
     };
     const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!action || (event.key === " " && event.target.tagName === "BUTTON")) return;
+    if (!action) return;
     event.preventDefault();
     action();
   }
@@ -134,63 +144,31 @@ export class Player {
     this.redraw();
   }
 
-  changeSpeed(by) {
-    this.speed = clamp(this.speed + by, SPEEDS.length);
-    this.speedText.textContent = `${SPEEDS[this.speed]}/s`;
-  }
-
   step(by) {
-    this.pause();
-    this.seek(this.view.step + by);
+    this.clock.pause();
+    this.clock.seek(this.clock.step + by);
   }
 
-  seek(step) {
-    this.view.step = clamp(step, this.episode.steps);
-    this.view.share = 0;
-    for (const follower of this.followers) follower.seek(this.view.step);
-    if (!this.isPlaying) this.remember();
+  /** Shows the moment of the clock, or the last one if the episode is over by then. */
+  tick() {
+    const { clock, view, playButton } = this;
+    view.step = clamp(clock.step, this.episode.steps);
+    view.share = view.step === clock.step && view.step < this.episode.steps - 1 ? clock.share : 0;
+    const [sign, title] = clock.isPlaying ? ["❚❚", "pause (Space)"] : ["▶", "play (Space)"];
+    if (playButton.title !== title) {
+      Object.assign(playButton, { textContent: sign, title });
+      playButton.setAttribute("aria-label", title);
+    }
+    this.speedText.textContent = `${clock.speed}/s`;
+    if (!clock.isPlaying) this.remember();
     this.redraw();
   }
 
-  toggle() {
-    if (this.isPlaying) return this.pause();
-    if (this.view.step === this.episode.steps - 1) this.seek(0);
-    this.isPlaying = true;
-    this.playButton.textContent = "❚❚";
-    let before = performance.now();
-    const frame = (now) => {
-      if (!this.isPlaying) return;
-      this.advance(((now - before) / 1000) * SPEEDS[this.speed]);
-      before = now;
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
-  }
-
-  /** Goes on by so many steps, which need not be whole. */
-  advance(by) {
-    const { steps } = this.episode;
-    const at = Math.min(this.view.step + this.view.share + by, steps - 1);
-    this.view.step = Math.floor(at);
-    this.view.share = at - this.view.step;
-    for (const follower of this.followers) follower.follow(this.view);
-    if (at >= steps - 1) this.pause();
+  /** Goes where the address says, which somebody has changed. */
+  goTo({ step, robot }) {
+    this.view.robot = this.known(robot);
+    if (step !== undefined) this.clock.seek(step);
     else this.redraw();
-  }
-
-  /** Shows the moment of another player. */
-  follow({ step, share }) {
-    this.view.step = clamp(step, this.episode.steps);
-    this.view.share = this.view.step === step ? share : 0;
-    this.redraw();
-  }
-
-  pause() {
-    this.isPlaying = false;
-    this.playButton.textContent = "▶";
-    this.view.share = 0;
-    this.remember();
-    this.redraw();
   }
 
   remember() {
@@ -198,42 +176,57 @@ export class Player {
   }
 
   redraw() {
+    const { steps } = this.episode;
     this.slider.value = this.view.step;
-    this.stepText.textContent = `step ${this.view.step} of ${this.episode.steps}`;
+    this.stepText.textContent = `step ${this.view.step} of ${steps - 1}`;
     this.world.node.redraw();
     this.panel.redraw();
     this.timeline.redraw();
   }
 }
 
-/** What an episode is, above it. */
-export function heading(episode) {
+/** Whether a key belongs to the element that has the focus: a field that is typed into, or a
+ *  button that Space presses. */
+function isTyped({ target, key }) {
+  const field = target.closest?.("input, select, textarea, [contenteditable]");
+  if (field && !["range", "checkbox"].includes(field.type)) return true;
+  return key === " " && target.closest?.("button, summary, a, input[type=checkbox]") !== null;
+}
+
+/** What an episode is, above it. `suffix`: as that of its player. */
+export function heading(episode, suffix = "") {
   const worlds = episode.generation === null ? "worlds of evaluations" : `worlds of generation ${episode.generation}`;
   const measures = Object.entries(episode.measures).map(([name, mean]) => `${name.replaceAll("_", " ")} ${decimals(mean, 3)}`);
   return element("header", { className: "episode" },
     element("h1", {}, episode.name),
     element("p", { className: "muted" },
       `${episode.experiment}, ${episode.n_robots} robots, seed ${episode.seed}, ${worlds}, trial ${episode.trial}`),
-    element("p", { id: "result" }, element("b", {}, `fitness ${decimals(episode.fitness, 4)}`), ` (${episode.fitness_function})`,
+    element("p", { id: `result${suffix}` }, element("b", {}, `fitness ${decimals(episode.fitness, 4)}`), ` (${episode.fitness_function})`,
       element("span", { className: "muted" }, measures.length ? ` · ${measures.join(" · ")}` : "")));
+}
+
+/** Step and robot after the # of an address. */
+export function readAddress() {
+  const words = new URLSearchParams(location.hash.slice(1));
+  const number = (name) => (/^\d+$/.test(words.get(name) ?? "") ? Number(words.get(name)) : undefined);
+  return { step: number("step"), robot: number("robot") };
 }
 
 /** Remembers step and robot after the # of the address. */
 function addressPlace() {
+  let written = location.hash;
   return {
-    read() {
-      const words = new URLSearchParams(location.hash.slice(1));
-      const number = (name) => (/^\d+$/.test(words.get(name) ?? "") ? Number(words.get(name)) : undefined);
-      return { step: number("step"), robot: number("robot") };
-    },
+    read: readAddress,
     write({ step, robot }) {
       const words = new URLSearchParams({ step });
       if (robot !== null) words.set("robot", robot);
-      history.replaceState(null, "", `#${words}`);
+      // Browsers take only so many changes of an address a second.
+      if (`#${words}` === written) return;
+      written = `#${words}`;
+      history.replaceState(history.state, "", written);
     },
   };
 }
 
-function clamp(value, n) {
-  return Math.max(0, Math.min(n - 1, value));
-}
+/** A player that the address does not know. */
+export const NOWHERE = { read: () => ({}), write: () => {} };

@@ -1,7 +1,7 @@
 // The page of a file that `swarmctl replay` wrote: the episode is in it.
 
 import { unpack } from "swarm/episode.js";
-import { Player, heading } from "swarm/player.js";
+import { Player, heading, readAddress } from "swarm/player.js";
 
 const text = atob(document.getElementById("episode").textContent);
 const episode = await unpack(Uint8Array.from(text, (letter) => letter.charCodeAt(0)));
@@ -9,3 +9,4 @@ document.title = `${episode.name} – replay`;
 const player = new Player(episode);
 document.getElementById("page").append(heading(episode), player.node);
 player.node.focus({ preventScroll: true });
+addEventListener("hashchange", () => player.goTo(readAddress()));

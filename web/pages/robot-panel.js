@@ -7,7 +7,8 @@ import { track } from "swarm/timeline.js";
 /** Height of a row of a map, pixels. */
 const ROW = 9;
 
-export function robotPanel(episode, view, seek, choose) {
+/** `id`: makes the ids of its parts from their names. */
+export function robotPanel(episode, view, seek, choose, id) {
   const node = element("aside", { className: "robot-panel", "aria-label": "the robot that is followed" });
   let shown = undefined;
   let parts = [];
@@ -38,8 +39,8 @@ export function robotPanel(episode, view, seek, choose) {
   /** What it does in this step, as a list. */
   const facts = () => {
     const list = element("dl", {});
-    const fact = (name, text, id) => {
-      const value = element("dd", { id });
+    const fact = (name, text, part) => {
+      const value = element("dd", { id: id(part) });
       list.append(element("dt", {}, name), value);
       parts.push(() => value.replaceChildren(...[text()].flat()));
     };

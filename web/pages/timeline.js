@@ -1,7 +1,7 @@
 // What all robots did over all steps, below the world: the current step is marked, and
 // dragging goes to another one.
 
-import { canvas, decimals, element, onTheme } from "swarm/dom.js";
+import { canvas, decimals, element } from "swarm/dom.js";
 import { palette, pixels, rgb } from "swarm/drawing.js";
 
 /** A picture over all steps with a mark at the current one. `paint(context, width, height)`
@@ -26,7 +26,6 @@ export function track(view, seek, height, label, paint) {
   }, label);
   node.className = "track";
   node.style.height = `${height}px`;
-  onTheme(() => node.repaint());
   node.repaint = () => {
     picture = null;
     node.redraw();

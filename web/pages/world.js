@@ -1,6 +1,6 @@
 // The world on a canvas: robots, lights, areas, and who heard whom.
 
-import { canvas, onTheme } from "swarm/dom.js";
+import { canvas } from "swarm/dom.js";
 import { Camera } from "swarm/camera.js";
 import { palette, symbolColor } from "swarm/drawing.js";
 import { shortest } from "swarm/episode.js";
@@ -22,7 +22,6 @@ export class World {
     this.camera = new Camera(episode);
     this.node = canvas((context, width, height) => this.draw(context, width, height), "the world");
     this.node.className = "world";
-    onTheme(() => this.node.redraw());
     this.listen(onRobot);
   }
 
@@ -97,8 +96,9 @@ export class World {
   /** A grid of a metre, and the seam where the torus closes. */
   drawPlane(context) {
     const { camera, colors, episode } = this;
-    const [left, top] = camera.toWorld(0, 0);
-    const [right, bottom] = camera.toWorld(camera.width, camera.height);
+    const [halfX, halfY] = camera.halves.map((half) => half / camera.scale);
+    const [left, right] = [camera.x - halfX, camera.x + halfX];
+    const [bottom, top] = [camera.y - halfY, camera.y + halfY];
     const line = (x0, y0, x1, y1) => {
       const [from, to] = [camera.toScreen(x0, y0), camera.toScreen(x1, y1)];
       context.moveTo(...from);

@@ -20,6 +20,7 @@ macro_rules! modules {
 
 modules!(
     "camera.js",
+    "clock.js",
     "dom.js",
     "doing.js",
     "drawing.js",
@@ -34,6 +35,7 @@ modules!(
     "page-experiments.js",
     "page-fleet.js",
     "page-login.js",
+    "page-missing.js",
     "page-replay.js",
     "player.js",
     "replay-file.js",

@@ -3,23 +3,25 @@
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
 use axum::{
-    Json,
     extract::{Request, State},
     http::{
-        HeaderMap, HeaderName, HeaderValue, Method, StatusCode,
+        HeaderMap, HeaderName, HeaderValue, StatusCode,
         header::{
             CACHE_CONTROL, CONTENT_SECURITY_POLICY, COOKIE, HOST, ORIGIN, REFERRER_POLICY,
             SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
         },
     },
     middleware::Next,
-    response::{IntoResponse, Redirect, Response},
+    response::{IntoResponse, Response},
 };
 use serde::Deserialize;
 use subtle::ConstantTimeEq as _;
 use swarm_transport::Token;
 
-use super::{assets, problem::Problem};
+use super::{
+    assets,
+    problem::{Body, Problem},
+};
 
 /// What the cookie is derived for.
 const PURPOSE: &str = "swarmevo web session";
@@ -82,7 +84,7 @@ pub async fn check(
         let why = "this address serves localhost only; open it by that name";
         return Err(Problem::new(StatusCode::MISDIRECTED_REQUEST, why));
     }
-    if request.method() != Method::GET && !is_same_origin(text(ORIGIN), host) {
+    if !request.method().is_safe() && !is_same_origin(text(ORIGIN), host) {
         let why = "the request does not come from a page of this address";
         return Err(Problem::new(StatusCode::FORBIDDEN, why));
     }
@@ -93,7 +95,8 @@ pub async fn check(
             let why = "log in again: the token is not known any more";
             return Err(Problem::new(StatusCode::UNAUTHORIZED, why));
         }
-        return Ok(secured(Redirect::to("/login").into_response()));
+        // At the same address, which is opened again when the token has been shown.
+        return Ok(secured((StatusCode::UNAUTHORIZED, assets::login()).into_response()));
     }
     Ok(secured(next.run(request).await))
 }
@@ -125,7 +128,7 @@ pub struct Login {
 /// Answers the right token with a cookie.
 pub async fn login(
     State(access): State<Arc<Access>>,
-    Json(login): Json<Login>,
+    Body(login): Body<Login>,
 ) -> Result<Response, Problem> {
     let is_right =
         access.token.as_ref().is_none_or(|token| token.matches(login.token.trim().as_bytes()));

@@ -4,7 +4,6 @@ use std::{collections::BTreeMap, sync::LazyLock};
 
 use axum::{
     Router,
-    extract::Path,
     http::{
         HeaderValue, StatusCode,
         header::{CACHE_CONTROL, CONTENT_TYPE},
@@ -15,6 +14,7 @@ use axum::{
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use sha2::{Digest as _, Sha256};
 
+use super::problem::{Path, Problem};
 use crate::modules::{MODULES, STYLE, import_map};
 
 /// Where modules and the style are.
@@ -49,8 +49,19 @@ pub fn routes() -> Router {
         .route("/compare", page("page-compare.js"))
         .route("/fleet", page("page-fleet.js"))
         .route("/replay/{*address}", page("page-replay.js"))
-        .route("/login", page("page-login.js"))
+        .route("/login", get(|| async { login() }))
         .route("/assets/{version}/{name}", get(asset))
+        .fallback(|| async { (StatusCode::NOT_FOUND, missing()) })
+}
+
+/// The page that asks for the token.
+pub fn login() -> Html<String> {
+    page("page-login.js")
+}
+
+/// The page of addresses that lead nowhere.
+fn missing() -> Html<String> {
+    page("page-missing.js")
 }
 
 /// A page is empty: its module fills it.
@@ -84,7 +95,7 @@ async fn asset(Path((_, name)): Path<(String, String)>) -> Response {
     static ASSETS: LazyLock<BTreeMap<&str, &str>> =
         LazyLock::new(|| MODULES.iter().copied().chain([("style.css", STYLE)]).collect());
     let Some(text) = ASSETS.get(name.as_str()) else {
-        return StatusCode::NOT_FOUND.into_response();
+        return Problem::new(StatusCode::NOT_FOUND, format!("there is no {name}")).into_response();
     };
     let kind = if name.ends_with(".css") { "text/css" } else { "text/javascript" };
     let headers = [

@@ -2,7 +2,7 @@
 
 use axum::{
     Json,
-    extract::{Path, Query, State},
+    extract::State,
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
@@ -13,7 +13,7 @@ use swarm_proto::v1::{ListEventsRequest, ListGenerationsRequest};
 use super::{
     Shared,
     answers::{self, ExperimentAnswer},
-    problem::Problem,
+    problem::{Path, Problem, Query},
 };
 
 /// Generations of the small curve of a list.

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 use axum::{
     Json,
     body::Bytes,
-    extract::{Path, State},
+    extract::State,
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
@@ -17,7 +17,7 @@ use tokio::{sync::Mutex, time::Instant};
 use super::{
     Shared,
     answers::{self, ExperimentAnswer, WorkerAnswer},
-    problem::Problem,
+    problem::{Body, Path, Problem},
 };
 use crate::source::{Action, Control};
 
@@ -148,7 +148,7 @@ pub struct Order {
 pub async fn steer(
     State(shared): State<Shared>,
     Path((id, action)): Path<(u64, String)>,
-    Json(order): Json<Order>,
+    Body(order): Body<Order>,
 ) -> Result<Json<ExperimentAnswer>, Problem> {
     let control = control(&shared)?;
     let action = match (&*action, order.priority) {

@@ -4,7 +4,7 @@
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Duration};
 
 use axum::{
-    extract::{Path, Query, State},
+    extract::State,
     http::HeaderMap,
     response::{
         IntoResponse, Response, Sse,
@@ -20,7 +20,7 @@ use tokio_stream::Stream;
 use super::{
     Shared,
     answers::{self, ExperimentAnswer},
-    problem::Problem,
+    problem::{Path, Problem, Query},
 };
 
 /// Least time between two events of a stream.

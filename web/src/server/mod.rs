@@ -31,6 +31,7 @@ use self::{
     fleet::{Explanations, LatestAnswer},
     listener::Connections,
     live::Latest,
+    problem::Problem,
 };
 
 /// Bytes of a request's body: a token, or what to change.
@@ -101,6 +102,8 @@ impl Site {
             .route("/experiments/{id}/explain", get(fleet::explain))
             .route("/experiments/{id}/{action}", post(fleet::steer))
             .route("/replay/{*address}", get(replays::replay))
+            .fallback(Problem::nowhere)
+            .method_not_allowed_fallback(Problem::nowhere)
             .with_state(shared);
         Router::new()
             .nest("/api", api)

@@ -1,10 +1,11 @@
 //! What went wrong, for pages: a status, and one line for people.
 
 use axum::{
-    Json,
-    http::StatusCode,
+    extract::{FromRequest, FromRequestParts, Request},
+    http::{StatusCode, Uri, request::Parts},
     response::{IntoResponse, Response},
 };
+use serde::de::DeserializeOwned;
 use serde_json::json;
 use tonic::{Code, Status};
 
@@ -23,6 +24,12 @@ impl Problem {
     /// What people have asked for makes no sense.
     pub fn bad(message: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, message)
+    }
+
+    /// Nothing is asked or done at an address, or not with this method.
+    pub async fn nowhere(uri: Uri) -> Self {
+        let path: String = uri.path().chars().take(80).collect();
+        Self::new(StatusCode::NOT_FOUND, format!("there is nothing at {path}"))
     }
 
     /// Only a coordinator can do this.
@@ -48,6 +55,48 @@ impl From<Status> for Problem {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        (self.status, Json(json!({ "error": self.message }))).into_response()
+        (self.status, axum::Json(json!({ "error": self.message }))).into_response()
+    }
+}
+
+/// What an address names, or one line on why it names nothing.
+#[derive(Debug)]
+pub struct Path<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Path<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let path = axum::extract::Path::from_request_parts(parts, state).await;
+        path.map(|it| Self(it.0)).map_err(|why| {
+            let path = parts.uri.path();
+            Problem::bad(format!("{path}: an experiment has a number, such as 3 ({why})"))
+        })
+    }
+}
+
+/// What follows the `?` of an address, or one line on what is wrong with it.
+#[derive(Debug)]
+pub struct Query<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let query = axum::extract::Query::from_request_parts(parts, state).await;
+        query.map(|it| Self(it.0)).map_err(|why| Problem::bad(why.body_text()))
+    }
+}
+
+/// A body that is JSON, or one line on what is wrong with it.
+#[derive(Debug)]
+pub struct Body<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let body = axum::Json::from_request(request, state).await;
+        body.map(|it| Self(it.0)).map_err(|why| Problem::new(why.status(), why.body_text()))
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::{Path, Query, State},
+    extract::State,
     http::{StatusCode, header::CONTENT_TYPE},
     response::{IntoResponse, Response},
 };
@@ -12,7 +12,10 @@ use experiment_file::ExperimentConfig;
 use sim_core::{FINGERPRINT, Simulation, TrialSet};
 use swarm_proto::v1::GetChampionResponse;
 
-use super::{Shared, problem::Problem};
+use super::{
+    Shared,
+    problem::{Path, Problem, Query},
+};
 use crate::{
     replay::{Episode, Replay},
     what_if::WhatIf,

@@ -99,8 +99,9 @@ async fn only_those_who_have_shown_the_token_see_anything() {
     let list = "/api/experiments";
     let refused = answer(HERE, Some(TOKEN), get(list, HERE, "")).await;
     assert_eq!(refused.status(), StatusCode::UNAUTHORIZED);
-    let sent_away = answer(HERE, Some(TOKEN), get("/", HERE, "")).await;
-    assert_eq!(sent_away.headers()["location"], "/login");
+    let asked = answer(HERE, Some(TOKEN), get("/replay/1?robots=7", HERE, "")).await;
+    assert_eq!(asked.status(), StatusCode::UNAUTHORIZED);
+    assert!(text(asked).await.contains("page-login.js"), "the token is not asked for in its place");
 
     let login = |token: &str| post("/login", HERE, ORIGIN, &format!(r#"{{"token":"{token}"}}"#));
     let wrong = answer(HERE, Some(TOKEN), login(&"x".repeat(32))).await;
@@ -164,11 +165,42 @@ async fn what_went_wrong_is_said_in_one_line() {
         ("/api/replay/1", StatusCode::CONFLICT, "nobody yet"),
         ("/api/replay/x", StatusCode::BAD_REQUEST, "names nobody"),
         ("/api/workers", StatusCode::CONFLICT, "only a coordinator"),
+        ("/api/experiments/x", StatusCode::BAD_REQUEST, "an experiment has a number"),
+        ("/api/experiments/-1/events", StatusCode::BAD_REQUEST, "an experiment has a number"),
+        ("/api/experiments/1/live?from=x", StatusCode::BAD_REQUEST, "from"),
+        ("/api/replay/1?robots=many", StatusCode::BAD_REQUEST, "robots"),
+        ("/api/replay/1?colour=red", StatusCode::BAD_REQUEST, "colour"),
+        ("/api/nothing", StatusCode::NOT_FOUND, "there is nothing at /nothing"),
     ] {
         let refused = answer(HERE, None, get(path, HERE, "")).await;
         assert_eq!(refused.status(), status, "{path}");
         let text = text(refused).await;
         assert!(text.contains(part) && text.lines().count() == 1, "{text}");
+        assert!(text.starts_with(r#"{"error":""#), "{text}");
+    }
+    for body in ["", "{", r#"{"token":7}"#, "[]"] {
+        let refused = answer(HERE, Some(TOKEN), post("/login", HERE, ORIGIN, body)).await;
+        assert!(refused.status().is_client_error(), "{body}");
+        assert!(text(refused).await.starts_with(r#"{"error":""#), "{body}");
+    }
+}
+
+#[tokio::test]
+async fn heads_are_told_what_they_would_get() {
+    let head = |path: &str| {
+        let request = Request::head(path).header("host", HERE);
+        request.body(Body::empty()).unwrap()
+    };
+    for (path, status) in [
+        ("/", StatusCode::OK),
+        ("/replay/1", StatusCode::OK),
+        ("/api/experiments", StatusCode::OK),
+        ("/api/experiments/9", StatusCode::NOT_FOUND),
+        ("/no/such/page", StatusCode::NOT_FOUND),
+    ] {
+        assert_eq!(answer(HERE, None, head(path)).await.status(), status, "{path}");
+        let stranger = answer(HERE, Some(TOKEN), head(path)).await;
+        assert_eq!(stranger.status(), StatusCode::UNAUTHORIZED, "{path}");
     }
 }
 

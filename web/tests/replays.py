@@ -1,0 +1,175 @@
+"""The player in a real browser, in every form in which it is shown; called as `browser.py` is."""
+
+import json
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from harness import CONFIG, PROGRAMS, BrowserTest, Fleet
+
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+
+class Replays(BrowserTest):
+    """Individuals that a server simulates."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.fleet = Fleet()
+        cls.addClassCleanup(cls.fleet.stop)
+        cls.fleet.start_worker()
+        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", "6", "--watch")
+
+    def open(self, path):
+        self.browser.get(self.fleet.pages + path)
+        # A page that hangs fails its test soon, and not by the deadline of the driver.
+        self.browser.set_script_timeout(20)
+
+    def texts(self, selector):
+        return self.script(f"return [...document.querySelectorAll('{selector}')].map((it) => it.textContent)")
+
+    def test_simulating_again_in_any_form_leaves_a_page_that_answers(self):
+        def press(selector):
+            self.find(selector).click()
+
+        def enter():
+            self.find("#what-if-robots").send_keys(Keys.ENTER)
+
+        for expected, act in [
+            ("7 robots", lambda: (self.find("#what-if-robots").send_keys("7"), press("#again"))),
+            ("6 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("6"), enter())),
+            ("6 robots", lambda: press("#beside")),
+            ("8 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("8"), press("#beside"))),
+            ("9 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("9"), press("#again"), press("#again"))),
+        ]:
+            if expected == "7 robots":
+                self.open("/replay/1")
+                self.find(".player")
+            act()
+            self.wait(lambda: any(expected in it for it in self.texts(".episode")), f"no {expected}")
+            self.wait(lambda: not self.script("return document.querySelector('[aria-busy]')"), "it stays busy")
+            self.script("document.querySelector('#play').click()")
+            before = self.texts(".step")
+            self.wait(lambda: self.texts(".step") != before, "it does not play")
+
+    def test_a_world_without_a_size_is_not_drawn_and_comes_back(self):
+        self.open("/replay/1#step=3")
+        self.find(".world")
+        drawn = "return document.querySelector('.world').toDataURL().length / 1000"
+        self.wait(lambda: self.script(drawn) > 8, "nothing is drawn")
+        for style in ["display: none", "width: 0", "height: 0; min-height: 0", "width: 0; height: 0; min-height: 0"]:
+            self.script(f"document.querySelector('.world').style.cssText = '{style}'")
+            self.find("#play").click()
+            before = self.text(".step")
+            self.wait(lambda: self.text(".step") != before, style)
+            self.find("#play").click()
+            self.script("document.querySelector('.world').style.cssText = ''")
+            self.wait(lambda: self.script(drawn) > 8, f"nothing is drawn after {style}")
+            self.find(".player").send_keys(Keys.HOME)
+
+    def test_a_robot_heard_by_the_whole_world_and_a_light_beyond_it_are_drawn_at_once(self):
+        self.open("/replay/1#step=3")
+        self.find(".player")
+        drawn = self.browser.execute_async_script("""
+            const done = arguments[0];
+            import('swarm/camera.js').then(({ Camera }) => {
+                const numbers = [1e-300, 1e-9, 1, 1e9, 1e300, Infinity];
+                let images = 0;
+                for (const world of numbers.slice(0, 5)) for (const radius of numbers) for (const size of [0, 1, 1000, 1e9]) {
+                    const episode = { width: world, height: world, n_robots: 0, steps: 0, lights: [], areas: [], at: () => 0 };
+                    const camera = new Camera(episode);
+                    camera.resize(size, size);
+                    let n = 0;
+                    camera.eachImage(0, 0, radius, () => n++);
+                    images = Math.max(images, n);
+                }
+                done(images);
+            });
+        """)
+        self.assertLessEqual(drawn, 49)
+        self.assertGreaterEqual(drawn, 9)
+
+    def test_two_side_by_side_are_locked_and_stay_so(self):
+        self.open("/replay/1#step=50")
+        self.wait_for_text(".episode", "5 robots")
+        self.find("#what-if-robots").send_keys("9")
+        self.find("#beside").click()
+        self.wait(lambda: len(self.texts(".player")) == 2, "one player")
+        ids = "return [...document.querySelectorAll('[id]')].map((it) => it.id)"
+        self.assertEqual(sorted(set(self.script(ids))), sorted(self.script(ids)), "an id is there twice")
+        second = self.browser.find_elements(By.CSS_SELECTOR, ".player")[1]
+        for act in [
+            lambda: self.find("#forward").click(),
+            lambda: self.find("#forward-beside").click(),
+            lambda: second.send_keys(Keys.ARROW_LEFT),
+            lambda: second.send_keys(Keys.HOME),
+            lambda: self.find("#play-beside").click(),
+            lambda: self.find("#play").click(),
+            lambda: second.send_keys(Keys.END),
+        ]:
+            act()
+            first, beside = self.texts(".step")
+            self.assertEqual(first, beside)
+        self.assertEqual(self.texts(".step"), ["step 99 of 99"] * 2)
+        self.browser.refresh()
+        self.wait(lambda: len(self.texts(".player")) == 2, "one player after loading again")
+        self.assertIn("9 robots", self.texts(".episode")[1])
+        self.assertEqual(self.texts(".step"), ["step 99 of 99"] * 2)
+
+    def test_an_address_that_is_pasted_leads_to_its_step(self):
+        self.open("/replay/1#step=5")
+        self.wait_for_text(".step", "step 5 of 99")
+        self.script("location.hash = '#step=42&robot=2'")
+        self.wait_for_text(".step", "step 42 of 99")
+        self.wait_for_text(".robot-panel h2", "Robot 2")
+
+    def test_keys_work_wherever_the_last_click_was(self):
+        self.open("/replay/1#step=5")
+        self.wait_for_text(".step", "step 5 of 99")
+        webdriver.ActionChains(self.browser).move_by_offset(3, 3).click().send_keys(Keys.ARROW_RIGHT).perform()
+        self.wait_for_text(".step", "step 6 of 99")
+        self.find(".episode").click()
+        webdriver.ActionChains(self.browser).send_keys(Keys.ARROW_RIGHT).perform()
+        self.wait_for_text(".step", "step 7 of 99")
+        # What is typed into a field is for the field.
+        self.find("#what-if-seed").send_keys("3", Keys.ARROW_LEFT, Keys.HOME)
+        self.assertEqual(self.text(".step"), "step 7 of 99")
+
+    def test_a_screen_reader_hears_what_play_does_and_not_each_step(self):
+        self.open("/replay/1#step=5")
+        play = self.find("#play")
+        self.assertEqual(play.get_attribute("aria-label"), "play (Space)")
+        play.click()
+        self.wait(lambda: play.get_attribute("aria-label") == "pause (Space)", "it stays play")
+        live = "return [...document.querySelectorAll('output, [aria-live], [role=status]')].filter((it) => it.closest('.player')).length"
+        self.assertEqual(self.script(live), 0)
+
+
+class Files(BrowserTest):
+    """A replay in a file."""
+
+    def test_a_hidden_frame_does_not_stop_the_page_around_it(self):
+        with tempfile.TemporaryDirectory() as directory:
+            genotype, html, slides = (pathlib.Path(directory) / name for name in ("genes.json", "swarm.html", "slides.html"))
+            genotype.write_text(json.dumps([0.6] * 424))
+            command = ["replay", "--config", CONFIG, "--genotype", genotype, "--to", html]
+            subprocess.run([PROGRAMS / "swarmctl", *command], check=True, capture_output=True)
+            frames = "".join(f'<iframe src="swarm.html" style="{it}"></iframe>' for it in ["display: none", "width: 0; height: 0", "visibility: hidden"])
+            slides.write_text(f"<!doctype html><title>slides</title><p>0</p>{frames}")
+            self.browser.set_script_timeout(20)
+            self.browser.set_page_load_timeout(60)
+            self.browser.get(slides.as_uri())
+            count = "const it = document.querySelector('p'); it.textContent = Number(it.textContent) + 1; return it.textContent"
+            self.assertEqual(self.script(count), "1")
+            # A slide that is shown plays.
+            self.script("document.querySelector('iframe').style.cssText = 'width: 900px; height: 700px'")
+            self.browser.switch_to.frame(0)
+            self.wait_for_text(".step", "step 0 of 99")
+            self.wait(lambda: self.script("return document.querySelector('.world').width") > 300, "the world has no size")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
