@@ -2,7 +2,10 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { sparkline } from "swarm/charts.js";
-import { askJson, bar, complain, listen, main, remaining, span, stateMark } from "swarm/page.js";
+import { askJson, bar, complain, listen, main, oneByOne, remaining, resolve, span, stateMark } from "swarm/page.js";
+
+/** Least time between two questions, ms. */
+const LOAD_EVERY = 1000;
 
 bar("Experiments", "/");
 const search = element("input", { type: "search", placeholder: "Search by name, group, algorithm, state", "aria-label": "search", oninput: () => draw() });
@@ -16,26 +19,62 @@ main.replaceChildren(
 
 const chosen = new Set();
 let experiments = [];
+/** The rows that exist, by id: what is shown of an experiment, and its cells. */
+const known = new Map();
+const none = element("tr", {}, element("td", { colSpan: 9, className: "muted" }));
 
-async function load() {
+/** One question at a time: a slow server gets fewer of them. */
+const load = oneByOne(async () => {
   try {
     experiments = (await askJson("/api/experiments")).experiments;
     draw();
+    resolve("list");
   } catch (error) {
-    complain(error);
+    complain(error, "list");
   }
-}
+  await new Promise((wake) => setTimeout(wake, LOAD_EVERY));
+});
 
+/** Only cells that say something else are replaced, so focus, clicks and scrolling are not lost. */
 function draw() {
   const words = search.value.toLowerCase().split(/\s+/);
   const matches = (it) => words.every((word) => `${it.id} ${it.name} ${it.group} ${it.variant} ${it.algorithm} ${it.state} seed=${it.seed}`.toLowerCase().includes(word));
   const weights = experiments.filter((it) => it.state === "running").reduce((sum, it) => sum + it.priority, 0);
   const found = experiments.filter(matches).reverse();
-  rows.replaceChildren(...found.map((it) => row(it, weights)));
-  if (found.length === 0) {
-    const text = experiments.length ? "No experiment matches." : "There is no experiment yet: swarmctl submit FILE starts one.";
-    rows.append(element("tr", {}, element("td", { colSpan: 9, className: "muted" }, text)));
+  const ids = new Set(experiments.map((it) => it.id));
+  for (const [id, { node }] of known) {
+    if (ids.has(id)) continue;
+    node.remove();
+    known.delete(id);
   }
+  const wanted = found.map((it) => updated(it, weights));
+  if (found.length === 0) {
+    none.firstChild.textContent = experiments.length ? "No experiment matches." : "There is no experiment yet: swarmctl submit FILE starts one.";
+    wanted.push(none);
+  }
+  for (const node of [...rows.children]) if (!wanted.includes(node)) node.remove();
+  wanted.forEach((node, place) => {
+    if (rows.children[place] !== node) rows.insertBefore(node, rows.children[place] ?? null);
+  });
+}
+
+/** The row of an experiment, with what is new of it. */
+function updated(it, weights) {
+  const share = it.state === "running" ? weights : 0;
+  const says = JSON.stringify([it, share]);
+  const old = known.get(it.id);
+  if (old?.says === says) return old.node;
+  const fresh = row(it, weights);
+  if (!old) {
+    known.set(it.id, { node: fresh, says });
+    return fresh;
+  }
+  old.says = says;
+  [...fresh.children].forEach((cell, place) => {
+    const shown = old.node.children[place];
+    if (place > 0 && shown.innerHTML !== cell.innerHTML) shown.replaceChildren(...cell.childNodes);
+  });
+  return old.node;
 }
 
 function row(it, weights) {
@@ -62,5 +101,5 @@ function row(it, weights) {
     cell("Share", it.state === "running" ? `${Math.round((100 * it.priority) / weights)} %` : "–"));
 }
 
-await load();
+load();
 listen("/api/live", load);
