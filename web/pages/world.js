@@ -28,27 +28,52 @@ export class World {
   listen(onRobot) {
     const { node, camera } = this;
     let held = null;
+    /** Fingers on the world, by their ids. */
+    const fingers = new Map();
     const place = (event) => {
       const box = node.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
     };
+    /** Where two fingers are, and how far apart. */
+    const pinch = () => {
+      const [[ax, ay], [bx, by]] = [...fingers.values()];
+      return { x: (ax + bx) / 2, y: (ay + by) / 2, apart: Math.max(1, Math.hypot(ax - bx, ay - by)) };
+    };
     node.addEventListener("pointerdown", (event) => {
-      held = { at: place(event), moved: false };
-      node.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, place(event));
+      held = { at: place(event), moved: fingers.size > 1 };
+      // A single finger scrolls the page, as anywhere else.
+      if (event.pointerType !== "touch") node.setPointerCapture(event.pointerId);
     });
     node.addEventListener("pointermove", (event) => {
-      if (!held) return;
+      if (!held || !fingers.has(event.pointerId)) return;
+      if (fingers.size === 2) {
+        const before = pinch();
+        fingers.set(event.pointerId, place(event));
+        const { x, y, apart } = pinch();
+        camera.move(x - before.x, y - before.y);
+        camera.zoomAt(x, y, apart / before.apart);
+        return node.redraw();
+      }
       const [x, y] = place(event);
       const [dx, dy] = [x - held.at[0], y - held.at[1]];
       if (!held.moved && Math.hypot(dx, dy) < 4) return;
       held = { at: [x, y], moved: true };
+      if (event.pointerType === "touch") return;
       camera.move(dx, dy);
       node.redraw();
     });
     node.addEventListener("pointerup", (event) => {
       if (held && !held.moved) onRobot(this.robotAt(...place(event)));
-      held = null;
+      fingers.delete(event.pointerId);
+      if (fingers.size === 0) held = null;
     });
+    for (const kind of ["pointercancel", "lostpointercapture"]) {
+      node.addEventListener(kind, (event) => {
+        fingers.delete(event.pointerId);
+        if (fingers.size === 0) held = null;
+      });
+    }
     node.addEventListener("wheel", (event) => {
       event.preventDefault();
       camera.zoomAt(...place(event), Math.exp(-event.deltaY * 0.0015));

@@ -119,6 +119,37 @@ class Replays(BrowserTest):
         self.assertIn("9 robots", self.texts(".episode")[1])
         self.assertEqual(self.texts(".step"), ["step 99 of 99"] * 2)
 
+    def test_on_a_phone_two_fingers_zoom_and_one_scrolls(self):
+        self.narrow()
+        self.browser.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True, "maxTouchPoints": 2})
+        self.open("/replay/1#step=3")
+        self.find(".world")
+        look = "return document.querySelector('.world').toDataURL().length"
+        self.wait(lambda: self.script(look) > 8000, "nothing is drawn")
+        x, y = self.script("const it = document.querySelector('.world').getBoundingClientRect(); return [it.x + it.width / 2, it.y + it.height / 2]")
+
+        def touch(kind, *apart):
+            points = [{"x": x, "y": y + sign * it, "id": i} for it in apart for i, sign in enumerate([-1, 1])]
+            self.browser.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        before = self.script("return document.querySelector('.world').toDataURL()")
+        touch("touchStart", 20)
+        for apart in range(25, 120, 5):
+            touch("touchMove", apart)
+        touch("touchEnd")
+        self.assertNotEqual(self.script("return document.querySelector('.world').toDataURL()"), before, "nothing is zoomed")
+        self.assertEqual(self.script("return window.visualViewport.scale"), 1, "the page is zoomed instead")
+        finger = lambda kind, *ys: self.browser.execute_cdp_cmd(
+            "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": it} for it in ys]}
+        )
+        finger("touchStart", y)
+        for by in range(10, 200, 10):
+            finger("touchMove", y - by)
+        finger("touchEnd")
+        self.wait(lambda: self.script("return window.scrollY") > 50, "the world blocks scrolling")
+        widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
+        self.assertLessEqual(*widths)
+
     def test_an_address_that_is_pasted_leads_to_its_step(self):
         self.open("/replay/1#step=5")
         self.wait_for_text(".step", "step 5 of 99")
