@@ -34,25 +34,31 @@ def main():
     for seed in args.seeds:
         for algorithm in args.algorithms:
             if not (to / f"{algorithm}-{seed}.json").exists():
-                evolve(args, algorithm, seed, to)
+                evolve_by(args, algorithm, seed, to)
 
 
-def evolve(args, algorithm, seed, to):
-    """One run, from file to champion."""
+def evolve_by(args, algorithm, seed, to):
+    """One run by an algorithm with its default parameters."""
     experiment = json.loads((RESULTS.parent / "configs" / f"{args.name}.json").read_text())
     experiment["algorithm"]["name"] = algorithm
+    experiment["algorithm"]["generations"] = args.generations
     for population in experiment["algorithm"]["populations"].values():
         population["params"] = {"encoding": "real"}
+    mean = evolve(experiment, seed, to / f"{algorithm}-{seed}", args.workers)
+    print(f"{args.name} by {algorithm}, seed {seed}: {mean:.3f}", flush=True)
+
+
+def evolve(experiment, seed, stem, workers):
+    """One run, from experiment to STEM.csv and STEM.json. Returns the mean of the last generation."""
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         file = folder / "experiment.json"
         file.write_text(json.dumps(experiment))
         command = ["swarmctl", "run", file, "--output", "json", "--data-dir", folder / "data",
-                   "--seed", str(seed), "--generations", str(args.generations),
-                   "--workers", str(args.workers)]
+                   "--seed", str(seed), "--workers", str(workers)]
         done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
         *generations, end = map(json.loads, done.stdout.splitlines())
-        with (to / f"{algorithm}-{seed}.csv").open("w", newline="") as stream:
+        with Path(f"{stem}.csv").open("w", newline="") as stream:
             rows = csv.DictWriter(stream, COLUMNS, extrasaction="ignore")
             rows.writeheader()
             rows.writerows(generations)
@@ -61,8 +67,8 @@ def evolve(args, algorithm, seed, to):
         del champion["network"]
         champion["digest"] = generations[-1]["digest"]
         # Last: with it, the run is complete.
-        (to / f"{algorithm}-{seed}.json").write_text(json.dumps(champion) + "\n")
-    print(f"{args.name} by {algorithm}, seed {seed}: {generations[-1]['mean']:.3f}", flush=True)
+        Path(f"{stem}.json").write_text(json.dumps(champion) + "\n")
+    return generations[-1]["mean"]
 
 
 if __name__ == "__main__":

@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""Evolves experiments with one thing changed at a time, and prints what the change does.
+
+    results/hypotheses.py run [EXPERIMENT...] [--variants V...] [--seeds S...] [--workers N]
+    results/hypotheses.py report
+
+EXPERIMENT is a name in the table below; `report` prints every experiment. `run` writes history and
+champion of each run to results/hypotheses/EXPERIMENT/VARIANT-SEED.csv and .json, and leaves alone the
+runs that exist, so it may be interrupted. The variant `as it is` is the file unchanged, whose runs are in
+results/histories. `run` needs swarmctl in the PATH. Python 3.9 and nothing else.
+"""
+
+import argparse
+import copy
+import csv
+import json
+import statistics
+from pathlib import Path
+
+import algorithms
+
+RESULTS = algorithms.RESULTS
+LAST = 50
+SEEDS = [0, 1, 2, 3, 4]
+
+GA = "algorithm.populations.p1.params."
+DRAWN = {"topology.decoding.outB.params.stochastic": True, "topology.decoding.outC.params.stochastic": True}
+TABLE_3_4 = {GA + "alpha": 0.5, GA + "mutation_sigma": 0.5477225575051661}
+MODE = {
+    "topology.synapses.COMM-MODE": {"pre": "OUT_COMM", "post": "OUT_MODE", "trainable": True, "p": 1.0},
+    "topology.synapses.MODE-COMM": {"pre": "OUT_MODE", "post": "OUT_COMM", "trainable": True, "p": 1.0},
+}
+RECURRENT = "topology.synapses.{}.p"
+GA_NETWORK = {
+    **{RECURRENT.format(name): 0.7 for name in ("H1-H1", "H2-H2")},
+    RECURRENT.format("H1-H2"): 1.0,
+    **{RECURRENT.format(name): 0.85 for name in ("COMM-H1", "WHEELS-H1", "MODE-H1")},
+    "topology.synapses.WHEELS-WHEELS": {
+        "pre": "OUT_WHEELS", "post": "OUT_WHEELS", "trainable": True, "p": 1.0
+    },
+}
+ROBOT = "world.objects.robotA."
+LONG_RADIO = {
+    ROBOT + "sensors.wireless_receiver.range": 150,
+    ROBOT + "sensors.wireless_receiver.msg_length": 3,
+    ROBOT + "actuators.wireless_transmitter.range": 150,
+    ROBOT + "actuators.wireless_transmitter.msg_length": 3,
+    "topology.stimuli.I1.n": 3,
+    "topology.ensembles.OUT_COMM.n": 3,
+}
+# By experiment, a file of configs/original: what each variant changes in it.
+VARIANTS = {
+    "borderline_ga_program": {
+        "LED and mode drawn": DRAWN,
+        "Table 3.4's alpha and sigma": TABLE_3_4,
+        "LED and mode drawn, Table 3.4's alpha and sigma": {**DRAWN, **TABLE_3_4},
+        "synapses between message and mode": MODE,
+        "bias inside the gain": {"topology.bias_in_gain": True},
+    },
+    "orientation_consensus_ga_program": {
+        "tournament selection": {GA + "selection_operator": "tournament", GA + "tournament_size": 3},
+        "Table 3.4's alpha and sigma": TABLE_3_4,
+        "tournament selection, Table 3.4's alpha and sigma": {
+            GA + "selection_operator": "tournament", GA + "tournament_size": 3, **TABLE_3_4
+        },
+        "bias inside the gain": {"topology.bias_in_gain": True},
+    },
+    "light_follower_snes_program": {
+        "light at 0.013 rad per step": {
+            "world.objects.light_red.controller.params.angle_step": 0.013
+        },
+        "the network of the original's file for the GA": GA_NETWORK,
+        "radio of 150 cm, messages of 3": LONG_RADIO,
+        "first deviation 0.2": {GA + "sigma_init": 0.2},
+        "wheels from -1 to 1": {"topology.ensembles.OUT_WHEELS.activation": "tanh"},
+    },
+}
+AS_IT_IS = "as it is"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    run = commands.add_parser("run", help="evolve what is missing")
+    run.add_argument("experiments", nargs="*", default=list(VARIANTS), metavar="EXPERIMENT")
+    run.add_argument("--variants", nargs="+")
+    run.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
+    run.add_argument("--workers", type=int, default=1)
+    commands.add_parser("report", help="print what is there")
+    args = parser.parse_args()
+    if args.command == "report":
+        report()
+        return
+    for name in args.experiments:
+        for variant, changes in VARIANTS[name].items():
+            if args.variants is None or variant in args.variants:
+                for seed in args.seeds:
+                    evolve(name, variant, changes, seed, args.workers)
+
+
+def evolve(name, variant, changes, seed, workers):
+    stem = stem_of(name, variant, seed)
+    if Path(f"{stem}.json").exists():
+        return
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    experiment = changed(read_config(name), changes)
+    mean = algorithms.evolve(experiment, seed, stem, workers)
+    print(f"{name}, {variant}, seed {seed}: {mean:.3f}", flush=True)
+
+
+def read_config(name):
+    return json.loads((RESULTS.parent / "configs" / "original" / f"{name}.json").read_text())
+
+
+def changed(experiment, changes):
+    experiment = copy.deepcopy(experiment)
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        inner = experiment
+        for key in parents:
+            inner = inner[key]
+        inner[last] = value
+    return experiment
+
+
+def stem_of(name, variant, seed):
+    """Where a run is, without the ending of a file's name."""
+    folder = RESULTS / "hypotheses" / name
+    return folder / f"{variant.replace(' ', '-').replace(',', '')}-{seed}"
+
+
+def report():
+    for name, variants in VARIANTS.items():
+        print(f"## {name}\n")
+        print("| variant | seeds | mean, last 50 | champion |")
+        print("|---|---|---|---|")
+        for variant in [AS_IT_IS, *variants]:
+            runs = [run for seed in SEEDS if (run := read(name, variant, seed))]
+            if runs:
+                means, champions = zip(*runs)
+                print(f"| {variant} | {len(runs)} | {spread(means)} | {spread(champions)} |")
+        print()
+
+
+def read(name, variant, seed):
+    """Mean fitness of the last generations and the champion's worth; None if it has not run."""
+    if variant == AS_IT_IS:
+        history = RESULTS / "histories" / f"{name}-{seed}.csv"
+        champion = RESULTS / "champions" / f"{name}-{seed}.json"
+    else:
+        stem = stem_of(name, variant, seed)
+        history, champion = Path(f"{stem}.csv"), Path(f"{stem}.json")
+    if not champion.exists():
+        return None
+    with history.open(newline="") as stream:
+        means = [float(row["mean"]) for row in csv.DictReader(stream)]
+    return statistics.mean(means[-LAST:]), json.loads(champion.read_text())["judged"]["mean"]
+
+
+def spread(values):
+    """Median, least and greatest."""
+    return f"{statistics.median(values):.3f} ({min(values):.3f} to {max(values):.3f})"
+
+
+if __name__ == "__main__":
+    main()
