@@ -6,6 +6,8 @@
 
 use std::time::Duration;
 
+use swarm_transport::listening::{Known, ListenerLimits, Room};
+
 /// Bundles that are sent or received at the same time; more wait. Each takes at most four
 /// times [`bundle::UNPACKED_LEN_MAX`] of memory and 160 MiB, beside the evolution that is gone
 /// through, which takes what the experiment takes when it runs.
@@ -24,19 +26,19 @@ pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
 /// Ancestors in one answer.
 pub const ANCESTORS_MAX: usize = 100_000;
 
-/// Connections at the same time of those who have made a call that was let in: every
-/// worker and every call of a client on one of its own.
-pub const CONNECTIONS_MAX: usize = WORKERS_MAX + CLIENT_CALLS_MAX;
-/// Connections at the same time of those who have not: one more ends the oldest.
-pub const STRANGERS_MAX: usize = 512;
-/// Time that each of those has at least to say something.
-pub const SILENT_STRANGER_GRACE: Duration = Duration::from_millis(100);
-/// Time that each of those has at least to make its first call if it says something. If
-/// all are younger, more wait in the system's queue: so a whole fleet that comes back at
-/// once gets in.
-pub const STRANGER_GRACE: Duration = Duration::from_millis(500);
-/// Connections that wait in the system's queue, as far as the system permits.
-pub const LISTEN_BACKLOG: u32 = 4096;
+/// Connections. Of those who have made a call that was let in: every worker and every call
+/// of a client on one of its own.
+pub const CONNECTIONS: ListenerLimits = ListenerLimits {
+    strangers: Room {
+        n_places: 512,
+        silent_grace: Duration::from_millis(100),
+        heard_grace: Duration::from_millis(500),
+    },
+    admission_time: Duration::from_secs(30),
+    known: Known::Refused { n_places: WORKERS_MAX + CLIENT_CALLS_MAX },
+    // A peer that does not read does not answer pings either.
+    stall_time: Duration::from_secs(40),
+};
 /// Workers at the same time. Each holds a stream, some buffers and a file
 /// descriptor.
 pub const WORKERS_MAX: usize = 4096;
@@ -47,17 +49,9 @@ pub const CALLS_PER_CONNECTION_MAX: u32 = 128;
 /// Bytes of a call's headers: a token has up to 1,024 characters.
 pub const HEADERS_LEN_MAX: u32 = 16 << 10;
 
-/// Time for a connection to make a call that is let in. So those who know no
-/// token cannot keep the others out by holding all connections.
-pub const ADMISSION_TIMEOUT: Duration = Duration::from_secs(30);
-/// Time for a TLS handshake.
-pub const TLS_HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// A peer is asked for a sign of life so often, and gone after as long without
 /// one: a machine that vanishes closes nothing.
 pub const KEEPALIVE: Duration = Duration::from_secs(20);
-/// Pause after the system cannot accept a connection, for lack of descriptors,
-/// say.
-pub const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
 /// Time for which the referee's process is kept when it is not asked anything.
 pub const REFEREE_IDLE_TIME: Duration = Duration::from_secs(30);
 /// Time for the referee to compute an item.

@@ -1,39 +1,40 @@
 //! The HTTP endpoint that Prometheus scrapes: `GET /metrics`, and nothing else. It
 //! reads, so it asks for no token; it is there only if somebody gives it an address.
 
-use std::{collections::VecDeque, convert::Infallible, io, net::SocketAddr, time::Duration};
+use std::{convert::Infallible, future::pending, io, net::SocketAddr, time::Duration};
 
 use http::{
-    Method, Request, Response, StatusCode,
+    Method, Response, StatusCode,
     header::{ALLOW, CONTENT_TYPE, HeaderValue},
 };
 use http_body_util::Full;
-use hyper::{
-    body::{Bytes, Incoming},
-    server::conn::http1,
-    service::service_fn,
-};
-use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper::body::Bytes;
 use prometheus::TEXT_FORMAT;
-use tokio::{
-    net::{TcpListener, TcpStream},
-    task::{AbortHandle, JoinSet},
-    time::{sleep, timeout},
-};
+use swarm_transport::listening::{self, HttpLimits, Known, ListenerLimits, Room, serve_http};
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-/// Connections at the same time, with one request each. One more ends the oldest: a
-/// scrape takes milliseconds, so the oldest is nobody's who scrapes.
-const CONNECTIONS_MAX: usize = 16;
-/// Time for a request to come and its answer to go: Prometheus itself waits for 10 s.
-const CONNECTION_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time for the headers of a request.
-const HEADERS_TIMEOUT: Duration = Duration::from_secs(2);
-/// Bytes of a request's headers, and how many there may be.
-const HEADERS_LEN_MAX: usize = 16 << 10;
-const N_HEADERS_MAX: usize = 64;
-/// Pause after the system cannot accept a connection, for lack of descriptors, say.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
+/// Connections, with one request each: nobody is known better than others. One more ends
+/// the oldest: a scrape takes milliseconds, so the oldest is nobody's who scrapes.
+/// Prometheus itself waits for 10 s.
+const CONNECTIONS: ListenerLimits = ListenerLimits {
+    strangers: Room {
+        n_places: 64,
+        silent_grace: Duration::from_millis(20),
+        heard_grace: Duration::from_millis(100),
+    },
+    admission_time: Duration::from_secs(10),
+    known: Known::Refused { n_places: 0 },
+    stall_time: Duration::from_secs(10),
+};
+/// Requests.
+const REQUESTS: HttpLimits = HttpLimits {
+    headers_time: Duration::from_secs(2),
+    headers_len: 16 << 10,
+    n_headers: 64,
+    keep_alive: false,
+};
 
 /// The address for metrics cannot be listened on.
 #[derive(Debug, thiserror::Error)]
@@ -55,7 +56,7 @@ impl Endpoint {
     /// Listens; port 0 takes a free one, which the log says.
     pub async fn listen(address: SocketAddr) -> Result<Self, ListenError> {
         let error = |source| ListenError { address, source };
-        let listener = TcpListener::bind(address).await.map_err(error)?;
+        let listener = listening::bind(address).map_err(error)?;
         let address = listener.local_addr().map_err(error)?;
         info!(%address, "metrics served");
         if !address.ip().to_canonical().is_loopback() {
@@ -73,51 +74,14 @@ impl Endpoint {
     where
         S: Future<Output = Option<String>> + Send + 'static,
     {
-        let mut connections = JoinSet::new();
-        let mut by_age: VecDeque<AbortHandle> = VecDeque::new();
-        loop {
-            tokio::select! {
-                accepted = self.listener.accept() => {
-                    match accepted {
-                        Ok((io, _)) => {
-                            by_age.retain(|connection| !connection.is_finished());
-                            if by_age.len() == CONNECTIONS_MAX
-                                && let Some(oldest) = by_age.pop_front()
-                            {
-                                oldest.abort();
-                            }
-                            let talk = timeout(CONNECTION_TIMEOUT, talk(io, scrape.clone()));
-                            by_age.push_back(connections.spawn(talk));
-                        }
-                        Err(error) => {
-                            warn!("cannot accept a connection for metrics: {error}");
-                            sleep(ACCEPT_PAUSE).await;
-                        }
-                    }
-                }
-                Some(_) = connections.join_next() => {}
-            }
-        }
+        let answer = move |request: http::Request<_>, _| {
+            let scrape = scrape.clone();
+            async move { answer(request.method(), request.uri().path(), scrape).await }
+        };
+        let never = CancellationToken::new();
+        serve_http(self.listener, (CONNECTIONS, REQUESTS), None, answer, never).await;
+        pending().await
     }
-}
-
-/// One request and its answer. Whoever breaks off, or talks nonsense, gets none.
-async fn talk<S>(io: TcpStream, scrape: impl Fn() -> S + Clone + Send + Sync + 'static)
-where
-    S: Future<Output = Option<String>> + Send + 'static,
-{
-    let service = service_fn(|request: Request<Incoming>| {
-        let scrape = scrape.clone();
-        async move { Ok::<_, Infallible>(answer(request.method(), request.uri().path(), scrape).await) }
-    });
-    let _ = http1::Builder::new()
-        .keep_alive(false)
-        .timer(TokioTimer::new())
-        .header_read_timeout(HEADERS_TIMEOUT)
-        .max_buf_size(HEADERS_LEN_MAX)
-        .max_headers(N_HEADERS_MAX)
-        .serve_connection(TokioIo::new(io), service)
-        .await;
 }
 
 async fn answer<S>(method: &Method, path: &str, scrape: impl Fn() -> S) -> Response<Full<Bytes>>
@@ -147,11 +111,12 @@ fn plain(status: StatusCode, text: impl Into<Bytes>) -> Response<Full<Bytes>> {
 
 #[cfg(test)]
 mod tests {
-    use std::future::{pending, ready};
+    use std::future::ready;
 
     use tokio::{
         io::{AsyncReadExt as _, AsyncWriteExt as _},
         net::TcpStream,
+        time::timeout,
     };
 
     use super::*;
@@ -196,8 +161,10 @@ mod tests {
     #[tokio::test]
     async fn headers_have_limits_and_nonsense_gets_no_metrics() {
         let address = endpoint(Some("up 1\n")).await;
-        let long = format!("GET /metrics HTTP/1.1\r\nx: {}\r\n\r\n", "x".repeat(HEADERS_LEN_MAX));
-        let many = format!("GET /metrics HTTP/1.1\r\n{}\r\n", "x: y\r\n".repeat(N_HEADERS_MAX + 1));
+        let long =
+            format!("GET /metrics HTTP/1.1\r\nx: {}\r\n\r\n", "x".repeat(REQUESTS.headers_len));
+        let many =
+            format!("GET /metrics HTTP/1.1\r\n{}\r\n", "x: y\r\n".repeat(REQUESTS.n_headers + 1));
         for request in [long.as_str(), &many, "\0\u{1}\u{2}\r\n\r\n", "PRI * HTTP/2.0\r\n\r\n"] {
             let answer = ask(address, request).await;
             assert!(!answer.contains("up 1"), "{request}: {answer}");
@@ -217,13 +184,13 @@ mod tests {
     async fn slow_connections_do_not_delay_a_scrape() {
         let address = endpoint(Some("up 1\n")).await;
         let mut slow = Vec::new();
-        for _ in 0..10 * CONNECTIONS_MAX {
+        for _ in 0..10 * CONNECTIONS.strangers.n_places {
             let mut stream = TcpStream::connect(address).await.unwrap();
             stream.write_all(b"GET /metrics HTTP/1.1\r\n").await.unwrap();
             slow.push(stream);
         }
         let scrape = ask(address, "GET /metrics HTTP/1.1\r\nhost: x\r\n\r\n");
-        let answer = timeout(HEADERS_TIMEOUT / 2, scrape).await.expect("it is not delayed");
+        let answer = timeout(REQUESTS.headers_time, scrape).await.expect("it is not delayed");
         assert!(answer.ends_with("up 1\n"), "{answer}");
     }
 
@@ -238,7 +205,7 @@ mod tests {
             pending::<Option<String>>()
         }));
         let mut taken = Vec::new();
-        for _ in 0..=CONNECTIONS_MAX {
+        for _ in 0..=CONNECTIONS.strangers.n_places {
             let mut stream = TcpStream::connect(address).await.unwrap();
             stream.write_all(b"GET /metrics HTTP/1.1\r\nhost: x\r\n\r\n").await.unwrap();
             questions.recv().await.unwrap();

@@ -8,7 +8,6 @@ mod endpoint;
 mod log;
 mod metric;
 mod text;
-mod throttle;
 
 use std::net::SocketAddr;
 
@@ -18,7 +17,6 @@ pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
 pub use prometheus::Histogram;
 pub use text::{EscapingWriter, escape, escape_lines, is_unprintable};
-pub use throttle::Throttle;
 
 /// Version of the programs, and in release builds the commit, such as
 /// `0.1.0 (1a2b3c4)`.

@@ -16,7 +16,9 @@ use tracing_subscriber::{
     util::SubscriberInitExt as _,
 };
 
-use crate::{text::EscapingWriter, throttle::Throttle};
+use swarm_transport::Throttle;
+
+use crate::text::EscapingWriter;
 
 /// Format and level of the log.
 #[derive(Debug, clap::Args)]

@@ -9,9 +9,11 @@ mod address;
 mod banner;
 mod credentials;
 mod link;
+pub mod listening;
 mod pem;
 mod pinned;
 mod server_tls;
+mod throttle;
 mod tls_diagnosis;
 mod token;
 
@@ -22,6 +24,7 @@ pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};
 pub use pinned::{PinError, pinned};
 pub use server_tls::server_tls;
+pub use throttle::Throttle;
 pub use tls_diagnosis::tls_diagnosis;
 pub use token::{BEARER, Token, TokenError};
 

@@ -21,7 +21,9 @@ pub use worker_service::Workers;
 use status::shutting_down;
 use tonic::Request;
 
-use crate::{control::Client, server::listener::Peer};
+use swarm_transport::listening::Peer;
+
+use crate::control::Client;
 
 /// Who sent a request, as far as clients take turns.
 fn client<T>(request: &Request<T>) -> Client {

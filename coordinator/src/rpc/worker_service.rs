@@ -13,7 +13,7 @@ use swarm_proto::{
         worker_service_server::WorkerService,
     },
 };
-use swarm_telemetry::Throttle;
+use swarm_transport::{Throttle, listening::Peer};
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::{Stream, StreamExt as _, wrappers::ReceiverStream};
 use tokio_util::sync::CancellationToken;
@@ -26,7 +26,6 @@ use crate::{
     engine::{Introduction, NamePattern},
     ids::WorkerId,
     limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
-    server::listener::Peer,
     text::printable,
 };
 

@@ -2,10 +2,8 @@
 
 use std::{fmt, net::SocketAddr};
 
-use swarm_transport::{Identity, Token};
+use swarm_transport::{Identity, Token, listening::TLS_HANDSHAKE_TIMEOUT};
 use tonic::transport::{Certificate, ServerTlsConfig};
-
-use crate::limits::TLS_HANDSHAKE_TIMEOUT;
 
 /// Who may talk to the coordinator, and whether others can listen in. The
 /// default, everybody and yes, is for loopback alone.

@@ -4,8 +4,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use http::{Request, header::AUTHORIZATION};
 use swarm_proto::v1::worker_service_server;
-use swarm_telemetry::Throttle;
-use swarm_transport::BEARER;
+use swarm_transport::{
+    BEARER, Throttle,
+    listening::{Peer, TooManyConnections},
+};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::{Status, body::Body, transport::server::TlsConnectInfo};
 use tonic_health::pb::health_server;
@@ -14,7 +16,6 @@ use tracing::warn;
 use super::{
     access::{Role, Tokens},
     call_layer::{Guard, Watch},
-    listener::{Peer, TooManyConnections},
 };
 use crate::{
     clock,

@@ -9,10 +9,8 @@ mod core;
 mod door;
 mod gate;
 mod in_process;
-pub mod listener;
 mod pages;
 mod services;
-mod strangers;
 
 use std::{
     convert::Infallible,
@@ -21,13 +19,13 @@ use std::{
 };
 
 use swarm_telemetry::Endpoint;
-use swarm_transport::tls_diagnosis;
+use swarm_transport::{listening, tls_diagnosis};
 use tokio::{net::TcpListener, task::JoinSet};
 use tonic::transport::Server;
 use tracing::{info, warn};
 
 use crate::{
-    limits::{CONNECTIONS_MAX, SHUTDOWN_GRACE},
+    limits::{CONNECTIONS, SHUTDOWN_GRACE},
     shared_store::{SharedStore, Unusable},
     store::Store,
 };
@@ -101,7 +99,7 @@ impl Coordinator {
         let mut server = JoinSet::new();
         server.spawn(core.services().serve(
             builder,
-            listener::accept(listener, CONNECTIONS_MAX, core.shutdown.clone()),
+            listening::accept(listener, CONNECTIONS, core.shutdown.clone()),
             core.instruments.calls.clone(),
             Gate::new(tokens),
             core.shutdown.clone(),
@@ -186,7 +184,7 @@ fn announced(mut address: SocketAddr, is_encrypted: bool) -> String {
 
 async fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
     let listen_error = |source| StartError::Listen { address, source };
-    let listener = listener::bind(address).map_err(listen_error)?;
+    let listener = listening::bind(address).map_err(listen_error)?;
     let local_addr = listener.local_addr().map_err(listen_error)?;
     Ok((listener, local_addr))
 }

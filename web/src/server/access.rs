@@ -3,6 +3,7 @@
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
 use axum::{
+    body::to_bytes,
     extract::{Request, State},
     http::{
         HeaderMap, HeaderName, HeaderValue, StatusCode,
@@ -16,10 +17,12 @@ use axum::{
 };
 use serde::Deserialize;
 use subtle::ConstantTimeEq as _;
-use swarm_transport::Token;
+use swarm_transport::{Token, listening::Peer};
+use tokio::time::timeout;
 
 use super::{
     assets,
+    limits::{BODY_LEN_MAX, BODY_TIME},
     problem::{Body, Problem},
 };
 
@@ -98,7 +101,26 @@ pub async fn check(
         // At the same address, which is opened again when the token has been shown.
         return Ok(secured((StatusCode::UNAUTHORIZED, assets::login()).into_response()));
     }
+    if !is_public && let Some(peer) = request.extensions().get::<Peer>() {
+        peer.admitted().await;
+    }
+    let request = if request.method().is_safe() { request } else { whole(request).await? };
     Ok(secured(next.run(request).await))
+}
+
+/// A request with all of its body, which has to be short, and to come in time.
+async fn whole(request: Request) -> Result<Request, Problem> {
+    let (head, body) = request.into_parts();
+    let body = timeout(BODY_TIME, to_bytes(body, BODY_LEN_MAX)).await;
+    let body = body.map_err(|_| {
+        let why = "the request's body did not arrive in time";
+        Problem::new(StatusCode::REQUEST_TIMEOUT, why)
+    })?;
+    let body = body.map_err(|_| {
+        let why = format!("the request's body is longer than {BODY_LEN_MAX} bytes, or broke off");
+        Problem::new(StatusCode::PAYLOAD_TOO_LARGE, why)
+    })?;
+    Ok(Request::from_parts(head, body.into()))
 }
 
 /// Browsers say where a request that changes something comes from.

@@ -6,38 +6,39 @@ mod answers;
 mod assets;
 mod experiments;
 mod fleet;
-mod listener;
+mod limits;
 mod live;
 mod problem;
 mod replays;
 
-use std::{io, net::SocketAddr, sync::Arc};
+use std::{convert::Infallible, io, net::SocketAddr, sync::Arc};
 
 use axum::{
     Router,
-    extract::DefaultBodyLimit,
+    body::Body,
+    http::Request,
     middleware,
     routing::{get, post},
 };
+use hyper::body::Incoming;
 use rustls::ServerConfig;
-use swarm_transport::Token;
+use swarm_transport::{
+    Token,
+    listening::{Peer, serve_http},
+};
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
+use tower::ServiceExt as _;
 
 use crate::source::{Archive, Control};
 
 use self::{
     access::Access,
     fleet::{Explanations, LatestAnswer},
-    listener::Connections,
+    limits::{AnswerRoom, CONNECTIONS, REPLAYS_MAX, REQUESTS},
     live::Latest,
     problem::Problem,
 };
-
-/// Bytes of a request's body: a token, or what to change.
-const BODY_LEN_MAX: usize = 16 << 10;
-/// Episodes that are simulated for pages at the same time.
-const REPLAYS_MAX: usize = 2;
 
 /// What is served, and to whom.
 #[derive(Clone)]
@@ -69,9 +70,16 @@ impl Site {
     /// Serves until `shutdown`.
     pub async fn serve(self, listener: TcpListener, shutdown: CancellationToken) -> io::Result<()> {
         let address = listener.local_addr()?;
-        let connections = Connections::accept(listener, self.tls.clone(), shutdown.clone());
+        let tls = self.tls.clone();
         let router = self.router(address, shutdown.clone());
-        axum::serve(connections, router).with_graceful_shutdown(shutdown.cancelled_owned()).await
+        let answer = move |request: Request<Incoming>, peer: Peer| {
+            let mut request = request.map(Body::new);
+            request.extensions_mut().insert(peer);
+            let answering = router.clone().oneshot(request);
+            async move { answering.await.unwrap_or_else(|never: Infallible| match never {}) }
+        };
+        serve_http(listener, (CONNECTIONS, REQUESTS), tls, answer, shutdown).await;
+        Ok(())
     }
 
     fn router(self, address: SocketAddr, shutdown: CancellationToken) -> Router {
@@ -104,13 +112,13 @@ impl Site {
             .route("/replay/{*address}", get(replays::replay))
             .fallback(Problem::nowhere)
             .method_not_allowed_fallback(Problem::nowhere)
+            .layer(middleware::from_fn_with_state(AnswerRoom::default(), limits::hold_answers))
             .with_state(shared);
         Router::new()
             .nest("/api", api)
             .merge(assets::routes())
             .route("/login", post(access::login).with_state(access.clone()))
             .layer(middleware::from_fn_with_state(access, access::check))
-            .layer(DefaultBodyLimit::max(BODY_LEN_MAX))
     }
 }
 

@@ -1,5 +1,7 @@
 //! Who is let in, and what browsers are told.
 
+use std::time::Duration;
+
 use axum::{
     body::{Body, to_bytes},
     http::{Request, Response, StatusCode},
@@ -9,7 +11,11 @@ use swarm_proto::v1::{
     Experiment, ExperimentState, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
     ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
 };
-use tokio::sync::watch;
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    net::TcpStream,
+    sync::watch,
+};
 use tonic::{Status, async_trait};
 use tower::ServiceExt as _;
 
@@ -63,14 +69,17 @@ impl Archive for OneExperiment {
     }
 }
 
-async fn answer(listen: &str, token: Option<&str>, request: Request<Body>) -> Response<Body> {
-    let site = Site {
+fn site(token: Option<&str>) -> Site {
+    Site {
         archive: Arc::new(OneExperiment(watch::Sender::new(0))),
         control: None,
         token: token.map(|token| Token::parse(token).unwrap()),
         tls: None,
-    };
-    let router = site.router(listen.parse().unwrap(), CancellationToken::new());
+    }
+}
+
+async fn answer(listen: &str, token: Option<&str>, request: Request<Body>) -> Response<Body> {
+    let router = site(token).router(listen.parse().unwrap(), CancellationToken::new());
     router.oneshot(request).await.unwrap()
 }
 
@@ -222,4 +231,59 @@ async fn generations_of_different_sizes_share_a_map() {
     let values: Vec<f32> = words[3..].iter().map(|word| f32::from_le_bytes(*word)).collect();
     assert_eq!(values[..3], [0.5, 1.0, 2.0]);
     assert!(values[3].is_nan());
+}
+
+/// Whatever they leave open, others see the pages.
+#[tokio::test]
+async fn idle_connections_slow_ones_and_streams_keep_nobody_out() {
+    for (token, bytes) in [
+        (None, ""),
+        (None, "GET / HTTP/1.1\r\nhost: "),
+        (None, "GET /api/live HTTP/1.1\r\nhost: localhost\r\n\r\n"),
+        (None, "GET / HTTP/1.1\r\nhost: localhost\r\n\r\n"),
+        (
+            None,
+            "POST /login HTTP/1.1\r\nhost: localhost\r\norigin: http://localhost\r\ncontent-length: 9\r\n\r\n{",
+        ),
+        (Some(TOKEN), ""),
+    ] {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let served = tokio::spawn(site(token).serve(listener, CancellationToken::new()));
+        let mut open = Vec::new();
+        for _ in 0..600 {
+            let mut stream = TcpStream::connect(address).await.unwrap();
+            // It may have had to go already.
+            let _ = stream.write_all(bytes.as_bytes()).await;
+            open.push(stream);
+        }
+        let mut stream = TcpStream::connect(address).await.unwrap();
+        let request = b"GET /login HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
+        stream.write_all(request).await.unwrap();
+        let mut page = Vec::new();
+        let read = stream.read_to_end(&mut page);
+        tokio::time::timeout(Duration::from_secs(20), read).await.unwrap().unwrap();
+        assert!(page.starts_with(b"HTTP/1.1 200 "), "{token:?} {bytes}");
+        served.abort();
+    }
+}
+
+#[tokio::test]
+async fn long_answers_that_nobody_reads_are_bounded() {
+    let room = AnswerRoom::default();
+    let long = || async { vec![0_u8; 64 << 20] };
+    let router = Router::new()
+        .route("/", axum::routing::get(long))
+        .route("/short", axum::routing::get(|| async { "short" }))
+        .layer(middleware::from_fn_with_state(room, limits::hold_answers));
+    let ask = |path: &'static str| router.clone().oneshot(get(path, HERE, ""));
+    let mut waiting = Vec::new();
+    for _ in 0..4 {
+        waiting.push(ask("/").await.unwrap());
+    }
+    assert!(waiting.iter().all(|answer| answer.status() == StatusCode::OK));
+    assert_eq!(ask("/").await.unwrap().status(), StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(ask("/short").await.unwrap().status(), StatusCode::OK);
+    waiting.pop();
+    assert_eq!(ask("/").await.unwrap().status(), StatusCode::OK);
 }

@@ -1,0 +1,239 @@
+//! Connections that share a limited number of places, and that have to go, one at a time,
+//! when others come. Synchronous.
+//!
+//! The one that goes belongs to the peer with the most connections, so that nobody is kept
+//! out by one machine; among those, one that has said nothing goes first, then the oldest.
+
+use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
+    net::{IpAddr, Ipv6Addr},
+    time::Duration,
+};
+
+use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
+
+/// Names a connection in a crowd.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MemberId(u64);
+
+/// How many connections there are at the same time, and for how long each is safe.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Connections at the same time: one more ends another.
+    pub n_places: usize,
+    /// Time that each connection has at least to say something.
+    pub silent_grace: Duration,
+    /// Time that each has at least if it says something. If all are younger, more wait in
+    /// the system's queue: so a whole fleet that comes back at once gets in.
+    pub heard_grace: Duration,
+}
+
+#[derive(Debug)]
+struct Member {
+    peer: IpAddr,
+    since: Instant,
+    is_heard: bool,
+    has_to_go: CancellationToken,
+}
+
+/// The connections.
+#[derive(Debug)]
+pub struct Crowd {
+    room: Room,
+    members: BTreeMap<MemberId, Member>,
+    n_of_peer: BTreeMap<IpAddr, usize>,
+    n_seen: u64,
+}
+
+impl Crowd {
+    pub fn new(room: Room) -> Self {
+        Self { room, members: BTreeMap::new(), n_of_peer: BTreeMap::new(), n_seen: 0 }
+    }
+
+    /// How long the next one has to wait for a place: until one of those with the most
+    /// connections has had its time.
+    pub fn time_to_place(&self, now: Instant) -> Duration {
+        if self.members.len() < self.room.n_places {
+            return Duration::ZERO;
+        }
+        let most = self.n_of_peer.values().max().copied();
+        let of_largest =
+            self.members.values().filter(|it| self.n_of_peer.get(&it.peer).copied() == most);
+        let times = of_largest.map(|member| self.time_left(member, now));
+        times.min().unwrap_or(Duration::ZERO)
+    }
+
+    fn time_left(&self, member: &Member, now: Instant) -> Duration {
+        let grace = if member.is_heard { self.room.heard_grace } else { self.room.silent_grace };
+        grace.saturating_sub(now.saturating_duration_since(member.since))
+    }
+
+    /// One comes. `has_to_go` tells it when it has to go. Returns whether another had to.
+    pub fn enter(
+        &mut self,
+        now: Instant,
+        peer: IpAddr,
+        has_to_go: CancellationToken,
+    ) -> (MemberId, bool) {
+        let is_full = self.members.len() >= self.room.n_places;
+        if is_full && let Some(id) = self.next_to_go(now) {
+            if let Some(member) = self.members.get(&id) {
+                member.has_to_go.cancel();
+            }
+            self.leave(id);
+        }
+        let peer = network_of(peer);
+        self.n_seen += 1;
+        let id = MemberId(self.n_seen);
+        self.members.insert(id, Member { peer, since: now, is_heard: false, has_to_go });
+        *self.n_of_peer.entry(peer).or_default() += 1;
+        (id, is_full)
+    }
+
+    fn next_to_go(&self, now: Instant) -> Option<MemberId> {
+        let order = |member: &Member| {
+            let n = self.n_of_peer.get(&member.peer);
+            (n, self.time_left(member, now).is_zero(), !member.is_heard, Reverse(member.since))
+        };
+        // Of equals `min_by_key` takes the first, which came first.
+        let first = self.members.iter().min_by_key(|(_, member)| Reverse(order(member)));
+        first.map(|(id, _)| *id)
+    }
+
+    /// One has said something, for the first time.
+    pub fn on_heard(&mut self, id: MemberId) {
+        if let Some(member) = self.members.get_mut(&id) {
+            member.is_heard = true;
+        }
+    }
+
+    /// One has made a request: it is as good as new.
+    pub fn on_request(&mut self, id: MemberId, now: Instant) {
+        if let Some(member) = self.members.get_mut(&id) {
+            (member.is_heard, member.since) = (true, now);
+        }
+    }
+
+    /// One has gone, or is not counted here any more.
+    pub fn leave(&mut self, id: MemberId) {
+        let Some(member) = self.members.remove(&id) else { return };
+        if let Some(n) = self.n_of_peer.get_mut(&member.peer) {
+            *n -= 1;
+            if *n == 0 {
+                self.n_of_peer.remove(&member.peer);
+            }
+        }
+    }
+}
+
+/// Whose connections count together: a machine has a whole network of addresses in IPv6.
+fn network_of(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V4(address) => address.into(),
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & (u128::MAX << 64)).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROOM: Room = Room {
+        n_places: 512,
+        silent_grace: Duration::from_millis(100),
+        heard_grace: Duration::from_millis(500),
+    };
+
+    fn ip(last: u8) -> IpAddr {
+        IpAddr::from([10, 0, 0, last])
+    }
+
+    /// As many as there are places for, since `now`.
+    fn full(now: Instant) -> (Crowd, Vec<(MemberId, CancellationToken)>) {
+        let mut crowd = Crowd::new(ROOM);
+        let enter = |_| {
+            assert_eq!(crowd.time_to_place(now), Duration::ZERO);
+            let token = CancellationToken::new();
+            let (id, has_ended_another) = crowd.enter(now, ip(1), token.clone());
+            assert!(!has_ended_another);
+            (id, token)
+        };
+        let entered = (0..ROOM.n_places).map(enter).collect();
+        (crowd, entered)
+    }
+
+    fn ended(entered: &[(MemberId, CancellationToken)]) -> Vec<usize> {
+        (0..entered.len()).filter(|&i| entered[i].1.is_cancelled()).collect()
+    }
+
+    #[test]
+    fn one_connection_too_many_ends_the_oldest_silent_one() {
+        let now = Instant::now();
+        let (mut crowd, entered) = full(now);
+        crowd.on_heard(entered[0].0);
+        assert_eq!(crowd.time_to_place(now), ROOM.silent_grace);
+        let later = now + ROOM.silent_grace;
+        assert_eq!(crowd.time_to_place(later), Duration::ZERO);
+        assert!(crowd.enter(later, ip(2), CancellationToken::new()).1);
+        assert_eq!(ended(&entered), [1]);
+    }
+
+    #[test]
+    fn those_who_speak_have_more_time() {
+        let now = Instant::now();
+        let (mut crowd, entered) = full(now);
+        entered.iter().for_each(|(id, _)| crowd.on_heard(*id));
+        assert_eq!(crowd.time_to_place(now), ROOM.heard_grace);
+        crowd.enter(now + ROOM.heard_grace, ip(2), CancellationToken::new());
+        assert_eq!(ended(&entered), [0]);
+    }
+
+    #[test]
+    fn whoever_made_a_request_last_goes_last() {
+        let now = Instant::now();
+        let (mut crowd, entered) = full(now);
+        entered.iter().for_each(|(id, _)| crowd.on_request(*id, now));
+        let later = now + ROOM.heard_grace;
+        crowd.on_request(entered[0].0, later);
+        crowd.enter(later, ip(1), CancellationToken::new());
+        assert_eq!(ended(&entered), [1]);
+    }
+
+    #[test]
+    fn the_peer_with_the_most_connections_makes_room() {
+        let now = Instant::now();
+        let (mut crowd, entered) = full(now);
+        crowd.leave(entered[0].0);
+        let alone = CancellationToken::new();
+        crowd.enter(now, ip(2), alone.clone());
+        let later = now + ROOM.heard_grace;
+        for _ in 0..10 * ROOM.n_places {
+            crowd.enter(later, ip(3), CancellationToken::new());
+        }
+        assert!(!alone.is_cancelled());
+        assert!(crowd.n_of_peer[&ip(1)].abs_diff(crowd.n_of_peer[&ip(3)]) <= 1, "{crowd:?}");
+    }
+
+    #[test]
+    fn addresses_of_one_machine_count_as_one_peer() {
+        let address = |text: &str| network_of(text.parse().unwrap());
+        assert_eq!(address("2001:db8:1:2::3"), address("2001:db8:1:2:ffff::9"));
+        assert_ne!(address("2001:db8:1:2::3"), address("2001:db8:1:3::3"));
+        assert_eq!(address("::ffff:10.0.0.1"), ip(1));
+    }
+
+    #[test]
+    fn whoever_leaves_makes_a_place() {
+        let now = Instant::now();
+        let (mut crowd, entered) = full(now);
+        crowd.on_heard(entered[0].0);
+        for (id, _) in &entered[..2] {
+            crowd.leave(*id);
+            assert_eq!(crowd.time_to_place(now), Duration::ZERO);
+            assert!(!crowd.enter(now, ip(2), CancellationToken::new()).1);
+        }
+        assert_eq!(ended(&entered), [0; 0]);
+    }
+}
