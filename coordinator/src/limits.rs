@@ -61,6 +61,21 @@ pub const SHUTDOWN_GRACE: Duration = Duration::from_secs(5);
 
 /// Time for a new worker's stream to say `Hello`.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+/// Bytes of a message or an answer that is not counted: there are as many as calls.
+pub const SHORT_LEN: usize = 64 << 10;
+/// Bytes of long messages that are on their way in, and of what they become; more wait. Each
+/// takes three times its length until it is decoded.
+pub const INTAKE_LEN_MAX: usize = 128 << 20;
+/// Time for a long message to arrive once there is room for it.
+pub const MESSAGE_TIME: Duration = Duration::from_secs(60);
+/// Bytes of long answers that wait for their readers; one more is refused. A list of all
+/// experiments may have 64 MiB.
+pub const OUTFLOW_LEN_MAX: usize = 512 << 20;
+/// Bytes of long messages to workers that wait to be read; more wait. Each takes three times
+/// its length while it is encoded.
+pub const WORKER_OUTFLOW_LEN_MAX: usize = 256 << 20;
+/// Bytes of a call, and of a connection, that the peer may send before they are read.
+pub const WINDOW_LEN: u32 = 256 << 10;
 /// Results in one message; ours sends fewer. On the wire an empty result takes two bytes,
 /// in memory fifty.
 pub const RESULTS_PER_MESSAGE_MAX: usize = 1 << 16;

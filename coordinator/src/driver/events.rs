@@ -127,6 +127,21 @@ pub enum ToWorker {
     Dropped(String),
 }
 
+impl ToWorker {
+    /// Bytes of what makes it long: a specification, or genes.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Spec(_, spec) => spec.len(),
+            Self::Distribution(_, distribution) => distribution.len(),
+            Self::Assignments { assignments, .. } => {
+                let sent = assignments.iter().filter(|it| !it.is_drawn);
+                sent.map(|it| size_of_val(it.genotype.as_slice())).sum()
+            }
+            Self::Welcome(_) | Self::Drop(_) | Self::End(_) | Self::Dropped(_) => 0,
+        }
+    }
+}
+
 /// Sends events to the driver.
 pub type EventSender = mpsc::Sender<DriverEvent>;
 

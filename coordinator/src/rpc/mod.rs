@@ -16,7 +16,7 @@ pub use evaluation_service::Evaluations;
 pub use experiment_service::Experiments;
 pub use fleet_service::Fleet;
 pub use pages::PagesArchive;
-pub use worker_service::Workers;
+pub use worker_service::{WorkerOutflow, Workers};
 
 use status::shutting_down;
 use tonic::Request;

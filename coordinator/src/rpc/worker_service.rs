@@ -3,9 +3,10 @@
 use std::{
     num::NonZeroU64,
     pin::Pin,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
+use futures_util::stream::unfold;
 use swarm_proto::{
     ITEMS_PER_SLOT_MAX, PROTOCOL_VERSION, SLOTS_MAX, WORKER_NAME_LEN_MAX,
     v1::{
@@ -14,18 +15,21 @@ use swarm_proto::{
     },
 };
 use swarm_transport::{Throttle, listening::Peer};
-use tokio::sync::{mpsc, oneshot};
-use tokio_stream::{Stream, StreamExt as _, wrappers::ReceiverStream};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 use tracing::warn;
 
 use crate::{
     clock,
-    driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
+    driver::{DriverEvent, EventSender, ToWorker, WorkerLink, WorkerMessage},
     engine::{Introduction, NamePattern},
     ids::WorkerId,
-    limits::{HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, WORKER_OUTBOX_SLACK},
+    limits::{
+        HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, SHORT_LEN, WORKER_OUTBOX_SLACK,
+        WORKER_OUTFLOW_LEN_MAX,
+    },
     text::printable,
 };
 
@@ -34,11 +38,29 @@ use super::{
     shutting_down,
 };
 
+/// What a message takes while it is encoded, compared with its length: itself, and a buffer
+/// that grows.
+const COPIES: usize = 3;
+/// Bytes that are counted together.
+const UNIT: usize = 16 << 10;
+
+/// Room for long messages to workers.
+#[derive(Debug)]
+pub struct WorkerOutflow(Arc<Semaphore>);
+
+impl Default for WorkerOutflow {
+    fn default() -> Self {
+        Self(Arc::new(Semaphore::new(WORKER_OUTFLOW_LEN_MAX / UNIT)))
+    }
+}
+
 /// The service.
 #[derive(Debug)]
 pub struct Workers {
     /// To the driver.
     pub events: EventSender,
+    /// For what is sent.
+    pub outflow: WorkerOutflow,
     /// What `Welcome` says.
     pub times: WelcomeTimes,
     /// Ends all streams.
@@ -90,11 +112,28 @@ impl WorkerService for Workers {
         let id = id.await.map_err(|_| shutting_down())?;
         tokio::spawn(listen(id, inbound, self.events.clone(), dropped));
 
-        let times = self.times;
-        let outbound =
-            ReceiverStream::new(inbox).map(move |message| convert::to_wire(message, times));
+        let (times, room) = (self.times, Arc::clone(&self.outflow.0));
+        let outbound = unfold((inbox, room, None), move |(mut inbox, room, place)| async move {
+            // The message before has been taken.
+            drop(place);
+            let message = inbox.recv().await?;
+            let place = room_for(&message, &room).await;
+            Some((convert::to_wire(message, times), (inbox, room, place)))
+        });
         Ok(Response::new(Box::pin(outbound)))
     }
+}
+
+/// Waits for the room that a long message takes until the worker has taken it; `None` if it is
+/// short.
+async fn room_for(message: &ToWorker, room: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
+    let len = message.len();
+    if len <= SHORT_LEN {
+        return None;
+    }
+    let n_units = (COPIES * len).min(WORKER_OUTFLOW_LEN_MAX) / UNIT;
+    let n_units = u32::try_from(n_units).unwrap_or(u32::MAX);
+    Arc::clone(room).acquire_many_owned(n_units).await.ok()
 }
 
 /// Passes on what a worker says until its stream ends.

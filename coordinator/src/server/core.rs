@@ -19,7 +19,7 @@ use crate::{
     limits::{BUNDLES_MAX, RECONSTRUCTIONS_MAX, REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
     referee::Referee,
-    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
+    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, WorkerOutflow, Workers},
     shared_store::SharedStore,
     store::Store,
 };
@@ -99,6 +99,7 @@ impl Core {
         Services {
             workers: Workers {
                 events: self.events.clone(),
+                outflow: WorkerOutflow::default(),
                 times: self.times,
                 shutdown: self.shutdown.clone(),
                 refusals: Mutex::default(),

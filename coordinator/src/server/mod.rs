@@ -9,6 +9,8 @@ mod core;
 mod door;
 mod gate;
 mod in_process;
+mod intake;
+mod outflow;
 mod pages;
 mod services;
 

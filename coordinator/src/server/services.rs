@@ -2,6 +2,7 @@
 
 use std::io;
 
+use http::{Request, Response};
 use swarm_proto::{
     FILE_DESCRIPTOR_SET,
     v1::{
@@ -14,7 +15,10 @@ use swarm_transport::{FROM_COORDINATOR_LEN_MAX, TO_COORDINATOR_LEN_MAX};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
-use tonic::transport::{Error, Server, server::Connected};
+use tonic::{
+    body::Body,
+    transport::{Error, Server, server::Connected},
+};
 use tonic_health::{
     pb::health_server::{Health, HealthServer},
     server::health_reporter,
@@ -24,9 +28,11 @@ use tonic_reflection::pb::{
     v1::server_reflection_server as v1, v1alpha::server_reflection_server as v1alpha,
 };
 
-use super::{call_layer::CallLayer, calls::Calls, gate::Gate};
+use tower::util::{MapRequestLayer, MapResponseLayer};
+
+use super::{call_layer::CallLayer, calls::Calls, gate::Gate, intake::Intake, outflow::Outflow};
 use crate::{
-    limits::{CALLS_PER_CONNECTION_MAX, HEADERS_LEN_MAX, KEEPALIVE},
+    limits::{CALLS_PER_CONNECTION_MAX, HEADERS_LEN_MAX, KEEPALIVE, WINDOW_LEN},
     rpc::{Evaluations, Experiments, Fleet, Workers},
 };
 
@@ -54,10 +60,13 @@ pub fn builder() -> Server {
         .http2_keepalive_timeout(Some(KEEPALIVE))
         .http2_max_header_list_size(HEADERS_LEN_MAX)
         .max_concurrent_streams(CALLS_PER_CONNECTION_MAX)
+        .initial_stream_window_size(WINDOW_LEN)
+        .initial_connection_window_size(WINDOW_LEN)
 }
 
 impl Services {
-    /// Serves until shutdown. Every call is counted, and then has to pass the gate.
+    /// Serves until shutdown. Every call is counted, and then has to pass the gate; its
+    /// messages and answers wait for room if they are long.
     pub async fn serve<IO>(
         self,
         server: Server,
@@ -71,10 +80,17 @@ impl Services {
         IO::ConnectInfo: Clone + Send + Sync + 'static,
     {
         let Self { workers, fleet, experiments, evaluations } = self;
+        let (intake, outflow) = (Intake::default(), Outflow::default());
         let (reflection_v1, reflection_v1alpha) = reflection();
         server
             .layer(CallLayer(calls))
             .layer(CallLayer(gate))
+            .layer(MapRequestLayer::new(move |request: Request<Body>| {
+                request.map(|body| intake.of(body))
+            }))
+            .layer(MapResponseLayer::new(move |response: Response<Body>| {
+                response.map(|body| outflow.of(body))
+            }))
             .add_service(health().await)
             .add_service(reflection_v1)
             .add_service(reflection_v1alpha)

@@ -1,0 +1,192 @@
+//! How much of long answers may wait for their readers. One that nobody reads is dropped, so
+//! that it takes no memory, and with it what would have followed.
+
+use std::{
+    pin::Pin,
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    task::{Context, Poll, ready},
+};
+
+use http_body::Frame;
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::{Instant, sleep_until},
+};
+use tonic::{Status, body::Body, codegen::Bytes};
+
+use crate::limits::{OUTFLOW_LEN_MAX, SHORT_LEN, WATCH_PATIENCE};
+
+/// Bytes that are counted together.
+const UNIT: usize = 16 << 10;
+/// Bytes that are handed to the connection at once: what it holds for a peer that does not
+/// read.
+const PIECE_LEN: usize = 32 << 10;
+
+/// Room for long answers.
+#[derive(Debug, Clone)]
+pub struct Outflow(Arc<Semaphore>);
+
+/// An answer, or a stream of them, and what of it waits.
+struct Unread {
+    body: Body,
+    rest: Bytes,
+    place: Option<OwnedSemaphorePermit>,
+    /// When a piece was last taken.
+    taken: Instant,
+    is_watched: bool,
+}
+
+/// None: it was dropped, as nobody read it.
+type Shared = Mutex<Option<Unread>>;
+
+/// Hands it out in pieces.
+struct Pieces {
+    room: Arc<Semaphore>,
+    unread: Arc<Shared>,
+}
+
+impl Default for Outflow {
+    fn default() -> Self {
+        Self(Arc::new(Semaphore::new(OUTFLOW_LEN_MAX / UNIT)))
+    }
+}
+
+impl Outflow {
+    /// The same answer in pieces, if there is room for it.
+    pub fn of(&self, body: Body) -> Body {
+        let (rest, taken) = (Bytes::new(), Instant::now());
+        let unread = Unread { body, rest, place: None, taken, is_watched: false };
+        let unread = Arc::new(Mutex::new(Some(unread)));
+        Body::new(Pieces { room: Arc::clone(&self.0), unread })
+    }
+}
+
+impl Unread {
+    /// The next piece of what waits.
+    fn piece(&mut self) -> Frame<Bytes> {
+        self.taken = Instant::now();
+        Frame::data(self.rest.split_to(PIECE_LEN.min(self.rest.len())))
+    }
+}
+
+impl http_body::Body for Pieces {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let mut shared = lock(&self.unread);
+        let Some(unread) = &mut *shared else {
+            let why = "the answer was not read in time; ask again";
+            return Poll::Ready(Some(Err(Status::aborted(why))));
+        };
+        if !unread.rest.is_empty() {
+            return Poll::Ready(Some(Ok(unread.piece())));
+        }
+        unread.place = None;
+        let Some(frame) = ready!(Pin::new(&mut unread.body).poll_frame(context)?) else {
+            return Poll::Ready(None);
+        };
+        let bytes = match frame.into_data() {
+            Ok(bytes) if bytes.len() > SHORT_LEN => bytes,
+            Ok(bytes) => return Poll::Ready(Some(Ok(Frame::data(bytes)))),
+            Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+        };
+        let n_units = u32::try_from(bytes.len() / UNIT).unwrap_or(u32::MAX);
+        let Ok(place) = Arc::clone(&self.room).try_acquire_many_owned(n_units) else {
+            let why = "many long answers wait for their readers; try again in a minute";
+            return Poll::Ready(Some(Err(Status::resource_exhausted(why))));
+        };
+        (unread.place, unread.rest) = (Some(place), bytes);
+        if !unread.is_watched {
+            unread.is_watched = true;
+            tokio::spawn(watch(Arc::downgrade(&self.unread)));
+        }
+        Poll::Ready(Some(Ok(unread.piece())))
+    }
+}
+
+/// Drops what nobody reads.
+async fn watch(unread: Weak<Shared>) {
+    loop {
+        let due = {
+            let Some(unread) = unread.upgrade() else { return };
+            let mut shared = lock(&unread);
+            let Some(it) = &mut *shared else { return };
+            if it.rest.is_empty() {
+                it.is_watched = false;
+                return;
+            }
+            let due = it.taken + WATCH_PATIENCE;
+            if due <= Instant::now() {
+                *shared = None;
+                return;
+            }
+            due
+        };
+        sleep_until(due).await;
+    }
+}
+
+fn lock(shared: &Shared) -> MutexGuard<'_, Option<Unread>> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use http_body_util::{BodyExt as _, Full};
+
+    use super::*;
+
+    fn answer(outflow: &Outflow, len: usize) -> Body {
+        outflow.of(Body::new(Full::new(Bytes::from(vec![7; len]))))
+    }
+
+    async fn piece(body: &mut Body) -> Result<usize, Status> {
+        Ok(body.frame().await.unwrap()?.into_data().unwrap().len())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_answer_is_whole_however_slowly_it_is_read() {
+        let outflow = Outflow::default();
+        let mut body = answer(&outflow, 1_000_000);
+        let mut n_bytes = 0;
+        while let Some(frame) = body.frame().await {
+            n_bytes += frame.unwrap().into_data().unwrap().len();
+            tokio::time::sleep(WATCH_PATIENCE - Duration::from_secs(1)).await;
+        }
+        assert_eq!(n_bytes, 1_000_000);
+        assert_eq!(outflow.0.available_permits(), OUTFLOW_LEN_MAX / UNIT);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_nobody_reads_is_dropped_and_its_room_is_free() {
+        let outflow = Outflow::default();
+        let mut body = answer(&outflow, 1_000_000);
+        assert_eq!(piece(&mut body).await.unwrap(), PIECE_LEN);
+        assert!(outflow.0.available_permits() < OUTFLOW_LEN_MAX / UNIT);
+        tokio::time::sleep(WATCH_PATIENCE + Duration::from_secs(1)).await;
+        assert_eq!(outflow.0.available_permits(), OUTFLOW_LEN_MAX / UNIT);
+        assert_eq!(piece(&mut body).await.unwrap_err().code(), tonic::Code::Aborted);
+    }
+
+    #[tokio::test]
+    async fn an_answer_too_many_is_refused_and_a_short_one_is_not() {
+        let outflow = Outflow::default();
+        let mut waiting = Vec::new();
+        for _ in 0..OUTFLOW_LEN_MAX >> 26 {
+            let mut body = answer(&outflow, 1 << 26);
+            piece(&mut body).await.unwrap();
+            waiting.push(body);
+        }
+        let refused = piece(&mut answer(&outflow, 1 << 26)).await.unwrap_err();
+        assert_eq!(refused.code(), tonic::Code::ResourceExhausted);
+        assert_eq!(piece(&mut answer(&outflow, SHORT_LEN)).await.unwrap(), SHORT_LEN);
+        waiting.pop();
+        piece(&mut answer(&outflow, 1 << 26)).await.unwrap();
+    }
+}
