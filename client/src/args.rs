@@ -91,6 +91,7 @@ Exit codes:
   10   the experiment has not ended within wait --timeout
   11   the database is damaged
   12   the bundle is not what it says (verify)
+  71   the system gives it too few threads, memory for them, or file descriptors
   130  interrupted";
 
 /// The experiment, or the group of them, that a command is about.

@@ -3,7 +3,7 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
@@ -20,9 +20,9 @@ use swarm_proto::v1::{
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
 use swarm_transport::{
-    Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, banner,
+    Banner, Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, banner,
 };
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep_until};
 use tonic::{
     Response, Status, Streaming,
     service::interceptor::InterceptedService,
@@ -32,11 +32,12 @@ use worker::Backoff;
 
 use crate::{
     args::Subject,
-    error::{Error, is_transient},
+    error::{Error, is_transient, reason},
     interrupt,
     place::{DEFAULT_DATA_DIR, Intent, Place},
     progress::Progress,
     settings::Settings,
+    waiting,
 };
 
 /// How long a request is repeated before the coordinator counts as unreachable.
@@ -367,7 +368,7 @@ impl Connection {
             }
             Ok::<_, Status>(bytes)
         };
-        match bundle.await {
+        match waiting::aloud(|| Some(self.waits(None)), bundle).await {
             Ok(bytes) => Ok(bytes),
             Err(status) => Err(self.diagnose(self.error(&status)).await),
         }
@@ -381,7 +382,7 @@ impl Connection {
             let answer = self.patient().import_experiment(tokio_stream::iter(requests)).await?;
             Ok::<_, Status>(answer.into_inner())
         };
-        match imported.await {
+        match waiting::aloud(|| Some(self.waits(None)), imported).await {
             Ok(answer) => Ok((present(answer.experiment)?, answer.is_new)),
             Err(status) => Err(self.diagnose(self.error(&status)).await),
         }
@@ -424,14 +425,37 @@ impl Connection {
         request: impl AsyncFn() -> Result<Response<T>, Status>,
     ) -> Result<T, Error> {
         let give_up_at = Instant::now() + self.patience;
-        let mut backoff = backoff();
-        loop {
-            match request().await {
-                Ok(response) => return Ok(response.into_inner()),
-                Err(status) if is_transient(&status) && Instant::now() < give_up_at => {
-                    sleep(backoff.next_delay(rand::random())).await;
+        let failure = Mutex::new(None);
+        let repeated = async {
+            let mut backoff = backoff();
+            loop {
+                match request().await {
+                    Ok(response) => return Ok(response.into_inner()),
+                    Err(status) if is_transient(&status) && Instant::now() < give_up_at => {
+                        *lock(&failure) = Some(reason(&status));
+                        let delay = backoff.next_delay(rand::random());
+                        sleep_until(give_up_at.min(Instant::now() + delay)).await;
+                    }
+                    Err(status) => return Err(self.diagnose(self.error(&status)).await),
                 }
-                Err(status) => return Err(self.diagnose(self.error(&status)).await),
+            }
+        };
+        // With little patience, whoever cannot be reached is reported soon.
+        let is_worth_a_word = |it: &Option<String>| it.is_none() || self.patience > PATIENCE;
+        let what = || {
+            let failure = lock(&failure);
+            is_worth_a_word(&failure).then(|| self.waits(failure.as_deref()))
+        };
+        waiting::aloud(what, repeated).await
+    }
+
+    /// What is waited for. `failure`: of the last attempt.
+    pub fn waits(&self, failure: Option<&str>) -> String {
+        match failure {
+            None => format!("the answer of the coordinator at {}", self.address),
+            Some(reason) => {
+                let (address, patience) = (&self.address, self.patience.as_secs());
+                format!("the coordinator at {address} for up to {patience} s: {reason}")
             }
         }
     }
@@ -442,8 +466,12 @@ impl Connection {
             return error;
         };
         match banner(&link.authority()).await {
-            Some(banner) => Error::foreign(&self.address, &banner),
-            None => error,
+            Some(Banner::Line(banner)) => Error::foreign(&self.address, &banner),
+            Some(Banner::Tls) if !self.address.starts_with("https:") => Error::Tls {
+                address: self.address.clone(),
+                diagnosis: "it speaks TLS; use https:// and --tls-ca".to_owned(),
+            },
+            Some(Banner::Tls) | None => error,
         }
     }
 }
@@ -531,6 +559,10 @@ fn several(name: &str, experiments: &[Experiment]) -> Error {
     let more = if experiments.len() > ids.len() { ", ..." } else { "" };
     let ids = ids.join(", ");
     Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A field of an answer that every coordinator sets.

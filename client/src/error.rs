@@ -7,6 +7,7 @@ use std::{
 
 use coordinator::{StartError, store::StoreError};
 use experiment_file::ConfigError;
+use swarm_telemetry::EXIT_STARVED;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
 
@@ -103,6 +104,9 @@ pub enum Error {
     /// A bundle is not what it says.
     #[error("{0}")]
     Flawed(String),
+    /// The system gives this program too little to start.
+    #[error(transparent)]
+    Starved(#[from] swarm_telemetry::Starved),
     /// A signal interrupted the command; the text says what happens to the experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
@@ -132,7 +136,8 @@ impl Error {
     pub fn foreign(address: &str, banner: &str) -> Self {
         Self::Foreign(format!(
             "the server at {address} is not a coordinator: it answers \"{banner}\"; is this the \
-             right port?"
+             right port?{}",
+            if banner.starts_with("HTTP/") { PORTS } else { "" }
         ))
     }
 
@@ -153,6 +158,7 @@ impl Error {
             Self::TimedOut { .. } => 10,
             Self::Damaged(_) => 11,
             Self::Flawed(_) => 12,
+            Self::Starved(_) => EXIT_STARVED,
             Self::Interrupted(_) => 130,
         }
     }
@@ -213,6 +219,10 @@ impl Error {
             return Self::Tls { address: address.into(), diagnosis };
         }
         match status.code() {
+            _ if is_no_grpc(status) => Self::Foreign(format!(
+                "the server at {address} is not a coordinator: it does not speak gRPC; is this \
+                 the right port?{PORTS}"
+            )),
             _ if is_transport(status) => {
                 Self::Unreachable { address: address.into(), reason: reason(status) }
             }
@@ -242,6 +252,18 @@ pub fn is_transient(status: &Status) -> bool {
         return false;
     }
     is_transport(status) || matches!(code, Code::Aborted | Code::ResourceExhausted)
+}
+
+/// Where else HTTP is spoken.
+const PORTS: &str = " Pages (--web-listen) and metrics (--metrics-listen) have ports of their \
+                     own; a coordinator's is 7700 unless its --listen is another one";
+
+/// Whether an answer is one of HTTP, and none of gRPC, by the texts of tonic.
+fn is_no_grpc(status: &Status) -> bool {
+    let message = status.message();
+    message.contains("invalid compression flag")
+        || message.contains("grpc-status header missing")
+        || message.contains("invalid content-type")
 }
 
 /// Whether the status is about the connection. A status that this side creates has a
@@ -290,6 +312,10 @@ mod tests {
         assert_eq!(exit_code(Status::unauthenticated("no token")), 7);
         assert_eq!(exit_code(Status::permission_denied("wrong token")), 7);
         assert_eq!(exit_code(Status::from_error("broken".into())), 4);
+        let json = "protocol error: received message with invalid compression flag: 123";
+        assert_eq!(exit_code(Status::internal(json)), 9);
+        let missing = "grpc-status header missing, mapped from HTTP status code 503";
+        assert_eq!(exit_code(Status::unavailable(missing)), 9);
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod synonyms;
 mod table;
 mod tensorboard;
 mod text;
+mod waiting;
 
 use std::{
     io::{self, Write as _},
@@ -36,17 +37,21 @@ use std::{
 
 use clap::{CommandFactory as _, Parser as _};
 use clap_complete::CompleteEnv;
-use swarm_telemetry::escape_lines;
+use swarm_telemetry::{escape_lines, runtime};
 
 use crate::{args::Args, progress::Progress, synonyms::with_suggestions};
 
-#[tokio::main]
-async fn main() -> ExitCode {
+fn main() -> ExitCode {
     // Answers a shell that asks what a command line may become, and ends then.
     CompleteEnv::with_factory(Args::command).complete();
     let args = Args::try_parse().unwrap_or_else(|error| with_suggestions(error).exit());
-    let progress = Progress::new(args.output).with_details(args.verbose);
-    let result = commands::execute(args, progress).await;
+    let result = match runtime(0) {
+        Ok(runtime) => {
+            let progress = Progress::new(args.output).with_details(args.verbose);
+            runtime.block_on(commands::execute(args, progress))
+        }
+        Err(starved) => Err(starved.into()),
+    };
     let Err(error) = result else { return ExitCode::SUCCESS };
     if let Some(report) = error.report() {
         // If standard error is closed there is no place left to report to.

@@ -10,7 +10,7 @@ use coordinator::{
     Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
     referee,
 };
-use swarm_telemetry::{LogArgs, MetricsArgs, VERSION};
+use swarm_telemetry::{EXIT_STARVED, LogArgs, MetricsArgs, VERSION, runtime};
 use swarm_transport::listen_address;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -93,6 +93,7 @@ Exit codes:
   2  bad input: address in use, or open to a network without tokens or TLS; token,
      certificate or data directory unusable; database damaged; wrong arguments
   3  another coordinator has taken over the data directory, and goes on there
+  71 the system gives it too few threads, memory for them, or file descriptors
 
 docs/security.md says how to create tokens and certificates.";
 
@@ -105,7 +106,14 @@ fn main() -> ExitCode {
     let args = Args::parse();
     match args.command {
         Some(Command::Referee) => evaluate_items(),
-        None => run(&args),
+        // The referee's threads are its own.
+        None => match runtime(0) {
+            Ok(runtime) => runtime.block_on(run(&args)),
+            Err(starved) => {
+                eprintln!("error: {starved}");
+                ExitCode::from(EXIT_STARVED)
+            }
+        },
     }
 }
 
@@ -120,7 +128,6 @@ fn evaluate_items() -> ExitCode {
     }
 }
 
-#[tokio::main]
 async fn run(args: &Args) -> ExitCode {
     if args.health_check {
         return report_health(args).await;

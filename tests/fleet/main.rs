@@ -26,5 +26,6 @@ mod scripts;
 mod security;
 mod simulate;
 mod slurm;
+mod starved;
 mod steering;
 mod strangers;

@@ -350,7 +350,7 @@ fn what_is_wrong_with_tls_is_said_in_words() {
     let named = format!("{token} --tls-ca @ca.pem --tls-domain localhost");
     assert_eq!(files.list(&by_address, &named).code, Some(0));
     // One side without TLS.
-    files.list_fails(&encrypted.url(), token, 4, &["https://"]);
+    files.list_fails(&encrypted.url(), token, 8, &["https://"]);
     files.list_fails(&encrypted.url(), &format!("{token} --tls-ca @ca.pem"), 2, &["https://"]);
     let plain = files.coordinator("");
     files.list_fails(&https(&plain), &format!("{token} --tls-ca @ca.pem"), 8, &["http://"]);

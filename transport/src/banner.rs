@@ -10,15 +10,28 @@ const LIMIT: Duration = Duration::from_secs(1);
 const SHOWN_BYTES_MAX: usize = 60;
 /// A server that speaks HTTP/1 answers this; a coordinator closes the connection.
 const REQUEST: &[u8] = b"GET / HTTP/1.0\r\n\r\n";
+/// How an alert of TLS begins.
+const TLS_ALERT: &str = "\u{15}\u{3}";
 
-/// The first line that the server at `HOST:PORT` sends, of at most 60 bytes; none if no
-/// server is there, or if the line is not text, as that of a coordinator (HTTP/2) is not.
-/// Takes up to a second.
-pub async fn banner(address: &str) -> Option<String> {
+/// What a server says to whom speaks neither TLS nor HTTP/2.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Banner {
+    /// A line of text, of at most 60 bytes.
+    Line(String),
+    /// That it does not understand: it speaks TLS.
+    Tls,
+}
+
+/// What the server at `HOST:PORT` says; none if no server is there, or if it is not text, as
+/// that of a coordinator (HTTP/2) is not. Takes up to a second.
+pub async fn banner(address: &str) -> Option<Banner> {
     let answer = timeout(LIMIT, answer(address)).await.ok()?.ok()?;
+    if answer.starts_with(TLS_ALERT) {
+        return Some(Banner::Tls);
+    }
     let line = answer.lines().next().filter(|line| !line.trim().is_empty())?;
     // HTTP/2 and TLS begin with control characters.
-    line.chars().all(|c| !c.is_control()).then(|| line.to_owned())
+    line.chars().all(|c| !c.is_control()).then(|| Banner::Line(line.to_owned()))
 }
 
 async fn answer(address: &str) -> io::Result<String> {
@@ -58,9 +71,10 @@ mod tests {
     #[tokio::test]
     async fn other_services_are_recognised_by_their_banner() {
         let http = service(b"HTTP/1.0 404 Not Found\r\nServer: x\r\n\r\n");
-        assert_eq!(banner(&http).await.unwrap(), "HTTP/1.0 404 Not Found");
-        assert_eq!(banner(&service(b"220 mail ESMTP\r\n")).await.unwrap(), "220 mail ESMTP");
-        assert_eq!(banner(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, None);
+        let line = |text: &str| Some(Banner::Line(text.to_owned()));
+        assert_eq!(banner(&http).await, line("HTTP/1.0 404 Not Found"));
+        assert_eq!(banner(&service(b"220 mail ESMTP\r\n")).await, line("220 mail ESMTP"));
+        assert_eq!(banner(&service(b"\x15\x03\x01\x00\x02\x02\x46")).await, Some(Banner::Tls));
         assert_eq!(banner(&service(b"")).await, None);
         assert_eq!(banner("127.0.0.1:1").await, None);
     }

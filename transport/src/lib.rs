@@ -18,7 +18,7 @@ mod tls_diagnosis;
 mod token;
 
 pub use address::listen_address;
-pub use banner::banner;
+pub use banner::{Banner, banner};
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
 pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};

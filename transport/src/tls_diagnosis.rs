@@ -2,7 +2,8 @@
 
 use std::{error::Error, io};
 
-use rustls::{AlertDescription, CertificateError, Error as TlsError};
+use rustls::{AlertDescription, CertificateError, Error as TlsError, pki_types::UnixTime};
+use time::{OffsetDateTime, format_description::well_known::Rfc3339};
 use tonic::{ConnectError, TimeoutExpired};
 
 /// If an error is one of TLS: what is wrong and what to do about it.
@@ -37,6 +38,14 @@ pub(crate) fn is_break(error: &(dyn Error + 'static)) -> bool {
     has_cause
 }
 
+/// A day and time for people.
+fn date(at: UnixTime) -> String {
+    let seconds = i64::try_from(at.as_secs()).unwrap_or(i64::MAX);
+    let known = OffsetDateTime::from_unix_timestamp(seconds).ok();
+    let text = known.and_then(|at| at.format(&Rfc3339).ok());
+    text.unwrap_or_else(|| format!("second {seconds} since 1970"))
+}
+
 fn explain(error: &TlsError) -> String {
     match error {
         // The latter: by one of the same name and another key.
@@ -46,6 +55,19 @@ fn explain(error: &TlsError) -> String {
         TlsError::InvalidCertificate(
             CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
         ) => "its certificate is for another name; pass that with --tls-domain".into(),
+        TlsError::InvalidCertificate(CertificateError::ExpiredContext { not_after, .. }) => {
+            format!(
+                "its certificate expired on {}; whoever runs it needs a new one \
+                 (docs/security.md), unless the clock of this machine is wrong",
+                date(*not_after)
+            )
+        }
+        TlsError::InvalidCertificate(CertificateError::NotValidYetContext {
+            not_before, ..
+        }) => format!(
+            "its certificate is valid from {} on; is the clock of this machine right?",
+            date(*not_before)
+        ),
         TlsError::InvalidCertificate(problem) => format!("its certificate is not valid: {problem}"),
         TlsError::InvalidMessage(_) => "it does not speak TLS; use http://".into(),
         TlsError::AlertReceived(
@@ -59,5 +81,29 @@ fn explain(error: &TlsError) -> String {
             | AlertDescription::DecryptError),
         ) => format!("it does not accept the client certificate of --tls-cert ({alert:?})"),
         other => format!("TLS: {other}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn an_expired_certificate_says_since_when() {
+        let at = |seconds| UnixTime::since_unix_epoch(Duration::from_secs(seconds));
+        let expired = CertificateError::ExpiredContext {
+            time: at(1_764_057_600),
+            not_after: at(1_735_689_600),
+        };
+        let text = tls_diagnosis(&TlsError::InvalidCertificate(expired)).unwrap();
+        assert!(text.contains("expired on 2025-01-01T00:00:00Z;"), "{text}");
+        let early = CertificateError::NotValidYetContext {
+            time: at(1_735_689_600),
+            not_before: at(1_764_057_600),
+        };
+        let text = tls_diagnosis(&TlsError::InvalidCertificate(early)).unwrap();
+        assert!(text.contains("valid from 2025-11-25T08:00:00Z on"), "{text}");
     }
 }

@@ -18,7 +18,7 @@ use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use sim_core::Isa;
 use swarm_proto::{SLOTS_MAX, WORKER_NAME_LEN_MAX};
-use swarm_transport::{Credentials, Link, LinkError, banner};
+use swarm_transport::{Banner, Credentials, Link, LinkError, banner};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
@@ -187,8 +187,9 @@ async fn run_with(
 ) -> Result<(), WorkerError> {
     let link = link(&config)?;
     let session_file = session_file(&config)?;
+    let pool = Pool::start(config.slots, Arc::clone(&config.stats))?;
+    let config = WorkerConfig { slots: pool.n_slots(), ..config };
     let stats = &config.stats;
-    let pool = Pool::start(config.slots, Arc::clone(stats))?;
     // 0 means that it is not known.
     let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
@@ -247,12 +248,16 @@ async fn run_with(
                 ("cannot connect", reason)
             }
         };
-        if !was_connected
-            && let Some(banner) = banner(&link.authority()).await
-            && !is_of_gateway(&banner)
-        {
-            return Err(WorkerError::AnotherService { address: config.coordinator, banner });
-        }
+        let banner = if was_connected { None } else { banner(&link.authority()).await };
+        let reason = match banner {
+            Some(Banner::Line(banner)) if !is_of_gateway(&banner) => {
+                return Err(WorkerError::AnotherService { address: config.coordinator, banner });
+            }
+            Some(Banner::Tls) if !config.coordinator.starts_with("https:") => {
+                "it speaks TLS; use https:// and --tls-ca".to_owned()
+            }
+            _ => reason,
+        };
         let delay = backoff.next_delay(rand::random());
         warn!(
             coordinator = config.coordinator,

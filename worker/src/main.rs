@@ -12,7 +12,9 @@ use std::{
 
 use clap::Parser;
 use sim_core::Isa;
-use swarm_telemetry::{Endpoint, LogArgs, MetricsArgs, VERSION, parse_positive_duration};
+use swarm_telemetry::{
+    EXIT_STARVED, Endpoint, LogArgs, MetricsArgs, VERSION, parse_positive_duration, runtime,
+};
 use swarm_transport::CredentialArgs;
 use tokio::{
     signal::unix::{SignalKind, signal},
@@ -91,14 +93,25 @@ Exit codes:
   2    bad arguments; token or certificate unusable; address of metrics in use
   7    the coordinator does not accept the token
   9    the server at the address is not a coordinator, or one of another version
+  71   the system gives it too few threads, memory for them, or file descriptors
   130  ended at once by a second signal";
 
-#[tokio::main]
-async fn main() -> ExitCode {
+fn main() -> ExitCode {
     let args = Args::parse();
     if let (true, Some(file)) = (args.health_check, &args.session_file) {
         return report_health(file);
     }
+    // One at least computes.
+    match runtime(1) {
+        Ok(runtime) => runtime.block_on(work(args)),
+        Err(starved) => {
+            eprintln!("error: {starved}");
+            EXIT_STARVED.into()
+        }
+    }
+}
+
+async fn work(args: Args) -> ExitCode {
     if let Err(error) = args.log.init() {
         eprintln!("error: {error}");
         return EXIT_INPUT.into();
@@ -157,6 +170,7 @@ async fn main() -> ExitCode {
                     EXIT_NO_COORDINATOR.into()
                 }
                 WorkerError::Denied { .. } => EXIT_DENIED.into(),
+                WorkerError::Threads(_) => EXIT_STARVED.into(),
                 error if error.is_input() => EXIT_INPUT.into(),
                 _ => EXIT_INTERNAL.into(),
             }

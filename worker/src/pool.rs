@@ -15,6 +15,7 @@ use std::{
 use sim_core::panic_to_failure;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 use tokio::sync::mpsc;
+use tracing::warn;
 
 use crate::{
     assignment::{Assignment, ItemResult},
@@ -43,6 +44,7 @@ pub(crate) type Reply = mpsc::Sender<ItemResult>;
 pub(crate) struct Pool {
     shared: Arc<Shared>,
     capacity: usize,
+    n_slots: usize,
 }
 
 #[derive(Debug)]
@@ -77,18 +79,33 @@ impl fmt::Debug for Queue {
 }
 
 impl Pool {
-    /// Starts `slots` threads; the queue holds as many assignments as the coordinator may
-    /// send ahead. `stats`: where they are counted.
+    /// Starts `slots` threads, or as many as the system gives, of which there has to be one;
+    /// the queue holds as many assignments as the coordinator may send ahead. `stats`: where
+    /// they are counted.
     pub(crate) fn start(slots: usize, stats: Arc<Stats>) -> io::Result<Self> {
         let (queue, changed) = (Mutex::default(), Condvar::new());
         let shared = Arc::new(Shared { queue, changed, stats });
         // Built first, so that the threads that did start end if one does not.
-        let pool = Self { shared, capacity: ITEMS_PER_SLOT_MAX * slots };
+        let mut pool = Self { shared, capacity: 0, n_slots: 0 };
         for slot in 0..slots {
             let shared = Arc::clone(&pool.shared);
-            thread::Builder::new().name(format!("slot-{slot}")).spawn(move || shared.work())?;
+            let thread = thread::Builder::new().name(format!("slot-{slot}"));
+            match thread.spawn(move || shared.work()) {
+                Ok(_) => pool.n_slots += 1,
+                Err(error) if slot == 0 => return Err(error),
+                Err(error) => {
+                    warn!("{slot} of {slots} slots: the system gives no more threads ({error})");
+                    break;
+                }
+            }
         }
+        pool.capacity = ITEMS_PER_SLOT_MAX * pool.n_slots;
         Ok(pool)
+    }
+
+    /// Assignments that are computed at the same time.
+    pub(crate) fn n_slots(&self) -> usize {
+        self.n_slots
     }
 
     /// Number of assignments that the queue holds.

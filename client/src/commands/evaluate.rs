@@ -7,8 +7,13 @@ mod measured;
 mod statistics;
 mod summary;
 
-use swarm_proto::v1::EvaluateRequest;
-use tokio::task::JoinSet;
+use std::{pin::pin, time::Duration};
+
+use swarm_proto::v1::{EvaluateRequest, ListWorkersRequest};
+use tokio::{
+    task::JoinSet,
+    time::{Instant, sleep, timeout},
+};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
@@ -20,6 +25,7 @@ use crate::{
     progress::Progress,
     settings::Settings,
     table::{Column, Table},
+    text, waiting,
 };
 
 pub use self::args::EvaluateArgs;
@@ -39,6 +45,10 @@ use super::{
 
 /// Most conditions that are evaluated at the same time.
 const CALLS_MAX: usize = 8;
+/// How long the coordinator has to say what an evaluation waits for.
+const ANSWER_TIME: Duration = Duration::from_secs(1);
+/// What works without a coordinator.
+const HERE: &str = "with --local this command evaluates in its own process";
 
 /// Evaluates all conditions, then writes the files.
 pub async fn evaluate(
@@ -72,7 +82,10 @@ async fn evaluate_all(
     // An unusable directory is an error now, not after the computation.
     let results = Results::begin(&args.to, args.replace)?;
     let measured = match remote {
-        Some(connection) => ask_all(&connection, &conditions, &genotype, args, progress).await?,
+        Some(connection) => {
+            let asked = ask_all(&connection, &conditions, &genotype, args, progress).await;
+            asked.map_err(or_here)?
+        }
         None => compute_here(&conditions, &genotype, args, progress).await?,
     };
     results.write_steps(&conditions, &measured, args.every)?;
@@ -159,6 +172,42 @@ async fn compute_here(
     result
 }
 
+/// The error that there is no coordinator, with what works without.
+fn or_here(error: Error) -> Error {
+    match error {
+        Error::Unreachable { address, reason } => {
+            Error::Unreachable { address, reason: format!("{reason} ({HERE})") }
+        }
+        error => error,
+    }
+}
+
+/// What an evaluation waits for.
+async fn waits_for(connection: &Connection, is_local: bool) -> String {
+    if is_local {
+        return "computing".to_owned();
+    }
+    let address = connection.address();
+    let impatient = connection.with_patience(Duration::ZERO);
+    let request = ListWorkersRequest {};
+    let listing = impatient.call_fleet(async |client| client.list_workers(request).await);
+    let listing = timeout(ANSWER_TIME, listing).await;
+    match listing.map(|answer| answer.map(|it| it.workers.len() as u64)) {
+        Ok(Ok(0)) => format!(
+            "waiting for a worker: the coordinator at {address} has none; start one with \
+             `worker --coordinator {address}`; {HERE}"
+        ),
+        Ok(Ok(n)) => {
+            let workers = text::counted(n, "worker");
+            format!("waiting for {workers} of the coordinator at {address}")
+        }
+        Ok(Err(error)) => format!("waiting: {error}; {HERE}"),
+        Err(_) => {
+            format!("waiting: the coordinator at {address} does not answer; {HERE}")
+        }
+    }
+}
+
 /// Evaluates all conditions, some at a time; the result has their order.
 async fn ask_all(
     connection: &Connection,
@@ -171,6 +220,7 @@ async fn ask_all(
     let mut waiting = conditions.iter().enumerate();
     let mut measured: Vec<Option<Measured>> = conditions.iter().map(|_| None).collect();
     let mut n_done = 0;
+    let mut silence = pin!(sleep(waiting::SILENCE_MAX));
     loop {
         while calls.len() < CALLS_MAX
             && let Some((index, condition)) = waiting.next()
@@ -184,7 +234,16 @@ async fn ask_all(
             let connection = connection.clone();
             calls.spawn(async move { (index, measured::ask(&connection, request).await) });
         }
-        let Some(call) = calls.join_next().await else { break };
+        let call = tokio::select! {
+            call = calls.join_next() => call,
+            () = &mut silence => {
+                let waits = waits_for(connection, args.local).await;
+                progress.remark(&format!("{n_done}/{} done; {waits}", conditions.len()));
+                silence.as_mut().reset(Instant::now() + waiting::REMINDER);
+                continue;
+            }
+        };
+        let Some(call) = call else { break };
         let (index, result) = call.map_err(|error| Error::Internal(error.to_string()))?;
         let condition = &conditions[index];
         measured[index] = Some(result.map_err(|error| condition.locate(error))?);

@@ -102,6 +102,8 @@ impl Remote for WorkersArgs {
         let request = ListWorkersRequest {};
         let response =
             connection.call_fleet(async |client| client.list_workers(request).await).await?;
+        // By the clock that said when they were heard.
+        let now_ms = Some(response.now_ms).filter(|&now_ms| now_ms > 0);
         let workers = response.workers;
         let records: Vec<Record<'_>> = workers.iter().map(Into::into).collect();
         let empty = match connection.data_dir() {
@@ -111,7 +113,8 @@ impl Remote for WorkersArgs {
                 connection.address()
             ),
         };
-        progress.print_table(&table(&workers, clock::unix_ms()), &CSV_KEYS, &records, &empty)
+        let now_ms = now_ms.unwrap_or_else(clock::unix_ms);
+        progress.print_table(&table(&workers, now_ms), &CSV_KEYS, &records, &empty)
     }
 }
 

@@ -29,7 +29,7 @@ impl FleetService for Fleet {
         let workers = self.control.workers().await?;
         let now_ms = clock::unix_ms();
         let workers = workers.into_iter().map(|worker| convert::worker(worker, now_ms)).collect();
-        Ok(Response::new(ListWorkersResponse { workers }))
+        Ok(Response::new(ListWorkersResponse { workers, now_ms }))
     }
 
     async fn readmit_worker(

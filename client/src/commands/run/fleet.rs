@@ -9,6 +9,7 @@ use std::{
 
 use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
 use sim_core::Isa;
+use swarm_telemetry::Starved;
 use swarm_transport::{Credentials, Token};
 use tokio::{task::JoinSet, time::timeout};
 use tokio_util::sync::CancellationToken;
@@ -97,6 +98,11 @@ impl Fleet {
             ended = self.workers.join_next() => ended,
         };
         let reason = match ended {
+            Some(Ok(Err(WorkerError::Threads(error)))) if self.workers.is_empty() => {
+                return Error::Starved(Starved::new(error));
+            }
+            // Fewer workers compute the same.
+            Some(Ok(Err(WorkerError::Threads(_)))) => return Box::pin(self.failure()).await,
             Some(Ok(Err(error))) => error.to_string(),
             Some(Err(error)) => error.to_string(),
             Some(Ok(Ok(()))) | None => "it ended by itself".into(),

@@ -1,0 +1,178 @@
+//! The runtime of a program, sized to the threads that the system lets it have.
+//!
+//! All threads that the runtime needs in order to go on are started at its beginning and
+//! kept, so that a limit that is reached later stops nothing. Where a thread is refused all
+//! the same, the program ends with one line.
+
+use std::{
+    io::{self, Write as _},
+    panic,
+    sync::{Arc, Barrier, RwLock},
+    thread,
+    time::Duration,
+};
+
+use tokio::runtime::{Builder, Runtime};
+
+/// Exit code of a program that the system gives too little to start or to go on: threads,
+/// memory for their stacks, file descriptors.
+pub const EXIT_STARVED: u8 = 71;
+/// Threads for what blocks: database, checks, reconstructions. More work than this waits.
+const BLOCKING_MAX: usize = 32;
+/// Those of them that always are there.
+const BLOCKING_KEPT: usize = 2;
+/// Longer than a program runs.
+const FOR_EVER: Duration = Duration::from_secs(1 << 32);
+
+/// The system gives the program too little to start.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the system gives this program too few threads or file descriptors to start ({0}); raise \
+     the limits of processes, memory or open files (ulimit -u, -v, -n; of a container, \
+     --pids-limit), or end other programs"
+)]
+pub struct Starved(io::Error);
+
+impl Starved {
+    /// For this reason.
+    pub fn new(reason: io::Error) -> Self {
+        Self(reason)
+    }
+}
+
+/// How many threads there are of which kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Sizes {
+    /// 0: the thread that starts the runtime does all.
+    workers: usize,
+    blocking: usize,
+}
+
+/// Shares out `granted` threads if `wanted` are not to be had; none if they are too few.
+fn sizes(wanted: Sizes, granted: usize) -> Option<Sizes> {
+    if granted >= wanted.workers + wanted.blocking {
+        return Some(wanted);
+    }
+    match granted {
+        0 => None,
+        1 | 2 => Some(Sizes { workers: 0, blocking: granted }),
+        // The rest is for what the program starts later.
+        _ => Some(Sizes {
+            workers: wanted.workers.min(granted / 4).max(1),
+            blocking: wanted.blocking.min(granted / 2),
+        }),
+    }
+}
+
+/// A runtime with as many threads as the program can use, or as the system lets it have.
+/// `n_others`: threads that the program starts beside it and needs. From here on a panic
+/// because of a thread that is refused is one line and [`EXIT_STARVED`].
+pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
+    report_refused_threads();
+    let n_cores = thread::available_parallelism().map_or(1, Into::into);
+    let wanted = Sizes { workers: n_cores, blocking: BLOCKING_MAX };
+    let (n_granted, refusal) = granted(n_cores + BLOCKING_MAX + n_others);
+    let starved = || Starved(refusal.unwrap_or_else(|| io::ErrorKind::OutOfMemory.into()));
+    let sizes = sizes(wanted, n_granted.saturating_sub(n_others)).ok_or_else(starved)?;
+    let mut builder = match sizes.workers {
+        0 => Builder::new_current_thread(),
+        n => {
+            let mut builder = Builder::new_multi_thread();
+            builder.worker_threads(n);
+            builder
+        }
+    };
+    builder.enable_all().max_blocking_threads(sizes.blocking).thread_keep_alive(FOR_EVER);
+    let runtime = builder.build().map_err(Starved)?;
+    let n_kept = if sizes == wanted { BLOCKING_KEPT } else { sizes.blocking };
+    keep(&runtime, n_kept);
+    Ok(runtime)
+}
+
+/// Starts this many of the threads for what blocks, all of which wait for each other.
+fn keep(runtime: &Runtime, n_kept: usize) {
+    let together = Arc::new(Barrier::new(n_kept));
+    for _ in 0..n_kept {
+        let together = Arc::clone(&together);
+        runtime.spawn_blocking(move || {
+            together.wait();
+        });
+    }
+}
+
+/// How many of `n_max` threads the system starts at the same time, and why no more.
+fn granted(n_max: usize) -> (usize, Option<io::Error>) {
+    let hold = RwLock::new(());
+    let held = hold.write();
+    thread::scope(|scope| {
+        let mut n_granted = 0;
+        let mut refusal = None;
+        while n_granted < n_max && refusal.is_none() {
+            match thread::Builder::new().spawn_scoped(scope, || drop(hold.read())) {
+                Ok(_) => n_granted += 1,
+                Err(error) => refusal = Some(error),
+            }
+        }
+        drop(held);
+        (n_granted, refusal)
+    })
+}
+
+/// Makes one line, and an end, of panics that say that a thread was refused: libraries do not
+/// return that as an error.
+fn report_refused_threads() {
+    let usual = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        let text = info.payload_as_str().unwrap_or_default();
+        if !is_refused_thread(text) {
+            return usual(info);
+        }
+        // The standard library quotes what the system says.
+        let why = text.split('"').nth(1).or_else(|| text.rsplit(": ").next()).unwrap_or(text);
+        // If standard error is closed there is no place left to report to.
+        let _ = writeln!(io::stderr(), "error: {}", Starved(io::Error::other(why.to_owned())));
+        std::process::exit(EXIT_STARVED.into());
+    }));
+}
+
+/// The texts of tokio, and of the standard library.
+fn is_refused_thread(text: &str) -> bool {
+    text.starts_with("OS can't spawn worker thread") || text.starts_with("failed to spawn thread")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_are_shared_out_and_one_is_enough() {
+        let wanted = Sizes { workers: 8, blocking: 32 };
+        let of = |granted| sizes(wanted, granted).map(|it| (it.workers, it.blocking));
+        assert_eq!(of(0), None);
+        assert_eq!(of(1), Some((0, 1)));
+        assert_eq!(of(2), Some((0, 2)));
+        assert_eq!(of(3), Some((1, 1)));
+        assert_eq!(of(39), Some((8, 19)));
+        assert_eq!(of(40), Some((8, 32)));
+        assert_eq!(of(4000), Some((8, 32)));
+        for granted in 1..40 {
+            let (workers, blocking) = of(granted).unwrap();
+            assert!(blocking > 0 && workers + blocking <= granted, "{granted}");
+        }
+    }
+
+    #[test]
+    fn as_many_threads_are_counted_as_there_are() {
+        let (n_granted, refusal) = granted(5);
+        assert_eq!((n_granted, refusal.map(|it| it.to_string())), (5, None));
+    }
+
+    #[test]
+    fn panics_about_threads_are_known_by_the_texts_of_the_libraries() {
+        assert!(is_refused_thread(
+            "OS can't spawn worker thread: Resource temporarily unavailable"
+        ));
+        assert!(is_refused_thread("failed to spawn thread: Os { code: 11 }"));
+        assert!(!is_refused_thread("index out of bounds"));
+    }
+}
