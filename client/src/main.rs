@@ -37,7 +37,7 @@ use std::{
 
 use clap::{CommandFactory as _, Parser as _};
 use clap_complete::CompleteEnv;
-use swarm_telemetry::{escape_lines, runtime};
+use swarm_telemetry::{block_on, escape_lines, runtime};
 
 use crate::{args::Args, progress::Progress, synonyms::with_suggestions};
 
@@ -48,7 +48,7 @@ fn main() -> ExitCode {
     let result = match runtime(0) {
         Ok(runtime) => {
             let progress = Progress::new(args.output).with_details(args.verbose);
-            runtime.block_on(commands::execute(args, progress))
+            block_on(runtime, commands::execute(args, progress))
         }
         Err(starved) => Err(starved.into()),
     };

@@ -10,7 +10,7 @@ use coordinator::{
     Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
     referee,
 };
-use swarm_telemetry::{EXIT_STARVED, LogArgs, MetricsArgs, VERSION, runtime};
+use swarm_telemetry::{EXIT_STARVED, LogArgs, MetricsArgs, VERSION, block_on, runtime};
 use swarm_transport::listen_address;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -108,7 +108,7 @@ fn main() -> ExitCode {
         Some(Command::Referee) => evaluate_items(),
         // The referee's threads are its own.
         None => match runtime(0) {
-            Ok(runtime) => runtime.block_on(run(&args)),
+            Ok(runtime) => block_on(runtime, run(&args)),
             Err(starved) => {
                 eprintln!("error: {starved}");
                 ExitCode::from(EXIT_STARVED)

@@ -17,7 +17,7 @@ pub use endpoint::{Endpoint, ListenError};
 pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
 pub use prometheus::Histogram;
-pub use runtime::{EXIT_STARVED, Starved, runtime};
+pub use runtime::{EXIT_STARVED, Starved, block_on, runtime};
 pub use text::{EscapingWriter, escape, escape_lines, is_unprintable};
 
 /// Version of the programs, and in release builds the commit, such as

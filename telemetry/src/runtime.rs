@@ -40,6 +40,14 @@ impl Starved {
     }
 }
 
+/// Runs a program's future to its end. Work on other threads that goes on then is nobody's any
+/// more: the program does not wait for it.
+pub fn block_on<T>(runtime: Runtime, program: impl Future<Output = T>) -> T {
+    let ended = runtime.block_on(program);
+    runtime.shutdown_background();
+    ended
+}
+
 /// How many threads there are of which kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Sizes {

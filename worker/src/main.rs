@@ -13,7 +13,8 @@ use std::{
 use clap::Parser;
 use sim_core::Isa;
 use swarm_telemetry::{
-    EXIT_STARVED, Endpoint, LogArgs, MetricsArgs, VERSION, parse_positive_duration, runtime,
+    EXIT_STARVED, Endpoint, LogArgs, MetricsArgs, VERSION, block_on, parse_positive_duration,
+    runtime,
 };
 use swarm_transport::CredentialArgs;
 use tokio::{
@@ -103,7 +104,7 @@ fn main() -> ExitCode {
     }
     // One at least computes.
     match runtime(1) {
-        Ok(runtime) => runtime.block_on(work(args)),
+        Ok(runtime) => block_on(runtime, work(args)),
         Err(starved) => {
             eprintln!("error: {starved}");
             EXIT_STARVED.into()
