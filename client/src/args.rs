@@ -92,7 +92,8 @@ Exit codes:
   11   the database is damaged
   12   the bundle is not what it says (verify)
   71   the system gives it too few threads, memory for them, or file descriptors
-  130  interrupted";
+  130  interrupted
+  141  standard output was closed (watch, logs); the other commands go on without it";
 
 /// The experiment, or the group of them, that a command is about.
 #[derive(Debug, ClapArgs)]

@@ -43,6 +43,18 @@ pub enum Error {
         /// What happened to the next one.
         cause: Box<Error>,
     },
+    /// Some experiments of a group were not changed.
+    #[error("{n_changed} of {n_all} experiments are changed, these are not:\n{lines}")]
+    Partly {
+        /// Number of those that were changed.
+        n_changed: usize,
+        /// Number of those that were to be.
+        n_all: usize,
+        /// The others, one per line, each with the reason.
+        lines: String,
+        /// The first reason.
+        cause: Box<Error>,
+    },
     /// No such experiment, or no champion.
     #[error("{0}")]
     NotFound(String),
@@ -110,8 +122,8 @@ pub enum Error {
     /// A signal interrupted the command; the text says what happens to the experiment.
     #[error("interrupted; {0}")]
     Interrupted(String),
-    /// The reader of standard output closed it.
-    #[error("standard output is closed")]
+    /// The reader of standard output closed it, and the command does nothing but print.
+    #[error("standard output is closed, so this command ends; experiments go on")]
     OutputClosed,
     /// Standard output, or a file, cannot be written.
     #[error("cannot write {what}: {source}")]
@@ -141,13 +153,20 @@ impl Error {
         ))
     }
 
+    /// Whether the same request for another experiment would fail of the same.
+    pub fn concerns_all(&self) -> bool {
+        matches!(
+            self,
+            Self::Unreachable { .. } | Self::Denied { .. } | Self::Tls { .. } | Self::Foreign(_)
+        )
+    }
+
     /// The exit code of `swarmctl`, as its help lists them.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutputClosed => 0,
             Self::Write { .. } | Self::Internal(_) => 1,
             Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
-            Self::Incomplete { cause, .. } => cause.exit_code(),
+            Self::Incomplete { cause, .. } | Self::Partly { cause, .. } => cause.exit_code(),
             Self::NotFound(_) => 3,
             Self::Unreachable { .. } => 4,
             Self::Failed { .. } => 5,
@@ -160,16 +179,16 @@ impl Error {
             Self::Flawed(_) => 12,
             Self::Starved(_) => EXIT_STARVED,
             Self::Interrupted(_) => 130,
+            Self::OutputClosed => 141,
         }
     }
 
-    /// What to print on standard error, if anything.
-    pub fn report(&self) -> Option<String> {
+    /// What to print on standard error.
+    pub fn report(&self) -> String {
         match self {
-            Self::OutputClosed => None,
-            Self::Config { file, problems } => Some(prefix_lines(problems, &file.display())),
-            Self::Interrupted(_) => Some(self.to_string()),
-            _ => Some(format!("error: {self}")),
+            Self::Config { file, problems } => prefix_lines(problems, &file.display()),
+            Self::Interrupted(_) | Self::OutputClosed => self.to_string(),
+            _ => format!("error: {self}"),
         }
     }
 
@@ -204,7 +223,7 @@ impl Error {
         }
     }
 
-    /// The error of writing to standard output; a closed pipe ends the command quietly.
+    /// The error of writing to standard output.
     pub fn from_stdout(source: io::Error) -> Self {
         match source.kind() {
             io::ErrorKind::BrokenPipe => Self::OutputClosed,
@@ -322,10 +341,10 @@ mod tests {
     fn exit_codes_of_what_happens_here() {
         let failed = Error::Failed { id: 3, reason: "item 7".into() };
         assert_eq!(failed.exit_code(), 5);
-        assert_eq!(failed.report().unwrap(), "error: experiment 3 failed: item 7");
+        assert_eq!(failed.report(), "error: experiment 3 failed: item 7");
         let cancelled = Error::Cancelled { id: 3, reason: String::new() };
         assert_eq!(cancelled.exit_code(), 6);
-        assert_eq!(cancelled.report().unwrap(), "error: experiment 3 was cancelled");
+        assert_eq!(cancelled.report(), "error: experiment 3 was cancelled");
         assert_eq!(Error::TimedOut { id: 3 }.exit_code(), 10);
         assert_eq!(Error::Damaged("x".into()).exit_code(), 11);
         assert_eq!(Error::Flawed("x".into()).exit_code(), 12);
@@ -336,7 +355,7 @@ mod tests {
     #[test]
     fn an_unreachable_coordinator_is_named_with_cause_and_remedy() {
         let status = Status::from_error(Box::new(io::Error::other("connection refused")));
-        let report = Error::from_status(&status, ADDRESS).report().unwrap();
+        let report = Error::from_status(&status, ADDRESS).report();
         for part in [ADDRESS, "connection refused", "--coordinator"] {
             assert!(report.contains(part), "{report}");
         }
@@ -346,14 +365,15 @@ mod tests {
     fn every_problem_of_a_file_has_its_line() {
         let file = PathBuf::from("a.json");
         let error = Error::Config { file, problems: "line 3: x\nworld: y".into() };
-        assert_eq!(error.report().unwrap(), "a.json: line 3: x\na.json: world: y");
+        assert_eq!(error.report(), "a.json: line 3: x\na.json: world: y");
         assert_eq!(error.exit_code(), 2);
     }
 
     #[test]
-    fn a_closed_pipe_is_no_error() {
+    fn a_command_that_a_closed_pipe_ends_says_so() {
         let error = Error::from_stdout(io::ErrorKind::BrokenPipe.into());
-        assert_eq!((error.exit_code(), error.report()), (0, None));
+        assert_eq!(error.exit_code(), 141);
+        assert!(error.report().starts_with("standard output is closed"), "{error}");
         assert_eq!(Error::from_stdout(io::ErrorKind::StorageFull.into()).exit_code(), 1);
     }
 }

@@ -9,12 +9,14 @@ mod clock;
 mod commands;
 mod complete;
 mod connection;
+mod consent;
 mod error;
 mod experiment_file;
 #[cfg(test)]
 mod fake_coordinator;
 mod figure;
 mod genotypes;
+mod group;
 mod interrupt;
 mod json;
 mod place;
@@ -53,9 +55,7 @@ fn main() -> ExitCode {
         Err(starved) => Err(starved.into()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    if let Some(report) = error.report() {
-        // If standard error is closed there is no place left to report to.
-        let _ = writeln!(io::stderr(), "{}", escape_lines(&report));
-    }
+    // If standard error is closed there is no place left to report to.
+    let _ = writeln!(io::stderr(), "{}", escape_lines(&error.report()));
     error.exit_code().into()
 }

@@ -40,6 +40,8 @@ const BAR_WIDTH: usize = 26;
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
+    /// What happens when the reader of standard output goes.
+    when_closed: WhenClosed,
     screen: Screen,
     /// Whether remarks are left out.
     is_silent: bool,
@@ -51,6 +53,17 @@ pub struct Progress {
     bar: ProgressBar,
     /// The experiments that are followed, by their numbers.
     followed: BTreeMap<u64, Followed>,
+}
+
+/// What a command does when the reader of standard output goes, as `| head` does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum WhenClosed {
+    /// It does its work to the end, and prints no more.
+    GoOn,
+    /// It has gone; the work goes on.
+    HasGone,
+    /// It ends: it does nothing but print, for as long as an experiment takes.
+    End,
 }
 
 /// What is shown of an experiment that is followed.
@@ -86,6 +99,7 @@ impl Progress {
         Self {
             format,
             stdout,
+            when_closed: WhenClosed::GoOn,
             screen: Screen::default(),
             is_silent: false,
             is_verbose: false,
@@ -108,6 +122,11 @@ impl Progress {
     /// Makes no remarks.
     pub fn silent(self) -> Self {
         Self { is_silent: true, ..self }
+    }
+
+    /// Ends the command when the reader of standard output goes, instead of going on.
+    pub fn end_with_reader(&mut self) {
+        self.when_closed = WhenClosed::End;
     }
 
     /// Whether standard output is for programs.
@@ -152,9 +171,19 @@ impl Progress {
     }
 
     fn write(&mut self, text: &str) -> Result<(), Error> {
+        if self.when_closed == WhenClosed::HasGone {
+            return Ok(());
+        }
         let Self { bar, stdout, .. } = self;
-        bar.suspend(|| writeln!(stdout, "{text}").and_then(|()| stdout.flush()))
-            .map_err(Error::from_stdout)
+        let written = bar.suspend(|| writeln!(stdout, "{text}").and_then(|()| stdout.flush()));
+        match written.map_err(Error::from_stdout) {
+            Err(Error::OutputClosed) if self.when_closed == WhenClosed::GoOn => {
+                self.when_closed = WhenClosed::HasGone;
+                self.remark("standard output is closed; the command goes on without it");
+                Ok(())
+            }
+            written => written,
+        }
     }
 
     /// A remark on standard error.
@@ -502,8 +531,12 @@ pub mod tests {
     }
 
     #[test]
-    fn a_closed_pipe_ends_the_output_quietly() {
+    fn a_closed_pipe_ends_the_output_and_not_the_work() {
         let mut progress = Progress::to(OutputFormat::Table, Box::new(Closed));
+        assert!(progress.print("x").is_ok());
+        assert!(progress.print("y").is_ok());
+        let mut progress = Progress::to(OutputFormat::Table, Box::new(Closed));
+        progress.end_with_reader();
         assert!(matches!(progress.print("x"), Err(Error::OutputClosed)));
     }
 }

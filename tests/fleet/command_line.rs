@@ -1,6 +1,12 @@
 //! What people see: results, errors that say what to do, exit codes.
 
-use std::{fs, io::Write as _, net::TcpListener, thread};
+use std::{
+    fs,
+    io::Write as _,
+    net::TcpListener,
+    process::{Command, Stdio},
+    thread,
+};
 
 use harness::{
     CoordinatorProcess, Experiment, WorkerProcess, run_coordinator, swarmctl, workspace_file,
@@ -58,6 +64,29 @@ fn an_interrupted_run_goes_on_with_the_same_command() {
     let undisturbed = swarmctl(args).expect_success().json_lines();
     assert_eq!(continued.last().unwrap()["digest"], undisturbed.last().unwrap()["digest"]);
     assert_eq!(continued.last().unwrap()["experiment"], 1, "no second experiment was started");
+}
+
+#[test]
+fn a_run_whose_output_nobody_reads_goes_on_to_its_champion() {
+    let experiment = Experiment::tiny(3);
+    for is_stderr_closed in [false, true] {
+        let directory = tempfile::tempdir().unwrap();
+        let mut run = Command::new(harness::binary("swarmctl"));
+        run.arg("run").arg(experiment.path()).args(["--workers", "1", "--data-dir"]);
+        run.arg(directory.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut run = run.spawn().unwrap();
+        drop(run.stdout.take());
+        if is_stderr_closed {
+            drop(run.stderr.take());
+        }
+        let output = run.wait_with_output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(is_stderr_closed || stderr.contains("goes on without it"), "{stderr}");
+        let files = fs::read_dir(directory.path()).unwrap().map(|file| file.unwrap().file_name());
+        let is_champion = |name: &std::ffi::OsString| name.to_string_lossy().contains("champion");
+        assert!(files.into_iter().any(|name| is_champion(&name)), "{directory:?}");
+    }
 }
 
 #[test]

@@ -3,15 +3,16 @@
 
 use clap::Args;
 use swarm_proto::v1::{
-    CancelExperimentRequest, Experiment, ExperimentState, PauseExperimentRequest,
-    ResumeExperimentRequest, SetPriorityRequest,
+    CancelExperimentRequest, Experiment, PauseExperimentRequest, ResumeExperimentRequest,
+    SetPriorityRequest,
 };
 
 use super::{Remote, watch};
 use crate::{
-    args::{Subject, Target, whole},
+    args::{Target, whole},
     connection::{Connection, present},
     error::Error,
+    group::{Outcome, change_each, members},
     json::{self, has_ended},
     place::Intent,
     progress::Progress,
@@ -44,10 +45,13 @@ impl Remote for PauseArgs {
                 connection.call(async |client| client.pause_experiment(request.clone()).await);
             present(call.await?.experiment)
         };
-        let changed = each(&self.target, connection, pause).await?;
-        let resume = format!("continue with: swarmctl resume {}", self.target.subject);
-        let lines = changed.iter().map(text::state_line).chain([resume]);
-        print(&self.target, &changed, lines, progress)
+        let outcome = each(&self.target, connection, pause).await?;
+        let is_any_paused = !outcome.changed.is_empty();
+        let printed = print(&self.target, outcome, text::state_line, progress);
+        if is_any_paused && !progress.is_json() {
+            progress.print(&format!("continue with: swarmctl resume {}", self.target.subject))?;
+        }
+        printed
     }
 }
 
@@ -73,8 +77,8 @@ impl Remote for ResumeArgs {
             let call = connection.call(async |client| client.resume_experiment(request).await);
             present(call.await?.experiment)
         };
-        let changed = each(&self.target, connection, resume).await?;
-        follow(&self.target, changed, connection, progress).await
+        let outcome = each(&self.target, connection, resume).await?;
+        follow(&self.target, outcome, connection, progress).await
     }
 }
 
@@ -103,9 +107,9 @@ impl Remote for PriorityArgs {
             let call = connection.call(async |client| client.set_priority(request).await);
             present(call.await?.experiment)
         };
-        let changed = each(&target, connection, set).await?;
+        let outcome = each(&target, connection, set).await?;
         let line = |it: &Experiment| format!("{}: priority {}", text::title(it), it.priority);
-        print(&target, &changed, changed.iter().map(line), progress)
+        print(&target, outcome, line, progress)
     }
 }
 
@@ -127,8 +131,8 @@ impl Remote for CancelArgs {
             let call = connection.call(async |client| client.cancel_experiment(request).await);
             present(call.await?.experiment)
         };
-        let changed = each(&self.target, connection, cancel).await?;
-        print(&self.target, &changed, changed.iter().map(text::cancelled), progress)
+        let outcome = each(&self.target, connection, cancel).await?;
+        print(&self.target, outcome, text::cancelled, progress)
     }
 }
 
@@ -137,61 +141,58 @@ async fn each(
     target: &Target,
     connection: &Connection,
     change: impl AsyncFn(u64) -> Result<Experiment, Error>,
-) -> Result<Vec<Experiment>, Error> {
+) -> Result<Outcome<Experiment>, Error> {
     let why_none = "all experiments of group `NAME` have ended";
-    each_that(target, connection, |state| !has_ended(state), why_none, change).await
-}
-
-/// Changes an experiment, or those of a group whose state is such. `why_none`: the error if
-/// there are none in the group NAME.
-pub async fn each_that<T>(
-    target: &Target,
-    connection: &Connection,
-    applies: impl Fn(ExperimentState) -> bool,
-    why_none: &str,
-    change: impl AsyncFn(u64) -> Result<T, Error>,
-) -> Result<Vec<T>, Error> {
-    let name = match &target.subject {
-        Subject::Experiment(id) => return Ok(vec![change(*id).await?]),
-        Subject::Group(name) => name,
-    };
-    let members = connection.group(name).await?;
-    let mut changed = Vec::new();
-    for experiment in &members {
-        // Of one alone, the coordinator says what is wrong with its state.
-        if members.len() == 1 || applies(experiment.state()) {
-            changed.push(change(experiment.id).await?);
-        }
-    }
-    match changed.is_empty() {
-        true => Err(Error::NotFound(why_none.replace("NAME", name))),
-        false => Ok(changed),
-    }
+    let members = members(target, connection, |state| !has_ended(state), why_none).await?;
+    Ok(change_each(&members, change).await)
 }
 
 /// Prints what goes on; follows it to its end if this process computes it.
 pub async fn follow(
     target: &Target,
-    changed: Vec<Experiment>,
+    outcome: Outcome<Experiment>,
     connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    if !connection.computes() || !progress.is_json() {
-        print(target, &changed, changed.iter().map(text::state_line), progress)?;
+    let changed = outcome.changed.clone();
+    let is_followed = connection.computes() && !changed.is_empty();
+    let printed = match is_followed && progress.is_json() {
+        true => outcome.end(),
+        false => print(target, outcome, text::state_line, progress),
+    };
+    if is_followed {
+        watch::watch(connection, changed, progress).await?;
     }
-    if connection.computes() { watch::watch(connection, changed, progress).await } else { Ok(()) }
+    printed
 }
 
-/// Prints what was changed, as lines or as JSON.
+/// Prints what was changed, as lines or as JSON; the error of what was not comes after it.
 pub fn print(
     target: &Target,
-    changed: &[Experiment],
-    lines: impl Iterator<Item = String>,
+    outcome: Outcome<Experiment>,
+    line: impl Fn(&Experiment) -> String,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    if progress.is_json() {
-        progress.print(&json::experiments(&target.subject, changed))
-    } else {
-        progress.print(&lines.collect::<Vec<_>>().join("\n"))
+    print_of(target, outcome, |experiment| experiment, line, progress)
+}
+
+/// The same of what has an experiment and more.
+pub fn print_of<T>(
+    target: &Target,
+    outcome: Outcome<T>,
+    experiment: impl Fn(&T) -> &Experiment,
+    line: impl Fn(&T) -> String,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    if outcome.changed.is_empty() {
+        return outcome.end();
     }
+    progress.print(&if progress.is_json() {
+        let changed: Vec<Experiment> =
+            outcome.changed.iter().map(|it| experiment(it).clone()).collect();
+        json::experiments(&target.subject, &changed)
+    } else {
+        outcome.changed.iter().map(line).collect::<Vec<_>>().join("\n")
+    })?;
+    outcome.end()
 }

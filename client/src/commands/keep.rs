@@ -9,12 +9,14 @@ use swarm_proto::v1::{
 
 use super::{
     Remote,
-    control::{each_that, print},
+    control::{print, print_of},
 };
 use crate::{
     args::{Label, Target},
     connection::{Connection, present},
+    consent::Consent,
     error::Error,
+    group::{Outcome, change_each, members},
     json::has_ended,
     place::Intent,
     progress::Progress,
@@ -33,6 +35,8 @@ const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
 pub struct DeleteArgs {
     #[command(flatten)]
     target: Target,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl Remote for DeleteArgs {
@@ -41,14 +45,17 @@ impl Remote for DeleteArgs {
     }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let members = members(&self.target, connection, has_ended, NONE_HAS_ENDED).await?;
+        if !self.consent.is_given("delete", &members, progress).await? {
+            return Ok(());
+        }
         let delete = async |experiment_id| {
             let request = DeleteExperimentRequest { experiment_id };
             let call = connection.call(async |client| client.delete_experiment(request).await);
             let response = call.await?;
             Ok((present(response.experiment)?, response.freed_bytes))
         };
-        let deleted =
-            each_that(&self.target, connection, has_ended, NONE_HAS_ENDED, delete).await?;
+        let deleted = change_each(&members, delete).await;
         print_with(&self.target, deleted, progress, |bytes| {
             format!("deleted, {} of the database are free", mib(bytes))
         })
@@ -64,6 +71,8 @@ impl Remote for DeleteArgs {
 pub struct PruneArgs {
     #[command(flatten)]
     target: Target,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 impl Remote for PruneArgs {
@@ -72,13 +81,17 @@ impl Remote for PruneArgs {
     }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let members = members(&self.target, connection, has_ended, NONE_HAS_ENDED).await?;
+        if !self.consent.is_given("prune", &members, progress).await? {
+            return Ok(());
+        }
         let prune = async |experiment_id| {
             let request = PruneExperimentRequest { experiment_id };
             let call = connection.call(async |client| client.prune_experiment(request).await);
             let response = call.await?;
             Ok((present(response.experiment)?, response.freed_bytes))
         };
-        let pruned = each_that(&self.target, connection, has_ended, NONE_HAS_ENDED, prune).await?;
+        let pruned = change_each(&members, prune).await;
         print_with(&self.target, pruned, progress, |bytes| {
             format!("{} of the database are free", mib(bytes))
         })
@@ -111,7 +124,8 @@ impl Remote for ArchiveArgs {
             let response = call.await?;
             Ok((present(response.experiment)?, response.log_bytes))
         };
-        let archived = each_that(&target, connection, has_ended, NONE_HAS_ENDED, archive).await?;
+        let members = members(&target, connection, has_ended, NONE_HAS_ENDED).await?;
+        let archived = change_each(&members, archive).await;
         print_with(&target, archived, progress, |bytes| match restore {
             true => "listed again".to_owned(),
             false => format!("archived; its fitness log takes {}, see swarmctl prune", mib(bytes)),
@@ -153,28 +167,25 @@ impl Remote for LabelArgs {
                 connection.call(async |client| client.label_experiment(request.clone()).await);
             present(call.await?.experiment)
         };
-        let changed = each_that(&self.target, connection, |_| true, NONE_HAS_ENDED, label).await?;
+        let members = members(&self.target, connection, |_| true, NONE_HAS_ENDED).await?;
+        let changed = change_each(&members, label).await;
         let line = |it: &Experiment| match text::labels(it) {
             labels if labels.is_empty() => format!("{}: no labels", text::title(it)),
             labels => format!("{}: {labels}", text::title(it)),
         };
-        print(&self.target, &changed, changed.iter().map(line), progress)
+        print(&self.target, changed, line, progress)
     }
 }
 
 /// Prints experiments, each with what became of so many bytes.
 fn print_with(
     target: &Target,
-    changed: Vec<(Experiment, u64)>,
+    outcome: Outcome<(Experiment, u64)>,
     progress: &mut Progress,
     what: impl Fn(u64) -> String,
 ) -> Result<(), Error> {
-    let lines: Vec<String> = changed
-        .iter()
-        .map(|(experiment, bytes)| format!("{}: {}", text::title(experiment), what(*bytes)))
-        .collect();
-    let experiments: Vec<Experiment> = changed.into_iter().map(|(it, _)| it).collect();
-    print(target, &experiments, lines.into_iter(), progress)
+    let line = |(it, bytes): &(Experiment, u64)| format!("{}: {}", text::title(it), what(*bytes));
+    print_of(target, outcome, |(it, _)| it, line, progress)
 }
 
 fn mib(bytes: u64) -> String {

@@ -182,6 +182,9 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
                 .into(),
         ));
     }
+    if matches!(&command, Command::Remote(RemoteCommand::Watch(_) | RemoteCommand::Logs(_))) {
+        progress.end_with_reader();
+    }
     let command = match command {
         // An interrupt ends these at once: they leave nothing to clean up.
         Command::Validate(args) => return validate::validate(&args.files, &mut progress),

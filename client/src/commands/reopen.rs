@@ -4,14 +4,12 @@ use clap::Args;
 use experiment_file::limits;
 use swarm_proto::v1::{ExperimentState, ExtendExperimentRequest, RetryExperimentRequest};
 
-use super::{
-    Remote,
-    control::{each_that, follow},
-};
+use super::{Remote, control::follow};
 use crate::{
     args::{Target, whole},
     connection::{Connection, present},
     error::Error,
+    group::{change_each, members},
     place::Intent,
     progress::Progress,
 };
@@ -45,8 +43,9 @@ impl Remote for ExtendArgs {
         };
         let is_completed = |state| state == ExperimentState::Completed;
         let why_none = "no experiment of group `NAME` has completed";
-        let changed = each_that(&target, connection, is_completed, why_none, extend).await?;
-        follow(&target, changed, connection, progress).await
+        let members = members(&target, connection, is_completed, why_none).await?;
+        let outcome = change_each(&members, extend).await;
+        follow(&target, outcome, connection, progress).await
     }
 }
 
@@ -73,7 +72,8 @@ impl Remote for RetryArgs {
         };
         let has_failed = |state| state == ExperimentState::Failed;
         let why_none = "no experiment of group `NAME` has failed";
-        let changed = each_that(&self.target, connection, has_failed, why_none, retry).await?;
-        follow(&self.target, changed, connection, progress).await
+        let members = members(&self.target, connection, has_failed, why_none).await?;
+        let outcome = change_each(&members, retry).await;
+        follow(&self.target, outcome, connection, progress).await
     }
 }

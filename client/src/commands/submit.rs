@@ -199,7 +199,7 @@ mod tests {
         let error = args(path.clone()).execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         let path = path.display();
-        assert_eq!(error.report().unwrap(), format!("{path}: line 1: a\n{path}: line 2: b"));
+        assert_eq!(error.report(), format!("{path}: line 1: a\n{path}: line 2: b"));
     }
 
     #[tokio::test]
@@ -212,7 +212,7 @@ mod tests {
         let error = args(path).execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         for key in ["topology", "algorithm", "world"] {
-            assert!(error.report().unwrap().contains(key), "{}", error.report().unwrap());
+            assert!(error.report().contains(key), "{}", error.report());
         }
         assert!(fake.script(|script| script.submitted.is_empty()));
     }
@@ -248,7 +248,7 @@ mod tests {
         args.experiment.sweep.seeds = Some("0..2".parse().unwrap());
         let error = args.execute(&connection, &mut progress).await.unwrap_err();
         assert_eq!(error.exit_code(), 3);
-        let report = error.report().unwrap();
+        let report = error.report();
         for part in ["1 of 3 runs", "1000 experiments", "same command again"] {
             assert!(report.contains(part), "{report}");
         }

@@ -155,13 +155,13 @@ async fn transcript_on(width: Option<usize>, script: Script, lines: &[&str]) -> 
             }
             Err(error) => {
                 let text = with_suggestions(error).to_string();
-                Err((2, Some(text.trim_end().to_owned())))
+                Err((2, text.trim_end().to_owned()))
             }
         };
         let mut section = vec![format!("$ swarmctl {line}")];
         section.extend(captured.lines());
         if let Err((code, report)) = result {
-            section.extend(report);
+            section.push(report);
             section.push(format!("[exit code {code}]"));
         }
         let section = section.join("\n").replace(connection.address(), "http://HOST:PORT");

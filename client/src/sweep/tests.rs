@@ -20,7 +20,7 @@ fn swept(more: &[&str]) -> Result<Vec<SweepRun>, Error> {
 }
 
 fn refusal(more: &[&str]) -> String {
-    swept(more).unwrap_err().report().unwrap()
+    swept(more).unwrap_err().report()
 }
 
 fn labels(runs: &[SweepRun]) -> Vec<(Option<u64>, &str)> {

@@ -107,7 +107,7 @@ async fn what_is_no_history_is_refused_in_one_line() {
         let file = csv(&dir, "a.csv", text);
         let error = run(NOWHERE, &[&file], dir.path().join("a.svg")).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        let report = error.report().unwrap();
+        let report = error.report();
         assert!(report.contains(expected) && report.lines().count() == 1, "{report}");
     }
     let error = run(NOWHERE, &["missing.csv"], dir.path().join("a.svg")).await.unwrap_err();

@@ -14,6 +14,8 @@ pub fn init(stderr: impl Fn() -> BesideBar + Send + Sync + 'static) {
         .with_ansi(false)
         .with_target(false)
         .without_time()
+        // It would panic if standard error is closed.
+        .log_internal_errors(false)
         // Of two commands in one process, the first has set it up.
         .try_init()
         .unwrap_or_default();

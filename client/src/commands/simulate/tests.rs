@@ -139,7 +139,7 @@ async fn a_trace_that_cannot_be_written_is_bad_input() {
         let error = run(NOWHERE, &SimulateArgs { trace: Some(path.clone()), ..args() }).await;
         let error = error.unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        let report = error.report().unwrap();
+        let report = error.report();
         assert!(report.starts_with(&format!("error: cannot write {}: ", path.display())));
         assert_eq!(report.lines().count(), 1);
     }
@@ -150,5 +150,5 @@ async fn a_file_with_problems_is_not_simulated() {
     let args = SimulateArgs { steps: StepsArg { steps: Some(u32::MAX) }, ..args() };
     let error = run(NOWHERE, &args).await.unwrap_err();
     assert_eq!(error.exit_code(), 2);
-    assert!(error.report().unwrap().contains("quickstart.json: algorithm.evaluation_steps: "));
+    assert!(error.report().contains("quickstart.json: algorithm.evaluation_steps: "));
 }

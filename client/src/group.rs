@@ -1,0 +1,125 @@
+//! A change of an experiment, or of each of a group: one that fails stops no other.
+
+use swarm_proto::v1::{Experiment, ExperimentState};
+
+use crate::{
+    args::{Subject, Target},
+    connection::Connection,
+    error::Error,
+    text,
+};
+
+/// What became of a change.
+#[derive(Debug)]
+pub struct Outcome<T> {
+    /// Those that were changed.
+    pub changed: Vec<T>,
+    /// Why some were not.
+    failure: Option<Error>,
+}
+
+impl<T> Outcome<T> {
+    /// The error, if not all were changed. It comes after what was changed is printed.
+    pub fn end(self) -> Result<(), Error> {
+        self.failure.map_or(Ok(()), Err)
+    }
+}
+
+/// The experiments that a change is for: one, or those of a group whose state is such.
+/// `why_none`: the error if there are none in the group NAME.
+pub async fn members(
+    target: &Target,
+    connection: &Connection,
+    applies: impl Fn(ExperimentState) -> bool,
+    why_none: &str,
+) -> Result<Vec<Experiment>, Error> {
+    let name = match &target.subject {
+        Subject::Experiment(id) => return Ok(vec![connection.experiment(*id).await?]),
+        Subject::Group(name) => name,
+    };
+    let mut members = connection.group(name).await?;
+    // Of one alone, the coordinator says what is wrong with its state.
+    if members.len() > 1 {
+        members.retain(|experiment| applies(experiment.state()));
+    }
+    match members.is_empty() {
+        true => Err(Error::NotFound(why_none.replace("NAME", name))),
+        false => Ok(members),
+    }
+}
+
+/// Changes experiments, one after the other. Only what would stop all of them ends it early.
+pub async fn change_each<T>(
+    members: &[Experiment],
+    change: impl AsyncFn(u64) -> Result<T, Error>,
+) -> Outcome<T> {
+    let (mut changed, mut lines, mut first) = (Vec::new(), Vec::new(), None);
+    for experiment in members {
+        match change(experiment.id).await {
+            Ok(result) => changed.push(result),
+            // It is said as it is, without a list.
+            Err(error) if members.len() == 1 => {
+                return Outcome { changed, failure: Some(error) };
+            }
+            Err(error) => {
+                let ends = error.concerns_all();
+                lines.push(format!("{}: {error}", text::title(experiment)));
+                first.get_or_insert(error);
+                if ends {
+                    break;
+                }
+            }
+        }
+    }
+    let failure = first.map(|first| Error::Partly {
+        n_changed: changed.len(),
+        n_all: members.len(),
+        lines: lines.join("\n"),
+        cause: Box::new(first),
+    });
+    Outcome { changed, failure }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(n: u64) -> Vec<Experiment> {
+        (1..=n).map(|id| Experiment { id, name: "a".into(), ..Experiment::default() }).collect()
+    }
+
+    #[tokio::test]
+    async fn a_run_that_cannot_be_changed_stops_no_other_and_is_named() {
+        let change = async |id| match id {
+            2 => Err(Error::NotFound("it has not completed".into())),
+            id => Ok(id),
+        };
+        let outcome = change_each(&group(3), change).await;
+        assert_eq!(outcome.changed, [1, 3]);
+        let error = outcome.end().unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        let report = error.report();
+        for part in ["2 of 3 experiments", "experiment 2 (a): it has not completed"] {
+            assert!(report.contains(part), "{report}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_coordinator_that_is_gone_is_not_asked_ten_thousand_times() {
+        let change = async |id| match id {
+            1 => Ok(id),
+            2 => Err(Error::Denied { address: "x".into(), refusal: "y".into() }),
+            _ => panic!("the second stops it"),
+        };
+        let outcome = change_each(&group(10_000), change).await;
+        assert_eq!(outcome.changed, [1]);
+        assert_eq!(outcome.end().unwrap_err().exit_code(), 7);
+    }
+
+    #[tokio::test]
+    async fn the_error_of_one_alone_is_said_as_it_is() {
+        let change = async |_| Err::<u64, _>(Error::NotFound("it has not ended".into()));
+        let error = change_each(&group(1), change).await.end().unwrap_err();
+        assert_eq!(error.report(), "error: it has not ended");
+    }
+}
