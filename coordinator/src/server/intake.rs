@@ -142,6 +142,10 @@ impl http_body::Body for Arriving {
             }
         }
     }
+
+    fn is_end_stream(&self) -> bool {
+        self.held.is_none() && self.body.is_end_stream()
+    }
 }
 
 #[cfg(test)]

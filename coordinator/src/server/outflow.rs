@@ -106,6 +106,12 @@ impl http_body::Body for Pieces {
         }
         Poll::Ready(Some(Ok(unread.piece())))
     }
+
+    /// A refusal is in the headers of an answer: clients take no frame after them.
+    fn is_end_stream(&self) -> bool {
+        let shared = lock(&self.unread);
+        shared.as_ref().is_some_and(|it| it.rest.is_empty() && it.body.is_end_stream())
+    }
 }
 
 /// Drops what nobody reads.
@@ -172,6 +178,13 @@ mod tests {
         tokio::time::sleep(WATCH_PATIENCE + Duration::from_secs(1)).await;
         assert_eq!(outflow.0.available_permits(), OUTFLOW_LEN_MAX / UNIT);
         assert_eq!(piece(&mut body).await.unwrap_err().code(), tonic::Code::Aborted);
+    }
+
+    #[test]
+    fn an_answer_without_a_message_has_no_frame() {
+        use http_body::Body as _;
+        assert!(Outflow::default().of(Body::empty()).is_end_stream());
+        assert!(!answer(&Outflow::default(), 1).is_end_stream());
     }
 
     #[tokio::test]
