@@ -38,6 +38,8 @@ pub struct Done<'a> {
     pub evolution: &'a Evolution,
     /// What it was told.
     pub told: &'a Told,
+    /// What was worth a word when evolution learnt from it.
+    pub notices: &'a [String],
     /// How long it took.
     pub duration: Duration,
     /// Threads, or whatever computes beside others.
@@ -121,7 +123,7 @@ impl LocalRun {
 
     /// Stores a generation with everything that belongs to it. Returns its row.
     pub fn commit(&mut self, done: &Done<'_>) -> Result<GenerationRecord, LocalRunError> {
-        let Done { evolution, told, duration, n_workers, completed } = *done;
+        let Done { evolution, told, notices, duration, n_workers, completed } = *done;
         let unsound = |why: String| LocalRunError::Unsound(self.id, why);
         let outcome = evolution.outcome(told).map_err(|error| unsound(error.to_string()))?;
         let means: Vec<f64> = told.trial_fitness.iter().map(|trials| mean(trials)).collect();
@@ -134,7 +136,7 @@ impl LocalRun {
             workers: n_workers,
             idle_share: 0.0,
         };
-        let mut notices = Vec::new();
+        let mut notices = notices.to_vec();
         if !told.blocks.is_empty() || !told.end.blocks.is_empty() {
             notices.extend(outcome.champion.as_ref().map(describe));
         }
@@ -153,6 +155,11 @@ impl LocalRun {
         };
         self.store.commit_generation(self.id, clock::unix_ms(), &commit)?;
         Ok(generation)
+    }
+
+    /// Ends it: no later generation could learn anything.
+    pub fn fail(&mut self, reason: &str) -> Result<(), StoreError> {
+        self.store.set_state(self.id, clock::unix_ms(), ExperimentState::Failed, reason)
     }
 }
 
@@ -196,6 +203,7 @@ mod tests {
             run.commit(&Done {
                 evolution: &evolution,
                 told: &told,
+                notices: &[],
                 duration,
                 n_workers: 1,
                 completed,
@@ -237,6 +245,20 @@ mod tests {
         drop(run);
         let run = LocalRun::open(directory.path(), file(3)).unwrap();
         assert_eq!(run.record().unwrap().state, ExperimentState::Running);
+    }
+
+    #[test]
+    fn a_run_that_failed_keeps_the_reason_and_the_next_one_begins_anew() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut run = LocalRun::open(directory.path(), file(3)).unwrap();
+        compute(&mut run, 2, 3);
+        run.fail("nothing can be learnt").unwrap();
+        let failed = run.record().unwrap();
+        assert_eq!(failed.state, ExperimentState::Failed);
+        assert_eq!(failed.reason, "nothing can be learnt");
+        drop(run);
+        let next = LocalRun::open(directory.path(), file(3)).unwrap();
+        assert_eq!((next.id(), next.evolution().unwrap().n_generations()), (ExperimentId(2), 0));
     }
 
     #[test]

@@ -85,7 +85,7 @@ pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use replay::{Outcome, Replay, Round};
 pub use setup::{Setup, SetupError};
-pub use stall::Drifted;
+pub use stall::{Drifted, Learnt};
 pub use statistics::{Statistics, between, deviation, finite_mean};
 pub use told::{End, Told};
 
@@ -160,7 +160,7 @@ pub enum EvolutionError {
         /// Index of the generation.
         generation: u64,
     },
-    /// It learns nothing, and its distribution is out of all bounds. [`Evolution::drifted`] says
+    /// It learns nothing, and its distribution is out of all bounds. [`Evolution::learn`] says
     /// so; [`Evolution::tell`] never does, so that whatever was told once can be told again.
     #[error(transparent)]
     Drifted(#[from] Drifted),

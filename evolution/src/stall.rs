@@ -4,7 +4,7 @@
 //! Nothing of it changes a bit of a run. It is what a run is told in words, and what ends one
 //! that goes on by chance alone.
 
-use super::{Evolution, GenerationSummary, algorithms::Strategy as _};
+use super::{Evolution, EvolutionError, Generation, GenerationSummary, algorithms::Strategy as _};
 
 /// How many of the latest generations told nobody apart, as far as they were told here: what
 /// is restored begins anew. It is no part of the state, so all of them are equal.
@@ -58,16 +58,53 @@ pub struct Drifted {
     pub deviation: f64,
 }
 
+/// What came of a generation of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learnt {
+    /// Its fitness in short.
+    pub summary: GenerationSummary,
+    /// What is worth a word.
+    pub notices: Vec<String>,
+    /// Why it is the last one, if it is; empty: all are done.
+    pub completed: Option<String>,
+}
+
 impl Evolution {
+    /// Learns from a generation as [`tell`](Self::tell) does, for whoever computes a run: with
+    /// what is worth a word, and an error where the run should end because nothing can be learnt
+    /// any more; evolution is of no use after it. `completion`: why the generation is the last one.
+    pub fn learn(
+        &mut self,
+        generation: Generation,
+        trial_fitness: &[Vec<f64>],
+        completion: impl FnOnce(&GenerationSummary) -> Option<String>,
+    ) -> Result<Learnt, EvolutionError> {
+        let widest_before = self.widest();
+        let summary = self.tell(generation, trial_fitness)?;
+        if let Some(drifted) = self.drifted(&summary) {
+            return Err(drifted.into());
+        }
+        let mut notices = Vec::new();
+        if summary.n_non_finite > 0 {
+            notices.push(format!(
+                "generation {}: the fitness of {} individuals is not finite; they rank last",
+                summary.generation, summary.n_non_finite
+            ));
+        }
+        let completed = completion(&summary);
+        notices.extend(self.remarks(widest_before, &summary, completed.is_some()));
+        Ok(Learnt { summary, notices, completed })
+    }
+
     /// The largest of the genes' standard deviations in distributions; none without one.
-    pub fn widest(&self) -> Option<f64> {
+    pub(crate) fn widest(&self) -> Option<f64> {
         let of_each = self.populations.iter().filter_map(|it| it.deviations());
         of_each.flatten().reduce(f64::max)
     }
 
     /// What is worth a word after a generation. `widest_before`: [`widest`](Self::widest) before
     /// it; `is_last`: whether it is the last one of the run.
-    pub fn remarks(
+    pub(crate) fn remarks(
         &self,
         widest_before: Option<f64>,
         summary: &GenerationSummary,
@@ -110,7 +147,7 @@ impl Evolution {
     }
 
     /// Why a run should end that learns nothing; none if it may go on.
-    pub fn drifted(&self, summary: &GenerationSummary) -> Option<Drifted> {
+    pub(crate) fn drifted(&self, summary: &GenerationSummary) -> Option<Drifted> {
         let n_generations = summary.n_flat;
         let deviation = self.widest().filter(|&it| it > DEVIATION_MAX)?;
         let fitness = summary.statistics.best.get();

@@ -1,5 +1,6 @@
 //! Errors of Rust as exceptions; their classes are in `swarmevo/errors.py`.
 
+use evolution::EvolutionError;
 use experiment_file::ConfigError;
 use pyo3::{call::PyCallArgs, exceptions::PyValueError, prelude::*};
 use sim_core::EvaluateError;
@@ -19,6 +20,11 @@ pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
     let problems = error.problems.iter();
     let problems = problems.map(|it| (it.path.as_str(), it.line, it.message.as_str()));
     exception(py, "ExperimentError", (problems.collect::<Vec<_>>(),))
+}
+
+/// A generation of which nothing can be learnt: `EvolutionError`.
+pub fn evolution_error(py: Python<'_>, error: &EvolutionError) -> PyErr {
+    exception(py, "EvolutionError", (error.to_string(),))
 }
 
 /// A request that is refused: `FleetError`, or one of its kinds, with the name of the status.

@@ -1,6 +1,9 @@
 //! The algorithms, as ask and tell.
 
-use evolution::{ALGORITHMS, Champion, ChampionSource, Generation, Setup, SetupError};
+use coordinator::local::completion;
+use evolution::{
+    ALGORITHMS, Champion, ChampionSource, EvolutionError, Generation, Learnt, Setup, SetupError,
+};
 use experiment_file::{
     AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, ExperimentConfig, Parameter,
     ParameterValue,
@@ -13,7 +16,7 @@ use pyo3::{
 };
 use sim_core::{FINGERPRINT, Simulation, TrialSet};
 
-use crate::{memory, running::Shared};
+use crate::{errors::evolution_error, experiment::Experiment, memory, running::Shared};
 
 /// Arrays as long as a genotype that any algorithm keeps, and those per individual while a
 /// generation is drawn and handed over: upper bounds.
@@ -23,6 +26,15 @@ const DRAWN_PER_GENE: u128 = 4;
 /// An evolution between two generations.
 #[pyclass(frozen, module = "swarmevo._core")]
 pub struct Evolution(Shared<State>);
+
+/// A generation: index, best, mean, min, standard deviation, number of those not finite.
+type Summary = (u64, f64, f64, f64, f64, usize);
+
+/// Why evolution did not learn from a generation.
+enum NotTold {
+    Rows(String),
+    Evolution(EvolutionError),
+}
 
 #[derive(Clone)]
 struct State {
@@ -80,33 +92,37 @@ impl Evolution {
         Ok(PyArray2::from_vec2(py, &genotypes)?)
     }
 
-    /// Learns from the fitness of the generation that was asked for, `[P, T]`. Returns the
-    /// index of the generation, best, mean, min, standard deviation and the number of those that
-    /// are not finite.
+    /// Learns from the fitness of the generation that was asked for, `[P, T]`; if it cannot, it
+    /// stays as it was. `experiment`: the one that it is a run of. Returns the index of the
+    /// generation, best, mean, min, standard deviation, the number of those that are not finite,
+    /// what is worth a word, and why the generation is the last one of the run.
+    #[pyo3(signature = (fitness, experiment=None))]
     fn tell(
         &self,
         py: Python<'_>,
         fitness: PyReadonlyArray2<'_, f64>,
-    ) -> PyResult<(u64, f64, f64, f64, f64, usize)> {
+        experiment: Option<&Experiment>,
+    ) -> PyResult<(Summary, Vec<String>, Option<String>)> {
         let fitness = rows(&fitness);
-        let summary = self.0.with(py, |state| {
-            let asked = state.asked.take().unwrap_or_else(|| state.evolution.ask());
-            if let Err(problem) = check_rows(&fitness, asked.genotypes.len()) {
-                state.asked = Some(asked);
-                return Err(problem);
-            }
-            let kept = asked.clone();
-            let told = state.evolution.tell(asked, &fitness);
-            told.map_err(|error| {
-                state.asked = Some(kept);
-                error.to_string()
-            })
+        let learnt = self.0.with(py, |state| {
+            let asked = state.asked.get_or_insert_with(|| state.evolution.ask());
+            check_rows(&fitness, asked.genotypes.len()).map_err(NotTold::Rows)?;
+            let mut after = state.evolution.clone();
+            let completion = |it: &_| experiment.and_then(|run| completion(run.config(), it));
+            let learnt = after.learn(asked.clone(), &fitness, completion);
+            let learnt = learnt.map_err(NotTold::Evolution)?;
+            *state = State { evolution: after, asked: None };
+            Ok(learnt)
         })?;
-        let summary = summary.map_err(PyValueError::new_err)?;
+        let Learnt { summary, notices, completed } = learnt.map_err(|error| match error {
+            NotTold::Rows(problem) => PyValueError::new_err(problem),
+            NotTold::Evolution(error) => evolution_error(py, &error),
+        })?;
         let of = &summary.statistics;
         let numbers = [of.best, of.mean, of.min, of.standard_deviation];
         let [best, mean, min, deviation] = numbers.map(f64::from);
-        Ok((summary.generation, best, mean, min, deviation, summary.n_non_finite))
+        let row = (summary.generation, best, mean, min, deviation, summary.n_non_finite);
+        Ok((row, notices, completed))
     }
 
     #[getter]
@@ -316,6 +332,12 @@ fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<Algorithm
         params.set(&key, value);
     }
     Ok(params)
+}
+
+/// What speaks against a population of this size, if anything does.
+#[pyfunction]
+pub fn advice(algorithm: &str, population_size: u32) -> Option<String> {
+    AlgorithmDescription::find(ALGORITHMS, algorithm)?.advice(population_size)
 }
 
 /// The algorithms: name, title, and of each parameter key, what it may be, default and

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use coordinator::local::completion;
 use evolution::{ALGORITHMS, Digest};
 use experiment_file::{ExperimentConfig, ScriptConfig};
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
@@ -95,12 +94,6 @@ impl Experiment {
         self.text()
     }
 
-    /// Why its evolution is over after so many generations, the latest with this mean fitness;
-    /// none if it is not, empty if all generations are done.
-    fn completion(&self, n_generations: u64, mean: f64) -> Option<String> {
-        completion(&self.config, n_generations, mean)
-    }
-
     /// Fitness of P genotypes in T trials, flat: `[P * T]`.
     fn evaluate<'py>(
         &self,
@@ -187,6 +180,10 @@ impl Experiment {
 }
 
 impl Experiment {
+    pub fn config(&self) -> &ExperimentConfig {
+        &self.config
+    }
+
     /// The file with all defaults, as JSON.
     pub fn text(&self) -> String {
         self.config.to_canonical_json()

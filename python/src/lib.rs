@@ -23,7 +23,7 @@ mod _core {
     #[pymodule_export]
     use crate::{
         database::Database,
-        evolution::{Evolution, Reevaluation, algorithms},
+        evolution::{Evolution, Reevaluation, advice, algorithms},
         experiment::{Experiment, inline_script, script_path},
         fitness_log::fitness_log,
         genes::encode_genes,

@@ -72,7 +72,8 @@ impl Record {
     }
 
     /// Stores a generation: evolution after it, its fitness, that of the blocks of the
-    /// comparison that was due, of the one that was only the end's, and of the judgement.
+    /// comparison that was due, of the one that was only the end's, and of the judgement, and
+    /// what is worth a word.
     #[expect(clippy::too_many_arguments, reason = "they are one generation")]
     fn commit(
         &self,
@@ -82,6 +83,7 @@ impl Record {
         blocks: Blocks<'_>,
         end_blocks: Blocks<'_>,
         judgement: Option<PyReadonlyArray2<'_, f64>>,
+        notices: Vec<String>,
         seconds: f64,
         n_workers: u64,
         completed: Option<String>,
@@ -100,9 +102,15 @@ impl Record {
         }
         self.ask(py, move |run| {
             let completed = completed.as_deref();
-            let done = Done { evolution: &evolution, told: &told, duration, n_workers, completed };
+            let (evolution, told, notices) = (&evolution, &told, &notices[..]);
+            let done = Done { evolution, told, notices, duration, n_workers, completed };
             run.commit(&done).map(|_| ())
         })
+    }
+
+    /// Ends the experiment, which has failed.
+    fn fail(&self, py: Python<'_>, reason: String) -> PyResult<()> {
+        self.ask(py, move |run| Ok(run.fail(&reason)?))
     }
 
     /// Lets others into the directory.

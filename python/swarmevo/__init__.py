@@ -12,7 +12,19 @@ from ._core import VERSION as __version__
 from .champion import Champion, Judged, Origin, Selection
 from .environment import parallel_env
 from .episodes import Actions, Episodes
-from .errors import ExperimentError, FleetError, ForkError, InternalError, NotFound, OtherExperimentError, Problem, RefusedArgument, SwarmError
+from .errors import (
+    EvolutionError,
+    EvolutionWarning,
+    ExperimentError,
+    FleetError,
+    ForkError,
+    InternalError,
+    NotFound,
+    OtherExperimentError,
+    Problem,
+    RefusedArgument,
+    SwarmError,
+)
 from .evolution import (
     CMAES,
     GA,
@@ -37,7 +49,8 @@ from .trials import TrialSet
 from .workers import Workers, workers
 
 __all__ = [
-    "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "Experiment", "ExperimentError",
+    "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "EvolutionError",
+    "EvolutionWarning", "Experiment", "ExperimentError",
     "FINGERPRINT", "FleetError", "FleetRun", "ForkError", "GA", "Generation", "Individuals", "InternalError",
     "Interrupted", "Judged", "LocalRun", "Measured", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",

@@ -48,6 +48,16 @@ class OtherExperimentError(SwarmError, ValueError):
         return f"{self.reason}. {self.args[1]}"
 
 
+class EvolutionError(SwarmError, ValueError):
+    """Evolution can learn nothing from a generation, or from any later one: no fitness is finite, or all have been the
+    same for a hundred generations while chance has driven the distribution out of all bounds."""
+
+
+class EvolutionWarning(UserWarning):
+    """Evolution learns nothing, or less than it could: what a coordinator has as notices of a run, and ``swarmctl``
+    as warnings of a file."""
+
+
 class InternalError(SwarmError, RuntimeError):
     """The simulator has panicked: a bug of it, or a state of an evolution that was edited."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from dataclasses import dataclass
 from typing import Any, Callable, ClassVar, NamedTuple
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments
 from .champion import Champion, Origin
+from .errors import EvolutionWarning
 from .generations import Generation
 from .trials import TrialSet
 
@@ -47,7 +49,7 @@ class Evolution:
         self, n_genes: int, *, population_size: int = 20, seed: int = 0, **params: float | str
     ) -> None:
         """``n_genes``: d, at least 1. ``params``: as in experiment files; ``docs/algorithms.md``
-        and :func:`algorithms` list them."""
+        and :func:`algorithms` list them. Warns (``EvolutionWarning``) of a population that teaches nothing."""
         if type(self) is Evolution:
             raise TypeError("use the class of an algorithm, such as SNES, or Experiment.evolution")
         n_genes = arguments.whole(n_genes, "n_genes", 0, arguments.SIZE_MAX)
@@ -58,6 +60,9 @@ class Evolution:
             self._core = _core.Evolution(self.algorithm, n_genes, population_size, seed, given)
         except ValueError as error:
             raise ValueError(_with_hints(str(error), self.algorithm, given)) from None
+        advice = _core.advice(self.algorithm, population_size)
+        if advice is not None:
+            warnings.warn(f"population_size: {advice}", EvolutionWarning, stacklevel=2)
         self._trials = (CHAMPION_TRIALS, JUDGEMENT_TRIALS)
         self._origin: Origin | None = None
 
@@ -80,15 +85,26 @@ class Evolution:
 
     def tell(self, fitness: ArrayLike) -> Generation:
         """Learns from the fitness of the genotypes that :meth:`ask` gave: ``[P]``, or
-        ``[P, T]`` for T trials of each, whose mean counts. Raises ValueError if none is
-        finite."""
+        ``[P, T]`` for T trials of each, whose mean counts. Warns (``EvolutionWarning``) of what a
+        coordinator would have as a notice: fitness that is not finite, or the same for everybody
+        in ten generations, and distributions that are a point or far wider than the genes' range.
+        Raises ``EvolutionError``, a ValueError, and stays as it is, where a coordinator's run fails:
+        if no fitness is finite, or nothing can be learnt any more."""
+        told = self._tell(fitness)
+        for notice in told.notices:
+            warnings.warn(notice, EvolutionWarning, stacklevel=2)
+        return told.generation
+
+    def _tell(self, fitness: ArrayLike, experiment: _core.Experiment | None = None) -> Told:
+        """``experiment``: the one that it is a run of."""
         values = arguments.numbers(fitness, "fitness")
         if values.ndim == 1:
             values = values[:, np.newaxis]
         if values.ndim != 2:
             raise ValueError(f"fitness is an array [P] or [P, T], not {list(values.shape)}")
-        index, best, mean, least, deviation, n_non_finite = self._core.tell(values)
-        return Generation(index, best, mean, least, n_non_finite, self.digest, deviation)
+        row, notices, completed = self._core.tell(values, experiment)
+        index, best, mean, least, deviation, n_non_finite = row
+        return Told(Generation(index, best, mean, least, n_non_finite, self.digest, deviation), notices, completed)
 
     def compare(self, evaluate: Evaluate, trials: int | None = None) -> Champion:
         """Compares the candidates for the champion on held-out trials, and makes the winner the champion: the
@@ -182,6 +198,16 @@ class Evolution:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} after {self.n_generations} generations>"
+
+
+class Told(NamedTuple):
+    """What came of a generation."""
+
+    generation: Generation
+    notices: list[str]
+    """What is worth a word."""
+    completed: str | None
+    """Why it is the last one of a run, if it is; empty: all are done."""
 
 
 class Judgement(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from . import _core, arguments
 from .champion import Champion, Genes, Origin
 from .episodes import Episodes
-from .errors import OtherExperimentError
+from .errors import EvolutionWarning, OtherExperimentError
 from .network import Network
 from .trace import Trace
 from .trials import AnyTrialSet, address
@@ -175,7 +176,8 @@ class Experiment:
 
     @property
     def warnings(self) -> list[str]:
-        """Keys of the file that were accepted and ignored."""
+        """What ``swarmctl validate`` warns of: keys of the file that were accepted and ignored, and a population that
+        teaches nothing."""
         return self._core.warnings
 
     def evaluate(
@@ -295,7 +297,16 @@ class Experiment:
 
     def evolution(self) -> Evolution:
         """The experiment's evolution before its first generation, the same as a
-        coordinator's: the same genotypes for the same fitness, and the same digests."""
+        coordinator's: the same genotypes for the same fitness, and the same digests. Warns
+        (``EvolutionWarning``) of what :attr:`warnings` has."""
+        self._warn(3)
+        return self._evolution()
+
+    def _warn(self, stacklevel: int) -> None:
+        for warning in self.warnings:
+            warnings.warn(warning, EvolutionWarning, stacklevel=stacklevel)
+
+    def _evolution(self) -> Evolution:
         from .evolution import Evolution
 
         settings = self._config["algorithm"]

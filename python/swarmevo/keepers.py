@@ -47,6 +47,8 @@ class Done(NamedTuple):
     """Fitness of the blocks of the comparison that was due; none if it was not."""
     judgement: Judgement | None
     """If it was the last one."""
+    notices: list[str]
+    """What is worth a word."""
     seconds: float
     n_workers: int
     completed: str | None
@@ -62,13 +64,16 @@ class Keeper:
     """If the run has completed before."""
 
     def __init__(self, experiment: Experiment) -> None:
-        self.evolution: Evolution = experiment.evolution()
+        self.evolution: Evolution = experiment._evolution()
         """After the generations that are done."""
         self.generations: list[Generation] = []
         """Those."""
 
     def commit(self, done: Done) -> None:
         """Keeps a generation."""
+
+    def fail(self, reason: str) -> None:
+        """Keeps that the next generation cannot be learnt from."""
 
     def close(self) -> None:
         """Keeps what is to be kept, and lets others use it."""
@@ -81,7 +86,7 @@ class InDatabase(Keeper):
         self._record = _core.Record(directory, experiment._core)
         try:
             self.id, is_over, digest = self._record.state()
-            empty = experiment.evolution()
+            empty = experiment._evolution()
             self.evolution = Evolution._of(self._record.evolution(), empty._trials, empty._origin)
             self.generations = [
                 Generation(index, best, mean, least, None, link, deviation, duration_ms)
@@ -102,10 +107,14 @@ class InDatabase(Keeper):
             done.blocks,
             [] if judgement is None else judgement.blocks,
             None if judgement is None else judgement.fitness,
+            done.notices,
             done.seconds,
             done.n_workers,
             done.completed,
         )
+
+    def fail(self, reason: str) -> None:
+        self._record.fail(reason)
 
     def close(self) -> None:
         self._record.close()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Callable
 
 from . import arguments
 from .champion import Champion
+from .errors import EvolutionError, EvolutionWarning
 from .evolution import Evaluate, Evolution, Floats, compute
 from .experiment import Experiment, thread_count
 from .generations import Generation, table
@@ -96,16 +98,20 @@ def evolve(
     ``callback``: called with every :class:`Generation` that is complete (and kept), and with a copy of evolution
     after it. What it raises ends the run, unchanged.
 
+    Warnings of the experiment, and what a coordinator would have as notices because evolution learns nothing, are an
+    ``EvolutionWarning``. Where a coordinator's run fails for that reason, this one ends with the same words in an
+    ``EvolutionError``, a ValueError; ``data_dir`` keeps the generations before. Its database has the failure, too,
+    and the same call begins another run there, as ``swarmctl run`` does.
+
     Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all that is complete; within a second
     where the experiment itself computes fitness.
 
     ``evaluate``: computes fitness instead of the experiment's own :meth:`~Experiment.evaluate`:
     ``f(genotypes, trial_set, n_trials)`` returns an array ``[P, T]`` of T = ``n_trials``, of any type of numbers
     (NumPy, JAX, PyTorch, lists, tuples), or ``[P]`` if trials do not matter, which counts as one trial. Anything
-    else is a ValueError at once. A fitness that is not finite ranks last; a generation without a finite one is a
-    ValueError. What ``evaluate`` raises ends the run, unchanged. ``data_dir`` keeps such a run in a file of its own,
-    ``NAME-DIGEST.evolve.json``: no coordinator could go on with it. It is for one function: another one, which may
-    be the same with changes, needs another directory.
+    else is a ValueError at once. A fitness that is not finite ranks last. What ``evaluate`` raises ends the run,
+    unchanged. ``data_dir`` keeps such a run in a file of its own, ``NAME-DIGEST.evolve.json``: no coordinator could
+    go on with it. It is for one function: another one, which may be the same with changes, needs another directory.
     """
     if not isinstance(experiment, Experiment):
         raise ValueError(f"evolve takes an Experiment, such as Experiment.from_file gives, not {type(experiment).__name__}")
@@ -114,6 +120,7 @@ def evolve(
     if generations is not None:
         experiment = experiment.replace(generations=generations)
     n_threads = thread_count(threads)
+    experiment._warn(3)
 
     def here(genotypes: Floats, trial_set: TrialSet, n_trials: int) -> Floats:
         return experiment.evaluate(genotypes, trial_set, trials=n_trials, threads=threads)
@@ -127,7 +134,8 @@ def evolve(
         try:
             todo = iter(run.step, False)
             for _ in shown(todo, experiment.name, progress, experiment.generations, len(run.done)):
-                pass
+                for notice in run.notices:
+                    warnings.warn(notice, EvolutionWarning, stacklevel=2)
         except KeyboardInterrupt:
             if not run.done:
                 raise
@@ -147,6 +155,8 @@ class _Run:
         self._settings = experiment.to_dict()["algorithm"]
         self._evolution, self.done = keeper.evolution, list(keeper.generations)
         self._end = keeper.end
+        self.notices: list[str] = []
+        """Of the latest generation."""
 
     def step(self) -> bool:
         """One generation, unless the run is over; whether there was one."""
@@ -156,14 +166,17 @@ class _Run:
         n_trials = self._experiment.n_trials
         fitness = compute(self._evaluate, self._evolution.ask(), TrialSet.of(self._evolution.n_generations), n_trials)
         after = self._evolution.copy()
-        told = after.tell(fitness)
+        try:
+            told, self.notices, completed = after._tell(fitness, self._experiment._core)
+        except EvolutionError as error:
+            self._keeper.fail(str(error))
+            raise
         is_due = after.n_generations % self._settings["champion_every"] == 0
         blocks = after._compare(self._evaluate, self._settings["champion_trials"]) if is_due else []
-        completed = self._experiment._core.completion(after.n_generations, told.mean)
         judgement = None if completed is None else after._judge(self._evaluate, self._settings["judgement_trials"])
         seconds = time.monotonic() - started
         generation = told._timed(seconds, fitness.size, self._n_threads)
-        kept = Done(generation, after, fitness, blocks, judgement, seconds, self._n_threads, completed)
+        kept = Done(generation, after, fitness, blocks, judgement, self.notices, seconds, self._n_threads, completed)
         self._keeper.commit(kept)
         self._evolution = after
         self.done.append(generation)

@@ -81,3 +81,28 @@ def test_an_environment_is_the_experiment(quickstart):
         total += rewards["robot_0"]
     assert not any(terminations.values()) and all(truncations.values())
     assert infos["robot_3"]["fitness"] == fitness.max() > 0 and total > 0
+
+
+def test_traces_and_episodes_show_what_a_script_senses():
+    config = swarmevo.Experiment.from_file(CONFIGS / "tasks" / "scent.json").to_dict()
+    config["algorithm"]["evaluation_steps"] = 20
+    experiment = swarmevo.Experiment.from_dict(config)
+    genotype = np.random.default_rng(5).random(experiment.n_genes)
+    trace = experiment.simulate(genotype, 2)
+    assert trace.stimulus_names == ["scent_0", "scent_1"]
+    columns = trace.columns()
+    assert np.array_equal(columns["stimulus_scent_1"], trace.stimuli[..., 1].ravel())
+    episodes = experiment.episodes(2)
+    episodes.load(genotype)
+    for step in range(experiment.n_steps):
+        assert np.array_equal(episodes.stimuli, trace.stimuli[:, step])
+        episodes.step(episodes.decide())
+    assert episodes.is_over and np.array_equal(episodes.fitness, trace.fitness)
+    # The scent, as the script has it: by the place of the antennae, with noise of 0.01.
+    before, headings = trace.positions[:, :-1], trace.headings[:, :-1]
+    for i, side in enumerate((0.8, -0.8)):
+        tip = before + 15 * np.stack([np.cos(headings + side), np.sin(headings + side)], axis=-1)
+        away = (tip - trace.areas[:, np.newaxis] + 200) % 400 - 200
+        expected = np.exp(-np.hypot(away[..., 0], away[..., 1]) / 80)
+        error = trace.stimuli[:, 1:, :, i] - expected
+        assert np.abs(error).max() < 0.06 and 0.005 < error.std() < 0.02

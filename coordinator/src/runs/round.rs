@@ -9,8 +9,8 @@ use sim_core::TrialSet;
 
 use crate::{engine::EvaluatedBatch, store::GenerationRecord};
 use evolution::{
-    Champion, ChampionSource, End, Evolution, EvolutionError, Judgement, Population, Reevaluation,
-    Told,
+    Champion, ChampionSource, End, Evolution, EvolutionError, GenerationSummary, Judgement, Learnt,
+    Population, Reevaluation, Told,
 };
 
 /// A batch that the fleet evaluates, and what it is for.
@@ -207,11 +207,8 @@ fn learn(
     generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
 ) -> Result<UpdatedEvolution, EvolutionError> {
-    let widest_before = evolution.widest();
-    let summary = evolution.tell(generation, &evaluated.values)?;
-    if let Some(drifted) = evolution.drifted(&summary) {
-        return Err(drifted.into());
-    }
+    let learnt = evolution.learn(generation, &evaluated.values, |it| completion(config, it))?;
+    let Learnt { summary, notices: remarks, completed } = learnt;
     let generation = GenerationRecord {
         generation: summary.generation,
         statistics: summary.statistics,
@@ -221,23 +218,15 @@ fn learn(
         workers: evaluated.n_workers as u64,
         idle_share: evaluated.idle_share,
     };
-    let mut notices = evaluated.notices.clone();
-    if summary.n_non_finite > 0 {
-        notices.push(format!(
-            "generation {}: the fitness of {} individuals is not finite; they rank last",
-            summary.generation, summary.n_non_finite
-        ));
-    }
-    let completed = completion(config, evolution.n_generations(), summary.statistics.mean.get());
-    notices.extend(evolution.remarks(widest_before, &summary, completed.is_some()));
+    let notices = [evaluated.notices.clone(), remarks].concat();
     let told = Told::of(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 
-/// Why evolution is over after so many generations, the latest with this mean fitness, if it is;
-/// empty: all generations are done.
-pub fn completion(config: &ExperimentConfig, n_generations: u64, mean: f64) -> Option<String> {
+/// Why a run is over after a generation, if it is; empty: all generations are done.
+pub fn completion(config: &ExperimentConfig, summary: &GenerationSummary) -> Option<String> {
     let algorithm = &config.algorithm;
+    let (n_generations, mean) = (summary.generation + 1, summary.statistics.mean.get());
     if algorithm.target_fitness.is_some_and(|target| mean >= target) {
         return Some(format!("the mean fitness {mean} has reached the target"));
     }
