@@ -8,7 +8,7 @@ use std::{
     str::FromStr,
 };
 
-use clap::{Args as ClapArgs, Parser, ValueEnum};
+use clap::{ArgAction, Args as ClapArgs, Parser, ValueEnum};
 use clap_complete::ArgValueCompleter;
 use coordinator::{group, labels};
 use experiment_file::limits;
@@ -16,12 +16,13 @@ use sim_core::Isa;
 use swarm_telemetry::VERSION;
 
 use crate::{
-    commands::Command, complete, experiment_file::Overrides, settings::Settings, sweep::SweepArgs,
+    commands::Command, complete, experiment_file::Overrides, help::WIDTH_MAX, settings::Settings,
+    sweep::SweepArgs,
 };
 
 /// Evolves controllers for swarms of robots.
 #[derive(Debug, Parser)]
-#[command(name = "swarmctl", version = VERSION, after_help = HELP, max_term_width = 100)]
+#[command(name = "swarmctl", version = VERSION, max_term_width = WIDTH_MAX)]
 pub struct Args {
     /// Format of standard output.
     #[arg(
@@ -37,6 +38,10 @@ pub struct Args {
     /// Say more while experiments are followed: digests of generations, and what is optimistic.
     #[arg(long, short, global = true)]
     pub verbose: bool,
+    /// Print help with all options, also those that say where experiments are: --data-dir,
+    /// --coordinator, tokens and certificates.
+    #[arg(long, global = true, action = ArgAction::HelpLong)]
+    pub help_all: Option<bool>,
     #[command(flatten)]
     pub settings: Settings,
     /// The command.
@@ -60,15 +65,17 @@ pub enum OutputFormat {
 }
 
 /// Below the list of commands.
-const HELP: &str = "\
+pub const EXAMPLES: &str = "\
 Examples:
   swarmctl validate experiments/*.json
   swarmctl run experiment.json --generations 20
   swarmctl submit experiment.json --seed 7 --watch
   swarmctl explain 3
   swarmctl history 3 --output csv > history.csv
-  swarmctl champion 3 > champion.json
+  swarmctl champion 3 > champion.json";
 
+/// Below the examples, on the long page.
+pub const MORE: &str = "\
 The connection to the coordinator is configured by the options, else by their
 environment variables, else by the settings file. SWARM_CONFIG names that file;
 the default is ~/.config/swarmevo/config.json. For example:

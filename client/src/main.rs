@@ -17,6 +17,7 @@ mod fake_coordinator;
 mod figure;
 mod genotypes;
 mod group;
+mod help;
 mod interrupt;
 mod json;
 mod place;
@@ -37,7 +38,7 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{CommandFactory as _, Parser as _};
+use clap::{CommandFactory as _, FromArgMatches as _};
 use clap_complete::CompleteEnv;
 use swarm_telemetry::{block_on, escape_lines, runtime};
 
@@ -46,7 +47,8 @@ use crate::{args::Args, progress::Progress, synonyms::with_suggestions};
 fn main() -> ExitCode {
     // Answers a shell that asks what a command line may become, and ends then.
     CompleteEnv::with_factory(Args::command).complete();
-    let args = Args::try_parse().unwrap_or_else(|error| with_suggestions(error).exit());
+    let args = help::matches().and_then(|matches| Args::from_arg_matches(&matches));
+    let args = args.unwrap_or_else(|error| with_suggestions(error).exit());
     let result = match runtime(0) {
         Ok(runtime) => {
             let progress = Progress::new(args.output).with_details(args.verbose);

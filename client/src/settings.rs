@@ -10,7 +10,7 @@ use clap::{Args as ClapArgs, ValueHint};
 use serde::Deserialize;
 use swarm_transport::{CredentialArgs, Credentials};
 
-use crate::error::Error;
+use crate::{error::Error, help::CONNECTION};
 
 /// The coordinator's default address.
 pub const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
@@ -25,7 +25,7 @@ const FILE: &str = "swarmevo/config.json";
 
 /// Address of the coordinator and credentials, as far as they have been set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
-#[command(next_help_heading = "Where experiments are")]
+#[command(next_help_heading = CONNECTION)]
 pub struct Settings {
     /// Address of the coordinator to ask [default: http://127.0.0.1:7700]
     #[arg(

@@ -12,6 +12,7 @@ use super::*;
 use crate::{
     clock,
     fake_coordinator::{FakeCoordinator, Script, state},
+    help,
     progress::tests::Captured,
     synonyms::with_suggestions,
 };
@@ -188,7 +189,8 @@ fn the_manual() {
     swarmctl.build();
     let shown = swarmctl.get_subcommands().filter(|command| !command.is_hide_set());
     let names: Vec<String> = shown.map(|command| command.get_name().to_owned()).collect();
-    let mut pages = vec![swarmctl.render_long_help().to_string()];
+    let first = ["swarmctl --help-all", "swarmctl list -h", "swarmctl doctor -h"];
+    let mut pages: Vec<String> = first.map(|line| help::tests::printed(line, 80)).into();
     for name in names.iter().filter(|name| *name != "help") {
         let command = swarmctl.find_subcommand(name).unwrap();
         pages.push(page(command));
