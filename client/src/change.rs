@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use clap::Args;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -48,6 +49,25 @@ impl From<u64> for Json {
     }
 }
 
+/// Most combinations of the values of one option.
+const COMBINATIONS_MAX: usize = 1000;
+
+/// `--set`, in all commands.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SetArg {
+    /// Change values of the experiment file: `,` separates values to try, `;` changes.
+    ///
+    /// A path is a place in the file as messages name it, such as
+    /// world.objects.robot.num_instances; a value is JSON, or text. `;` separates changes of one
+    /// option, `,` the values of one change; within quotes, lists and objects they separate
+    /// nothing. With several values, `run` and `submit` make a group of runs, `evaluate` several
+    /// conditions, one of each combination; `fork` and `replay` take one value of each path. The
+    /// option may be given several times: `evaluate` adds a condition for each, the other commands
+    /// take all of them together.
+    #[arg(long, value_name = "PATH=VALUE[,...][;...]")]
+    pub set: Vec<String>,
+}
+
 /// A path in an experiment file and the value to put there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
@@ -63,21 +83,44 @@ impl Change {
         Self { path, value }
     }
 
-    /// Reads `PATH=VALUE; PATH=VALUE...`.
-    pub fn parse_all(text: &str) -> Result<Vec<Self>, String> {
-        let parse = |change: &str| {
-            let (path, value) = path_and_value(change)?;
-            Ok(Self::new(path.to_owned(), Json::parse(value)))
+    /// Reads `PATH=VALUE,VALUE...; PATH=VALUE...`: for each path a change per value. Separators
+    /// within quotes, lists and objects do not separate.
+    pub fn parse_axes(text: &str) -> Result<Vec<Vec<Self>>, String> {
+        let axis = |text: &str| {
+            let (path, values) = path_and_value(text)?;
+            let value = |value: &str| Self::new(path.to_owned(), Json::parse(value.trim()));
+            Ok(split(values, ',').into_iter().map(value).collect())
         };
-        split(text, ';').into_iter().map(parse).collect()
+        split(text, ';').into_iter().map(axis).collect()
     }
 
-    /// Reads `PATH=VALUE,VALUE...`: a change for each value. Commas within quotes, lists
-    /// and objects do not separate.
-    pub fn parse_variants(text: &str) -> Result<Vec<Self>, String> {
-        let (path, values) = path_and_value(text)?;
-        let value = |value: &str| Self::new(path.to_owned(), Json::parse(value.trim()));
-        Ok(split(values, ',').into_iter().map(value).collect())
+    /// Reads the same where every path has one value.
+    pub fn parse_all(text: &str) -> Result<Vec<Self>, String> {
+        let one = |axis: Vec<Self>| match <[Self; 1]>::try_from(axis) {
+            Ok([change]) => Ok(change),
+            Err(axis) => Err(format!(
+                "{}: takes one value here, and commas separate {}; put a text with commas in \
+                 double quotes, numbers in [ ]",
+                axis[0].path,
+                axis.len()
+            )),
+        };
+        Self::parse_axes(text)?.into_iter().map(one).collect()
+    }
+
+    /// Reads the same: the changes for each combination of values.
+    pub fn parse_combinations(text: &str) -> Result<Vec<Vec<Self>>, String> {
+        let axes = Self::parse_axes(text)?;
+        let count = axes.iter().map(Vec::len).fold(1, usize::saturating_mul);
+        if count > COMBINATIONS_MAX {
+            return Err(format!("these are more than {COMBINATIONS_MAX} combinations of values"));
+        }
+        Ok(axes.iter().fold(vec![Vec::new()], |all, axis| {
+            let with = |changes: &Vec<Self>, change: &Self| {
+                changes.iter().chain([change]).cloned().collect()
+            };
+            all.iter().flat_map(|it| axis.iter().map(move |change| with(it, change))).collect()
+        }))
     }
 
     /// Sets the value at its path; missing objects on the path are created.
@@ -195,14 +238,30 @@ mod tests {
     }
 
     #[test]
-    fn variants_are_values_of_one_path() {
-        let variants = |text| -> Vec<String> {
-            let variants = Change::parse_variants(text).unwrap();
-            variants.iter().map(ToString::to_string).collect()
+    fn commas_separate_values_and_semicolons_changes() {
+        let combinations = |text| -> Vec<String> {
+            let all = Change::parse_combinations(text).unwrap();
+            let name = |changes: &Vec<Change>| {
+                changes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+            };
+            all.iter().map(name).collect()
         };
-        assert_eq!(variants("a.b=1, 2.5"), ["a.b=1", "a.b=2.5"]);
-        assert_eq!(variants(r#"a=x,[1,2],{"c":[3,4]}"#), ["a=x", "a=[1,2]", r#"a={"c":[3,4]}"#]);
-        assert_eq!(variants(r#"a="x,y",z"#), ["a=x,y", "a=z"]);
-        assert!(Change::parse_variants("a").is_err());
+        assert_eq!(combinations("a.b=1, 2.5"), ["a.b=1", "a.b=2.5"]);
+        assert_eq!(combinations("a=1; b=2"), ["a=1; b=2"]);
+        assert_eq!(combinations("a=1,2; b=x,y"), ["a=1; b=x", "a=1; b=y", "a=2; b=x", "a=2; b=y"]);
+        let three = [r"a=x", r"a=[1,2]", r#"a={"c":[3,4]}"#];
+        assert_eq!(combinations(r#"a=x,[1,2],{"c":[3,4]}"#), three);
+        assert_eq!(combinations(r#"a="x,y;z",z"#), ["a=x,y;z", "a=z"]);
+        let many = ["a=1,2,3,4,5,6,7,8,9,0"; 9].join(";");
+        for text in ["a", "a=1;", "a=1;b", &many] {
+            Change::parse_combinations(text).unwrap_err();
+        }
+    }
+
+    #[test]
+    fn several_values_are_refused_where_one_is_wanted() {
+        let refusal = applied("d=x,y").unwrap_err();
+        assert!(refusal.starts_with("d: takes one value here, and commas separate 2"), "{refusal}");
+        assert_eq!(applied(r#"d="x,y""#).unwrap()["d"], json!("x,y"));
     }
 }

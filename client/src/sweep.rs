@@ -10,7 +10,7 @@ use swarm_proto::v1::SubmitExperimentRequest;
 
 use crate::{
     args::{ExperimentArgs, Label},
-    change::Change,
+    change::{Change, SetArg},
     error::Error,
     experiment_file::{ExperimentFile, Overrides, random_request_id},
     interrupt, json,
@@ -26,10 +26,8 @@ pub struct SweepArgs {
     /// five: both ends belong to it.
     #[arg(long, value_name = "FIRST..LAST|S,...", conflicts_with = "seed")]
     pub seeds: Option<Seeds>,
-    /// Change a value of the experiment file. With several values, run the experiment with
-    /// each of them, as a group of runs; several options give all combinations.
-    #[arg(long, value_name = "PATH=VALUE,...")]
-    pub set: Vec<String>,
+    #[command(flatten)]
+    pub set: SetArg,
     /// Name of the group [default: the name of the experiment, if there are several runs]
     #[arg(long, value_name = "NAME")]
     pub group: Option<String>,
@@ -91,7 +89,7 @@ pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
         Some(Seeds(seeds)) => seeds.iter().copied().map(Some).collect(),
         None => vec![overrides.seed],
     };
-    let variants = variants(&args.sweep.set, RUNS_MAX / seeds.len())?;
+    let variants = variants(&args.sweep.set.set, RUNS_MAX / seeds.len())?;
     let is_group = args.sweep.group.is_some() || args.sweep.seeds.is_some() || variants.len() > 1;
     let (mut runs, mut problems) = (Vec::new(), Vec::new());
     for variant in &variants {
@@ -159,8 +157,8 @@ struct Variant {
 fn variants(set: &[String], n_max: usize) -> Result<Vec<Variant>, Error> {
     let (mut axes, mut problems) = (Vec::new(), Vec::new());
     for text in set {
-        match Change::parse_variants(text) {
-            Ok(axis) => axes.push(axis),
+        match Change::parse_axes(text) {
+            Ok(of_text) => axes.extend(of_text),
             Err(problem) => problems.push(format!("--set {problem}")),
         }
     }

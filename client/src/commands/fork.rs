@@ -9,7 +9,7 @@ use swarm_proto::v1::{ForkPoint, GetExperimentRequest};
 use crate::{
     address::NamedAddress,
     args::{SeedArg, whole},
-    change::{self, Change, Json},
+    change::{self, Change, Json, SetArg},
     complete,
     connection::{Connection, present},
     error::Error,
@@ -35,9 +35,8 @@ pub struct ForkArgs {
     /// Where: ID@G or NAME@G, after generation G of an experiment.
     #[arg(value_name = "ID@G", add = ArgValueCompleter::new(complete::experiments))]
     address: NamedAddress,
-    /// Change the experiment file; may be given several times.
-    #[arg(long, value_name = "PATH=VALUE[;...]")]
-    set: Vec<String>,
+    #[command(flatten)]
+    set: SetArg,
     #[command(flatten)]
     seed: SeedArg,
     /// Number of generations, with those that are shared, instead of the parent's.
@@ -110,7 +109,7 @@ impl ForkArgs {
         let mut file = Json::parse(config_json);
         let mut changes = Vec::new();
         let mut problems = Vec::new();
-        for text in &self.set {
+        for text in &self.set.set {
             match Change::parse_all(text) {
                 Ok(parsed) => changes.extend(parsed),
                 Err(problem) => problems.push(format!("--set: {problem}")),

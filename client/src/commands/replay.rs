@@ -19,7 +19,7 @@ use super::simulate::genotype::Genotype;
 use crate::{
     address::NamedAddress,
     args::{SeedArg, StepsArg, whole},
-    change::Change,
+    change::{Change, SetArg},
     complete,
     connection::Connection,
     error::Error,
@@ -64,9 +64,8 @@ pub struct ReplayArgs {
     judged: Option<u32>,
     #[command(flatten)]
     steps: StepsArg,
-    /// Change values of the experiment file, such as world.objects.robot.num_instances=20.
-    #[arg(long, value_name = "PATH=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    set: SetArg,
     /// Step that a .png shows; FIRST..LAST, both included, makes an animated one [default: the
     /// last step]
     #[arg(long, value_name = "STEP|FIRST..LAST", requires = "to")]
@@ -95,7 +94,7 @@ pub async fn replay(
     let (path, format) = args.path()?;
     let Subject { file, genotype, generation, judged } = args.subject(settings, progress).await?;
     let mut changes = Vec::new();
-    for text in &args.set {
+    for text in &args.set.set {
         let parsed = Change::parse_all(text);
         changes.extend(parsed.map_err(|problem| Error::Input(format!("--set {problem}")))?);
     }

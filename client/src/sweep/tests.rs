@@ -123,3 +123,11 @@ fn all_mistakes_of_all_values_are_said_at_once_and_once() {
     let set = [format!("a={many}"), format!("b={many}")];
     assert!(refusal(&["--set", &set[0], "--set", &set[1]]).contains("more than 1000 runs"));
 }
+
+#[test]
+fn semicolons_separate_changes_as_several_options_do() {
+    let [size, steps] = ["algorithm.population_size=8,16", "algorithm.evaluation_steps=9,10"];
+    let together = swept(&["--set", &format!("{size}; {steps}")]).unwrap();
+    let apart = swept(&["--set", size, "--set", steps]).unwrap();
+    assert_eq!((together.len(), labels(&together)), (4, labels(&apart)));
+}

@@ -9,6 +9,7 @@ use experiment_file::limits;
 use crate::{
     address::NamedAddress,
     args::{IsaArgs, StepsArg, whole},
+    change::SetArg,
     complete,
 };
 
@@ -50,10 +51,9 @@ pub struct EvaluateArgs {
     /// wireless_receiver:msg or msg.
     #[arg(long, value_name = "STIMULUS,...", value_delimiter = ',')]
     pub inhibit: Vec<String>,
-    /// Add a condition with changes of the experiment file, separated by semicolons.
-    #[arg(long, value_name = "PATH=VALUE[;...]")]
-    pub set: Vec<String>,
-    /// Change the experiment file in all conditions, including the nominal one.
+    #[command(flatten)]
+    pub set: SetArg,
+    /// As --set, with one value of each path, in all conditions, including the nominal one.
     #[arg(long, value_name = "PATH=VALUE[;...]")]
     pub base: Vec<String>,
     /// Write every K-th step, and the last one, to steps.csv.
@@ -79,8 +79,7 @@ pub struct EvaluateArgs {
 }
 
 const HELP: &str = "\
-A PATH is a place in the experiment file, as its error messages name it; a VALUE
-is JSON, or text. docs/evaluation.md explains files, measures and statistics.
+docs/evaluation.md explains files, measures and statistics.
 
 Examples:
   swarmctl evaluate 3@59/mean --data-dir swarm-data --local --to mean

@@ -76,8 +76,8 @@ pub fn all(file: &ExperimentFile, args: &EvaluateArgs) -> Result<Vec<Condition>,
         let changes = nominal.inhibition(name)?;
         conditions.push(nominal.condition(format!("inhibit={name}"), changes)?);
     }
-    for text in &args.set {
-        conditions.push(nominal.condition(text.clone(), parsed("--set", text)?)?);
+    for text in &args.set.set {
+        conditions.extend(nominal.conditions(text)?);
     }
     if conditions.len() > CONDITIONS_MAX {
         return Err(Error::Input(format!("at most {CONDITIONS_MAX} conditions at once")));
@@ -104,6 +104,22 @@ impl Nominal {
         let config = read(&format!("condition {name}"), &file)?;
         let experiment = Simulation::compile(&config).map_err(|error| input(problems(&error)))?;
         Ok(Condition { name, changes, config, experiment })
+    }
+
+    /// The conditions of one `--set`: one for each combination of its values.
+    fn conditions(&self, text: &str) -> Result<Vec<Condition>, Error> {
+        let combinations = Change::parse_combinations(text)
+            .map_err(|problem| Error::Input(format!("--set {problem}")))?;
+        if combinations.len() > CONDITIONS_MAX {
+            return Err(Error::Input(format!("at most {CONDITIONS_MAX} conditions at once")));
+        }
+        let is_one = combinations.len() == 1;
+        let condition = |changes: Vec<Change>| {
+            let names: Vec<String> = changes.iter().map(Change::to_string).collect();
+            let name = if is_one { text.to_owned() } else { names.join("; ") };
+            self.condition(name, changes)
+        };
+        combinations.into_iter().map(condition).collect()
     }
 
     fn evolvable(&self) -> &str {

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::{measured::Measured, *};
 use crate::{
     args::{IsaArgs, StepsArg},
+    change::SetArg,
     experiment_file::{Overrides, tests::shipped},
 };
 
@@ -20,7 +21,7 @@ fn args() -> EvaluateArgs {
         robots: Vec::new(),
         perturb: Vec::new(),
         inhibit: Vec::new(),
-        set: Vec::new(),
+        set: SetArg::default(),
         base: Vec::new(),
         every: 1,
         priority: None,
@@ -113,7 +114,7 @@ fn perturbations_take_parameters_or_their_defaults() {
 fn changes_make_a_condition_or_all_of_them() {
     let path = "world.objects.light_red.controller=light_rnd_pos_controller";
     let args = EvaluateArgs {
-        set: strings(&[path]),
+        set: SetArg { set: strings(&[path]) },
         base: strings(&["world.height=2000; seed=7"]),
         steps: StepsArg { steps: Some(50) },
         ..args()
@@ -202,4 +203,13 @@ fn the_summary_estimates_time_means_and_ends() {
     assert_eq!(precision["time_mean"]["n"], 1);
     assert_eq!(precision["time_mean"]["proportion_ci95"], json!([1.0, 1.0]));
     assert_eq!(precision.get("end"), None);
+}
+
+#[test]
+fn values_of_one_option_make_a_condition_each() {
+    let set = SetArg { set: strings(&["world.height=1000,2000; seed=7", "seed=8"]) };
+    let conditions = conditions("light_follower_snes", &EvaluateArgs { set, ..args() }).unwrap();
+    let names: Vec<&str> = conditions.iter().map(|condition| &*condition.name).collect();
+    let both = ["world.height=1000; seed=7", "world.height=2000; seed=7"];
+    assert_eq!(names, ["nominal", both[0], both[1], "seed=8"]);
 }
