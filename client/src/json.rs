@@ -5,6 +5,7 @@ mod individuals;
 
 use std::collections::BTreeMap;
 
+use experiment_file::Seed;
 use serde::Serialize;
 use swarm_proto::v1::{
     Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
@@ -210,7 +211,7 @@ pub struct ExperimentDocument<'a> {
     reason: &'a str,
     generations_done: u64,
     generations: u64,
-    seed: u64,
+    seed: Seed,
     algorithm: &'a str,
     population_size: u32,
     genotype_len: u32,
@@ -257,7 +258,7 @@ impl<'a> From<&'a Experiment> for ExperimentDocument<'a> {
             reason: &experiment.reason,
             generations_done: experiment.generations_done,
             generations: experiment.generations,
-            seed: experiment.seed,
+            seed: Seed(experiment.seed),
             algorithm: &experiment.algorithm,
             population_size: experiment.population_size,
             genotype_len: experiment.genotype_len,
@@ -339,6 +340,21 @@ mod tests {
         assert_eq!(bits("mean"), summary.mean.to_bits());
         assert_eq!(bits("min"), summary.min.to_bits());
         assert_eq!(bits("standard_deviation"), summary.standard_deviation.to_bits());
+    }
+
+    #[test]
+    fn a_seed_that_jq_would_round_is_text() {
+        let experiment = |seed| Experiment { seed, ..Experiment::default() };
+        let seed = |seed| {
+            let experiment = experiment(seed);
+            let listed = serde_json::to_value(ExperimentDocument::from(&experiment)).unwrap();
+            let champion = champion();
+            let champion = ChampionDocument::new(&experiment, &champion).unwrap();
+            assert_eq!(listed["seed"], serde_json::to_value(champion).unwrap()["seed"]);
+            listed["seed"].clone()
+        };
+        assert_eq!(seed(1 << 53), 1_u64 << 53);
+        assert_eq!(seed((1 << 53) + 1), "9007199254740993");
     }
 
     #[test]

@@ -78,6 +78,7 @@ mod read;
 mod report;
 mod robot;
 mod schema;
+mod seed;
 mod semantics;
 mod sensors;
 mod synapses;
@@ -105,6 +106,7 @@ pub use query::*;
 pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
+pub use seed::Seed;
 pub use sensors::*;
 pub use synapses::*;
 pub use task::*;
@@ -131,7 +133,7 @@ pub struct ExperimentConfig {
     /// Name for display; does not influence the run.
     pub name: String,
     /// Master seed of all randomness.
-    #[schemars(extend("default" = 0))]
+    #[schemars(schema_with = "schema::seed", extend("default" = 0))]
     pub seed: u64,
     /// The neural network's structure.
     pub topology: TopologyConfig,

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use crate::limits::{POSITIVE, QUANTITY};
 use crate::report::{Excerpt, Message, Path, Report, check_name, suggestion, unknown_name};
 use crate::variant::variant;
-use crate::{NamedMap, ParameterValue, limits};
+use crate::{NamedMap, ParameterValue, Seed, limits};
 
 type Properties<'a> = IndexMap<&'a str, &'a Value<'a>>;
 
@@ -144,6 +144,22 @@ impl<'a> Node<'a> {
     pub(crate) fn u32(self, range: RangeInclusive<u32>) -> u32 {
         let number = self.u64((*range.start()).into()..=(*range.end()).into());
         number.try_into().unwrap_or(*range.start())
+    }
+
+    /// A whole number of 64 bits; or text of its digits, as programs write it that would round
+    /// the number.
+    pub(crate) fn seed(self) -> u64 {
+        if !self.is_string() {
+            return self.u64(0..=u64::MAX);
+        }
+        let (report, path) = (self.report, self.path.clone());
+        let text = self.string().unwrap_or_default();
+        let seed = Seed::from_digits(text).map(|Seed(seed)| seed);
+        seed.unwrap_or_else(|| {
+            let (max, found) = (u64::MAX, Excerpt(text));
+            report.problem(&path, || format!("must be a whole number between 0 and {max}, or text of its digits; it is `{found}`"));
+            0
+        })
     }
 
     /// A number of a range; `POSITIVE` is worded as what it stands for.

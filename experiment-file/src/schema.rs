@@ -179,6 +179,14 @@ pub(super) fn affected_robots(_: &mut SchemaGenerator) -> Schema {
     ], "default": "all"})
 }
 
+/// A whole number of 64 bits, or a text of its digits.
+pub(super) fn seed(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"anyOf": [
+        {"type": "integer", "format": "uint64", "minimum": 0},
+        {"type": "string", "pattern": "^[0-9]+$"},
+    ]})
+}
+
 /// A quantity >= 0.
 pub(super) fn amount(description: &str) -> Value {
     json!({"type": "number", "minimum": 0, "description": description})

@@ -37,7 +37,7 @@ pub struct TopologyConfig {
     #[schemars(range(min = 1, max = limits::TIME_SCALE), extend("default" = DEFAULT_TIME_SCALE))]
     pub time_scale: u32,
     /// Seed of the random connections (and of fixed weights); default 821.
-    #[schemars(extend("default" = DEFAULT_CONNECTION_SEED))]
+    #[schemars(schema_with = "schema::seed", extend("default" = DEFAULT_CONNECTION_SEED))]
     pub seed: u64,
     /// How the neurons work; default `rate_model`.
     #[serde(skip_serializing_if = "NeuronModel::is_default")]

@@ -6,6 +6,7 @@ mod trace;
 
 use std::{borrow::Cow, path::Path};
 
+use experiment_file::Seed;
 use serde::Serialize;
 use sim_core::{EpisodeSummary, EvaluateError, MeasureName, Measures};
 
@@ -52,7 +53,7 @@ pub async fn simulate(
     let report = SimulationReport {
         name: &compiled.config.name,
         genotype: genotype.to_string(),
-        seed: compiled.config.seed,
+        seed: Seed(compiled.config.seed),
         generation,
         steps: compiled.config.algorithm.evaluation_steps,
         mean: mean(&trials),
@@ -109,7 +110,7 @@ async fn subject(
 struct SimulationReport<'a> {
     name: &'a str,
     genotype: String,
-    seed: u64,
+    seed: Seed,
     generation: u64,
     steps: u32,
     trials: Vec<Trial>,
@@ -129,7 +130,7 @@ struct Trial {
 
 impl SimulationReport<'_> {
     fn to_text(&self, screen: Screen) -> String {
-        let Self { name, genotype, seed, generation, steps, .. } = self;
+        let Self { name, genotype, seed: Seed(seed), generation, steps, .. } = self;
         let mut lines = vec![format!(
             "{name}: {genotype}, seed {seed}, generation {generation}, {steps} steps per trial"
         )];

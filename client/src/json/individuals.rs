@@ -1,5 +1,6 @@
 //! Documents with genotypes: champions, individuals, whole generations.
 
+use experiment_file::Seed;
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
@@ -10,7 +11,7 @@ use super::ChampionSummary;
 struct OfExperiment<'a> {
     experiment: u64,
     name: &'a str,
-    seed: u64,
+    seed: Seed,
     simulation: &'a str,
     config_digest: &'a str,
 }
@@ -59,7 +60,7 @@ struct IndividualFields<'a> {
 impl<'a> From<&'a Experiment> for OfExperiment<'a> {
     fn from(experiment: &'a Experiment) -> Self {
         let Experiment { id, name, seed, simulation, config_digest, .. } = experiment;
-        Self { experiment: *id, name, seed: *seed, simulation, config_digest }
+        Self { experiment: *id, name, seed: Seed(*seed), simulation, config_digest }
     }
 }
 

@@ -61,7 +61,7 @@ fn experiment(o: &mut Object<'_>, default_name: &str, algorithms: Algorithms) ->
             }
             default_name.to_owned()
         }),
-        seed: o.or("seed", 0, |node| node.u64(0..=u64::MAX)),
+        seed: o.or("seed", 0, Node::seed),
         topology: o.required("topology").object(|o| topology::topology(o, semantics)),
         algorithm: {
             let has_task = o.has("task");

@@ -41,7 +41,7 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     TopologyConfig {
         dt,
         time_scale,
-        seed: o.or("seed", DEFAULT_CONNECTION_SEED, |node| node.u64(0..=u64::MAX)),
+        seed: o.or("seed", DEFAULT_CONNECTION_SEED, Node::seed),
         neuron_model: model.unwrap_or_default(),
         bias_in_gain,
         initial_rates,

@@ -208,6 +208,7 @@ impl Schema {
             "integer" => format!("whole, {range}"),
             "number" => range,
             "boolean" => "`true`, `false`".into(),
+            "string" if value["pattern"] == "^[0-9]+$" => "text of digits".into(),
             "string" => "text".into(),
             "null" => "`null`".into(),
             "array" => format!("list of: {}", self.values(&value["items"])),

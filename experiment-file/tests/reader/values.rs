@@ -8,7 +8,7 @@ use evolution::ALGORITHMS;
 use experiment_file::{
     Activation, AreaController, ExperimentConfig, GaussianField, InitialRates, Initializer,
     LightController, LightSourceConfig, NeuronModel, ObjectConfig, OrbitConfig, Pace,
-    RandomTargetsConfig, ReceptiveField, RewardConfig, RobotController, SendingDirection,
+    RandomTargetsConfig, ReceptiveField, RewardConfig, RobotController, Seed, SendingDirection,
     TopologyConfig, UncontrollableRotationConfig, WirelessReceiverConfig, json_schema,
 };
 
@@ -38,6 +38,51 @@ fn receptive_fields_have_the_defaults_of_their_scheme() {
         assert_eq!(field, ReceptiveField::Gaussian(expected));
         assert_eq!((topology.n_sources("I5"), topology.n_sources("I1")), (6, 2));
         assert_eq!(topology.learning, None);
+    }
+}
+
+#[test]
+fn a_seed_may_be_text_of_its_digits_and_means_the_same() {
+    for seed in ["0", "9007199254740993", "18446744073709551615"] {
+        let with = |seed: &str| {
+            let text = edited(r#""name": "base","#, &format!(r#""name": "base", "seed": {seed},"#));
+            text.replace(r#""topology": {"#, &format!(r#""topology": {{"seed": {seed},"#))
+        };
+        let (number, text) = (with(seed), with(&format!("{seed:?}")));
+        let value = serde_json::from_str(&text).unwrap();
+        assert!(is_valid(&json_schema(ALGORITHMS), &value), "{text}");
+        let config = accept(&text);
+        assert_eq!(config.seed.to_string(), seed);
+        assert_eq!(config.to_canonical_json(), accept(&number).to_canonical_json());
+    }
+    for seed in ["", "-1", "1.0", "0x7", "18446744073709551616"] {
+        let text = edited(r#""name": "base","#, &format!(r#""name": "base", "seed": {seed:?},"#));
+        let problem = format!("must be a whole number between 0 and {}", u64::MAX);
+        assert!(refuse(&text).contains(&problem), "{seed}");
+    }
+}
+
+#[test]
+fn a_seed_that_other_programs_would_round_is_text_and_both_forms_are_read() {
+    let exact = 1 << 53;
+    for (seed, json) in [
+        (0, "0"),
+        (exact, "9007199254740992"),
+        (exact + 1, r#""9007199254740993""#),
+        (u64::MAX, r#""18446744073709551615""#),
+    ] {
+        assert_eq!(serde_json::to_string(&Seed(seed)).unwrap(), json);
+        assert_eq!(serde_json::from_str::<Seed>(json).unwrap(), Seed(seed));
+        let number = seed.to_string();
+        assert_eq!(serde_json::from_str::<Seed>(&number).unwrap(), Seed(seed));
+    }
+}
+
+#[test]
+fn what_is_no_seed_is_refused_with_what_one_is() {
+    for json in ["-1", "1.5", r#""""#, r#""+1""#, r#"" 1""#, r#""18446744073709551616""#, "null"] {
+        let error = serde_json::from_str::<Seed>(json).unwrap_err().to_string();
+        assert!(error.contains("or a text of its digits"), "{json}: {error}");
     }
 }
 

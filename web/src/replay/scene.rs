@@ -1,6 +1,8 @@
 //! What is the same in all steps of an episode.
 
-use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController, SensorQuery};
+use experiment_file::{
+    ExperimentConfig, ObjectConfig, RobotConfig, RobotController, Seed, SensorQuery,
+};
 use serde::Serialize;
 use sim_core::{MeasureName, TrialSet};
 
@@ -13,7 +15,7 @@ pub struct Scene {
     name: String,
     /// The experiment's name.
     experiment: String,
-    seed: u64,
+    seed: Seed,
     /// Of the worlds, if they are a generation's.
     generation: Option<u64>,
     trial: u32,
@@ -83,7 +85,7 @@ impl Scene {
         Self {
             name: episode.name.to_owned(),
             experiment: config.name.clone(),
-            seed: config.seed,
+            seed: Seed(config.seed),
             generation: match episode.trial_set {
                 TrialSet::Generation(generation) => Some(generation),
                 _ => None,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use experiment_file::Seed;
 use serde::Serialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{
@@ -19,7 +20,7 @@ pub struct ExperimentAnswer {
     reason: String,
     generations_done: u64,
     generations: u64,
-    seed: u64,
+    seed: Seed,
     algorithm: String,
     population_size: u32,
     genotype_len: u32,
@@ -53,7 +54,7 @@ impl ExperimentAnswer {
             reason: it.reason,
             generations_done: it.generations_done,
             generations: it.generations,
-            seed: it.seed,
+            seed: Seed(it.seed),
             algorithm: it.algorithm,
             population_size: it.population_size,
             genotype_len: it.genotype_len,

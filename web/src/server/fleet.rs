@@ -9,6 +9,7 @@ use axum::{
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
+use experiment_file::Seed;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{ExplainExperimentResponse, ForkPoint, Round, SubmitExperimentRequest};
@@ -141,7 +142,7 @@ pub struct Order {
     /// For `fork`: the last generation that both have.
     generation: Option<u64>,
     /// For `fork`: another seed.
-    seed: Option<u64>,
+    seed: Option<Seed>,
 }
 
 /// Pauses, resumes, cancels, forks an experiment, or gives it another priority.
@@ -172,7 +173,7 @@ async fn fork(
     let parent = shared.archive.experiment(id).await?;
     let forked = control.submit(SubmitExperimentRequest {
         config_json: parent.config_json,
-        seed: order.seed,
+        seed: order.seed.map(|Seed(seed)| seed),
         fork_of: Some(ForkPoint { experiment_id: id, generation }),
         ..SubmitExperimentRequest::default()
     });

@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use experiment_file::Seed;
 use serde::Deserialize;
 use swarm_proto::v1::{Experiment, ExperimentState};
 
@@ -54,7 +55,7 @@ pub struct Samples {
 /// The part of a champion file that is compared.
 #[derive(Debug, Deserialize)]
 struct ChampionFile {
-    seed: u64,
+    seed: Seed,
     judged: Option<JudgedFile>,
 }
 
@@ -85,8 +86,8 @@ impl Samples {
             let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
             let champion: ChampionFile = serde_json::from_str(&text)
                 .map_err(|error| format!("{error}; expected what `swarmctl champion` writes"))?;
-            if champion.seed != seed {
-                return Err(format!("it is of seed {}", champion.seed));
+            if champion.seed != Seed(seed) {
+                return Err(format!("it is of seed {}", champion.seed.0));
             }
             let run = self.run(name, seed);
             run.sources.push(source);

@@ -1,5 +1,6 @@
 //! The summary: what was evaluated, and estimates of its fitness and measures.
 
+use experiment_file::Seed;
 use indexmap::IndexMap;
 use serde::Serialize;
 use serde_json::Value;
@@ -24,7 +25,7 @@ pub struct Subject {
     genotype_digest: String,
     genes: usize,
     fitness_function: Value,
-    seed: u64,
+    seed: Seed,
     /// The trial set: the trials of evaluations.
     trials_of: String,
     steps: u32,
@@ -46,7 +47,7 @@ impl Subject {
             genes: genotype.len(),
             fitness_function: serde_json::to_value(algorithm.fitness_function)
                 .expect("a name serialises"),
-            seed: config.seed,
+            seed: Seed(config.seed),
             trials_of: sim_core::TrialSet::Evaluation.to_string(),
             steps: algorithm.evaluation_steps,
         }

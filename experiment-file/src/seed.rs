@@ -1,0 +1,56 @@
+//! A seed in JSON: a number as far as every program reads it exactly, text beyond.
+
+use std::fmt;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+/// Greatest seed that is a number in JSON: JavaScript and jq round those beyond it.
+const NUMBER_MAX: u64 = 1 << 53;
+
+/// A seed, as JSON answers and files of results have it: from 2^53 + 1 on as text of
+/// digits. It is read in both forms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seed(pub u64);
+
+impl Seed {
+    /// The seed that a text of digits is.
+    pub fn from_digits(text: &str) -> Option<Self> {
+        let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
+        text.parse().ok().filter(|_| is_plain).map(Self)
+    }
+}
+
+impl Serialize for Seed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0 <= NUMBER_MAX {
+            serializer.serialize_u64(self.0)
+        } else {
+            serializer.collect_str(&self.0)
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Seed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Digits)
+    }
+}
+
+/// Takes a number, or its digits.
+struct Digits;
+
+impl de::Visitor<'_> for Digits {
+    type Value = Seed;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a whole number from 0 to {}, or a text of its digits", u64::MAX)
+    }
+
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Seed, E> {
+        Ok(Seed(number))
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Seed, E> {
+        Seed::from_digits(text).ok_or_else(|| E::invalid_value(de::Unexpected::Str(text), &self))
+    }
+}
