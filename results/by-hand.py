@@ -21,7 +21,7 @@ TASKS = RESULTS.parent / "configs" / "tasks"
 def evaluation(config, champion, trials, to):
     """What `swarmctl evaluate` says of the experiment file as it is."""
     command = ["swarmctl", "evaluate", "--local", "--config", config, "--genotype", champion,
-               "--trials", str(trials), "--to", to]
+               "--changed-conditions", "--trials", str(trials), "--to", to]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     return json.loads((to / "summary.json").read_text())["conditions"][0]
 

@@ -197,6 +197,15 @@ pub struct StepsArg {
     pub steps: Option<u32>,
 }
 
+/// Whether a champion meets another experiment file than that in which it was evolved.
+#[derive(Debug, Clone, Copy, Default, ClapArgs)]
+pub struct ChangedArg {
+    /// Take a champion file with an experiment file in which it was not evolved; without this
+    /// option that is refused.
+    #[arg(long, requires = "genotype")]
+    pub changed_conditions: bool,
+}
+
 /// Vector instructions of the simulation.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct IsaArgs {

@@ -1,10 +1,6 @@
 //! Experiment files: reading, checking, compiling, and submitting them.
 
-use std::{
-    fs::File,
-    io::{self, Read},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use coordinator::limits::KEY_LEN_MAX;
 use evolution::ALGORITHMS;
@@ -18,6 +14,7 @@ use crate::{
     change::{Change, Json, apply_all},
     clock,
     error::{Error, prefix_lines},
+    input::{is_stdin, read_text},
     interrupt, json,
 };
 
@@ -53,6 +50,11 @@ impl ExperimentFile {
         Self { path, text }
     }
 
+    /// Where it is, for messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The error of this file being invalid.
     pub fn invalid(&self, error: &ConfigError) -> Error {
         Error::invalid(&self.path, error)
@@ -68,7 +70,8 @@ impl ExperimentFile {
                 message: format!("cannot be read: {what}"),
             }],
         };
-        let text = read_text(path, limits::FILE_BYTES).map_err(|what| problem("", what))?;
+        let text =
+            read_text(path, limits::FILE_BYTES).map_err(|error| problem("", error.to_string()))?;
         let Some((script, place)) = script_path(&text) else {
             return Ok(Self { path: path.into(), text });
         };
@@ -156,27 +159,6 @@ impl ExperimentFile {
         let fits = |(start, c): &(usize, char)| start + c.len_utf8() <= KEY_LEN_MAX;
         stem.char_indices().take_while(fits).map(|(_, c)| c).collect()
     }
-}
-
-/// The text of a file of at most so many bytes.
-fn read_text(path: &Path, max_bytes: usize) -> Result<String, String> {
-    let mut bytes = Vec::new();
-    open(path)
-        .and_then(|file| file.take(max_bytes as u64 + 1).read_to_end(&mut bytes))
-        .map_err(|error: io::Error| error.to_string())?;
-    if bytes.len() > max_bytes {
-        return Err(format!("it has more than {} KiB", max_bytes / 1024));
-    }
-    String::from_utf8(bytes).map_err(|error| error.to_string())
-}
-
-/// A file to read; `-` is standard input.
-pub fn open(path: &Path) -> io::Result<Box<dyn Read>> {
-    Ok(if is_stdin(path) { Box::new(io::stdin()) } else { Box::new(File::open(path)?) })
-}
-
-fn is_stdin(path: &Path) -> bool {
-    path == Path::new("-")
 }
 
 impl Overrides {

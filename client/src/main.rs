@@ -18,6 +18,7 @@ mod figure;
 mod genotypes;
 mod group;
 mod help;
+mod input;
 mod interrupt;
 mod json;
 mod place;

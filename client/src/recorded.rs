@@ -10,6 +10,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     figure::Point,
+    input::{TABLE_BYTES, read_text},
 };
 
 /// A run that the command line names.
@@ -115,7 +116,8 @@ impl Run {
     /// A history in a file.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
-        let mut reader = csv::Reader::from_path(path).map_err(|error| problem(plain(&error)))?;
+        let text = read_text(path, TABLE_BYTES).map_err(|error| problem(error.to_string()))?;
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
         let generations: Vec<Row> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
                 problem(format!(

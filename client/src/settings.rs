@@ -2,7 +2,7 @@
 //! file, else the default address.
 
 use std::{
-    env, fs, io,
+    env, io,
     path::{Path, PathBuf},
 };
 
@@ -10,7 +10,11 @@ use clap::{Args as ClapArgs, ValueHint};
 use serde::Deserialize;
 use swarm_transport::{CredentialArgs, Credentials};
 
-use crate::{error::Error, help::CONNECTION};
+use crate::{
+    error::Error,
+    help::CONNECTION,
+    input::{SETTINGS_BYTES, read_text},
+};
 
 /// The coordinator's default address.
 pub const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
@@ -79,7 +83,7 @@ impl Settings {
                 None => return Ok(this),
             },
         };
-        let mut others = match fs::read_to_string(&path) {
+        let mut others = match read_text(&path, SETTINGS_BYTES) {
             Ok(text) => parse(&path, &text)?,
             Err(error) if error.kind() == io::ErrorKind::NotFound && !must_exist => {
                 return Ok(this);

@@ -143,7 +143,8 @@ async fn subject(
         (_, Some(genotype), Some(config)) => {
             let file =
                 ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error))?;
-            Ok((file, Genotype::read(genotype)?.genes))
+            let genotype = Genotype::read(genotype, &file, args.changed)?;
+            Ok((file, genotype.genes))
         }
         _ => Err(Error::Internal("the command line names nothing to evaluate".into())),
     }

@@ -18,7 +18,7 @@ use self::picture::Moments;
 use super::simulate::genotype::Genotype;
 use crate::{
     address::NamedAddress,
-    args::{SeedArg, StepsArg, whole},
+    args::{ChangedArg, SeedArg, StepsArg, whole},
     change::{Change, SetArg},
     complete,
     connection::Connection,
@@ -49,6 +49,8 @@ pub struct ReplayArgs {
     /// such as a champion file; with --config.
     #[arg(long, value_name = "FILE", requires = "config")]
     genotype: Option<PathBuf>,
+    #[command(flatten)]
+    changed: ChangedArg,
     #[command(flatten)]
     seed: SeedArg,
     /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an
@@ -203,9 +205,10 @@ impl ReplayArgs {
     /// The experiment, who of it, and whose worlds.
     async fn subject(&self, settings: Settings, progress: &Progress) -> Result<Subject, Error> {
         if let (Some(config), Some(genotype)) = (&self.config, &self.genotype) {
-            let file = ExperimentFile::read(config).map_err(|error| Error::invalid(config, &error));
-            let genotype = Genotype::read(genotype)?;
-            return Ok(Subject { file: file?, genotype, generation: 0, judged: None });
+            let file = ExperimentFile::read(config);
+            let file = file.map_err(|error| Error::invalid(config, &error))?;
+            let genotype = Genotype::read(genotype, &file, self.changed)?;
+            return Ok(Subject { file, genotype, generation: 0, judged: None });
         }
         let address = self.address.as_ref().expect("clap requires an address or a file");
         let connection = Connection::open(settings, Intent::Read, progress).await?;

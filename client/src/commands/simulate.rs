@@ -1,6 +1,7 @@
 //! `swarmctl simulate`: single trials, the same as in evolution.
 
 mod args;
+mod champion;
 pub mod genotype;
 mod trace;
 
@@ -97,11 +98,12 @@ async fn subject(
         let generation = args.generation.unwrap_or(found.individual.generation);
         return Ok(Subject { compiled, genotype: Genotype::found(address, found), generation });
     }
-    let compiled = args.compiled(&args.file()?)?;
+    let file = args.file()?;
+    let compiled = args.compiled(&file)?;
     for warning in &compiled.warnings {
         progress.remark(&format!("warning: {}: {warning}", args.subject.display()));
     }
-    let genotype = Genotype::choose(settings, args, &compiled, progress).await?;
+    let genotype = Genotype::choose(settings, args, &file, &compiled, progress).await?;
     Ok(Subject { compiled, genotype, generation: args.generation.unwrap_or_default() })
 }
 

@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -14,6 +13,7 @@ use crate::{
     args::Subject,
     connection::Connection,
     error::Error,
+    input::{GENOTYPE_BYTES, read_text},
     progress::Progress,
     recorded::{GenerationFitness, Run},
     text,
@@ -83,7 +83,7 @@ impl Samples {
             .ok_or("expected a file NAME-SEED.csv or NAME-SEED.json")?;
         let source = path.display().to_string();
         if path.extension().is_some_and(|ending| ending == "json") {
-            let text = fs::read_to_string(path).map_err(|error| error.to_string())?;
+            let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
             let champion: ChampionFile = serde_json::from_str(&text)
                 .map_err(|error| format!("{error}; expected what `swarmctl champion` writes"))?;
             if champion.seed != Seed(seed) {

@@ -8,7 +8,7 @@ use experiment_file::limits;
 
 use crate::{
     address::NamedAddress,
-    args::{IsaArgs, StepsArg, whole},
+    args::{ChangedArg, IsaArgs, StepsArg, whole},
     change::SetArg,
     complete,
 };
@@ -33,6 +33,8 @@ pub struct EvaluateArgs {
     /// The experiment file that goes with --genotype.
     #[arg(long, value_name = "FILE", requires = "genotype")]
     pub config: Option<PathBuf>,
+    #[command(flatten)]
+    pub changed: ChangedArg,
     /// Number of trials per condition.
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = whole::<u32>(1..=1000))]
     pub trials: u32,

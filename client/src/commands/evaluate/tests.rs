@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{measured::Measured, *};
 use crate::{
-    args::{IsaArgs, StepsArg},
+    args::{ChangedArg, IsaArgs, StepsArg},
     change::SetArg,
     experiment_file::{Overrides, tests::shipped},
 };
@@ -16,6 +16,7 @@ fn args() -> EvaluateArgs {
         address: None,
         genotype: None,
         config: None,
+        changed: ChangedArg::default(),
         trials: 3,
         steps: StepsArg::default(),
         robots: Vec::new(),

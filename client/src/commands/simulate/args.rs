@@ -9,7 +9,7 @@ use experiment_file::limits;
 use super::trace::ExtraColumns;
 use crate::{
     address::NamedAddress,
-    args::{IsaArgs, SeedArg, StepsArg, whole},
+    args::{ChangedArg, IsaArgs, SeedArg, StepsArg, whole},
     complete,
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
@@ -39,6 +39,8 @@ pub struct SimulateArgs {
     /// generation G; ID@G/mean, the mean of the distribution after it.
     #[arg(long, value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
     pub experiment: Option<NamedAddress>,
+    #[command(flatten)]
+    pub changed: ChangedArg,
     #[command(flatten)]
     pub seed: SeedArg,
     /// Generation, from 0, whose worlds to simulate [default: that of the address; 0 for an

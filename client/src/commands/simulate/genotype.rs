@@ -1,17 +1,19 @@
 //! The genotype to simulate: from a file, from a coordinator, or random.
 
-use std::{fmt, io, path::Path};
+use std::{fmt, path::Path};
 
 use coordinator::Address;
 use numeric::random::{Purpose, Stream};
 use serde_json::Value;
 
-use super::SimulateArgs;
+use super::{SimulateArgs, champion::Origin};
 use crate::{
+    args::ChangedArg,
     connection::Connection,
     error::Error,
-    experiment_file::{Compiled, open},
+    experiment_file::{Compiled, ExperimentFile},
     genotypes::{Found, described},
+    input::{GENOTYPE_BYTES, read_text},
     place::Intent,
     progress::Progress,
     settings::Settings,
@@ -26,11 +28,15 @@ pub struct Genotype {
 }
 
 impl Genotype {
-    /// The genotype in a file.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let genes = read(path).map_err(|problem| {
+    /// The genotype in a file, to be simulated in an experiment file. A champion of another
+    /// experiment is refused, unless that is wanted.
+    pub fn read(path: &Path, file: &ExperimentFile, changed: ChangedArg) -> Result<Self, Error> {
+        let (genes, origin) = read(path).map_err(|problem| {
             Error::Input(format!("no genotype in {}: {problem}", path.display()))
         })?;
+        if let Some(origin) = origin {
+            origin.check(path, file, changed)?;
+        }
         Ok(Self { genes, source: format!("genotype in {}", path.display()) })
     }
 
@@ -43,11 +49,12 @@ impl Genotype {
     pub async fn choose(
         settings: Settings,
         args: &SimulateArgs,
+        file: &ExperimentFile,
         compiled: &Compiled,
         progress: &Progress,
     ) -> Result<Self, Error> {
         if let Some(path) = &args.genotype {
-            return Self::read(path);
+            return Self::read(path, file, args.changed);
         }
         if let Some(address) = &args.experiment {
             let connection = Connection::open(settings, Intent::Read, progress).await?;
@@ -64,9 +71,9 @@ impl fmt::Display for Genotype {
     }
 }
 
-/// Reads a list of genes, or the one in an object.
-fn read(path: &Path) -> Result<Vec<f64>, String> {
-    let text = open(path).and_then(io::read_to_string).map_err(|error| error.to_string())?;
+/// Reads a list of genes, or the one in an object, and what that says of its experiment.
+fn read(path: &Path) -> Result<(Vec<f64>, Option<Origin>), String> {
+    let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
     let value: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
     let genes = match &value {
         Value::Array(genes) => Some(genes),
@@ -76,7 +83,9 @@ fn read(path: &Path) -> Result<Vec<f64>, String> {
     let gene = |(index, gene): (usize, &Value)| {
         gene.as_f64().ok_or_else(|| format!("gene {index} is not a number"))
     };
-    genes.iter().enumerate().map(gene).collect()
+    let genes: Vec<f64> = genes.iter().enumerate().map(gene).collect::<Result<_, _>>()?;
+    let origin = Origin::of(&value).map_err(|error| error.to_string())?;
+    Ok((genes, origin))
 }
 
 /// Uniform genes, from the streams that draw the first generation of a population.
@@ -96,7 +105,7 @@ mod tests {
     use evolution::Evolution;
 
     use super::*;
-    use crate::experiment_file::{ExperimentFile, Overrides, tests::shipped};
+    use crate::experiment_file::{Overrides, tests::shipped};
 
     #[test]
     fn a_random_genotype_is_the_first_that_a_ga_evaluates() {
@@ -113,8 +122,14 @@ mod tests {
         let path = dir.path().join("genes.json");
         for text in ["[0, 0.1, 1.0]", r#"{"fitness": 3, "genotype": [0, 0.1, 1]}"#] {
             fs::write(&path, text).unwrap();
-            assert_eq!(read(&path).unwrap(), [0.0, 0.1, 1.0]);
+            assert_eq!(read(&path).unwrap().0, [0.0, 0.1, 1.0]);
         }
+    }
+
+    #[test]
+    fn a_file_that_is_larger_than_any_champion_is_not_read_to_its_end() {
+        let problem = read(Path::new("/dev/zero")).unwrap_err();
+        assert_eq!(problem, format!("it has more than {} KiB", GENOTYPE_BYTES / 1024));
     }
 
     #[test]

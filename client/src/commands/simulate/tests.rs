@@ -7,7 +7,7 @@ use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::*;
 use crate::{
-    args::{IsaArgs, OutputFormat, SeedArg, StepsArg},
+    args::{ChangedArg, IsaArgs, OutputFormat, SeedArg, StepsArg},
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script},
     progress::tests::Captured,
@@ -23,6 +23,7 @@ fn args() -> SimulateArgs {
         subject: quickstart(),
         genotype: None,
         experiment: None,
+        changed: ChangedArg::default(),
         seed: SeedArg { seed: Some(7) },
         generation: None,
         trials: Some(2),

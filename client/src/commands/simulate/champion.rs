@@ -1,0 +1,135 @@
+//! A champion file says in what experiment it was evolved; here it meets an experiment file.
+
+use std::path::Path;
+
+use evolution::Digest;
+use experiment_file::Seed;
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::{
+    args::ChangedArg,
+    error::Error,
+    experiment_file::{ExperimentFile, Overrides},
+};
+
+/// Characters of a digest that tell configurations apart for people.
+const SHOWN: usize = 12;
+
+/// In what a champion was evolved.
+#[derive(Debug, PartialEq, Eq, Deserialize)]
+pub struct Origin {
+    config_digest: String,
+    #[serde(default)]
+    name: String,
+    seed: Option<Seed>,
+    simulation: Option<String>,
+}
+
+impl Origin {
+    /// What a file with a genotype says of it; none if it says nothing, as a list of genes.
+    pub fn of(file: &Value) -> Result<Option<Self>, serde_json::Error> {
+        match file.get("config_digest") {
+            None | Some(Value::Null) => Ok(None),
+            Some(_) => Self::deserialize(file).map(Some),
+        }
+    }
+
+    /// Refuses an experiment file, as it is and with the champion's seed, that is another
+    /// experiment than the champion's, unless that is wanted.
+    pub fn check(
+        &self,
+        champion: &Path,
+        file: &ExperimentFile,
+        ChangedArg { changed_conditions }: ChangedArg,
+    ) -> Result<(), Error> {
+        if changed_conditions {
+            return Ok(());
+        }
+        let seed = self.seed.map(|Seed(seed)| seed);
+        let compiled = file.compile(&Overrides { seed, ..Overrides::default() });
+        let config = compiled.map_err(|error| file.invalid(&error))?.config;
+        let simulation = self.simulation.as_deref().unwrap_or(sim_core::FINGERPRINT);
+        if Digest::of_config(&config, simulation).to_string() == self.config_digest {
+            return Ok(());
+        }
+        let seed = seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
+        let digest: String = self.config_digest.chars().take(SHOWN).collect();
+        Err(Error::Input(format!(
+            "{}: the champion was evolved in `{}`{seed}, configuration {digest}, and {} is another \
+             experiment; give the file of the champion's, or --changed-conditions to take this one \
+             knowingly",
+            champion.display(),
+            self.name.escape_debug(),
+            file.path().display()
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::json;
+
+    use super::*;
+    use crate::experiment_file::tests::{quickstart, shipped};
+
+    const KNOWINGLY: ChangedArg = ChangedArg { changed_conditions: true };
+
+    /// A champion of the quickstart with this seed.
+    fn champion(seed: u64) -> Value {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let overrides = Overrides { seed: Some(seed), ..Overrides::default() };
+        let config = file.compile(&overrides).unwrap().config;
+        json!({
+            "name": "quickstart",
+            "seed": Seed(seed),
+            "simulation": "another simulation",
+            "config_digest": Digest::of_config(&config, "another simulation").to_string(),
+            "genotype": [0.5],
+        })
+    }
+
+    fn check(champion: &Value, file: &Path, changed: ChangedArg) -> Result<(), String> {
+        let origin = Origin::of(champion).unwrap().unwrap();
+        let file = ExperimentFile::read(file).unwrap();
+        origin.check("c.json".as_ref(), &file, changed).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_champion_is_taken_with_the_file_in_which_it_was_evolved_whatever_its_seed() {
+        for seed in [0, 7, u64::MAX] {
+            check(&champion(seed), &quickstart(), ChangedArg::default()).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_champion_is_refused_with_another_file_unless_that_is_wanted() {
+        let directory = tempfile::tempdir().unwrap();
+        let longer = directory.path().join("longer.json");
+        let text = fs::read_to_string(quickstart()).unwrap();
+        let steps = "\"evaluation_steps\": 100";
+        assert!(text.contains(steps));
+        fs::write(&longer, text.replace(steps, "\"evaluation_steps\": 99")).unwrap();
+        let champion = champion(7);
+        for file in [&longer, &shipped("leader_selection_snes")] {
+            let error = check(&champion, file, ChangedArg::default()).unwrap_err();
+            let digest = &champion["config_digest"].as_str().unwrap()[..12];
+            let name = file.display().to_string();
+            for part in ["c.json", "`quickstart`, seed 7", digest, &name, "--changed-conditions"] {
+                assert!(error.contains(part), "{error}");
+            }
+            assert_eq!(error.lines().count(), 1, "{error}");
+            check(&champion, file, KNOWINGLY).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_list_of_genes_says_nothing_of_its_experiment() {
+        for genes in [json!([0.5]), json!({"genotype": [0.5]}), json!({"config_digest": null})] {
+            assert_eq!(Origin::of(&genes).unwrap(), None);
+        }
+        assert!(Origin::of(&json!({"config_digest": 3})).is_err());
+    }
+}

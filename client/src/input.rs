@@ -1,0 +1,45 @@
+//! Reading files that somebody else may have made: never more than a file of its kind has.
+
+use std::{
+    fs::File,
+    io::{self, ErrorKind, Read},
+    path::Path,
+};
+
+/// Most bytes of a file with a genotype, such as a champion file: more than a million genes.
+pub const GENOTYPE_BYTES: usize = 32 << 20;
+/// Most bytes of a table of generations.
+pub const TABLE_BYTES: usize = 256 << 20;
+/// Most bytes of the settings.
+pub const SETTINGS_BYTES: usize = 64 << 10;
+
+/// The text of a file of at most so many bytes; `-` is standard input.
+pub fn read_text(path: &Path, max_bytes: usize) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    let file: Box<dyn Read> =
+        if is_stdin(path) { Box::new(io::stdin()) } else { Box::new(File::open(path)?) };
+    file.take(max_bytes as u64 + 1).read_to_end(&mut bytes)?;
+    let invalid = |what: String| io::Error::new(ErrorKind::InvalidData, what);
+    if bytes.len() > max_bytes {
+        return Err(invalid(format!("it has more than {} KiB", max_bytes / 1024)));
+    }
+    String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
+}
+
+/// Whether a path stands for standard input.
+pub fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_without_an_end_is_refused_once_it_is_too_long() {
+        let endless = read_text("/dev/zero".as_ref(), 4096).unwrap_err();
+        assert_eq!(endless.to_string(), "it has more than 4 KiB");
+        let missing = read_text("/nowhere/at/all".as_ref(), 4096).unwrap_err();
+        assert_eq!(missing.kind(), ErrorKind::NotFound);
+    }
+}
