@@ -5,6 +5,7 @@
 //! the same, the program ends with one line.
 
 use std::{
+    fs,
     io::{self, Write as _},
     panic,
     sync::{Arc, Barrier, RwLock},
@@ -21,6 +22,8 @@ pub const EXIT_STARVED: u8 = 71;
 const BLOCKING_MAX: usize = 32;
 /// Those of them that always are there.
 const BLOCKING_KEPT: usize = 2;
+/// Time for threads that have ended to be gone, ms.
+const GONE_TIME_MS: usize = 1000;
 /// Longer than a program runs.
 const FOR_EVER: Duration = Duration::from_secs(1 << 32);
 
@@ -79,7 +82,11 @@ pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
     report_refused_threads();
     let n_cores = thread::available_parallelism().map_or(1, Into::into);
     let wanted = Sizes { workers: n_cores, blocking: BLOCKING_MAX };
+    let n_before = n_threads();
     let (n_granted, refusal) = granted(n_cores + BLOCKING_MAX + n_others);
+    if refusal.is_some() {
+        wait_for_ended_threads(n_before);
+    }
     let starved = || Starved(refusal.unwrap_or_else(|| io::ErrorKind::OutOfMemory.into()));
     let sizes = sizes(wanted, n_granted.saturating_sub(n_others)).ok_or_else(starved)?;
     let mut builder = match sizes.workers {
@@ -124,6 +131,22 @@ fn granted(n_max: usize) -> (usize, Option<io::Error>) {
         drop(held);
         (n_granted, refusal)
     })
+}
+
+/// The threads that the system counts; none where it does not say.
+fn n_threads() -> Option<usize> {
+    fs::read_dir("/proc/self/task").ok().map(Iterator::count)
+}
+
+/// A thread counts for a moment after it has been joined: until then there is no other in its
+/// place.
+fn wait_for_ended_threads(n_before: Option<usize>) {
+    for _ in 0..GONE_TIME_MS {
+        if n_threads() <= n_before {
+            return;
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Makes one line, and an end, of panics that say that a thread was refused: libraries do not
