@@ -49,6 +49,7 @@ impl Remote for DeleteArgs {
         if !self.consent.is_given("delete", &members, progress).await? {
             return Ok(());
         }
+        let members = latest_first(members);
         let delete = async |experiment_id| {
             let request = DeleteExperimentRequest { experiment_id };
             let call = connection.call(async |client| client.delete_experiment(request).await);
@@ -85,6 +86,7 @@ impl Remote for PruneArgs {
         if !self.consent.is_given("prune", &members, progress).await? {
             return Ok(());
         }
+        let members = latest_first(members);
         let prune = async |experiment_id| {
             let request = PruneExperimentRequest { experiment_id };
             let call = connection.call(async |client| client.prune_experiment(request).await);
@@ -177,6 +179,12 @@ impl Remote for LabelArgs {
     }
 }
 
+/// A fork before the experiment that it shares generations with, which is kept until then.
+fn latest_first(mut members: Vec<Experiment>) -> Vec<Experiment> {
+    members.sort_by_key(|it| std::cmp::Reverse(it.id));
+    members
+}
+
 /// Prints experiments, each with what became of so many bytes.
 fn print_with(
     target: &Target,
@@ -190,4 +198,38 @@ fn print_with(
 
 fn mib(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use swarm_proto::v1::{ForkPoint, SubmitExperimentRequest};
+
+    use super::{super::one_world::output, *};
+    use crate::{experiment_file::tests::quickstart, place::Place};
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn forks_are_deleted_before_what_they_share_generations_with() {
+        let temporary = tempfile::tempdir().unwrap();
+        let path = temporary.path().join("data");
+        let at = ["--data-dir", path.to_str().unwrap()];
+        let file = quickstart().display().to_string();
+        output(&format!("run {file} --generations 3 --group both"), &at).await;
+        let place = Place::Directory { path: path.clone(), is_found: false };
+        let connection = Connection::to(place, Intent::Submit).await.unwrap();
+        let fork = SubmitExperimentRequest {
+            config_json: connection.stored(1).await.unwrap().1,
+            seed: Some(9),
+            group: "both".into(),
+            fork_of: Some(ForkPoint { experiment_id: 1, generation: 1 }),
+            ..SubmitExperimentRequest::default()
+        };
+        connection.submit(fork).await.unwrap();
+        connection.close().await;
+        output("resume 2", &at).await;
+        let refused = output("delete 1 --yes", &at).await;
+        assert!(refused.contains("[exit code"), "{refused}");
+        let deleted = output("delete both --yes", &at).await;
+        assert!(!deleted.contains("[exit code"), "{deleted}");
+        assert_eq!(deleted.matches("deleted, ").count(), 2, "{deleted}");
+    }
 }

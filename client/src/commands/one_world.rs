@@ -99,7 +99,7 @@ const ALONE: &[&str] = &[
 ];
 
 /// What a command line printed, and how it ended.
-async fn output(line: &str, place: &[&str]) -> String {
+pub async fn output(line: &str, place: &[&str]) -> String {
     let captured = Captured::default();
     let words = ["swarmctl"].into_iter().chain(line.split(' ')).chain(place.iter().copied());
     let args = Args::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
