@@ -55,6 +55,12 @@ impl ExperimentFile {
         &self.path
     }
 
+    /// The name that it gives its experiment; none if it cannot be read.
+    pub fn name(&self) -> Option<String> {
+        let read = ExperimentConfig::from_json(&self.text, &self.default_name(), ALGORITHMS);
+        read.ok().map(|(config, _)| config.name)
+    }
+
     /// The error of this file being invalid.
     pub fn invalid(&self, error: &ConfigError) -> Error {
         Error::invalid(&self.path, error)

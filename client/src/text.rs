@@ -112,18 +112,38 @@ pub fn submitted_group(name: &str, runs: &[Experiment]) -> String {
     lines.join("\n")
 }
 
+/// Says under which name an experiment was computed, if a file gives another one.
+pub fn under_another_name(old: &str, name: &str) -> Option<String> {
+    (old != name).then(|| format!("it was computed under the name `{}`", escape(old)))
+}
+
 /// What to say of a submission of which an identical experiment exists; `identical`: its number,
-/// 0 for none.
-pub fn identical(submitted: &Experiment, identical: u64, reuse: bool) -> Option<String> {
+/// 0 for none; `names`: its name, and that of the file, if both are known.
+pub fn identical(
+    submitted: &Experiment,
+    identical: u64,
+    reuse: bool,
+    names: Option<(&str, &str)>,
+) -> Option<String> {
+    let old = names.and_then(|(old, name)| under_another_name(old, name));
     match identical {
         0 => None,
         id if id == submitted.id => reuse.then(|| {
-            format!("experiment {id} is of the same file, seed and version, and is used again")
+            let remark =
+                format!("experiment {id} is of the same file, seed and version, and is used again");
+            match (old, names) {
+                (Some(old), Some((_, name))) => format!(
+                    "{remark}; {old}, and without `--reuse` it is computed under `{}`",
+                    escape(name)
+                ),
+                _ => remark,
+            }
         }),
         id => Some(format!(
             "experiment {id} is of the same file, seed and version as experiment {}, so it has the \
-             same results; `--reuse` answers with it once it has completed",
-            submitted.id
+             same results; `--reuse` answers with it once it has completed{}",
+            submitted.id,
+            old.map(|old| format!("; {old}")).unwrap_or_default()
         )),
     }
 }

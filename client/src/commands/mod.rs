@@ -25,6 +25,7 @@ mod logs;
 mod man;
 mod plot;
 mod reopen;
+mod reordered;
 mod replay;
 mod run;
 mod schema;

@@ -13,6 +13,7 @@ use std::{
 use clap::Args;
 use evolution::Digest;
 use swarm_proto::v1::{Experiment, ExperimentState, ListWorkersRequest};
+use swarm_telemetry::escape;
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
@@ -128,8 +129,8 @@ async fn evolve(
         .filter(|experiment| experiment.state() == ExperimentState::Running)
         .collect();
     let submitted = match existing(connection, runs, args).await? {
-        Some(existing) => {
-            progress.remark(&already_completed(&existing));
+        Some((existing, name)) => {
+            progress.remark(&already_completed(&existing, &name));
             vec![existing]
         }
         None => submit_all(runs, Manner::default(), connection, progress).await?,
@@ -148,13 +149,13 @@ async fn evolve(
 }
 
 /// The experiment that has completed in the data directory with this file, seed and number of
-/// generations, unless it is to begin anew; one of no group, if there is one. Runs of a group are
-/// found by their requests.
+/// generations, unless it is to begin anew, and the name that the file gives; one of no group, if
+/// there is one. Runs of a group are found by their requests.
 async fn existing(
     connection: &Connection,
     runs: &[SweepRun],
     args: &RunArgs,
-) -> Result<Option<Experiment>, Error> {
+) -> Result<Option<(Experiment, String)>, Error> {
     let [run] = runs else { return Ok(None) };
     if args.new || run.group().is_some() {
         return Ok(None);
@@ -169,17 +170,22 @@ async fn existing(
             && it.forked_from.is_none()
     };
     let same = connection.experiments().await?.into_iter().filter(is_it);
-    Ok(same.max_by_key(|it| (it.group.is_empty(), it.id)))
+    let same = same.max_by_key(|it| (it.name == config.name, it.group.is_empty(), it.id));
+    Ok(same.map(|it| (it, config.name)))
 }
 
-/// Says what exists, and what else can be wanted.
-fn already_completed(existing: &Experiment) -> String {
+/// Says what exists, and what else can be wanted; `name`: that of the file.
+fn already_completed(existing: &Experiment, name: &str) -> String {
     let of_group = match &*existing.group {
         "" => String::new(),
         group => format!(" of group {group}"),
     };
+    let once_more = match text::under_another_name(&existing.name, name) {
+        Some(old) => format!("{old}; under `{}`: --new", escape(name)),
+        None => "the same once more: --new".to_owned(),
+    };
     format!(
-        "{}{of_group} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> the same once more: --new",
+        "{}{of_group} has completed here with this file and seed, and is shown again\n           -> more generations: --generations {}\n           -> another run: --seed {}\n           -> {once_more}",
         text::title(existing),
         existing.generations.saturating_mul(2),
         existing.seed.wrapping_add(1)
@@ -251,10 +257,19 @@ mod tests {
 
     #[test]
     fn what_exists_is_said_with_what_else_can_be_wanted() {
-        let text = already_completed(&Experiment { seed: u64::MAX, ..experiment(3, "a") });
+        let text = already_completed(&Experiment { seed: u64::MAX, ..experiment(3, "a") }, "a");
         for part in ["experiment 3 (a)", "--generations 80", "--seed 0", "--new"] {
             assert!(text.contains(part), "{text}");
         }
+    }
+
+    #[test]
+    fn what_was_computed_under_another_name_is_said_with_the_way_to_the_new_one() {
+        let text = already_completed(&experiment(3, "old"), "new");
+        let expected = "it was computed under the name `old`; under `new`: --new";
+        assert!(text.contains(expected), "{text}");
+        let same = already_completed(&experiment(3, "new"), "new");
+        assert!(!same.contains("under"), "{same}");
     }
 
     #[test]

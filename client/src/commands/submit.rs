@@ -14,7 +14,7 @@ use crate::{
     text,
 };
 
-use super::{Remote, watch};
+use super::{Remote, reordered, watch};
 
 /// Submit an experiment, or a group of runs of it, to the coordinator.
 ///
@@ -136,10 +136,19 @@ pub async fn submit_all(
             last_warnings = warnings;
         }
         let experiment = present(response.experiment)?;
-        let remark = reuse.and_then(|it| text::identical(&experiment, response.identical, it));
-        remark.iter().for_each(|remark| progress.remark(remark));
+        if let Some(reuse) = reuse
+            && response.identical > 0
+        {
+            let old = connection.stored(response.identical).await.ok().map(|(old, _)| old.name);
+            let name = run.file.name();
+            let names = old.as_deref().zip(name.as_deref());
+            let remark = text::identical(&experiment, response.identical, reuse, names);
+            remark.iter().for_each(|remark| progress.remark(remark));
+        }
         submitted.push(experiment);
     }
+    let remark = reordered::remark(connection, &submitted).await;
+    remark.iter().for_each(|remark| progress.remark(remark));
     Ok(submitted)
 }
 
@@ -200,6 +209,21 @@ mod tests {
         assert_eq!(error.exit_code(), 2);
         let path = path.display();
         assert_eq!(error.report(), format!("{path}: line 1: a\n{path}: line 2: b"));
+    }
+
+    #[test]
+    fn an_identical_experiment_of_another_name_is_said_to_be_so() {
+        let submitted = Experiment { id: 3, ..Experiment::default() };
+        let said = |identical, reuse, name| {
+            text::identical(&submitted, identical, reuse, Some(("old", name))).unwrap()
+        };
+        let reused = said(3, true, "new");
+        let way = "under the name `old`, and without `--reuse` it is computed under `new`";
+        assert!(reused.contains(way), "{reused}");
+        assert!(said(1, false, "new").contains("under the name `old`"));
+        for same in [said(3, true, "old"), said(1, false, "old")] {
+            assert!(!same.contains("name"), "{same}");
+        }
     }
 
     #[tokio::test]

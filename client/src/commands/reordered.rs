@@ -1,0 +1,114 @@
+//! Experiments of the same file with its keys in another order: they are not the same.
+
+use std::cmp::Reverse;
+
+use serde_json::{Value, json};
+use swarm_proto::v1::{Experiment, ExperimentState};
+
+use crate::{connection::Connection, text};
+
+/// Most files that are compared with those of a submission.
+const COMPARED_MAX: usize = 16;
+
+/// Says of what was submitted that an earlier experiment is of the same file with its keys in
+/// another order, so that nobody wonders why it is computed again. Of several, the first counts.
+pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option<String> {
+    let first = submitted.first()?;
+    // What has been submitted is so, even if nothing can be said of it.
+    let mut earlier = connection.experiments().await.ok()?;
+    earlier.retain(|it| may_be_reordered(it, first));
+    if earlier.is_empty() {
+        return None;
+    }
+    earlier.sort_by_key(|it| Reverse(it.id));
+    let file = without_order(&connection.stored(first.id).await.ok()?.1);
+    for other in earlier.iter().take(COMPARED_MAX) {
+        if without_order(&connection.stored(other.id).await.ok()?.1) == file {
+            return Some(format!(
+                "{} is of this file with its keys in another order; the order of ensembles, \
+                 synapses and objects is the order of genes and random draws, so experiment {} is \
+                 computed as one of its own",
+                text::title(other),
+                first.id
+            ));
+        }
+    }
+    None
+}
+
+/// Whether an experiment could be of the same file as a later one, but for the order.
+fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
+    use ExperimentState::{Completed, Paused, Running};
+    earlier.id < later.id
+        && (&earlier.name, earlier.seed) == (&later.name, later.seed)
+        && earlier.config_digest != later.config_digest
+        && earlier.forked_from.is_none()
+        && matches!(earlier.state(), Completed | Running | Paused)
+}
+
+/// A file in canonical form as a value that equals those with its keys in another order, without
+/// the length of the run, which makes no other experiment.
+fn without_order(config_json: &str) -> Value {
+    let mut file: Value = serde_json::from_str(config_json).unwrap_or_default();
+    if let Some(algorithm) = file.get_mut("algorithm").and_then(Value::as_object_mut) {
+        algorithm.insert("generations".to_owned(), json!(0));
+        algorithm.remove("target_fitness");
+        algorithm.remove("judgement_trials");
+    }
+    file
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::{super::one_world::output, *};
+    use crate::{
+        experiment_file::tests::quickstart,
+        place::{Intent, Place},
+    };
+
+    /// The text of the quickstart with its objects' keys in reverse order.
+    fn reversed(text: &str) -> String {
+        fn write(value: &Value) -> String {
+            match value {
+                Value::Object(map) => {
+                    let entries = map.iter().map(|(key, it)| (json!(key).to_string(), write(it)));
+                    let mut entries: Vec<_> = entries.collect();
+                    entries.sort();
+                    let entries = entries.iter().rev().map(|(key, it)| format!("{key}:{it}"));
+                    format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
+                }
+                other => other.to_string(),
+            }
+        }
+        write(&serde_json::from_str(text).unwrap())
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn the_same_file_in_another_order_is_said_to_be_so_and_another_file_is_not() {
+        let temporary = tempfile::tempdir().unwrap();
+        let data = temporary.path().join("data");
+        let text = fs::read_to_string(quickstart()).unwrap();
+        let longer = text.replace("\"evaluation_steps\": 100", "\"evaluation_steps\": 99");
+        assert_ne!(longer, text);
+        for (index, text) in [&text, &longer, &reversed(&text)].into_iter().enumerate() {
+            let file = temporary.path().join(format!("{index}.json"));
+            fs::write(&file, text).unwrap();
+            let line = format!("run {} --generations {}", file.display(), index + 1);
+            output(&line, &["--data-dir", data.to_str().unwrap()]).await;
+        }
+        let place = Place::Directory { path: data, is_found: false };
+        let connection = Connection::to(place, Intent::Submit).await.unwrap();
+        let mut experiments = connection.experiments().await.unwrap();
+        experiments.sort_by_key(|it| it.id);
+        let [first, longer, reordered] = &experiments[..] else { panic!("{experiments:?}") };
+        for other in [first, longer] {
+            assert_eq!(remark(&connection, std::slice::from_ref(other)).await, None);
+        }
+        let said = remark(&connection, std::slice::from_ref(reordered)).await.unwrap();
+        connection.close().await;
+        let expected = "experiment 1 (quickstart) is of this file with its keys in another order";
+        assert!(said.starts_with(expected) && said.contains("so experiment 3 is"), "{said}");
+    }
+}
