@@ -94,6 +94,8 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     let data_dir = elsewhere.data_dir().to_str().unwrap();
     swarmctl(["doctor", "--data-dir", data_dir]).expect_success();
     hostile(&elsewhere, &file);
+    refused(&here.swarmctl(&["prune", "1"]), 3, "delete that first: swarmctl delete 2");
+    here.swarmctl(&["delete", "2"]).expect_success();
     here.swarmctl(&["prune", "1"]).expect_success();
     refused(&here.swarmctl(&["export", "1", "--to", path]), 3, "was pruned before generation 4");
 }
