@@ -349,7 +349,7 @@ impl Value {
     }
 
     /// The text, if it is one. Comparing it with few short names is no work; what reads all of a
-    /// text asks for [`read_text`](Self::read_text).
+    /// text, such as a comparison, pays for it.
     pub fn as_text(&self) -> Option<&str> {
         if let Self::Text(text) = self { Some(&text.text) } else { None }
     }
