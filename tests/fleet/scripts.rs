@@ -1,9 +1,10 @@
 //! Experiments that bring their task as a script, on workers that never saw it.
 
-use std::fs;
+use std::{fs, process::Command};
 
 use harness::{
-    CoordinatorProcess, Experiment, WorkerProcess, swarmctl, undisturbed, workspace_file,
+    CoordinatorProcess, Experiment, Outcome, WorkerProcess, binary, swarmctl, undisturbed,
+    workspace_file,
 };
 use serde_json::json;
 
@@ -222,6 +223,8 @@ fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
     let path = experiment.path();
     let validated = swarmctl(["validate", path.to_str().unwrap()]).expect_success();
     assert!(validated.stdout.contains("its start takes long"), "{}", validated.stdout);
-    let submitted = coordinator.swarmctl(&["submit", path.to_str().unwrap()]).expect_success();
+    let mut submit = Command::new(binary("swarmctl"));
+    submit.args(["--coordinator", &coordinator.url(), "submit", path.to_str().unwrap()]);
+    let submitted = Outcome::of(&mut submit).expect_success();
     assert!(submitted.stderr.contains("its start takes long"), "{}", submitted.stderr);
 }
