@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use coordinator::limits::KEY_LEN_MAX;
 use evolution::ALGORITHMS;
 use experiment_file::{
-    ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, script_path,
+    ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, plain, script_path,
 };
 use sim_core::{Simulation, TRYING_TIME_MAX};
 use swarm_proto::v1::SubmitExperimentRequest;
@@ -99,7 +99,7 @@ impl ExperimentFile {
         }
         let read = |text: &str| ExperimentConfig::from_json(text, &self.default_name(), ALGORITHMS);
         read(&self.text)?;
-        let mut file = Json::parse(self.text.trim_start_matches('\u{feff}'));
+        let mut file = Json::parse(&plain(&self.text));
         apply_all(changes, &mut file).map_err(|problems| ConfigError {
             problems: problems.into_iter().map(unlocated).collect(),
         })?;

@@ -23,7 +23,12 @@ pub fn read_text(path: &Path, max_bytes: usize) -> io::Result<String> {
     if bytes.len() > max_bytes {
         return Err(invalid(format!("it has more than {} KiB", max_bytes / 1024)));
     }
-    String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
+    let mut text = String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))?;
+    // Some editors begin a file with a byte order mark.
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
 }
 
 /// Whether a path stands for standard input.
@@ -39,6 +44,10 @@ mod tests {
     fn a_file_without_an_end_is_refused_once_it_is_too_long() {
         let endless = read_text("/dev/zero".as_ref(), 4096).unwrap_err();
         assert_eq!(endless.to_string(), "it has more than 4 KiB");
+        let directory = tempfile::tempdir().unwrap();
+        let marked = directory.path().join("marked");
+        std::fs::write(&marked, "\u{feff}{}").unwrap();
+        assert_eq!(read_text(&marked, 4096).unwrap(), "{}");
         let missing = read_text("/nowhere/at/all".as_ref(), 4096).unwrap_err();
         assert_eq!(missing.kind(), ErrorKind::NotFound);
     }

@@ -103,6 +103,7 @@ pub use learning::*;
 pub use neuron::*;
 pub use problem::{ConfigError, Problem};
 pub use query::*;
+pub use read::plain;
 pub use report::suggestion;
 pub use robot::*;
 pub use schema::json_schema;
@@ -174,6 +175,7 @@ impl ExperimentConfig {
     ) -> Result<(Self, Vec<Problem>), ConfigError> {
         // RFC 8259 lets readers ignore a byte order mark, and some editors write one.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let text = &plain(text);
         let root = read::parse(text)?;
         let report = Report::new(text, &root);
         let config = read::read(&report, &root, default_name, algorithms);

@@ -31,7 +31,8 @@ pub struct ScriptConfig {
 /// The script that a file refers to by a path, and where in the text of the file the path
 /// stands. None if there is no such path, or if the text is no JSON.
 pub fn script_path(text: &str) -> Option<(String, Range<usize>)> {
-    let root = read::parse(text).ok()?;
+    let text = read::plain(text);
+    let root = read::parse(&text).ok()?;
     let script = property(property(&root, "task")?, "script")?;
     match script {
         Value::StringLit(path) => Some((path.value.to_string(), script.start()..script.end())),

@@ -6,6 +6,7 @@ mod algorithm;
 mod encoding;
 mod learning;
 mod parse;
+mod plain;
 mod population;
 mod robot;
 mod task;
@@ -13,6 +14,7 @@ mod topology;
 mod world;
 
 pub(super) use parse::parse;
+pub use plain::plain;
 
 use crate::node::{self, Node, Object};
 use jsonc_parser::ast::Value;

@@ -31,12 +31,20 @@ fn a_file_has_a_limited_size() {
 }
 
 #[test]
+fn comments_and_trailing_commas_change_nothing() {
+    let commented = BASE.replace(",\n", ", // a remark, with a \"quote\"\n");
+    let commented = commented.replace("}", ", /* } */ }").replace("{, ", "{ ");
+    assert_ne!(commented, BASE);
+    assert_eq!(read(&commented), read(BASE));
+}
+
+#[test]
 fn what_is_not_strict_json_is_refused_with_its_line() {
     for (text, expected) in [
         ("", "line 1: the file is empty"),
         ("\u{feff}", "line 1: the file is empty"),
-        ("{\n  // comment\n}", "line 2: not JSON: Comments are not allowed (column 3)"),
-        ("{\"a\": 1,\n}", "line 1: not JSON: Trailing commas are not allowed (column 8)"),
+        ("{\n  /* comment\n}", "line 2: not JSON: Unterminated comment block (column 3)"),
+        ("{\"a\": 1,,\n}", "line 1: not JSON: Unexpected token in object (column 9)"),
         ("{\"a\": NaN}", "line 1: not JSON: Unexpected token (column 7)"),
         ("{\"a\": -Infinity}", "line 1: not JSON: Infinity and NaN are not allowed (column 7)"),
         ("{\"a\": 01}", "line 1: not JSON: Expected comma (column 8)"),
