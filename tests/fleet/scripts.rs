@@ -219,7 +219,11 @@ fn a_script_that_burns_time_is_ended_by_cancelling_it_and_by_signals() {
 #[test]
 fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
     let coordinator = CoordinatorProcess::start();
-    let experiment = scripted(3, &BURNS.replace("world.step < 60", "False"));
+    // Most of what a call may do, in long statements: seconds for the steps that are tried.
+    let sums = vec!["i + j"; 60].join(", ");
+    let loops = "for i in range(2000):\n        for j in range(100): x =";
+    let script = format!("def fitness(world):\n    {loops} [{sums}]\n    return 1\n");
+    let experiment = scripted(3, &script);
     let path = experiment.path();
     let validated = swarmctl(["validate", path.to_str().unwrap()]).expect_success();
     assert!(validated.stdout.contains("its start takes long"), "{}", validated.stdout);
