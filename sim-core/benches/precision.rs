@@ -12,7 +12,7 @@ mod configs;
 #[path = "../tests/reference/mod.rs"]
 mod reference;
 
-use numeric::random::{Purpose, Stream};
+use determinism::random::{Purpose, Stream};
 use sim_core::Simulation;
 
 use configs::{experiment_a, experiment_b, experiment_c, experiment_d};

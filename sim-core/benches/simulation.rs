@@ -17,13 +17,13 @@ mod reference;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     DecodingConfig, EncodingConfig, EncodingScheme, ExperimentConfig, FitnessFunction,
     GaussianField, GenotypeQuery, Initializer, LearningConfig, NeuronModel, Neurotransmitter,
     OutputSelector, ReceptiveField, ScriptConfig, SynapseModel, SynapseParams, SynapseSelector,
     TaskConfig,
 };
-use numeric::random::{Purpose, Stream};
 use sim_core::bench::{NetworkLoad, multiply_adds, network_size};
 use sim_core::{Isa, Simulation};
 

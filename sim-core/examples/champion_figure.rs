@@ -18,9 +18,9 @@ use std::{
     thread,
 };
 
+use determinism::random::{Purpose, Stream, TrialSet};
 use evolution::{ALGORITHMS, Evolution, HeldOut, Population, Setup};
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream, TrialSet};
 use sim_core::Simulation;
 
 /// Sets of fresh trials, and trials in each.

@@ -6,8 +6,8 @@
 
 use std::{env, error::Error, fs};
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream};
 use sim_core::{Simulation, TrialSet};
 
 const N_GENOTYPES: u64 = 5;

@@ -13,9 +13,9 @@
 
 use std::{env, error::Error, f64::consts::PI, fs};
 
+use determinism::random::{Purpose, Stream};
 use evolution::{Evolution, Population};
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream};
 use sim_core::Simulation;
 
 const N_GENOTYPES: u64 = 200;

@@ -8,8 +8,8 @@ use pulp::{Simd, WithSimd};
 use crate::lanes::Lanes;
 use crate::network::dynamics::NetworkState;
 use crate::simulation::{EvaluateError, Simulation};
-use numeric::Isa;
-use numeric::random::{Purpose, Stream};
+use determinism::Isa;
+use determinism::random::{Purpose, Stream};
 
 /// The network of a genotype, at work without robots.
 #[derive(Debug)]

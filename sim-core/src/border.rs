@@ -61,8 +61,8 @@ mod tests {
 
     use super::*;
     use crate::initializers::Positions;
+    use determinism::random::{Purpose, Stream};
     use experiment_file::Initializer;
-    use numeric::random::{Purpose, Stream};
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

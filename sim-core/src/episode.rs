@@ -13,8 +13,8 @@ use crate::network::Phenotype;
 use crate::record::StepRecord;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::{Trial, encoding_streams};
+use determinism::random::TrialSet;
 use experiment_file::RobotController;
-use numeric::random::TrialSet;
 
 /// Lanes that are simulated side by side: enough to share the weights, few enough
 /// to stay in the cache.

@@ -65,7 +65,7 @@
 //! a genotype side by side and shows them to a recorder; `stepping` has somebody else decide; `trial` has the phases of a
 //! step, and `swarm` the state of its robots. A phase is a module each: `senses` and
 //! `sensors`, `communication`, `controllers`, `perturbations`, `drive`, `lights`,
-//! `fitness`. Below everything lie `numeric`'s random streams, `torus`, `neighbours`
+//! `fitness`. Below everything lie `determinism`'s random streams, `torus`, `neighbours`
 //! (which robots are within reach of each other), and the arithmetic on vectors of
 //! robots: `lanes` are the vectors, `exp2` is what activations are made of. `bench`
 //! opens the kernel to the benchmarks.
@@ -108,7 +108,7 @@ mod trial;
 mod world;
 
 pub use communication::Mode;
-pub use numeric::{Isa, UnknownIsa, random::TrialSet};
+pub use determinism::{Isa, UnknownIsa, random::TrialSet};
 pub use output::Output;
 pub use record::{EpisodeSummary, MeasureName, Measures, ReceivedFrame, RobotRecord, StepRecord};
 pub use simulation::{EvaluateError, Simulation};

@@ -3,8 +3,8 @@
 use std::f64::consts::FRAC_PI_4;
 
 use crate::torus::{Torus, Vec2, wrap_angle};
+use determinism::random::Stream;
 use experiment_file::{LightController, OrbitConfig, Pace, RandomTargetsConfig};
-use numeric::random::Stream;
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
@@ -147,7 +147,7 @@ fn flee(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 800.0 };
 

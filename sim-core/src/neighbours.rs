@@ -8,7 +8,7 @@ use pulp::{Simd, WithSimd};
 
 use crate::polar;
 use crate::torus::{Torus, Vec2, wrap_angle};
-use numeric::Isa;
+use determinism::Isa;
 
 /// Swarms up to this size are searched without a grid.
 const MAX_WITHOUT_GRID: usize = 64;

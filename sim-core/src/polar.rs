@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use pulp::{Simd, WithSimd};
 
 use crate::torus::Vec2;
-use numeric::Isa;
+use determinism::Isa;
 
 /// Computes the polar coordinates of points (x, y), cm: `rho`, their distance from the origin,
 /// cm, and `bearing`, their direction seen from it, in \[0, 2 pi), 0 for the origin itself. All

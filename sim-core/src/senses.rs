@@ -8,8 +8,8 @@ use crate::sensors::{Noise, NoiseStream, Sensor, Surroundings};
 use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::RobotGroup;
+use determinism::random::{Stream, standard_normal_quantiles};
 use experiment_file::SensorQuery;
-use numeric::random::{Stream, standard_normal_quantiles};
 
 /// Readings of the robots of one group in one trial, beside those of the radio.
 #[derive(Debug, Clone)]
@@ -241,7 +241,7 @@ impl NoiseSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     #[test]
     fn noise_has_its_deviation_and_one_draw_per_value_that_is_wanted() {

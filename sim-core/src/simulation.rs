@@ -14,8 +14,8 @@ use crate::record::{EpisodeSummary, MeasureName, StepRecord};
 use crate::script::{self, ScriptTask};
 use crate::trial::try_places;
 use crate::world::World;
+use determinism::{Isa, random::TrialSet};
 use experiment_file::{ConfigError, ExperimentConfig, FitnessParams, limits};
-use numeric::{Isa, random::TrialSet};
 use task_script::ScriptError;
 
 /// Trials whose start is tried out when an experiment is compiled.

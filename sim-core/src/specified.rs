@@ -10,8 +10,8 @@ use std::{
     panic::{self, AssertUnwindSafe},
 };
 
+use determinism::{Isa, random::TrialSet};
 use experiment_file::{ConfigError, ExperimentConfig};
-use numeric::{Isa, random::TrialSet};
 
 use crate::{Output, Simulation};
 

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use determinism::random::TrialSet;
 use experiment_file::{AlgorithmConfig, ConfigError};
-use numeric::random::TrialSet;
 
 use crate::initializers::Positions;
 use crate::objects::Site;

@@ -9,8 +9,8 @@ use crate::controllers::{
 use crate::lanes::Lanes;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::trial::{Trial, encoding_streams};
+use determinism::random::{Stream, TrialSet};
 use experiment_file::RobotController;
-use numeric::random::{Stream, TrialSet};
 
 /// Trials of an experiment side by side, whose robots with a network, the *agents*, do what
 /// they are told: stimuli out, actions in. Robots with another controller decide for themselves.

@@ -1,9 +1,9 @@
 //! The shipped experiments, for tests to vary.
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     ExperimentConfig, GenotypeQuery, NeuronModel, ObjectConfig, RobotConfig, SynapseSelector,
 };
-use numeric::random::{Purpose, Stream};
 
 /// Leader selection.
 pub(crate) fn experiment_a() -> ExperimentConfig {

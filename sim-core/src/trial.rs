@@ -20,9 +20,9 @@ use crate::stepping::Actions;
 use crate::swarm::Swarm;
 use crate::torus::{Torus, Vec2};
 use crate::world::World;
+use determinism::Isa;
+use determinism::random::{Purpose, Stream, TrialSet};
 use experiment_file::SensorQuery;
-use numeric::Isa;
-use numeric::random::{Purpose, Stream, TrialSet};
 use task_script::ScriptError;
 
 /// State of a trial.

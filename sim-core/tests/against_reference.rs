@@ -9,8 +9,8 @@ mod reference;
 
 use std::ops::Range;
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream};
 use sim_core::Simulation;
 
 use reference::Episode;

@@ -12,11 +12,11 @@ use std::{
     time::Duration,
 };
 
+use determinism::random::{Purpose, Stream, TrialSet};
 use experiment_file::{
     ExperimentConfig, FitnessFunction, LightController, ObjectConfig, RobotController,
     ScriptConfig, TaskConfig,
 };
-use numeric::random::{Purpose, Stream, TrialSet};
 use sim_core::{EvaluateError, Simulation};
 
 /// Valid scripts, and the experiment file beside each that has one.

@@ -120,7 +120,7 @@ fn the_page_on_logs_has_every_line_with_its_fields_and_no_other() {
     for (heading, directories) in [
         ("Coordinator", &["coordinator/src"][..]),
         ("Worker", &["worker/src"]),
-        ("Both", &["telemetry/src", "transport/src"]),
+        ("Both", &["crates/telemetry/src", "crates/transport/src"]),
     ] {
         let said: BTreeSet<Line> = directories.iter().flat_map(|it| lines_of(it)).collect();
         let documented = documented(&page, heading);

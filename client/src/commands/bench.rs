@@ -8,8 +8,8 @@ use std::{
 };
 
 use clap::Args;
+use determinism::random::{Purpose, Stream};
 use experiment_file::ExperimentConfig;
-use numeric::random::{Purpose, Stream};
 use serde::Serialize;
 use sim_core::{Isa, Simulation};
 

@@ -9,8 +9,8 @@ use pulp::{Simd, WithSimd};
 use crate::neighbours::Neighbours;
 use crate::sensors::Decay;
 use crate::torus::{Vec2, angular_difference, sector_angle, wrap_angle};
+use determinism::Isa;
 use experiment_file::SendingDirection;
-use numeric::Isa;
 
 /// A border between sectors belongs to both in spite of rounding, radians.
 const BORDER: f64 = 1e-12;

@@ -5,7 +5,7 @@ use std::f64::consts::LOG2_E;
 use pulp::{Simd, WithSimd};
 
 use crate::exp2::exp2;
-use numeric::Isa;
+use determinism::Isa;
 
 /// Draws lattice points with probabilities softmax(-beta * d / sqrt(M)), d the
 /// Euclidean distance to the message. In f32, as the messages are, one lane per

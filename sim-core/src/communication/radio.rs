@@ -9,9 +9,9 @@ use crate::neighbours::Neighbours;
 use crate::swarm::{Received, Swarm};
 use crate::torus::Vec2;
 use crate::world::{RobotGroup, World};
+use determinism::Isa;
+use determinism::random::Stream;
 use experiment_file::SendingDirection;
-use numeric::Isa;
-use numeric::random::Stream;
 
 /// State of the wireless link.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 
 use super::{Action, Controller};
 use crate::lanes::Lanes;
-use numeric::random::Stream;
+use determinism::random::Stream;
 
 /// Wheel action per mean reading of a half.
 const GAIN: f32 = 5.0;
@@ -52,7 +52,7 @@ impl Controller for BraitenbergLightFollower {
 mod tests {
     use super::*;
     use crate::communication::Mode;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     fn wheels(readings: &[f64]) -> [f64; 2] {
         let mut stimuli = Lanes::new(readings.len(), 3);

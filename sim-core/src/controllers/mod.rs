@@ -8,7 +8,7 @@ pub(crate) use neural::NeuralController;
 
 use crate::communication::Mode;
 use crate::lanes::Lanes;
-use numeric::random::Stream;
+use determinism::random::Stream;
 
 /// Decides for all robots of one object of the world, in all trials at once: one
 /// lane per robot and trial.

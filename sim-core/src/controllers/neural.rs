@@ -5,8 +5,8 @@ use crate::lanes::Lanes;
 use crate::network::decoding::Output;
 use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
-use numeric::Isa;
-use numeric::random::Stream;
+use determinism::Isa;
+use determinism::random::Stream;
 
 /// One network, its state in every lane, and the decoding of its outputs.
 #[derive(Debug)]

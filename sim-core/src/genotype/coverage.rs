@@ -5,8 +5,8 @@ use indexmap::IndexMap;
 use super::Parameter;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
+use determinism::random::{Purpose, Stream};
 use experiment_file::{LearningConfig, ReceptiveField, TopologyConfig, limits};
-use numeric::random::{Purpose, Stream};
 
 /// The first stream of fixed weights of decoders, after those of groups of synapses.
 const DECODERS: u64 = 1 << 32;

@@ -5,8 +5,8 @@ mod random_graph;
 use std::f64::consts::TAU;
 
 use crate::torus::{Torus, Vec2, wrap_angle};
+use determinism::random::Stream;
 use experiment_file::Initializer;
-use numeric::random::Stream;
 
 /// An initialiser that cannot place all its objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,7 +130,7 @@ fn fixed<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 500.0 };
 

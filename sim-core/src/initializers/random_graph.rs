@@ -3,7 +3,7 @@
 
 use super::Unplaceable;
 use crate::torus::{Torus, Vec2};
-use numeric::random::Stream;
+use determinism::random::Stream;
 
 /// Scale of a step, cm.
 const STEP: f64 = 80.0;
@@ -89,7 +89,7 @@ fn stands(candidate: Vec2, placed: &[Vec2], torus: &Torus) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     const TORUS: Torus = Torus { width: 1000.0, height: 1000.0 };
 

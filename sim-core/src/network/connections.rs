@@ -6,8 +6,8 @@ use indexmap::IndexMap;
 
 use super::{Ensemble, Stimulus};
 use crate::problems::Problems;
+use determinism::random::{Purpose, Stream};
 use experiment_file::{Neurotransmitter, TopologyConfig};
-use numeric::random::{Purpose, Stream};
 
 /// Where a synapse comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,8 +10,8 @@ use crate::controllers::Action;
 use crate::lanes::Lanes;
 use crate::network::dynamics::{NetworkState, SpikeWindow};
 use crate::problems::Problems;
+use determinism::random::{Stream, sample};
 use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig};
-use numeric::random::{Stream, sample};
 
 /// An ensemble that drives an actuator.
 #[derive(Debug, Clone)]
@@ -241,7 +241,7 @@ impl Decoder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     /// Actions of `n` neurons with the given activities.
     fn decode(

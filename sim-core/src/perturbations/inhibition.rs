@@ -2,8 +2,8 @@
 //! sensors and radios work on, so they still relay what they receive.
 
 use super::draw_affected;
+use determinism::random::Stream;
 use experiment_file::{InhibitedStimulus, SensorQuery, StimuliInhibitionConfig};
-use numeric::random::Stream;
 
 /// Who lost what.
 #[derive(Debug, Clone)]
@@ -39,8 +39,8 @@ impl Inhibition {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use determinism::random::Purpose;
     use experiment_file::WholeReceiver;
-    use numeric::random::Purpose;
 
     fn inhibition(stimuli: InhibitedStimulus) -> Inhibition {
         let config = StimuliInhibitionConfig { stimuli, affected_robots: 3 };

@@ -10,8 +10,8 @@ use rotation::Rotation;
 
 use crate::swarm::Swarm;
 use crate::world::RobotGroup;
+use determinism::random::Stream;
 use experiment_file::{PerturbationsConfig, SensorQuery};
-use numeric::random::Stream;
 
 /// Stream numbers of the perturbations that draw robots: their places in
 /// [`PerturbationsConfig`]. Part of the format of a run.
@@ -101,8 +101,8 @@ fn draw_affected(n_affected: u32, n_robots: usize, stream: &mut Stream) -> Vec<b
 #[cfg(test)]
 mod tests {
     use super::*;
+    use determinism::random::Purpose;
     use experiment_file::TopologySwitchConfig;
-    use numeric::random::Purpose;
 
     fn stream(number: usize) -> Stream {
         Stream::new(0, 0, 0, Purpose::Perturbation, number as u64)

@@ -3,8 +3,8 @@
 
 use super::draw_affected;
 use crate::torus::{angular_difference, wrap_angle};
+use determinism::random::Stream;
 use experiment_file::UncontrollableRotationConfig;
-use numeric::random::Stream;
 
 /// Distance from the target within which a robot holds its heading, radians.
 const ARRIVED: f64 = 0.15;
@@ -56,7 +56,7 @@ impl Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     const TURN: [f64; 2] = [0.3, -0.3];
     const HOLD: [f64; 2] = [0.0, 0.0];

@@ -1,6 +1,6 @@
 //! What a script may change, and when.
 
-use numeric::random::Stream;
+use determinism::random::Stream;
 use task_script::{Object, Value};
 
 use super::names::Named;

@@ -11,8 +11,8 @@ pub(crate) use change::May;
 use change::Plan;
 pub(crate) use view::View;
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{RobotController, ScriptConfig};
-use numeric::random::{Purpose, Stream};
 use task_script::{FunctionId, Limits, Object, Program, Script, ScriptError, Value};
 
 use crate::objects::{Site, StaticObjects};

@@ -1,7 +1,7 @@
 //! What robots sense by the script: its function `sense`.
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::SensorQuery;
-use numeric::random::{Purpose, Stream};
 use task_script::{FunctionId, ScriptError, Value};
 
 use super::change::May;

@@ -3,11 +3,11 @@
 mod acting;
 mod sensing;
 
+use determinism::Isa;
+use determinism::random::TrialSet;
 use experiment_file::{
     ExperimentConfig, FitnessFunction, LightController, ScriptConfig, TaskConfig,
 };
-use numeric::Isa;
-use numeric::random::TrialSet;
 
 use crate::simulation::{EvaluateError, Simulation};
 use crate::testing::{experiment_a, experiment_b, experiment_c, experiment_d, genotype};

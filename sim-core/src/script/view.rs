@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 use std::rc::Rc;
 
+use determinism::random::Stream;
 use experiment_file::suggestion;
-use numeric::random::Stream;
 use task_script::{Host, Meter, Name, Object, Value};
 
 use super::change::May;

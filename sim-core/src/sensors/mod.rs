@@ -97,7 +97,7 @@ impl NoiseStream {
     /// be another one.
     pub const LIGHT_AND_DISTANCE: Self = Self(0);
 
-    /// The stream's number, at [`Purpose::SensorNoise`](numeric::random::Purpose),
+    /// The stream's number, at [`Purpose::SensorNoise`](determinism::random::Purpose),
     /// for a robot.
     pub fn number(self, robot: usize) -> u64 {
         // Robots are far fewer.

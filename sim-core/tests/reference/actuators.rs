@@ -1,7 +1,7 @@
 //! From activities to actions (decoding), and from wheel actions to motion.
 
+use determinism::random::Stream;
 use experiment_file::{ActuatorQuery, DecodingConfig, TopologyConfig, WheelActuatorConfig};
-use numeric::random::Stream;
 
 use super::communication::draw;
 use super::network::neurons_of;

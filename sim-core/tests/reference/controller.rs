@@ -1,7 +1,7 @@
 //! The network of a robot, of one kind of neurons or the other.
 
+use determinism::random::Stream;
 use experiment_file::ExperimentConfig;
-use numeric::random::Stream;
 
 use super::network::{Matrices, Network};
 use super::spiking::{SpikingNetwork, SpikingState};

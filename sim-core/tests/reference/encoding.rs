@@ -1,7 +1,7 @@
 //! Encoders of stimuli and their receptive fields, one node after the other.
 
+use determinism::random::Stream;
 use experiment_file::{EncodingScheme, ReceptiveField, TopologyConfig};
-use numeric::random::Stream;
 
 /// An encoder with its weights.
 #[derive(Clone)]

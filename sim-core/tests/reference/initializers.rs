@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use determinism::random::Stream;
 use experiment_file::Initializer;
-use numeric::random::Stream;
 
 use super::torus::{Torus, Vector, norm, wrap_angle};
 
@@ -123,7 +123,7 @@ fn cholesky(var_x: f64, covariance: f64, var_y: f64) -> [f64; 3] {
 #[test]
 fn random_graphs_have_the_measured_statistics() {
     use super::alpha_shape::borderline;
-    use numeric::random::Purpose;
+    use determinism::random::Purpose;
 
     const N_SAMPLES: u64 = 200;
     let torus = Torus { width: 1000.0, height: 1000.0 };

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
+use determinism::random::Stream;
 use experiment_file::{LightController, LightParams, LightSourceConfig, Pace};
-use numeric::random::Stream;
 
 use super::torus::{Torus, Vector, norm};
 
@@ -110,8 +110,8 @@ impl<'a> Light<'a> {
 
 #[test]
 fn an_orbiting_light_spirals_outwards_from_the_centre() {
+    use determinism::random::Purpose;
     use experiment_file::{Initializer, OrbitConfig, PositionInitializers};
-    use numeric::random::Purpose;
 
     let torus = Torus { width: 1000.0, height: 1000.0 };
     let config = LightSourceConfig {

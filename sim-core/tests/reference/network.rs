@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     Activation, EnsembleSelector, ExperimentConfig, GenotypeQuery, GroupSelector, InitialRates,
     Neurotransmitter, StimulusSelector, SynapseSelector, TopologyConfig,
 };
-use numeric::random::{Purpose, Stream};
 
 use super::{encoding, spiking};
 

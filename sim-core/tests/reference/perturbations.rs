@@ -1,9 +1,9 @@
 //! What goes wrong in a swarm (chapter 6).
 
+use determinism::random::Stream;
 use experiment_file::{
     InhibitedStimulus, SensorQuery, UncontrollableRotationConfig, WholeReceiver,
 };
-use numeric::random::Stream;
 
 use super::torus::angular_difference;
 

@@ -1,8 +1,8 @@
 //! The sensors of section 3.2.2. Each returns its readings without knowing who
 //! asks for them.
 
+use determinism::random::Stream;
 use experiment_file::{DistanceSensorConfig, LightSensorConfig, SensorQuery};
-use numeric::random::Stream;
 
 use super::communication::Reception;
 use super::lights::Light;

@@ -1,11 +1,11 @@
 //! Spiking neurons and decoders of their spikes (sections 4.1 and 4.2), with dense
 //! matrices.
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     ActuatorQuery, DecodingConfig, ExperimentConfig, NamedMap, NeuronModel, OutputSelector,
     SynapseParams, TopologyConfig,
 };
-use numeric::random::{Purpose, Stream};
 
 use super::actuators::Actions;
 use super::encoding::{Encoder, EncoderState, encoders as encoders_of};

@@ -1,10 +1,10 @@
 //! The world and the order of one step: sense, control, act, score, move lights.
 
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams, Initializer,
     ObjectConfig, RobotConfig, RobotController, WirelessTransmitterConfig,
 };
-use numeric::random::{Purpose, Stream};
 
 use super::actuators::{self, Actions};
 use super::communication::{Frame, Reception, quantise, receive};

@@ -3,7 +3,7 @@
 use std::{fmt, path::Path};
 
 use coordinator::Address;
-use numeric::random::{Purpose, Stream};
+use determinism::random::{Purpose, Stream};
 use serde_json::Value;
 
 use super::{SimulateArgs, champion::Origin};

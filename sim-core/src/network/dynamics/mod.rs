@@ -16,9 +16,9 @@ use super::connections::{Synapse, SynapseGroup};
 use super::{Ensemble, Network, Phenotype};
 use crate::lanes::Lanes;
 use ctrnn::{Ctrnn, PlasticCtrnn};
+use determinism::Isa;
+use determinism::random::Stream;
 use experiment_file::NeuronModel;
-use numeric::Isa;
-use numeric::random::Stream;
 
 /// The neurons of a network with their synapses, by one model, and their state in
 /// every lane. An implementation must give a lane the same bits whatever its place,

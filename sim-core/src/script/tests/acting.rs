@@ -1,10 +1,10 @@
 //! What scripts do: control robots, move lights and areas, have things happen.
 
+use determinism::Isa;
+use determinism::random::TrialSet;
 use experiment_file::{
     AreaController, ExperimentConfig, LightController, ObjectConfig, RobotController,
 };
-use numeric::Isa;
-use numeric::random::TrialSet;
 
 use super::{measured, with_script};
 use crate::record::StepRecord;

@@ -1,8 +1,8 @@
 //! What robots sense by a script.
 
+use determinism::Isa;
+use determinism::random::TrialSet;
 use experiment_file::{ExperimentConfig, ObjectConfig, RobotConfig, RobotController};
-use numeric::Isa;
-use numeric::random::TrialSet;
 use serde_json::json;
 
 use super::acting::{failure, watch};

@@ -9,8 +9,8 @@ use super::super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
+use determinism::Isa;
 use experiment_file::InitialRates;
-use numeric::Isa;
 
 /// Vectors per row of a chunk, at most: the sums of four neurons then fit in registers.
 pub(super) const MAX_WIDTH: usize = 4;

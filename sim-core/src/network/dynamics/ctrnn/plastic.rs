@@ -15,8 +15,8 @@ use super::squash::{scale, squash};
 use crate::lanes::Lanes;
 use crate::network::connections::Source;
 use crate::network::{Network, Phenotype};
+use determinism::Isa;
 use experiment_file::{Activation, InitialRates};
-use numeric::Isa;
 
 /// A network with its weights, and its state in every lane.
 #[derive(Debug)]

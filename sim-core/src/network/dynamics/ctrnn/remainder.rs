@@ -11,8 +11,8 @@ use super::super::aligned::Aligned;
 use super::kernel::{Blocks, Coupling, Kernel};
 use super::squash::squash;
 use crate::lanes::Lanes;
+use determinism::Isa;
 use experiment_file::{Activation, InitialRates};
-use numeric::Isa;
 
 /// Lanes of a remainder, at most.
 pub(super) const MAX_LANES: usize = 4;

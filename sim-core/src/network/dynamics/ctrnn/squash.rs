@@ -94,7 +94,7 @@ mod tests {
 
     use super::*;
     use crate::exp2::MAX_EXPONENT;
-    use numeric::Isa;
+    use determinism::Isa;
 
     /// Both functions of every y of a slice, paired with some other y.
     struct Squash<'a> {

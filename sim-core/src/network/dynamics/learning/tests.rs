@@ -8,11 +8,11 @@ use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::testing::{experiment_a, experiment_a_spiking, genotype};
+use determinism::Isa;
 use experiment_file::{
     EncodingConfig, EncodingScheme, ExperimentConfig, LearningConfig, LinearField, NeuronModel,
     Neurotransmitter, ReceptiveField, RewardConfig, SynapseModel, SynapseParams,
 };
-use numeric::Isa;
 
 /// What a test looks at: all neurons, step by step.
 type Bits = Vec<u32>;

@@ -10,8 +10,8 @@ use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::testing::experiment_a_spiking;
+use determinism::Isa;
 use experiment_file::{NeuronModel, Neurotransmitter, SynapseModel, SynapseParams};
-use numeric::Isa;
 
 /// Between rest and the peak of a spike, about, mV.
 const SPAN: f64 = 100.0;

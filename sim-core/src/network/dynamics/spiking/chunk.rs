@@ -11,7 +11,7 @@ use super::model::Model;
 use super::neurons::Neurons;
 use super::receptors::ReceptorState;
 use crate::lanes::Lanes;
-use numeric::Isa;
+use determinism::Isa;
 
 /// Vectors per row of a chunk, at most.
 pub(super) const MAX_WIDTH: usize = 2;

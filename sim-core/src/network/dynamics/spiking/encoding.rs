@@ -275,9 +275,9 @@ mod tests {
     use pulp::WithSimd;
 
     use super::*;
+    use determinism::Isa;
+    use determinism::random::{Purpose, Stream};
     use experiment_file::{GaussianField, SlopedField};
-    use numeric::Isa;
-    use numeric::random::{Purpose, Stream};
 
     const N_SUBSTEPS: u32 = 20;
 

@@ -37,7 +37,7 @@ mod tests {
     use pulp::WithSimd;
 
     use super::*;
-    use numeric::Isa;
+    use determinism::Isa;
 
     /// exp, tanh and cosh of whole vectors of x.
     struct Functions<'a>(&'a [f32]);

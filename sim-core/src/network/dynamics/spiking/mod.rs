@@ -28,10 +28,10 @@ use crate::lanes::Lanes;
 use crate::network::{Network, Phenotype};
 use chunk::Chunk;
 use circuit::Circuit;
+use determinism::Isa;
 use experiment_file::NeuronModel;
 use model::Model;
 use neurons::Neurons;
-use numeric::Isa;
 pub(super) use wiring::Wiring;
 
 /// A network of spiking neurons, by their model, at rest.

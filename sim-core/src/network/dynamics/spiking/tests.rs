@@ -5,12 +5,12 @@ use crate::network::dynamics::NetworkState;
 use crate::network::{Network, Phenotype};
 use crate::problems::Problems;
 use crate::testing::{experiment_a_spiking, genotype};
+use determinism::Isa;
+use determinism::random::{Purpose, Stream};
 use experiment_file::{
     EncodingConfig, EncodingScheme, ExperimentConfig, GaussianField, LinearField, NeuronModel,
     Neurotransmitter, ReceptiveField, SlopedField, SynapseModel, SynapseParams,
 };
-use numeric::Isa;
-use numeric::random::{Purpose, Stream};
 
 const MODELS: [NeuronModel; 5] = [
     NeuronModel::Lif,

@@ -1,0 +1,27 @@
+//! Numbers with the same bits on every machine.
+//!
+//! - [`random`]: random streams that are addressed by what they are for;
+//! - [`Isa`]: the vector instructions that a computation uses, which decide how
+//!   fast it is and change no bit.
+//!
+//! A stream's values depend on its address alone, not on who reads it or when:
+//!
+//! ```
+//! use determinism::random::{Purpose, Stream};
+//!
+//! // Seed 7, generation 1, trial 2, what it is for, robot 3.
+//! let mut stream = Stream::new(7, 1_u64, 2, Purpose::Reception, 3);
+//! assert_eq!(stream.uniform(), 0.20192406347197278);
+//!
+//! let mut again = Stream::new(7, 1_u64, 2, Purpose::Reception, 3);
+//! again.skip(1);
+//! assert_eq!(again.normal(), stream.normal());
+//!
+//! let mut of_another_robot = Stream::new(7, 1_u64, 2, Purpose::Reception, 4);
+//! assert_ne!(of_another_robot.uniform(), 0.20192406347197278);
+//! ```
+
+mod isa;
+pub mod random;
+
+pub use isa::{Isa, UnknownIsa};

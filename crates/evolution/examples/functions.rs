@@ -1,0 +1,112 @@
+//! How close each algorithm comes to the maximum of four functions of 20 genes: what is missing
+//! after so many evaluations, median and range of five seeds.
+//!
+//! `cargo run -p evolution --example functions -- [INDIVIDUALS] [EVALUATIONS]`;
+//! `crates/evolution/examples/cma_functions.py` has the same of the package `cma`.
+
+use std::f64::consts::TAU;
+
+use evolution::{AlgorithmParams, Setup};
+
+const N_GENES: usize = 20;
+const SEEDS: [u64; 5] = [0, 1, 2, 3, 4];
+
+/// A function to be minimised, of coordinates in \[-5, 5\]; the least value is 0.
+type Function = fn(&[f64]) -> f64;
+
+const FUNCTIONS: [(&str, Function); 4] = [
+    ("sphere", |x| x.iter().map(|x| (x - 1.5) * (x - 1.5)).sum()),
+    ("ellipsoid", |x| {
+        let weight = |i: usize| libm::pow(1e6, i as f64 / (N_GENES - 1) as f64);
+        x.iter().enumerate().map(|(i, x)| weight(i) * (x - 1.5) * (x - 1.5)).sum()
+    }),
+    ("Rosenbrock", |x| {
+        let step = |pair: &[f64]| {
+            let bend = pair[1] - pair[0] * pair[0];
+            100.0 * bend * bend + (1.0 - pair[0]) * (1.0 - pair[0])
+        };
+        x.windows(2).map(step).sum()
+    }),
+    ("Rastrigin", |x| {
+        let wave = |z: f64| z * z - 10.0 * libm::cos(TAU * z) + 10.0;
+        x.iter().map(|x| wave(x - 1.5)).sum()
+    }),
+];
+
+fn params(values: &[(&str, f64)]) -> AlgorithmParams {
+    values.iter().fold(AlgorithmParams::default(), |params, (key, value)| params.with(key, *value))
+}
+
+/// The algorithms with their defaults, and with other parameters.
+fn variants() -> Vec<(String, AlgorithmParams)> {
+    let d = N_GENES as f64;
+    let snes = (3.0 + libm::log(d)) / (5.0 * d.sqrt());
+    let xnes = 3.0 * snes / d;
+    [
+        ("GA", vec![]),
+        ("GA", vec![("mutation_sigma", 0.1)]),
+        ("GA", vec![("mutation_sigma", 0.03)]),
+        ("SNES", vec![]),
+        ("SNES", vec![("eta_sigma", 2.0 * snes)]),
+        ("xNES", vec![]),
+        ("xNES", vec![("eta_sigma", snes), ("eta_B", xnes)]),
+        // These are those of `"rates": "fast"`.
+        ("xNES", vec![("eta_sigma", snes), ("eta_B", 2.0 * xnes)]),
+        ("CMA-ES", vec![]),
+        ("sep-CMA-ES", vec![]),
+        ("openaiES", vec![]),
+        ("openaiES", vec![("sigma", 0.03), ("learning_rate", 0.01)]),
+        ("openaiES", vec![("sigma", 0.02), ("learning_rate", 0.005)]),
+    ]
+    .map(|(name, values): (&str, Vec<(&str, f64)>)| (name.to_owned(), params(&values)))
+    .into()
+}
+
+/// What is missing of the champion and, where there is one, of the distribution's mean.
+fn run(setup: &Setup, function: Function, n_evaluations: u32) -> (f64, Option<f64>) {
+    let of_genes = |genes: &[f64]| {
+        let x: Vec<f64> = genes.iter().map(|gene| 10.0 * gene - 5.0).collect();
+        function(&x)
+    };
+    let mut evolution = setup.start().expect("the setup is sound");
+    for _ in 0..n_evaluations / setup.population_size {
+        let generation = evolution.ask();
+        let fitness: Vec<Vec<f64>> =
+            generation.genotypes.iter().map(|genes| vec![-of_genes(genes)]).collect();
+        evolution.tell(generation, &fitness).expect("fitness is finite");
+    }
+    let best = evolution.champion().and_then(|it| it.fitness()).expect("there was a generation");
+    (-best, evolution.mean().map(|genes| of_genes(&genes)))
+}
+
+/// Median, least and largest.
+fn summary(mut values: Vec<f64>) -> String {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values[0], values[values.len() - 1]);
+    format!("{:.1e} ({low:.1e} to {high:.1e})", values[values.len() / 2])
+}
+
+fn main() {
+    let mut arguments = std::env::args().skip(1).map(|it| it.parse().expect("a whole number"));
+    let population_size: u32 = arguments.next().unwrap_or(20);
+    let n_evaluations: u32 = arguments.next().unwrap_or(20_000);
+    println!("{N_GENES} genes, {population_size} individuals, {n_evaluations} evaluations");
+    for (name, function) in FUNCTIONS {
+        println!("\n{name}\n| algorithm | champion | mean of the distribution |\n|---|---|---|");
+        for (algorithm, params) in variants() {
+            let keys: Vec<String> =
+                params.iter().map(|(key, value)| format!(" {key}={value}")).collect();
+            let setup = |seed| Setup {
+                population_size,
+                seed,
+                params: params.clone(),
+                ..Setup::new(&algorithm, N_GENES)
+            };
+            let runs = SEEDS.map(|seed| run(&setup(seed), function, n_evaluations));
+            let mean: Option<Vec<f64>> = runs.iter().map(|it| it.1).collect();
+            let mean = mean.map_or_else(|| "-".to_owned(), summary);
+            let champion = summary(runs.iter().map(|it| it.0).collect());
+            println!("| {algorithm}{} | {champion} | {mean} |", keys.concat());
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Genetic algorithm with real genes.
+//!
+//! The thesis's section 2.2.1; Eiben, Smith: "Introduction to evolutionary
+//! computing" (2nd ed., 2015) for the operators in general, each operator's own
+//! source beside it.
+
+mod crossover;
+mod mutation;
+mod selection;
+
+use determinism::random::Stream;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
+use serde::{Deserialize, Serialize};
+
+use super::{Described, Sample, Strategy};
+use crate::{Birth, Genotype, Parents};
+use crossover::Crossover;
+use mutation::Mutation;
+use selection::Selection;
+
+/// The operators, and the last generation as far as its fitness is finite: whoever
+/// has none is neither elite nor parent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ga {
+    d: usize,
+    n_elite: usize,
+    selection: Selection,
+    crossover: Crossover,
+    crossover_prob: f64,
+    mutation: Mutation,
+    mutation_prob: f64,
+    /// Best first; empty before the first generation.
+    ranked: Vec<Genotype>,
+    /// Of `ranked`.
+    fitness: Vec<f64>,
+}
+
+/// Pairs are neighbours of a shuffled list; there is no other way yet.
+const MATING_OPERATOR: Parameter =
+    Parameter::one_of("mating_operator", &["random"], &[], "How parents are paired");
+const CROSSOVER_PROB: Parameter =
+    Parameter::unit("crossover_prob", 0.9, "Probability that a pair is crossed");
+const MUTATION_PROB: Parameter =
+    Parameter::unit("mutation_prob", 0.05, "Probability that a gene mutates");
+const NUM_ELITE: Parameter =
+    Parameter::below_population_size("num_elite", 3, "Individuals that survive unchanged");
+
+impl Described for Ga {
+    const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
+        name: "GA",
+        title: "Genetic algorithm",
+        learns: "population",
+        state: "P d",
+        keeps: Keeps::Population,
+        individuals_min: 1,
+        learns_from: LearnsFrom::Ranks,
+        genes_max: None,
+        parameters: &[
+            selection::OPERATOR,
+            selection::TOURNAMENT_SIZE,
+            MATING_OPERATOR,
+            crossover::OPERATOR,
+            crossover::ALPHA,
+            CROSSOVER_PROB,
+            mutation::OPERATOR,
+            MUTATION_PROB,
+            mutation::SIGMA,
+            mutation::CATEGORIES,
+            NUM_ELITE,
+        ],
+    };
+
+    fn start(params: &AlgorithmParams, d: usize) -> Self {
+        Self {
+            d,
+            n_elite: params.whole(&NUM_ELITE) as usize,
+            selection: Selection::new(params),
+            crossover: Crossover::new(params),
+            crossover_prob: params.number(&CROSSOVER_PROB),
+            mutation: Mutation::new(params),
+            mutation_prob: params.number(&MUTATION_PROB),
+            ranked: Vec::new(),
+            fitness: Vec::new(),
+        }
+    }
+}
+
+impl Ga {
+    /// The elite, then children, all with their parents. Each phase draws for all individuals
+    /// before the next one begins.
+    fn breed(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        let elite = self.ranked.iter().take(self.n_elite).enumerate();
+        let mut population: Vec<(Genotype, Parents)> =
+            elite.map(|(rank, genes)| (genes.clone(), Parents::Elite(rank))).collect();
+        let n_children = population_size - population.len();
+        let mut parents = self.selection.select(n_children, &self.fitness, rng);
+        shuffle(&mut parents, rng);
+        let mut children = Vec::with_capacity(n_children);
+        for pair in parents.chunks(2) {
+            match *pair {
+                [a, b] if rng.bernoulli(self.crossover_prob) => {
+                    let crossed = self.crossover.cross(&self.ranked[a], &self.ranked[b], rng);
+                    children.extend(crossed.map(|genes| (genes, Parents::Two(a, b))));
+                }
+                _ => children
+                    .extend(pair.iter().map(|&one| (self.ranked[one].clone(), Parents::One(one)))),
+            }
+        }
+        for (child, _) in &mut children {
+            self.mutation.mutate(child, self.mutation_prob, rng);
+            child.iter_mut().for_each(|gene| *gene = gene.clamp(0.0, 1.0));
+        }
+        population.extend(children);
+        population
+    }
+
+    /// The first generation, U(0, 1)^d.
+    fn begin(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        let mut genes = || (0..self.d).map(|_| rng.uniform()).collect();
+        (0..population_size).map(|_| (genes(), Parents::None)).collect()
+    }
+
+    fn draw(&self, population_size: usize, rng: &mut Stream) -> Vec<(Genotype, Parents)> {
+        match self.ranked.is_empty() {
+            true => self.begin(population_size, rng),
+            false => self.breed(population_size, rng),
+        }
+    }
+}
+
+impl Strategy for Ga {
+    fn n_genes(&self) -> usize {
+        self.d
+    }
+
+    /// The first generation is U(0, 1)^d. Later ones: the elite unchanged, then
+    /// children of selected parents; a pair that does not cross, and an odd parent
+    /// out, is its own children; every child mutates and is clipped to \[0, 1\].
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        let drawn = self.draw(population_size, rng).into_iter();
+        let genotypes = drawn.map(|(genes, _)| genes).collect();
+        Sample::new(genotypes, Vec::new())
+    }
+
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        let drawn = self.draw(population_size, rng).into_iter();
+        let parent = |rank: usize| &self.ranked[rank];
+        Some(drawn.map(|(genes, parents)| Birth::of(parents, &genes, parent)).collect())
+    }
+
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
+        let finite = || ranking.iter().filter(|&&i| fitness[i].is_finite());
+        self.ranked = finite().map(|&i| sample.genotypes[i].clone()).collect();
+        self.fitness = finite().map(|&i| fitness[i]).collect();
+    }
+}
+
+/// A uniformly random permutation (Fisher, Yates).
+fn shuffle(items: &mut [usize], rng: &mut Stream) {
+    for i in (1..items.len()).rev() {
+        items.swap(i, rng.below(i + 1));
+    }
+}
+
+#[cfg(test)]
+mod tests;

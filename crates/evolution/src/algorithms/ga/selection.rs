@@ -1,0 +1,254 @@
+//! Selection: whose genes get a chance.
+
+use determinism::random::Stream;
+use experiment_file::{AlgorithmParams, Parameter, limits};
+use serde::{Deserialize, Serialize};
+
+/// How parents are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Selection {
+    /// The best of `size` drawn uniformly with replacement (Algorithm 1).
+    Tournament {
+        /// Contestants, K.
+        size: usize,
+    },
+    /// Proportional to fitness, independent draws.
+    Roulette,
+    /// Linear in rank (Baker 1985), with selection pressure 1.5.
+    LinearRank,
+    /// Geometric in rank (Michalewicz 1992), with ratio 0.9.
+    NonlinearRank,
+    /// Proportional to fitness, evenly spaced draws with one random offset (Baker
+    /// 1987): everyone is drawn within one of what is expected.
+    StochasticUniversal,
+}
+
+/// Expected draws of the best by linear rank, relative to the average.
+const LINEAR_PRESSURE: f64 = 1.5;
+/// Weight of the best by non-linear rank, before the weights are made to sum
+/// to 1; each further rank has 1 - this of the one before.
+const NONLINEAR_BEST: f64 = 0.1;
+
+/// Chooses among the variants of [`Selection`], in their order.
+pub const OPERATOR: Parameter = Parameter::one_of(
+    "selection_operator",
+    &["tournament", "roulette", "lin_rank", "nonlin_rank", "stochastic_universal"],
+    &[],
+    "How parents are chosen",
+);
+/// Contestants of a tournament, K.
+pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
+    "tournament_size",
+    [1, limits::POPULATION],
+    3,
+    "Contestants of a tournament, drawn with replacement",
+);
+
+impl Selection {
+    /// As configured.
+    pub fn new(params: &AlgorithmParams) -> Self {
+        match params.name(&OPERATOR).as_str() {
+            "tournament" => Self::Tournament { size: params.whole(&TOURNAMENT_SIZE) as usize },
+            "roulette" => Self::Roulette,
+            "lin_rank" => Self::LinearRank,
+            "nonlin_rank" => Self::NonlinearRank,
+            "stochastic_universal" => Self::StochasticUniversal,
+            other => unreachable!("`{other}` is none of the names in the domain"),
+        }
+    }
+
+    /// Draws `n` parents, as ranks (0 is the best). `fitness`: finite, best first,
+    /// not empty.
+    pub fn select(self, n: usize, fitness: &[f64], rng: &mut Stream) -> Vec<usize> {
+        match self {
+            Self::Tournament { size } => {
+                (0..n).map(|_| tournament(size, fitness.len(), rng)).collect()
+            }
+            Self::Roulette => Wheel::new(proportional(fitness)).spin(n, rng),
+            Self::LinearRank => Wheel::new(linear(fitness.len())).spin(n, rng),
+            Self::NonlinearRank => Wheel::new(geometric(fitness.len())).spin(n, rng),
+            Self::StochasticUniversal => Wheel::new(proportional(fitness)).sweep(n, rng),
+        }
+    }
+}
+
+/// The best rank is the smallest, so it wins; equals go by rank, too.
+fn tournament(size: usize, n: usize, rng: &mut Stream) -> usize {
+    (1..size).fold(rng.below(n), |best, _| best.min(rng.below(n)))
+}
+
+/// Fitness itself if none is negative; else fitness minus the smallest. If nothing
+/// is left then, everyone is equal.
+fn proportional(fitness: &[f64]) -> Vec<f64> {
+    // Halves and a common scale: neither a difference nor a sum can overflow.
+    let smallest = fitness[fitness.len() - 1];
+    let shift = if smallest < 0.0 { smallest / 2.0 } else { 0.0 };
+    let largest = fitness[0] / 2.0 - shift;
+    if largest == 0.0 {
+        return vec![1.0; fitness.len()];
+    }
+    fitness.iter().map(|f| (f / 2.0 - shift) / largest).collect()
+}
+
+/// s - (2s - 2) r/(n - 1) for rank r = 0..n, s the selection pressure.
+fn linear(n: usize) -> Vec<f64> {
+    let slope = 2.0 * (LINEAR_PRESSURE - 1.0) / (n.max(2) - 1) as f64;
+    (0..n).map(|rank| LINEAR_PRESSURE - slope * rank as f64).collect()
+}
+
+/// q (1 - q)^r for rank r = 0..n.
+fn geometric(n: usize) -> Vec<f64> {
+    let mut weight = NONLINEAR_BEST;
+    let mut weights = Vec::with_capacity(n);
+    for _ in 0..n {
+        weights.push(weight);
+        weight *= 1.0 - NONLINEAR_BEST;
+    }
+    weights
+}
+
+/// A wheel of fortune: each rank has a sector as wide as its weight.
+struct Wheel {
+    /// Where the sectors end.
+    ends: Vec<f64>,
+}
+
+impl Wheel {
+    /// `weights`: not negative, not all 0.
+    fn new(weights: Vec<f64>) -> Self {
+        let mut end = 0.0;
+        let ends = weights.into_iter().map(|weight| {
+            end += weight;
+            end
+        });
+        Self { ends: ends.collect() }
+    }
+
+    /// The rank at `position` in \[0, 1\] of the wheel's circumference.
+    fn at(&self, position: f64) -> usize {
+        let circumference = self.ends[self.ends.len() - 1];
+        let target = (position * circumference).min(circumference.next_down());
+        // Sectors are open at their ends: one without width is never hit.
+        self.ends.partition_point(|&end| end <= target)
+    }
+
+    /// `n` independent positions.
+    fn spin(&self, n: usize, rng: &mut Stream) -> Vec<usize> {
+        (0..n).map(|_| self.at(rng.uniform())).collect()
+    }
+
+    /// `n` positions at equal distances.
+    fn sweep(&self, n: usize, rng: &mut Stream) -> Vec<usize> {
+        let offset = rng.uniform();
+        (0..n).map(|k| self.at((k as f64 + offset) / n as f64)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use determinism::random::Purpose;
+
+    use super::*;
+
+    const N: usize = 10;
+
+    fn rng() -> Stream {
+        Stream::new(1, 0, 0, Purpose::Evolution, 0)
+    }
+
+    fn fitness() -> Vec<f64> {
+        (0..N).map(|rank| (N - rank) as f64).collect()
+    }
+
+    /// Share of the draws that each rank gets.
+    fn shares(selection: Selection, fitness: &[f64]) -> Vec<f64> {
+        let n = 200_000;
+        let mut shares = vec![0.0; fitness.len()];
+        for rank in selection.select(n, fitness, &mut rng()) {
+            shares[rank] += 1.0 / n as f64;
+        }
+        shares
+    }
+
+    /// Standard deviations of the shares are below 0.0012.
+    fn assert_close(shares: &[f64], expected: impl Fn(usize) -> f64) {
+        for (rank, share) in shares.iter().enumerate() {
+            assert!((share - expected(rank)).abs() < 0.004, "{rank}: {share} {}", expected(rank));
+        }
+    }
+
+    #[test]
+    fn a_tournament_of_k_selects_by_the_kth_power_of_rank() {
+        for size in [1, 2, 3, 5] {
+            let not_better = |rank: usize| libm::pow((N - rank) as f64 / N as f64, size as f64);
+            let shares = shares(Selection::Tournament { size }, &fitness());
+            assert_close(&shares, |rank| not_better(rank) - not_better(rank + 1));
+        }
+    }
+
+    #[test]
+    fn roulette_selects_in_proportion_to_fitness() {
+        assert_close(&shares(Selection::Roulette, &fitness()), |rank| (N - rank) as f64 / 55.0);
+    }
+
+    #[test]
+    fn linear_rank_gives_the_best_its_pressure_and_falls_evenly() {
+        let expected = |rank: usize| (1.5 - rank as f64 / (N - 1) as f64) / N as f64;
+        assert_close(&shares(Selection::LinearRank, &fitness()), expected);
+    }
+
+    #[test]
+    fn nonlinear_rank_falls_geometrically() {
+        let sum: f64 = (0..N).map(|rank| libm::pow(0.9, rank as f64)).sum();
+        let expected = |rank: usize| libm::pow(0.9, rank as f64) / sum;
+        assert_close(&shares(Selection::NonlinearRank, &fitness()), expected);
+    }
+
+    #[test]
+    fn stochastic_universal_draws_everyone_within_one_of_what_is_expected() {
+        let n = 37;
+        let mut rng = rng();
+        let mut offsets_matter = false;
+        for _ in 0..100 {
+            let selected = Selection::StochasticUniversal.select(n, &fitness(), &mut rng);
+            for rank in 0..N {
+                let expected = n as f64 * (N - rank) as f64 / 55.0;
+                let count = selected.iter().filter(|&&r| r == rank).count() as f64;
+                assert!((count - expected).abs() < 1.0, "{rank}: {count} {expected}");
+                offsets_matter |= count > expected && rank == 0;
+            }
+        }
+        assert!(offsets_matter);
+        let shares = shares(Selection::StochasticUniversal, &fitness());
+        assert_close(&shares, |rank| (N - rank) as f64 / 55.0);
+    }
+
+    #[test]
+    fn negative_fitness_counts_from_the_worst() {
+        for selection in [Selection::Roulette, Selection::StochasticUniversal] {
+            let shares = shares(selection, &[2.0, 0.0, -2.0]);
+            assert!((shares[0] - 2.0 / 3.0).abs() < 0.004, "{shares:?}");
+            assert_eq!(shares[2], 0.0, "the worst has nothing left");
+        }
+    }
+
+    #[test]
+    fn fitness_without_differences_or_beyond_reason_is_selected_from_all_the_same() {
+        for selection in [Selection::Roulette, Selection::StochasticUniversal] {
+            for equal in [0.0, -3.0, 7.0, -0.0] {
+                assert_close(&shares(selection, &[equal; 4]), |_| 0.25);
+            }
+            let huge = shares(selection, &[f64::MAX, 0.0, -f64::MAX]);
+            assert!((huge[0] - 2.0 / 3.0).abs() < 0.004, "{huge:?}");
+            assert_close(&shares(selection, &[f64::MIN_POSITIVE; 4]), |_| 0.25);
+            assert!((shares(selection, &[1.0])[0] - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn nobody_without_a_share_is_ever_drawn() {
+        let wheel = Wheel::new(vec![0.0, 1.0, 0.0, 2.0, 0.0]);
+        let hits: Vec<usize> = [0.0, 0.1, 0.333, 0.334, 1.0].map(|p| wheel.at(p)).to_vec();
+        assert_eq!(hits, [1, 1, 1, 3, 3]);
+    }
+}

@@ -1,0 +1,266 @@
+//! The evolutionary algorithms, all behind one interface: draw a generation,
+//! learn from its fitness.
+//!
+//! An algorithm is one file, which implements [`Strategy`] and [`Described`], and
+//! one row of the registry at the end of the declarations below. Its names,
+//! parameters and limits in experiment files, in their JSON Schema and in
+//! `docs/algorithms.md` follow from its description.
+
+mod cma_es;
+mod cumulation;
+mod ga;
+mod linalg;
+mod openai_es;
+mod parameters;
+mod sep_cma_es;
+mod snes;
+mod xnes;
+
+use std::iter;
+
+use determinism::random::Stream;
+use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps};
+use serde::{Deserialize, Serialize};
+
+use super::{Birth, Genotype, Population};
+/// Declares the algorithms: the state of each, its description, its start.
+macro_rules! registry {
+    ($($(#[$doc:meta])* $module:ident::$name:ident,)*) => {
+        /// The algorithms, each with its state. A variant's name is part of the
+        /// format of keyframes.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub enum Algorithm {
+            $($(#[$doc])* $name($module::$name),)*
+        }
+
+        /// The descriptions of all algorithms, for the reader of experiment files.
+        pub static ALGORITHMS: &[AlgorithmDescription] =
+            &[$(<$module::$name as Described>::DESCRIPTION,)*];
+
+        impl Algorithm {
+            /// The algorithm of this name at its start; none if there is none.
+            /// `d`: genes of the population, at least 1.
+            pub fn new(name: &str, params: &AlgorithmParams, d: usize) -> Option<Self> {
+                $(if name == <$module::$name as Described>::DESCRIPTION.name {
+                    return Some(Self::$name(Described::start(params, d)));
+                })*
+                None
+            }
+
+            /// The largest of what it keeps between generations.
+            pub fn keeps(&self) -> Keeps {
+                match self {
+                    $(Self::$name(_) => <$module::$name as Described>::DESCRIPTION.keeps,)*
+                }
+            }
+
+            fn strategy(&self) -> &dyn Strategy {
+                match self {
+                    $(Self::$name(strategy) => strategy,)*
+                }
+            }
+
+            fn strategy_mut(&mut self) -> &mut dyn Strategy {
+                match self {
+                    $(Self::$name(strategy) => strategy,)*
+                }
+            }
+        }
+    };
+}
+
+registry! {
+    /// Genetic algorithm.
+    ga::Ga,
+    /// Separable natural evolution strategy.
+    snes::Snes,
+    /// Exponential natural evolution strategy.
+    xnes::Xnes,
+    /// Covariance matrix adaptation.
+    cma_es::CmaEs,
+    /// Covariance matrix adaptation with a diagonal matrix.
+    sep_cma_es::SepCmaEs,
+    /// OpenAI's evolution strategy.
+    openai_es::OpenAiEs,
+}
+
+/// What an algorithm draws for one generation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Genes of each individual, within \[0, 1\].
+    pub genotypes: Population,
+    /// The standard normal draws behind each individual, for algorithms that
+    /// learn from those; else empty.
+    pub normals: Vec<Vec<f64>>,
+    /// What correlation makes of the normals, for algorithms that learn from
+    /// both; else empty.
+    pub steps: Vec<Vec<f64>>,
+}
+
+impl Sample {
+    /// Individuals and the normals behind them.
+    pub fn new(genotypes: Vec<Genotype>, normals: Vec<Vec<f64>>) -> Self {
+        Self { genotypes: genotypes.into(), normals, steps: Vec::new() }
+    }
+}
+
+/// An algorithm between two generations. Its state is plain numbers: whoever
+/// restores it draws and learns the same bits.
+pub trait Strategy {
+    /// Genes of an individual.
+    fn n_genes(&self) -> usize;
+
+    /// The mean of the distribution, if the algorithm has one.
+    fn mean(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// The standard deviation of every gene, before it is put back into \[0, 1\], if the
+    /// algorithm has a distribution.
+    fn deviations(&self) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// Draws `population_size` individuals. A pure function of the state and
+    /// the stream.
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
+
+    /// Whether [`individual`](Self::individual) draws.
+    fn draws_one_by_one(&self) -> bool {
+        false
+    }
+
+    /// The individual of this index, below `population_size`, of the sample that
+    /// [`sample`](Self::sample) draws from the same stream; none where one is not drawn
+    /// without the others.
+    fn individual(
+        &self,
+        _index: usize,
+        _population_size: usize,
+        _rng: &mut Stream,
+    ) -> Option<Genotype> {
+        None
+    }
+
+    /// From whom the individuals come that [`sample`](Self::sample) draws from the same
+    /// stream; none if they have no parents.
+    fn births(&self, _population_size: usize, _rng: &mut Stream) -> Option<Vec<Birth>> {
+        None
+    }
+
+    /// Learns from a generation that [`sample`](Self::sample) drew from this
+    /// state.
+    ///
+    /// `fitness`: one value per individual; at least one is finite. `ranking`:
+    /// indices of the individuals, best first, those whose fitness is not finite
+    /// last (see [`ranking`](super::ranking::ranking)).
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]);
+}
+
+/// What makes an algorithm known to experiment files.
+pub trait Described: Strategy {
+    /// Its name, parameters and limits.
+    const DESCRIPTION: AlgorithmDescription;
+
+    /// Its state before the first generation, over `d` genes (at least 1).
+    /// `params` lie in the domains of the description.
+    fn start(params: &AlgorithmParams, d: usize) -> Self;
+}
+
+impl Algorithm {
+    /// The mean of its distribution as a genotype, if it has one.
+    pub fn mean(&self) -> Option<Genotype> {
+        let mean = self.strategy().mean()?;
+        Some(mean.iter().map(|&gene| mirror(gene)).collect())
+    }
+}
+
+impl Strategy for Algorithm {
+    fn n_genes(&self) -> usize {
+        self.strategy().n_genes()
+    }
+
+    fn deviations(&self) -> Option<Vec<f64>> {
+        self.strategy().deviations()
+    }
+
+    fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
+        self.strategy().sample(population_size, rng)
+    }
+
+    fn draws_one_by_one(&self) -> bool {
+        self.strategy().draws_one_by_one()
+    }
+
+    fn individual(
+        &self,
+        index: usize,
+        population_size: usize,
+        rng: &mut Stream,
+    ) -> Option<Genotype> {
+        self.strategy().individual(index, population_size, rng)
+    }
+
+    fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
+        self.strategy().births(population_size, rng)
+    }
+
+    fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {
+        self.strategy_mut().learn(sample, ranking, fitness);
+    }
+}
+
+/// `n` vectors of `d` independent standard normals, in this order.
+fn draw_normals(n: usize, d: usize, rng: &mut Stream) -> Vec<Vec<f64>> {
+    let vector = || {
+        let mut vector = vec![0.0; d];
+        rng.fill_normal(&mut vector);
+        vector
+    };
+    iter::repeat_with(vector).take(n).collect()
+}
+
+/// The vector of this index that [`draw_normals`] draws from a stream at its beginning.
+fn draw_normal(index: usize, d: usize, rng: &mut Stream) -> Vec<f64> {
+    rng.seek(index as u64 * d as u64);
+    let mut vector = vec![0.0; d];
+    rng.fill_normal(&mut vector);
+    vector
+}
+
+/// `x` in \[0, 1\], by reflection at both ends.
+fn mirror(x: f64) -> f64 {
+    let x = x.abs();
+    let x = x - 2.0 * (x / 2.0).floor();
+    if x > 1.0 { 2.0 - x } else { x }
+}
+
+/// e^x, but at most [`f64::MAX`]: with a very large learning rate, the exponential
+/// would overflow to infinity, and 0 * infinity is NaN.
+fn finite_exp(x: f64) -> f64 {
+    libm::exp(x).min(f64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mirror;
+
+    #[test]
+    fn mirroring_reflects_at_both_ends_as_often_as_needed() {
+        for (x, expected) in [
+            (0.0, 0.0),
+            (0.25, 0.25),
+            (1.0, 1.0),
+            (1.25, 0.75),
+            (-0.25, 0.25),
+            (2.25, 0.25),
+            (-1.25, 0.75),
+            (1001.25, 0.75),
+        ] {
+            assert_eq!(mirror(x), expected, "{x}");
+        }
+        for x in [1e300, -1e300, 1.0f64.next_up(), 0.0f64.next_down()] {
+            assert!((0.0..=1.0).contains(&mirror(x)), "{x}");
+        }
+    }
+}
