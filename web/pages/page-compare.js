@@ -2,6 +2,7 @@
 
 import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
+import { allExperiments } from "swarm/experiment-list.js";
 import { askJson, bar, complain, main, resolve } from "swarm/page.js";
 
 const COLORS = ["#4269d0", "#ff725c", "#3ca951", "#a463f2", "#efb118", "#6cc5b0", "#ff8ab7", "#9c6b4e", "#97bbf5", "#9498a0"];
@@ -91,7 +92,7 @@ async function show() {
 }
 
 try {
-  experiments = (await askJson("/api/experiments")).experiments;
+  experiments = await allExperiments();
   if (chosen.size === 0) for (const it of experiments.slice(-5)) chosen.add(it.id);
   list.replaceChildren(...experiments.toReversed().map((it) => {
     const box = element("input", { type: "checkbox", checked: chosen.has(it.id), onchange: () => {

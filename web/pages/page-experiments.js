@@ -1,105 +1,109 @@
 // All experiments.
 
-import { decimals, element } from "swarm/dom.js";
-import { sparkline } from "swarm/charts.js";
-import { askJson, bar, complain, listen, main, oneByOne, remaining, resolve, span, stateMark } from "swarm/page.js";
-
-/** Least time between two questions, ms. */
-const LOAD_EVERY = 1000;
+import { element } from "swarm/dom.js";
+import { followExperiments } from "swarm/experiment-list.js";
+import { COLUMNS } from "swarm/list-columns.js";
+import { listTable } from "swarm/list-table.js";
+import { ListView, groupings } from "swarm/list-view.js";
+import { askJson, bar, complain, main, order, resolve } from "swarm/page.js";
 
 bar("Experiments", "/");
-const search = element("input", { type: "search", placeholder: "Search by name, group, algorithm, state", "aria-label": "search", oninput: () => draw() });
-const rows = element("tbody");
-const table = element("table", { className: "list" },
-  element("thead", {}, element("tr", {}, ...["", "Experiment", "State", "Progress", "Best", "Mean", "Recent best", "Champion", "Share"].map((name) => element("th", {}, name)))), rows);
-const compare = element("button", { disabled: true, onclick: () => location.assign(`/compare?runs=${[...chosen].join(",")}`) }, "Compare");
-main.replaceChildren(
-  element("header", { className: "row" }, element("h1", {}, "Experiments"), element("span", { className: "space" }), search, compare),
-  element("div", { className: "panel scroll" }, table));
-
+let experiments = new Map();
 const chosen = new Set();
-let experiments = [];
-/** The rows that exist, by id: what is shown of an experiment, and its cells. */
-const known = new Map();
-const none = element("tr", {}, element("td", { colSpan: 9, className: "muted" }));
+const view = new ListView(COLUMNS, () => draw());
+const table = listTable(view, chosen, () => drawActions());
 
-/** One question at a time: a slow server gets fewer of them. */
-const load = oneByOne(async () => {
-  try {
-    experiments = (await askJson("/api/experiments")).experiments;
-    draw();
-    resolve("list");
-  } catch (error) {
-    complain(error, "list");
-  }
-  await new Promise((wake) => setTimeout(wake, LOAD_EVERY));
+const search = element("input", { type: "search", value: view.parts.q, placeholder: "Words, state=running, KEY=VALUE, -not", title: "words of name, group, algorithm, state and labels; state=failed, seed=3 or a label KEY=VALUE are exact; - before a word: not", "aria-label": "search", oninput: () => view.set({ q: search.value }) });
+const grouping = element("select", { id: "by", onchange: () => view.set({ by: grouping.value, open: "" }) });
+const archived = element("input", { type: "checkbox", id: "archived", checked: view.parts.archived !== "", onchange: () => view.set({ archived: archived.checked ? "1" : "" }) });
+const archivedText = element("span");
+const boxes = COLUMNS.map((column) => {
+  const box = element("input", { type: "checkbox", checked: view.shown.includes(column), onchange: () => view.showColumn(column.name, box.checked) });
+  box.dataset.column = column.name;
+  return element("label", {}, box, column.title);
 });
+const columns = element("details", { className: "menu" }, element("summary", {}, "Columns"), element("div", {}, ...boxes));
+const states = element("div", { className: "row states" });
+const count = element("span", { className: "muted", id: "count" });
+const actions = element("div", { className: "row actions" });
 
-/** Only cells that say something else are replaced, so focus, clicks and scrolling are not lost. */
+main.replaceChildren(
+  element("header", { className: "row" }, element("h1", {}, "Experiments"), states, element("span", { className: "space" }), search,
+    element("label", {}, "by ", grouping), columns, element("label", {}, archived, archivedText)),
+  element("div", { className: "row bar" }, count, element("span", { className: "space" }), actions),
+  element("div", { className: "panel scroll" }, table.node));
+
+/** Texts and choices around the table; what says the same as before is left alone. */
+function drawAround() {
+  const all = [...experiments.values()];
+  const n_archived = all.filter((it) => it.archived).length;
+  archivedText.textContent = `archived (${n_archived})`;
+  count.textContent = table.count() === all.length ? `${all.length} experiments` : `${table.count()} of ${all.length}`;
+  const names = ["", ...Object.keys(groupings(all))];
+  if (grouping.dataset.names !== names.join()) {
+    grouping.dataset.names = names.join();
+    grouping.replaceChildren(...names.map((name) => element("option", { value: name, selected: name === view.parts.by }, name || "nothing")));
+  }
+  const counts = [...Map.groupBy(all.filter((it) => !it.archived || archived.checked), (it) => it.state)].map(([state, its]) => [state, its.length]);
+  const says = JSON.stringify([counts, view.parts.q]);
+  if (states.dataset.says === says) return;
+  states.dataset.says = says;
+  const held = states.contains(document.activeElement) ? document.activeElement.dataset.state : null;
+  states.replaceChildren(...counts.map(([state, n]) => {
+    const word = `state=${state}`;
+    const words = view.parts.q.split(/\s+/).filter(Boolean);
+    const isOn = words.includes(word);
+    const button = element("button", { type: "button", className: `state ${state}`, "aria-pressed": String(isOn), onclick: () => {
+      search.value = (isOn ? words.filter((it) => it !== word) : [...words.filter((it) => !it.startsWith("state=")), word]).join(" ");
+      view.set({ q: search.value });
+    } }, `${n} ${state}`);
+    button.dataset.state = state;
+    return button;
+  }));
+  if (held) [...states.children].find((it) => it.dataset.state === held)?.focus();
+}
+
 function draw() {
-  const words = search.value.toLowerCase().split(/\s+/);
-  const matches = (it) => words.every((word) => `${it.id} ${it.name} ${it.group} ${it.variant} ${it.algorithm} ${it.state} seed=${it.seed}`.toLowerCase().includes(word));
-  const weights = experiments.filter((it) => it.state === "running").reduce((sum, it) => sum + it.priority, 0);
-  const found = experiments.filter(matches).reverse();
-  const ids = new Set(experiments.map((it) => it.id));
-  for (const [id, { node }] of known) {
-    if (ids.has(id)) continue;
-    node.remove();
-    known.delete(id);
-  }
-  const wanted = found.map((it) => updated(it, weights));
-  if (found.length === 0) {
-    none.firstChild.textContent = experiments.length ? "No experiment matches." : "There is no experiment yet: swarmctl submit FILE starts one.";
-    wanted.push(none);
-  }
-  for (const node of [...rows.children]) if (!wanted.includes(node)) node.remove();
-  wanted.forEach((node, place) => {
-    if (rows.children[place] !== node) rows.insertBefore(node, rows.children[place] ?? null);
-  });
+  table.redraw();
+  drawAround();
 }
 
-/** The row of an experiment, with what is new of it. */
-function updated(it, weights) {
-  const share = it.state === "running" ? weights : 0;
-  const says = JSON.stringify([it, share]);
-  const old = known.get(it.id);
-  if (old?.says === says) return old.node;
-  const fresh = row(it, weights);
-  if (!old) {
-    known.set(it.id, { node: fresh, says });
-    return fresh;
-  }
-  old.says = says;
-  [...fresh.children].forEach((cell, place) => {
-    const shown = old.node.children[place];
-    if (place > 0 && shown.innerHTML !== cell.innerHTML) shown.replaceChildren(...cell.childNodes);
-  });
-  return old.node;
+let hasCoordinator = false;
+
+/** What can be done with those that are ticked. */
+function drawActions() {
+  const its = [...chosen].map((id) => experiments.get(id)).filter(Boolean);
+  const button = (id, text, onclick) => element("button", { type: "button", id, onclick }, text);
+  const each = async (action, body) => {
+    try {
+      for (const it of its) await order(`/api/experiments/${it.id}/${action}`, body);
+      resolve("order");
+    } catch (error) {
+      complain(error, "order");
+    }
+  };
+  const label = () => {
+    const answer = prompt("Labels for the ticked experiments, such as `paper draft=2`; `-paper` takes one away:");
+    if (!answer?.trim()) return;
+    const words = answer.trim().split(/\s+/);
+    const set = Object.fromEntries(words.filter((it) => !it.startsWith("-")).map((it) => [it.split("=")[0], it.split("=").slice(1).join("=")]));
+    each("label", { set, remove: words.filter((it) => it.startsWith("-")).map((it) => it.slice(1)) });
+  };
+  const areArchived = its.length > 0 && its.every((it) => it.archived);
+  actions.replaceChildren(...(its.length === 0 ? [element("span", { className: "muted" }, "tick some to compare, label or archive them")] : [
+    element("span", { className: "muted" }, `${its.length} ticked`),
+    button("compare", "Compare", () => location.assign(`/compare?runs=${[...chosen].join(",")}`)),
+    ...(hasCoordinator ? [button("label", "Label …", label), button("archive", areArchived ? "Take out of the archive" : "Archive", () => each(areArchived ? "restore" : "archive", {}))] : []),
+  ]));
 }
 
-function row(it, weights) {
-  const left = remaining(it, it.recent);
-  const done = it.generations ? it.generations_done / it.generations : 0;
-  const box = element("input", { type: "checkbox", checked: chosen.has(it.id), "aria-label": `compare ${it.name}`, onchange: () => {
-    if (box.checked) chosen.add(it.id);
-    else chosen.delete(it.id);
-    compare.disabled = chosen.size === 0;
-  } });
-  const progress = element("progress", { max: 1, value: done });
-  const place = [it.group, it.variant, `seed ${it.seed}`, it.algorithm, it.forked_from && `fork of ${it.forked_from}`].filter(Boolean).join(" · ");
-  const cell = (label, ...content) => element("td", { "data-label": label }, ...content);
-  return element("tr", { "data-id": it.id },
-    cell("", box),
-    cell("", element("a", { href: `/experiment/${it.id}` }, `${it.id} ${it.name}`), element("div", { className: "muted small" }, place)),
-    cell("State", stateMark(it)),
-    cell("Progress", progress, element("div", { className: "small muted" }, `${it.generations_done} of ${it.generations}${left === null ? "" : `, ${span(left)} left`}`)),
-    cell("Best", decimals(it.best ?? NaN, 3)), cell("Mean", decimals(it.mean ?? NaN, 3)),
-    cell("", sparkline(it.recent.map((generation) => generation[1]))),
-    cell("Champion", it.champion !== null
-      ? element("a", { href: `/replay/${it.id}`, title: "its worth, on trials that selected nothing; click to play" }, decimals(it.champion, 3))
-      : it.generations_done ? element("a", { href: `/replay/${it.id}` }, "play") : "–"),
-    cell("Share", it.state === "running" ? `${Math.round((100 * it.priority) / weights)} %` : "–"));
-}
-
-load();
-listen("/api/live", load);
+drawActions();
+askJson("/api/session").then((session) => {
+  hasCoordinator = session.has_coordinator;
+  drawActions();
+}).catch((error) => complain(error, "session"));
+followExperiments((now, changed) => {
+  experiments = now;
+  table.update(now, changed);
+  drawAround();
+});

@@ -2,6 +2,7 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { whatItDoes } from "swarm/doing.js";
+import { followExperiments } from "swarm/experiment-list.js";
 import { fleetTimeline } from "swarm/fleet-timeline.js";
 import { askJson, bar, complain, counted, main, resolve, span } from "swarm/page.js";
 
@@ -31,15 +32,25 @@ function row(it) {
     cell("Version", it.version), cell("", element("span", { className: "bad" }, it.trouble)));
 }
 
+/** Those that run, and the panels of some of them, by id. */
+let running = [];
+const panels = new Map();
+const more = element("p", { className: "muted" });
+
 /** What each experiment does that is not at its end, and why it waits. */
-async function explain(experiments) {
-  const running = experiments.filter((it) => it.state === "running");
-  const parts = await Promise.all(running.slice(0, EXPLAINED_MAX).map(async (it) =>
-    element("section", { className: "panel" },
-      element("h2", {}, element("a", { href: `/experiment/${it.id}` }, `${it.id} ${it.name}`)),
-      ...whatItDoes(await askJson(`/api/experiments/${it.id}/explain`)))));
-  if (running.length > parts.length) parts.push(element("p", { className: "muted" }, `${running.length - parts.length} more experiments run`));
-  work.replaceChildren(...parts);
+async function explain() {
+  const its = running.slice(0, EXPLAINED_MAX);
+  for (const id of panels.keys()) if (!its.some((it) => it.id === id)) panels.delete(id);
+  await Promise.all(its.map(async (it) => {
+    const answer = await askJson(`/api/experiments/${it.id}/explain`);
+    const text = element("div");
+    const panel = panels.get(it.id) ?? { text, node: element("section", { className: "panel" }, element("h2", {}, element("a", { href: `/experiment/${it.id}` }, `${it.id} ${it.name}`)), text) };
+    panels.set(it.id, panel);
+    panel.text.replaceChildren(...whatItDoes(answer));
+  }));
+  more.textContent = running.length > its.length ? `${running.length - its.length} more experiments run` : "";
+  const wanted = [...[...panels.values()].map((panel) => panel.node), more];
+  if (wanted.some((node, place) => work.children[place] !== node)) work.replaceChildren(...wanted);
 }
 
 async function look() {
@@ -52,7 +63,7 @@ async function look() {
       : "No worker is connected: start one with `worker`.";
     rows.replaceChildren(...workers.slice(0, 1000).map(row));
     timeline.show(await askJson("/api/timeline"), workers);
-    await explain((await askJson("/api/experiments")).experiments);
+    await explain();
     resolve("look");
   } catch (error) {
     complain(error, "look");
@@ -61,4 +72,5 @@ async function look() {
   setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
 }
 
+await followExperiments((experiments) => (running = [...experiments.values()].filter((it) => it.state === "running")));
 await look();

@@ -1,6 +1,6 @@
 //! What pages are made of: the same queries, in the same messages, as clients have.
 
-use std::{ops::Range, time::Duration};
+use std::{collections::BTreeMap, ops::Range, time::Duration};
 
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -64,7 +64,7 @@ pub trait Control: Send + Sync + 'static {
 }
 
 /// What can be done with an experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
     /// Until it is resumed.
     Pause,
@@ -74,6 +74,10 @@ pub enum Action {
     Cancel,
     /// Its weight in the sharing of the fleet, 1 to 1000.
     Priority(u32),
+    /// Whether it is in the archive.
+    Archive(bool),
+    /// Labels to set, and keys of labels to remove.
+    Label(BTreeMap<String, String>, Vec<String>),
 }
 
 /// Something that a worker was given to compute.

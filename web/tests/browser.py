@@ -208,30 +208,6 @@ class Live(BrowserTest):
         self.wait(lambda: n_generations() == 40, "generations are missing")
         self.wait_for_text(".state", "completed")
 
-    def test_a_list_that_changes_keeps_its_rows_and_asks_one_question_at_a_time(self):
-        fleet = Fleet()
-        self.addCleanup(fleet.stop)
-        fleet.start_worker()
-        fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
-        self.browser.get(fleet.pages + "/")
-        self.find("tr[data-id='1'] a")
-        self.script("""
-            document.querySelector("tr[data-id='1'] a").focus();
-            window.before = document.activeElement;
-            const ask = window.fetch;
-            window.flying = window.flyingMost = 0;
-            window.fetch = async (...it) => {
-                flyingMost = Math.max(flyingMost, ++flying);
-                return ask(...it).finally(() => flying--);
-            };
-        """)
-        for _ in range(3):
-            progress = "return document.querySelector(\"tr[data-id='1'] td[data-label=Progress]\").textContent"
-            before = self.script(progress)
-            self.wait(lambda: self.script(progress) != before, "nothing changes")
-        self.assertTrue(self.script("return before.isConnected && document.activeElement === before"), "focus is lost")
-        self.assertEqual(self.script("return flyingMost"), 1)
-
     def test_the_timeline_shows_who_computes_and_what_was_lost(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)

@@ -142,6 +142,10 @@ impl WebControl for Experiments {
             Action::Priority(weight) => {
                 self.control.set_priority(id, convert::priority(weight)?).await
             }
+            Action::Archive(is_archived) => {
+                self.control.archive(id, is_archived).await.map(|(experiment, _)| experiment)
+            }
+            Action::Label(set, remove) => self.control.label(id, set, remove).await,
         };
         Ok(convert::experiment(changed?))
     }

@@ -38,6 +38,10 @@ pub struct ExperimentAnswer {
     variant: String,
     forked_from: Option<String>,
     last_sequence: u64,
+    labels: BTreeMap<String, String>,
+    archived: bool,
+    /// Mean time of its latest generations.
+    generation_ms: Option<f64>,
 }
 
 impl ExperimentAnswer {
@@ -70,6 +74,9 @@ impl ExperimentAnswer {
             variant: it.variant,
             forked_from: it.forked_from.map(|it| format!("{}@{}", it.experiment_id, it.generation)),
             last_sequence: it.last_sequence,
+            labels: it.labels,
+            archived: it.archived,
+            generation_ms: it.recent_generation_ms.map(f64::round),
         }
     }
 }

@@ -16,8 +16,6 @@ use super::{
     problem::{Path, Problem, Query},
 };
 
-/// Generations of the small curve of a list.
-const RECENT: u64 = 40;
 /// Events at the end of an experiment that are looked at.
 const EVENTS: u64 = 1000;
 /// Generations of one answer with the fitness of every individual.
@@ -28,24 +26,6 @@ const FITNESS_MAX: u32 = 500;
 pub struct From {
     #[serde(default)]
     from: u64,
-}
-
-/// All experiments, each with its latest generations.
-pub async fn all(State(shared): State<Shared>) -> Result<Json<Value>, Problem> {
-    let mut list = Vec::new();
-    for experiment in shared.archive.experiments().await? {
-        let request = ListGenerationsRequest {
-            experiment_id: experiment.id,
-            from_generation: experiment.generations_done.saturating_sub(RECENT),
-            page_size: RECENT as u32,
-        };
-        let recent = shared.archive.generations(request).await?.generations;
-        let recent: Vec<_> = recent.iter().filter_map(answers::generation_row).collect();
-        let mut answer = json!(ExperimentAnswer::new(experiment, shared.control.is_some()));
-        answer["recent"] = json!(recent);
-        list.push(answer);
-    }
-    Ok(Json(json!({ "experiments": list })))
 }
 
 /// One experiment, its file, and its champion as far as there is one.

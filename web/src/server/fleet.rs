@@ -143,9 +143,13 @@ pub struct Order {
     generation: Option<u64>,
     /// For `fork`: another seed.
     seed: Option<Seed>,
+    /// For `label`: what to set.
+    set: BTreeMap<String, String>,
+    /// For `label`: keys to remove.
+    remove: Vec<String>,
 }
 
-/// Pauses, resumes, cancels, forks an experiment, or gives it another priority.
+/// Pauses, resumes, cancels, forks, archives or labels an experiment, or gives it another priority.
 pub async fn steer(
     State(shared): State<Shared>,
     Path((id, action)): Path<(u64, String)>,
@@ -157,6 +161,9 @@ pub async fn steer(
         ("resume", _) => Action::Resume,
         ("cancel", _) => Action::Cancel,
         ("priority", Some(priority)) => Action::Priority(priority),
+        ("archive", _) => Action::Archive(true),
+        ("restore", _) => Action::Archive(false),
+        ("label", _) => Action::Label(order.set, order.remove),
         ("fork", _) => return fork(&shared, control, id, &order).await,
         (action, _) => return Err(Problem::bad(format!("no such action: {action}"))),
     };

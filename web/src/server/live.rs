@@ -86,16 +86,6 @@ pub struct From {
     from: u64,
 }
 
-/// An event whenever something may be new.
-pub async fn news(State(shared): State<Shared>) -> Response {
-    let news = shared.archive.news();
-    let state = (shared, news);
-    stream(futures_util::stream::unfold(state, |(shared, mut news)| async move {
-        wait(&shared, &mut news).await?;
-        Some((Ok(Event::default().data("{}")), (shared, news)))
-    }))
-}
-
 /// Generations of an experiment from some on, oldest first. The id of an event is the
 /// generation after its last one, so a page that was cut off goes on without a gap.
 pub async fn generations(
@@ -140,15 +130,22 @@ enum Step {
 }
 
 /// Waits for news, and a moment longer, so that many come as one; none at the end.
-async fn wait(shared: &Shared, news: &mut watch::Receiver<u64>) -> Option<()> {
+pub async fn wait(shared: &Shared, news: &mut watch::Receiver<u64>) -> Option<()> {
     tokio::select! {
         () = shared.shutdown.cancelled() => return None,
         changed = news.changed() => changed.ok()?,
     }
-    tokio::time::sleep(PAUSE).await;
-    Some(())
+    rest(shared, PAUSE).await
 }
 
-fn stream(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
+/// Waits for so long; none at the end.
+pub async fn rest(shared: &Shared, time: Duration) -> Option<()> {
+    tokio::select! {
+        () = shared.shutdown.cancelled() => None,
+        () = tokio::time::sleep(time) => Some(()),
+    }
+}
+
+pub fn stream(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
     Sse::new(events).keep_alive(KeepAlive::default()).into_response()
 }

@@ -4,9 +4,11 @@
 mod access;
 mod answers;
 mod assets;
+mod compression;
 mod experiments;
 mod fleet;
 mod limits;
+mod list;
 mod live;
 mod problem;
 mod replays;
@@ -36,6 +38,7 @@ use self::{
     access::Access,
     fleet::{Explanations, LatestAnswer},
     limits::{AnswerRoom, CONNECTIONS, REPLAYS_MAX, REQUESTS},
+    list::List,
     live::Latest,
     problem::Problem,
 };
@@ -62,6 +65,7 @@ struct Shared {
     timeline: Arc<LatestAnswer>,
     explanations: Arc<Explanations>,
     latest: Arc<Latest>,
+    list: Arc<List>,
     replays: Arc<Semaphore>,
     shutdown: CancellationToken,
 }
@@ -92,6 +96,7 @@ impl Site {
             timeline: Arc::default(),
             explanations: Arc::default(),
             latest: Arc::default(),
+            list: Arc::default(),
             replays: Arc::new(Semaphore::new(REPLAYS_MAX)),
             shutdown,
         };
@@ -99,8 +104,8 @@ impl Site {
             .route("/session", get(fleet::session))
             .route("/workers", get(fleet::workers))
             .route("/timeline", get(fleet::timeline))
-            .route("/live", get(live::news))
-            .route("/experiments", get(experiments::all))
+            .route("/live", get(list::live))
+            .route("/experiments", get(list::all))
             .route("/experiments/{id}", get(experiments::one))
             .route("/experiments/{id}/generations", get(experiments::generations))
             .route("/experiments/{id}/events", get(experiments::events))
@@ -112,11 +117,12 @@ impl Site {
             .route("/replay/{*address}", get(replays::replay))
             .fallback(Problem::nowhere)
             .method_not_allowed_fallback(Problem::nowhere)
+            .layer(middleware::from_fn(compression::compress))
             .layer(middleware::from_fn_with_state(AnswerRoom::default(), limits::hold_answers))
             .with_state(shared);
         Router::new()
             .nest("/api", api)
-            .merge(assets::routes())
+            .merge(assets::routes().layer(middleware::from_fn(compression::compress)))
             .route("/login", post(access::login).with_state(access.clone()))
             .layer(middleware::from_fn_with_state(access, access::check))
     }

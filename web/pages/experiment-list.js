@@ -1,0 +1,42 @@
+// All experiments, kept up to date: the whole list once, and then what has changed.
+
+import { askJson, complain, listen, resolve } from "swarm/page.js";
+
+/** Follows the list. `onChange(experiments, changed)`: all of them by id, and the ids of those that
+ *  are new, different or gone. */
+export async function followExperiments(onChange) {
+  const experiments = new Map();
+  const take = (news) => {
+    const changed = new Set(news.gone);
+    if (news.whole) {
+      for (const id of experiments.keys()) changed.add(id);
+      experiments.clear();
+    }
+    for (const id of news.gone) experiments.delete(id);
+    for (const it of news.experiments) {
+      experiments.set(it.id, it);
+      changed.add(it.id);
+    }
+    onChange(experiments, changed);
+  };
+  const begin = async () => {
+    try {
+      const whole = await askJson("/api/experiments");
+      resolve("list");
+      take(whole);
+      listen(`/api/live?since=${whole.mark}`, take);
+    } catch (error) {
+      complain(error, "list");
+      if (error.status !== 401) setTimeout(begin, AGAIN_AFTER);
+    }
+  };
+  await begin();
+}
+
+/** Time until a list is asked for again that did not come, ms. */
+const AGAIN_AFTER = 2000;
+
+/** All experiments as they are now, oldest first. */
+export async function allExperiments() {
+  return (await askJson("/api/experiments")).experiments;
+}
