@@ -23,6 +23,7 @@ mod lineage;
 mod list;
 mod logs;
 mod man;
+mod new;
 mod plot;
 mod reopen;
 mod reordered;
@@ -58,6 +59,7 @@ pub enum Command {
     Run(run::RunArgs),
     #[command(flatten)]
     Remote(RemoteCommand),
+    New(new::NewArgs),
     Validate(validate::ValidateArgs),
     Schema(schema::SchemaArgs),
     Simulate(simulate::SimulateArgs),
@@ -188,7 +190,8 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     }
     let command = match command {
         // An interrupt ends these at once: they leave nothing to clean up.
-        Command::Validate(args) => return validate::validate(&args.files, &mut progress),
+        Command::Validate(args) => return validate::validate(&args, &mut progress),
+        Command::New(args) => return new::new(&args, &mut progress),
         Command::Schema(_) => return schema::schema(&mut progress),
         Command::Simulate(args) => {
             return simulate::simulate(settings, &args, &mut progress).await;

@@ -112,7 +112,8 @@ impl ParameterCoverage {
         }
     }
 
-    /// What is not covered, except what the experiment declares untrainable.
+    /// What is not covered, except what the experiment declares untrainable, and parameters that
+    /// it evolves in no neuron, which is a choice.
     pub fn describe(&self, config: &TopologyConfig, network: &Network) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, group) in network.groups.iter().filter(|(_, group)| group.trainable) {
@@ -146,7 +147,7 @@ impl ParameterCoverage {
             }
         }
         let parameters = network.model.spec().parameters.iter().zip(&self.neurons);
-        for (parameter, covered) in parameters.filter(|(parameter, _)| parameter.gene.is_some()) {
+        for (parameter, covered) in parameters.filter(|(_, covered)| covered.contains(&true)) {
             for (name, ensemble) in &network.ensembles {
                 if covered[ensemble.neurons.clone()].iter().any(|covered| !covered) {
                     let value = ensemble.default_of(parameter);

@@ -1,0 +1,289 @@
+//! `swarmctl new`: an experiment of one's own, begun from one that evolves.
+
+use std::{
+    fs::{self, OpenOptions},
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, builder::PossibleValue};
+use coordinator::group;
+use serde::Serialize;
+
+use crate::{error::Error, json, progress::Progress};
+
+/// Write an experiment file to begin with, and the script of its task.
+///
+/// NAME.json evolves as it is; NAME.star says what good is, in a language that looks like
+/// Python. Change either, and ask `swarmctl validate` what it makes of the change.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct NewArgs {
+    /// Name of the experiment, and of its files in this directory: letters, digits, - and _.
+    #[arg(value_parser = name)]
+    name: String,
+    /// The task to begin with.
+    #[arg(long, value_name = "TEMPLATE", default_value = TEMPLATES[0].name, value_parser = templates())]
+    task: String,
+}
+
+const HELP: &str = "\
+Examples:
+  swarmctl new spread
+  swarmctl new hunters --task predator";
+
+/// An experiment that others begin with.
+struct Template {
+    name: &'static str,
+    /// The experiment file.
+    config: &'static str,
+    /// Its script, if its task is none of those that are built in.
+    script: Option<&'static str>,
+    /// The experiment, in a sentence.
+    about: &'static str,
+}
+
+/// An experiment of `configs/tasks`.
+macro_rules! task {
+    ($name:literal, $about:literal) => {
+        Template {
+            name: $name,
+            config: include_str!(concat!("../../../configs/tasks/", $name, ".json")),
+            script: Some(include_str!(concat!("../../../configs/tasks/", $name, ".star"))),
+            about: $about,
+        }
+    };
+}
+
+/// The default first.
+const TEMPLATES: [Template; 6] = [
+    task!("dispersion", "Robots spread out; they sense how near others are"),
+    task!("flocking", "Robots travel together; the fitness is a product of three measures"),
+    task!("foraging", "Robots carry food to a nest; the script remembers who is loaded"),
+    task!(
+        "predator",
+        "Robots flee from a light that the script moves; whoever is caught stands still"
+    ),
+    task!("scent", "Robots find a source with a sensor that the script defines"),
+    Template {
+        name: "leader",
+        config: include_str!("../../../configs/quickstart.json"),
+        script: None,
+        about: "Robots agree on a leader by radio; the task is built in, without a script",
+    },
+];
+
+/// What the parts of an experiment file are.
+const PARTS: [(&str, &str); 4] = [
+    ("task", "What good is: the functions of this script."),
+    ("topology", "The network that every robot has a copy of, from stimuli to outputs."),
+    ("algorithm", "What evolves, and how: more generations or individuals take longer."),
+    ("world", "The arena: who is in it, where they start, what they sense and do."),
+];
+
+fn templates() -> Vec<PossibleValue> {
+    let value = |it: &'static Template| PossibleValue::new(it.name).help(it.about);
+    TEMPLATES.iter().map(value).collect()
+}
+
+/// A name that files can have, and that commands take for an experiment.
+fn name(text: &str) -> Result<String, String> {
+    match group::check_name(text) {
+        Ok(()) if !text.is_empty() && !text.starts_with('-') => Ok(text.to_owned()),
+        _ => Err("a name has letters, digits, - and _, and a letter in it, as my-task has".into()),
+    }
+}
+
+impl Template {
+    /// The experiment file under another name, with comments that say what is where.
+    fn config(&self, name: &str) -> String {
+        let mut lines = vec![
+            format!("// {}.", self.about),
+            "// Lengths are cm, angles radians, times steps. Every key: docs/experiment-files.md, or".into(),
+            "// in an editor that completes: swarmctl schema > experiment.schema.json".into(),
+        ];
+        for line in self.config.lines() {
+            let trimmed = line.trim_start();
+            let indent = &line[..line.len() - trimmed.len()];
+            let is_part = |key: &str| trimmed.starts_with(&format!("\"{key}\": {{"));
+            if let Some((_, what)) = PARTS.iter().find(|(key, _)| is_part(key)) {
+                lines.push(format!("{indent}// {what}"));
+            }
+            lines.push(line.to_owned());
+        }
+        let own = lines.join("\n") + "\n";
+        let named = |key: &str, value: &str| format!("\"{key}\": \"{value}\"");
+        let of_template = self.config_name();
+        own.replacen(&named("name", of_template), &named("name", name), 1).replacen(
+            &named("script", &format!("{of_template}.star")),
+            &named("script", &format!("{name}.star")),
+            1,
+        )
+    }
+
+    /// The script, with a comment below the line that says what it is about.
+    fn script(&self) -> Option<String> {
+        let (first, rest) = self.script?.split_once('\n')?;
+        let hint = "# All that a script sees, and the functions that it may have: docs/tasks.md";
+        Some(format!("{first}\n\n{hint}\n{rest}"))
+    }
+
+    /// The name that the experiment file gives its experiment.
+    fn config_name(&self) -> &'static str {
+        if self.script.is_some() { self.name } else { "quickstart" }
+    }
+}
+
+/// What was written.
+#[derive(Debug, Serialize)]
+struct Written<'a> {
+    name: &'a str,
+    task: &'a str,
+    files: Vec<PathBuf>,
+}
+
+/// Writes the files into this directory.
+pub fn new(args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
+    new_in(Path::new(""), args, progress)
+}
+
+fn new_in(directory: &Path, args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
+    let NewArgs { name, task } = args;
+    let template = TEMPLATES.iter().find(|it| it.name == task);
+    let template = template.expect("the command line takes no other");
+    let config = directory.join(format!("{name}.json"));
+    let mut files = vec![(config.clone(), template.config(name))];
+    if let Some(script) = template.script() {
+        files.push((directory.join(format!("{name}.star")), script));
+    }
+    write_new(&files)?;
+    let files: Vec<PathBuf> = files.into_iter().map(|(path, _)| path).collect();
+    if progress.is_json() {
+        return progress.print(&json::document(&Written { name, task, files }));
+    }
+    let shown: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let config = config.display();
+    progress.print(&format!(
+        "written: {}\n{}\nnext:\n  swarmctl validate {config}\n  swarmctl run {config}\n  swarmctl replay {name}",
+        shown.join(", "),
+        template.about,
+    ))
+}
+
+/// Writes files that are not there yet: all of them or none.
+fn write_new(files: &[(PathBuf, String)]) -> Result<(), Error> {
+    for (i, (path, text)) in files.iter().enumerate() {
+        let written = OpenOptions::new().write(true).create_new(true).open(path);
+        let is_there = written.as_ref().is_err_and(|it| it.kind() == io::ErrorKind::AlreadyExists);
+        if let Err(error) = written.and_then(|mut file| file.write_all(text.as_bytes())) {
+            let of_us = if is_there { i } else { i + 1 };
+            for (path, _) in &files[..of_us] {
+                let _ = fs::remove_file(path);
+            }
+            let path = path.display();
+            return Err(Error::Input(if is_there {
+                format!("{path} exists; choose another name, or move it away")
+            } else {
+                format!("cannot write {path}: {error}")
+            }));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::{
+        args::{Args, OutputFormat},
+        commands::{Command, one_world::output},
+        experiment_file::{ExperimentFile, Overrides},
+        progress::tests::Captured,
+    };
+
+    fn args(words: &[&str]) -> Result<NewArgs, clap::Error> {
+        let line = ["swarmctl", "new"].iter().chain(words);
+        match Args::try_parse_from(line)?.command {
+            Command::New(args) => Ok(args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn written(directory: &Path, words: &[&str]) -> Result<String, Error> {
+        let captured = Captured::default();
+        let args = args(words).unwrap();
+        new_in(directory, &args, &mut captured.progress(OutputFormat::Table))?;
+        Ok(captured.lines().join("\n"))
+    }
+
+    /// The mean fitness of the generations of a run of this file.
+    async fn means(directory: &Path, name: &str, generations: u32) -> Vec<f64> {
+        let path = directory.join(format!("{name}.json"));
+        // Judging takes most of the time of a short run.
+        let text = fs::read_to_string(&path).unwrap();
+        let text = text.replace("\"judgement_trials\": 100", "\"judgement_trials\": 1");
+        fs::write(&path, text.replace("\"champion_trials\": 20", "\"champion_trials\": 1"))
+            .unwrap();
+        let data = directory.join(format!("{name}.data"));
+        let at = ["--data-dir", data.to_str().unwrap()];
+        let run = format!("run {} --generations {generations}", path.display());
+        let text = output(&run, &at).await;
+        assert!(text.contains("completed after"), "{text}");
+        let history = output("history 1 --output json", &at).await;
+        let history: serde_json::Value = serde_json::from_str(&history).unwrap();
+        let mean = |it: &serde_json::Value| it["mean"].as_f64().unwrap();
+        history.as_array().unwrap().iter().map(mean).collect()
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn every_template_validates_without_a_warning_and_evolves() {
+        let directory = tempfile::tempdir().unwrap();
+        for template in &TEMPLATES {
+            let own = format!("my_{}", template.name);
+            let text = written(directory.path(), &[&own, "--task", template.name]).unwrap();
+            assert!(text.contains(&format!("swarmctl replay {own}")), "{text}");
+            let path = directory.path().join(format!("{own}.json"));
+            let compiled = ExperimentFile::read(&path).unwrap().check(&Overrides::default());
+            let compiled = compiled.unwrap();
+            assert_eq!(compiled.warnings, [], "{own}");
+            assert_eq!(compiled.config.name, own);
+            let of_script = compiled.config.task.map(|task| task.script.name);
+            assert_eq!(of_script, template.script.map(|_| format!("{own}.star")));
+            assert_eq!(means(directory.path(), &own, 1).await.len(), 1);
+        }
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn the_default_template_improves_in_a_few_generations() {
+        let directory = tempfile::tempdir().unwrap();
+        written(directory.path(), &["spread"]).unwrap();
+        let means = means(directory.path(), "spread", 8).await;
+        assert!(means[7] > means[0] + 0.05, "{means:?}");
+    }
+
+    #[test]
+    fn nothing_is_overwritten_and_nothing_is_left_behind() {
+        let directory = tempfile::tempdir().unwrap();
+        let star = directory.path().join("a.star");
+        fs::write(&star, "mine").unwrap();
+        let error = written(directory.path(), &["a"]).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains("a.star exists; "), "{error}");
+        assert_eq!(fs::read_to_string(&star).unwrap(), "mine");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+        let nowhere = directory.path().join("none");
+        let error = written(&nowhere, &["a"]).unwrap_err();
+        assert!(error.to_string().starts_with("cannot write "), "{error}");
+    }
+
+    #[test]
+    fn names_that_files_or_experiments_cannot_have_are_refused() {
+        for name in ["", "a b", "a/b", "../a", "7", "a.json", "a\n", "-a", "--", "a\0"] {
+            assert!(args(&[name]).is_err(), "{name}");
+        }
+        let error = args(&["a", "--task", "dispersal"]).unwrap_err().to_string();
+        assert!(error.contains("dispersion"), "{error}");
+    }
+}
