@@ -230,6 +230,26 @@ pub mod tests {
     }
 
     #[test]
+    fn no_shipped_experiment_has_a_warning() {
+        let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs")];
+        let mut n_files = 0;
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|it| it == "json") {
+                    let file = ExperimentFile::read(&path).unwrap();
+                    let compiled = file.compile(&Overrides::default()).unwrap();
+                    assert_eq!(compiled.warnings, [], "{}", path.display());
+                    n_files += 1;
+                }
+            }
+        }
+        assert!(n_files > 30, "{n_files}");
+    }
+
+    #[test]
     fn a_long_file_name_gives_a_shorter_default_name() {
         let path = format!("x{}.json", "ü".repeat(100)).into();
         let file = ExperimentFile { path, text: String::new() };

@@ -15,16 +15,21 @@ use crate::{
 
 /// Check experiment files, without a coordinator.
 ///
-/// Prints one line per valid file, and every problem of every invalid one.
+/// Prints one line per valid file, its warnings, and every problem of every invalid one. A
+/// warning is about a value that is allowed and rarely meant, such as degrees instead of radians.
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
     /// The experiment files.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// Fail (exit code 2) if a file has warnings, too.
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// Checks all files and reports on each; fails if one is invalid.
-pub fn validate(files: &[PathBuf], progress: &mut Progress) -> Result<(), Error> {
+pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Error> {
+    let ValidateArgs { files, strict } = args;
     let mut reports = Vec::new();
     for file in files {
         let report = Report::of(file);
@@ -42,10 +47,17 @@ pub fn validate(files: &[PathBuf], progress: &mut Progress) -> Result<(), Error>
     if progress.is_json() {
         progress.print(&json::document(&reports))?;
     }
-    match reports.iter().filter(|report| !report.ok).count() {
-        0 => Ok(()),
-        n_bad => {
-            Err(Error::Input(format!("experiment files with problems: {n_bad} of {}", files.len())))
+    let n_bad = reports.iter().filter(|report| !report.ok).count();
+    let n_doubtful = reports.iter().filter(|report| !report.warnings.is_empty()).count();
+    match (n_bad, n_doubtful) {
+        (0, 0) => Ok(()),
+        (0, _) if !strict => Ok(()),
+        (0, n) => Err(Error::Input(format!(
+            "experiment files with warnings: {n} of {}, and --strict takes none",
+            files.len()
+        ))),
+        (n, _) => {
+            Err(Error::Input(format!("experiment files with problems: {n} of {}", files.len())))
         }
     }
 }
@@ -155,10 +167,36 @@ mod tests {
         (dir, [quickstart(), bad, missing])
     }
 
+    fn args(files: &[PathBuf]) -> ValidateArgs {
+        ValidateArgs { files: files.to_vec(), strict: false }
+    }
+
+    #[test]
+    fn warnings_are_shown_and_fail_a_strict_check() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("degrees.json");
+        let text = fs::read_to_string(quickstart()).unwrap();
+        fs::write(&path, text.replace("6.283185307179586", "360")).unwrap();
+        let captured = Captured::default();
+        let mut given = args(&[quickstart(), path]);
+        validate(&given, &mut captured.progress(OutputFormat::Json)).unwrap();
+        let reports: Value = serde_json::from_str(&captured.lines().join("\n")).unwrap();
+        assert_eq!((&reports[1]["ok"], &reports[0]["warnings"]), (&json!(true), &json!([])));
+        let place = "world.objects.robot.initializers.orientations.params.high";
+        assert_eq!(reports[1]["warnings"][0]["path"], place);
+        given.strict = true;
+        let error = validate(&given, &mut captured.progress(OutputFormat::Json)).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        let expected = "experiment files with warnings: 1 of 2, and --strict takes none";
+        assert_eq!(error.to_string(), expected);
+        given.files.pop();
+        validate(&given, &mut captured.progress(OutputFormat::Table)).unwrap();
+    }
+
     #[test]
     fn a_good_file_is_one_line() {
         let captured = Captured::default();
-        validate(&[quickstart()], &mut captured.progress(OutputFormat::Table)).unwrap();
+        validate(&args(&[quickstart()]), &mut captured.progress(OutputFormat::Table)).unwrap();
         let [line] = &captured.lines()[..] else { panic!() };
         let expected = "quickstart.json: ok: quickstart, SNES, 5 robots, 424 genes, 60 generations";
         assert!(line.ends_with(expected), "{line}");
@@ -168,7 +206,8 @@ mod tests {
     fn one_bad_file_does_not_hide_another() {
         let (_dir, files) = files();
         let captured = Captured::default();
-        let error = validate(&files, &mut captured.progress(OutputFormat::Json)).unwrap_err();
+        let error =
+            validate(&args(&files), &mut captured.progress(OutputFormat::Json)).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         assert_eq!(error.to_string(), "experiment files with problems: 2 of 3");
         let reports: Value = serde_json::from_str(&captured.lines().join("\n")).unwrap();

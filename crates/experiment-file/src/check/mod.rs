@@ -11,6 +11,7 @@ mod genotype;
 mod learning;
 mod network;
 mod task;
+mod units;
 mod world;
 
 use super::report::Report;
@@ -28,5 +29,6 @@ pub(super) fn check(
     genotype::check(config, algorithm, report);
     world::check(config, report);
     task::check(config, report);
+    units::check(config, report);
     budget::check(config, algorithm, report);
 }

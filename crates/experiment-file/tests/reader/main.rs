@@ -10,6 +10,7 @@ mod reference;
 mod schema;
 mod sensors;
 mod shipped;
+mod units;
 mod validator;
 mod values;
 
@@ -100,11 +101,12 @@ fn read(text: &str) -> Result<(ExperimentConfig, Vec<Problem>), ConfigError> {
 }
 
 /// The configuration of a text that must be right, without warnings, unless it is of
-/// inputs that the network does not get.
+/// inputs that the network does not get, or asks for a unit.
 fn accept(text: &str) -> ExperimentConfig {
     match read(text) {
         Ok((config, mut warnings)) => {
             warnings.retain(|warning| !warning.path.starts_with("topology.stimuli"));
+            warnings.retain(|warning| !warning.message.ends_with('?'));
             assert_eq!(warnings, [], "{text}");
             config
         }

@@ -1,0 +1,48 @@
+//! Values that are allowed, and look as if they were meant in another unit: warnings, each with
+//! the unit that is likely. A file whose author means what it says is accepted as it is.
+
+mod space;
+mod time;
+
+use crate::report::{Path, Report};
+use crate::{ExperimentConfig, RobotConfig};
+
+pub(super) fn check(config: &ExperimentConfig, report: &Report<'_>) {
+    let doubts = Doubts { config, report };
+    space::check(&doubts);
+    time::check(&doubts);
+}
+
+/// Where doubts go, and what they are measured by.
+struct Doubts<'a> {
+    config: &'a ExperimentConfig,
+    report: &'a Report<'a>,
+}
+
+impl Doubts<'_> {
+    /// Warns of a value. `likely`: what its author may have had in mind.
+    fn add(&self, path: &Path, what: String, likely: &str) {
+        self.report.warning(path, || format!("{what}; {likely}?"));
+    }
+
+    /// The longer side of the world, cm.
+    fn longer_side(&self) -> f64 {
+        self.config.world.width.max(self.config.world.height)
+    }
+
+    /// The shorter side of the world, cm.
+    fn shorter_side(&self) -> f64 {
+        self.config.world.width.min(self.config.world.height)
+    }
+
+    /// The way of the fastest robot in a step, cm; 0 if none has wheels.
+    fn longest_step(&self) -> f64 {
+        self.config.robots().map(|(_, robot)| step(robot)).fold(0.0, f64::max)
+    }
+}
+
+/// The longest way of a robot in a step, cm; 0 without wheels.
+fn step(robot: &RobotConfig) -> f64 {
+    let wheels = robot.actuators.wheel_actuator.as_ref();
+    wheels.map_or(0.0, |wheels| wheels.max_speed * wheels.step_duration)
+}
