@@ -27,6 +27,9 @@ struct Quantity {
     title: String,
     /// Whether less is better.
     less_is_better: bool,
+    /// Fewest and most generations of a run that are averaged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    averaged: Option<[u64; 2]>,
     samples: Vec<Summary>,
     pairs: Vec<Pair>,
 }
@@ -54,6 +57,8 @@ struct Pair {
 
 impl Report {
     pub fn new(samples: &[Sample], last: u64, target: Option<f64>) -> Self {
+        let averaged = averaged(samples, last);
+        let of_last = |what: &str| format!("{what} fitness of a generation, {}", spoken(averaged));
         let mut quantities = vec![
             Quantity::new(
                 "judged",
@@ -62,20 +67,14 @@ impl Report {
                 samples,
                 |run| run.judged,
             ),
-            Quantity::new(
-                "mean",
-                format!("mean fitness of a generation, average of the last {last}"),
-                false,
-                samples,
-                |run| average(run, last, |generation| generation.mean),
-            ),
-            Quantity::new(
-                "best",
-                format!("best fitness of a generation, average of the last {last}"),
-                false,
-                samples,
-                |run| average(run, last, |generation| generation.best),
-            ),
+            Quantity::new("mean", of_last("mean"), false, samples, |run| {
+                average(run, last, |generation| generation.mean)
+            })
+            .averaged(averaged),
+            Quantity::new("best", of_last("best"), false, samples, |run| {
+                average(run, last, |generation| generation.best)
+            })
+            .averaged(averaged),
         ];
         if let Some(target) = target {
             quantities.push(Quantity::new(
@@ -127,7 +126,11 @@ impl Quantity {
             .enumerate()
             .flat_map(|(i, first)| samples[i + 1..].iter().map(move |second| (first, second)));
         let pairs = pairs.map(|(first, second)| Pair::new(first, second, less_is_better)).collect();
-        Self { name, title, less_is_better, samples, pairs }
+        Self { name, title, less_is_better, averaged: None, samples, pairs }
+    }
+
+    fn averaged(self, averaged: Option<[u64; 2]>) -> Self {
+        Self { averaged, ..self }
     }
 
     fn to_text(&self, screen: Screen) -> String {
@@ -206,6 +209,24 @@ fn number(value: f64, digits: usize) -> String {
 fn span(interval: &Interval, digits: usize) -> String {
     let ends = interval.ci95.map(|ends| ends.map(|end| number(end, digits)));
     ends.map_or_else(|| "-".into(), |[low, high]| format!("{low} to {high}"))
+}
+
+/// Fewest and most generations of a run that are averaged if `last` are wanted; none without a
+/// history.
+fn averaged(samples: &[Sample], last: u64) -> Option<[u64; 2]> {
+    let lengths = samples.iter().flat_map(Sample::histories).map(|it| it.len() as u64);
+    let numbers: Vec<u64> = lengths.map(|length| length.min(last)).collect();
+    Some([*numbers.iter().min()?, *numbers.iter().max()?])
+}
+
+/// "average of the last 50", or of as many as there are.
+fn spoken(averaged: Option<[u64; 2]>) -> String {
+    match averaged {
+        Some([1, 1]) => "the last one".into(),
+        Some([fewest, most]) if fewest == most => format!("average of the last {most}"),
+        Some([fewest, most]) => format!("average of the last {fewest} to {most}"),
+        None => String::new(),
+    }
 }
 
 fn average(

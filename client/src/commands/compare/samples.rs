@@ -19,6 +19,10 @@ use crate::{
     text,
 };
 
+/// Of which run a file is, has to be known.
+const UNNAMED: &str = "expected a file NAME-SEED.csv or NAME-SEED.json, or a champion file that \
+                       has its name in it";
+
 /// Runs that differ in their seed only.
 #[derive(Debug)]
 pub struct Sample {
@@ -55,6 +59,8 @@ pub struct Samples {
 /// The part of a champion file that is compared.
 #[derive(Debug, Deserialize)]
 struct ChampionFile {
+    #[serde(default)]
+    name: String,
     seed: Seed,
     judged: Option<JudgedFile>,
 }
@@ -76,28 +82,29 @@ impl Samples {
     }
 
     fn read_file(&mut self, path: &Path) -> Result<(), String> {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let name_and_seed = stem.rsplit_once('-');
-        let (name, seed) = name_and_seed
-            .and_then(|(name, seed)| Some((name, seed.parse::<u64>().ok()?)))
-            .ok_or("expected a file NAME-SEED.csv or NAME-SEED.json")?;
+        let of_file = name_and_seed(path);
         let source = path.display().to_string();
         if path.extension().is_some_and(|ending| ending == "json") {
             let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
             let champion: ChampionFile = serde_json::from_str(&text)
                 .map_err(|error| format!("{error}; expected what `swarmctl champion` writes"))?;
-            if champion.seed != Seed(seed) {
-                return Err(format!("it is of seed {}", champion.seed.0));
-            }
-            let run = self.run(name, seed);
+            let Seed(seed) = champion.seed;
+            let name = match of_file {
+                Some((_, other)) if other != seed => return Err(format!("it is of seed {seed}")),
+                Some((name, _)) => name,
+                None if champion.name.is_empty() => return Err(UNNAMED.into()),
+                None => champion.name,
+            };
+            let run = self.run(&name, seed);
             run.sources.push(source);
             if run.judged.is_some() {
                 return Err(twice(run));
             }
             run.judged = champion.judged.map(|judged| judged.mean);
         } else {
+            let (name, seed) = of_file.ok_or(UNNAMED)?;
             let history = Run::read(path).map_err(|error| error.to_string())?;
-            let run = self.run(name, seed);
+            let run = self.run(&name, seed);
             run.sources.push(source);
             if run.history.is_some() {
                 return Err(twice(run));
@@ -158,6 +165,13 @@ impl Samples {
         });
         self.samples[place].runs.entry(seed).or_default()
     }
+}
+
+/// What the name of a file `NAME-SEED.ENDING` says of its run.
+fn name_and_seed(path: &Path) -> Option<(String, u64)> {
+    let stem = path.file_stem()?.to_string_lossy();
+    let (name, seed) = stem.rsplit_once('-')?;
+    Some((name.to_owned(), seed.parse().ok()?))
 }
 
 fn twice(run: &RecordedRun) -> String {
