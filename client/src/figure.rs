@@ -5,9 +5,9 @@ mod draw;
 
 pub use draw::{FONT, embed_font};
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use crate::error::Error;
+use crate::{error::Error, output_file::Overwrite};
 
 /// Most curves of a figure: more could not be told apart.
 pub const CURVES_MAX: usize = 14;
@@ -56,6 +56,12 @@ pub enum Format {
 }
 
 impl Format {
+    /// Refuses a file with a bad name, and one that may not be written over.
+    pub fn check(path: &Path, overwrite: Overwrite) -> Result<(), Error> {
+        Self::of(path)?;
+        overwrite.check(path)
+    }
+
     /// The format that the extension of a file's name selects.
     pub fn of(path: &Path) -> Result<Self, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
@@ -71,13 +77,12 @@ impl Format {
 
 impl Figure {
     /// Writes the figure in the format that the extension of the file's name selects.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
+    pub fn write(&self, path: &Path, overwrite: Overwrite) -> Result<(), Error> {
         let bytes = match Format::of(path)? {
             Format::Svg => self.to_svg()?.into_bytes(),
             Format::Png => self.to_png()?,
         };
-        fs::write(path, bytes)
-            .map_err(|error| Error::Input(format!("cannot write {}: {error}", path.display())))
+        overwrite.write(path, &bytes)
     }
 }
 

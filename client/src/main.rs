@@ -21,6 +21,7 @@ mod help;
 mod input;
 mod interrupt;
 mod json;
+mod output_file;
 mod place;
 mod progress;
 mod recorded;

@@ -29,3 +29,4 @@ mod slurm;
 mod starved;
 mod steering;
 mod strangers;
+mod written_files;

@@ -79,7 +79,7 @@ fn a_trace_shows_every_robot_in_every_step_and_changes_no_bit() {
         let config = workspace_file(&format!("configs/{config}.json"));
         let args = ["--trials", "2", "--steps", "50", "--seed", "5"];
         let unseen = simulated(&config, &args);
-        let with_trace = [&args[..], &["--trace", path.to_str().unwrap()]].concat();
+        let with_trace = [&args[..], &["--force", "--trace", path.to_str().unwrap()]].concat();
         let seen = simulated(&config, &with_trace);
         let fitness = |simulation: &Value| {
             fitness_bits(simulation["trials"].as_array().unwrap(), |trial| &trial["fitness"])

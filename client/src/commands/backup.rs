@@ -6,10 +6,14 @@ use std::{
 };
 
 use clap::Args;
-use coordinator::store::{self, Backup};
+use coordinator::store::{self, Backup, StoreError};
 
 use super::doctor::print_inspection;
-use crate::{error::Error, progress::Progress};
+use crate::{
+    error::Error,
+    output_file::{Overwrite, exists},
+    progress::Progress,
+};
 
 /// Copy a data directory, whether or not a coordinator uses it.
 ///
@@ -19,9 +23,12 @@ use crate::{error::Error, progress::Progress};
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct BackupArgs {
-    /// The copy: a directory that does not exist yet, or is empty.
+    /// The copy: a directory that does not exist yet, or is empty; with --force, a data directory
+    /// that it replaces.
     #[arg(value_name = "TO")]
     to: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -35,8 +42,14 @@ Examples:
 
 /// Makes the copy.
 pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
-    match store::backup(data_dir, &args.to).map_err(|error| Error::from_store(&error))? {
-        Backup::Made(inspection) => {
+    let copied = args.overwrite.data_directory(data_dir, &args.to, |to| {
+        store::backup(data_dir, to).map_err(|error| refused(&error))
+    });
+    match copied? {
+        Backup::Made(mut inspection) => {
+            // It was made beside what it has replaced.
+            inspection.path =
+                args.to.join(inspection.path.file_name().expect("a database has a name"));
             print_inspection(&inspection, progress)?;
             let damaged: BTreeSet<u64> =
                 inspection.findings.iter().filter_map(|it| Some(it.experiment?.0)).collect();
@@ -55,5 +68,13 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
             let database = inspection.path.display();
             Err(Error::Damaged(format!("{database} is damaged, so that it was not copied")))
         }
+    }
+}
+
+/// The error of making a data directory.
+pub fn refused(error: &StoreError) -> Error {
+    match error {
+        StoreError::NotEmpty { path } => exists(path),
+        error => Error::from_store(error),
     }
 }

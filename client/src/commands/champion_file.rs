@@ -1,27 +1,25 @@
 //! The champion of what was computed in a data directory, as a file there.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::individual::champion_document;
-use crate::error::Error;
+use crate::{error::Error, output_file::Overwrite};
 
 /// Longest part of an experiment's name in a file's name, in characters.
 const FILE_NAME_CHARS_MAX: usize = 50;
 
-/// Writes the champion to a file in the data directory; returns its path.
+/// Writes the champion to a file in the data directory; returns its path. One of before is this
+/// program's own, of the same experiment, and is replaced.
 pub fn write(
     data_dir: &Path,
     experiment: &Experiment,
     champion: &GetChampionResponse,
 ) -> Result<PathBuf, Error> {
     let path = data_dir.join(champion_file_name(experiment));
-    fs::write(&path, champion_document(experiment, champion)? + "\n")
-        .map_err(|source| Error::Write { what: path.display().to_string(), source })?;
+    let document = champion_document(experiment, champion)? + "\n";
+    Overwrite::OWN.write(&path, document.as_bytes())?;
     Ok(path)
 }
 
@@ -39,6 +37,8 @@ fn champion_file_name(experiment: &Experiment) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn experiment(id: u64, name: &str) -> Experiment {

@@ -15,6 +15,7 @@ use crate::{
     error::Error,
     figure::{CURVES_MAX, Curve, Figure, Format, Point},
     json,
+    output_file::Overwrite,
     place::Intent,
     progress::Progress,
     recorded::Source,
@@ -42,10 +43,10 @@ const POINTS_MAX: usize = 200;
 #[command(after_help = HELP)]
 pub struct CompareArgs {
     /// Names of groups, numbers of experiments, or files: histories (.csv) that `swarmctl
-    /// history` wrote and champions (.json) that `swarmctl champion` wrote.
+    /// history` wrote and champions (.json) that `swarmctl champion` or `swarmctl run` wrote.
     #[arg(required = true, value_name = "GROUP|ID|FILE", add = ArgValueCompleter::new(complete::experiments_and_files))]
     pub runs: Vec<String>,
-    /// Number of last generations of each run that are averaged.
+    /// Number of last generations of each run that are averaged; of a run that has fewer, all.
     #[arg(long, value_name = "N", default_value_t = LAST, value_parser = clap::value_parser!(u64).range(1..))]
     pub last: u64,
     /// Also compare how many generations and episodes it takes until the mean fitness of a
@@ -56,11 +57,14 @@ pub struct CompareArgs {
     /// band of its 95 % interval. The name ends in .svg or .png.
     #[arg(long, value_name = "FILE")]
     pub to: Option<PathBuf>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 const HELP: &str = "\
 Runs of a group that differ in more than the seed are a sample for each variant. Files
 NAME-SEED.csv and NAME-SEED.json are of one run, and those of one NAME are a sample.
+Champion files with other names, as those of `run`, say name and seed themselves.
 p-values are two-sided, and not corrected for the number of pairs.
 
 Examples:
@@ -75,7 +79,7 @@ pub async fn compare(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     // A bad name of the figure is refused before anything is read.
-    args.to.as_deref().map(Format::of).transpose()?;
+    args.to.as_deref().map(|to| Format::check(to, args.overwrite)).transpose()?;
     if args.target.is_some_and(|target| !target.is_finite()) {
         return Err(Error::Input("--target is a finite number".into()));
     }
@@ -97,7 +101,7 @@ pub async fn compare(
     let samples = samples.finish()?;
     let report = Report::new(&samples, args.last, args.target);
     if let Some(to) = &args.to {
-        figure(&samples)?.write(to)?;
+        figure(&samples)?.write(to, args.overwrite)?;
     }
     progress.print(&if progress.is_json() {
         json::document(&report)

@@ -7,7 +7,8 @@ use coordinator::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
 use serde::Serialize;
 use swarm_telemetry::escape;
 
-use crate::{error::Error, json, progress::Progress, text};
+use super::backup::refused;
+use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text};
 
 /// Check the database of a data directory, or keep what is sound in a damaged one.
 ///
@@ -23,6 +24,8 @@ pub struct DoctorArgs {
     /// it is resumed, and comes to the same bits.
     #[arg(long, value_name = "NEW")]
     recover: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -67,7 +70,9 @@ struct RecoveredDocument<'a> {
 /// Looks at a data directory, or makes a new one of it.
 pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(to) = &args.recover {
-        let recovery = store::recover(data_dir, to).map_err(|error| Error::from_store(&error))?;
+        let recovery = args.overwrite.data_directory(data_dir, to, |to| {
+            store::recover(data_dir, to).map_err(|error| refused(&error))
+        })?;
         return progress.print(&if progress.is_json() {
             json::document(&recovery_document(&recovery, to))
         } else {

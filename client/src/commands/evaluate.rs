@@ -73,6 +73,8 @@ async fn evaluate_all(
     args: &EvaluateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    // What would be in vain is refused before anything is asked for.
+    args.overwrite.check_files(&args.to, &files::NAMES)?;
     let (file, genotype) = subject(settings.clone(), args, progress).await?;
     let remote = remote(settings, args, progress).await?;
     let conditions = conditions::all(&file, args)?;
@@ -80,7 +82,7 @@ async fn evaluate_all(
         condition.check(&genotype)?;
     }
     // An unusable directory is an error now, not after the computation.
-    let results = Results::begin(&args.to, args.replace)?;
+    let results = Results::begin(&args.to, args.overwrite)?;
     let measured = match remote {
         Some(connection) => {
             let asked = ask_all(&connection, &conditions, &genotype, args, progress).await;

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{self, Read as _, Write as _},
+    io::{self, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -10,7 +10,6 @@ use bundle::LEN_MAX;
 use clap::Args;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
-use tempfile::NamedTempFile;
 
 use super::Remote;
 use crate::{
@@ -18,6 +17,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     json,
+    output_file::Overwrite,
     progress::Progress,
     tensorboard::EventFile,
     text,
@@ -36,12 +36,14 @@ use crate::{
 pub struct ExportArgs {
     #[command(flatten)]
     target: Target,
-    /// The bundle; a file that exists is replaced.
+    /// The bundle.
     #[arg(long, value_name = "FILE", required_unless_present = "tensorboard")]
     to: Option<PathBuf>,
     /// Write an event file for TensorBoard into a directory of its own in this one.
     #[arg(long, value_name = "DIR", conflicts_with = "to")]
     tensorboard: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -71,6 +73,7 @@ async fn export(
     connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    args.to.as_deref().map(|to| args.overwrite.check(to)).transpose()?;
     let id = match &args.target.subject {
         Subject::Experiment(id) => *id,
         subject => connection.one(subject).await?.id,
@@ -86,7 +89,7 @@ async fn export(
         }
         (None, None) => return Err(Error::Input("name a file to write with --to".into())),
     };
-    write(&path, &bytes)?;
+    args.overwrite.write(&path, &bytes)?;
     let file = path.display().to_string();
     let written = Written { experiment: id, file, bytes: bytes.len(), sha256: sha256(&bytes) };
     progress.print(&if progress.is_json() {
@@ -125,31 +128,6 @@ async fn events(
     fs::create_dir_all(&run).map_err(failed)?;
     let name = format!("events.out.tfevents.{}.swarmevo", experiment.submitted_at_ms / 1000);
     Ok((run.join(name), file.into_bytes()))
-}
-
-/// Writes a file whole or not at all.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let failed =
-        |source: io::Error| Error::Input(format!("cannot write {}: {source}", path.display()));
-    let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
-    let mut file = NamedTempFile::new_in(directory.unwrap_or(Path::new("."))).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    let readable = fs::metadata(path).map(|found| found.permissions());
-    file.persist(path).map_err(|error| failed(error.error))?;
-    make_readable(path, readable.ok()).map_err(failed)
-}
-
-/// A temporary file is its owner's alone; a bundle is for others.
-#[cfg(unix)]
-fn make_readable(path: &Path, before: Option<fs::Permissions>) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt as _;
-    fs::set_permissions(path, before.unwrap_or_else(|| fs::Permissions::from_mode(0o644)))
-}
-
-#[cfg(not(unix))]
-fn make_readable(_: &Path, _: Option<fs::Permissions>) -> io::Result<()> {
-    Ok(())
 }
 
 /// Reads a bundle that others may have made: no more of it than one can have.

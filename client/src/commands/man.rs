@@ -1,10 +1,15 @@
 //! `swarmctl man`: manual pages.
 
-use std::{fs, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, CommandFactory as _};
 
-use crate::{args::Args, error::Error, progress::Progress};
+use crate::{
+    args::Args,
+    error::Error,
+    output_file::{Overwrite, unwritable},
+    progress::Progress,
+};
 
 /// Write the manual pages of this program and its commands to a directory.
 #[derive(Debug, ClapArgs)]
@@ -12,6 +17,8 @@ use crate::{args::Args, error::Error, progress::Progress};
 pub struct ManArgs {
     /// The directory; created if it does not exist.
     pub directory: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -21,14 +28,17 @@ Examples:
 /// Writes a page per command.
 pub fn man(args: &ManArgs, progress: &mut Progress) -> Result<(), Error> {
     let directory = &args.directory;
-    fs::create_dir_all(directory)
-        .and_then(|()| clap_mangen::generate_to(Args::command(), directory))
-        .map_err(|error| Error::Input(format!("cannot write {}: {error}", directory.display())))?;
+    let pages = args.overwrite.begin_files(directory, &[])?;
+    clap_mangen::generate_to(Args::command(), pages.unfinished())
+        .map_err(|error| unwritable(directory, &error))?;
+    pages.finish()?;
     progress.print(&format!("manual pages are in {}", directory.display()))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::args::OutputFormat;
 
@@ -37,7 +47,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let directory = dir.path().join("man1");
         let mut progress = Progress::to(OutputFormat::Table, Box::new(std::io::sink()));
-        man(&ManArgs { directory: directory.clone() }, &mut progress).unwrap();
+        let args = ManArgs { directory: directory.clone(), overwrite: Overwrite::default() };
+        man(&args, &mut progress).unwrap();
         let page = fs::read_to_string(directory.join("swarmctl-submit.1")).unwrap();
         assert!(page.contains("Submit an experiment"), "{page}");
         assert!(directory.join("swarmctl.1").exists());

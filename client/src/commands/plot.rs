@@ -30,7 +30,7 @@ pub async fn plot(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     // A bad name of the figure is refused before anything is read.
-    Format::of(&args.to)?;
+    Format::check(&args.to, args.overwrite)?;
     if let Some(dir) = &args.steps {
         return plot_steps(dir, args, progress);
     }
@@ -61,7 +61,7 @@ pub async fn plot(
     }
     let names = names(&runs);
     let function = common_function(&runs)?;
-    figure(&runs, &names, function).write(&args.to)?;
+    figure(&runs, &names, function).write(&args.to, args.overwrite)?;
     progress.print(&if progress.is_json() {
         json::document(&Plotted::new(&runs, &names, &args.to))
     } else {
@@ -78,7 +78,7 @@ fn plot_steps(dir: &Path, args: &PlotArgs, progress: &mut Progress) -> Result<()
     if figure.curves.len() > CURVES_MAX {
         return Err(Error::Input(format!("a figure holds at most {CURVES_MAX} conditions")));
     }
-    figure.write(&args.to)?;
+    figure.write(&args.to, args.overwrite)?;
     let conditions: Vec<&str> = figure.curves.iter().map(|curve| curve.name.as_str()).collect();
     let to = args.to.display();
     progress.print(&if progress.is_json() {

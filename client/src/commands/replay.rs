@@ -2,10 +2,7 @@
 
 mod picture;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
@@ -24,6 +21,7 @@ use crate::{
     connection::Connection,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
+    output_file::Overwrite,
     place::Intent,
     progress::Progress,
     settings::Settings,
@@ -76,6 +74,8 @@ pub struct ReplayArgs {
     /// [default: replay-ADDRESS.html, replay.html]
     #[arg(long, value_name = "FILE")]
     to: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -94,6 +94,7 @@ pub async fn replay(
     progress: &mut Progress,
 ) -> Result<(), Error> {
     let (path, format) = args.path()?;
+    args.overwrite.check(&path)?;
     let Subject { file, genotype, generation, judged } = args.subject(settings, progress).await?;
     let mut changes = Vec::new();
     for text in &args.set.set {
@@ -130,8 +131,7 @@ pub async fn replay(
         Format::Html => html(&episode)?.into_bytes(),
         Format::Png => png(&episode, args.at)?,
     };
-    fs::write(&path, bytes)
-        .map_err(|error| Error::Input(format!("cannot write {}: {error}", path.display())))?;
+    args.overwrite.write(&path, &bytes)?;
     progress.print(&path.display().to_string())
 }
 

@@ -32,12 +32,15 @@ pub async fn simulate(
     args: &SimulateArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
+    args.trace.as_deref().map(|path| args.overwrite.check(path)).transpose()?;
     let Subject { compiled, genotype, generation } = subject(settings, args, progress).await?;
     // A genotype that does not fit is refused before a file is touched.
     let refused = |error: EvaluateError| Error::Input(format!("{genotype}: {error}"));
     compiled.experiment.network_json(&genotype.genes).map_err(refused)?;
     let mut trace = match &args.trace {
-        Some(path) => Some(Trace::create(path, &compiled.config, &args.trace_columns)?),
+        Some(path) => {
+            Some(Trace::create(path, &compiled.config, &args.trace_columns, args.overwrite)?)
+        }
         None => None,
     };
     let mut trials = Vec::new();

@@ -1,5 +1,7 @@
 //! What a figure shows, as SVG and as PNG.
 
+use std::fs;
+
 use super::*;
 
 fn curve(name: &str, points: &[(f64, f64, f64, f64)]) -> Curve {
@@ -104,12 +106,12 @@ fn names_are_text_whatever_is_in_them() {
 fn the_file_name_says_the_format() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.svg");
-    two_runs().write(&path).unwrap();
+    two_runs().write(&path, Overwrite::default()).unwrap();
     assert_eq!(fs::read_to_string(path).unwrap(), two_runs().to_svg().unwrap());
     assert_eq!(Format::of("a.svg".as_ref()).unwrap(), Format::Svg);
     assert_eq!(Format::of("b/a.png".as_ref()).unwrap(), Format::Png);
     for name in ["a.pdf", "svg", "missing/a.svg"] {
-        let error = two_runs().write(&dir.path().join(name)).unwrap_err();
+        let error = two_runs().write(&dir.path().join(name), Overwrite::default()).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");
     }
 }

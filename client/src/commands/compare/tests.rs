@@ -48,7 +48,13 @@ async fn run(
 ) -> Result<String, Error> {
     let captured = Captured::default();
     let settings = Settings { coordinator: Some(coordinator.into()), ..Settings::default() };
-    let args = CompareArgs { runs: runs.to_vec(), last: 2, target, to: None };
+    let args = CompareArgs {
+        runs: runs.to_vec(),
+        last: 2,
+        target,
+        to: None,
+        overwrite: Overwrite::default(),
+    };
     compare(settings, &args, &mut captured.progress(format)).await?;
     Ok(captured.lines().join("\n"))
 }
@@ -95,7 +101,13 @@ async fn tables_fit_the_terminal() {
     let (_dir, runs) = files();
     for width in [40, 80, 200] {
         let captured = Captured::default();
-        let args = CompareArgs { runs: runs.clone(), last: 2, target: Some(6.0), to: None };
+        let args = CompareArgs {
+            runs: runs.clone(),
+            last: 2,
+            target: Some(6.0),
+            to: None,
+            overwrite: Overwrite::default(),
+        };
         let mut progress = captured.progress_on(OutputFormat::Table, width);
         compare(Settings::default(), &args, &mut progress).await.unwrap();
         let lines = captured.lines();
@@ -127,6 +139,55 @@ async fn all_files_that_are_wrong_are_named_at_once() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert_eq!(text.lines().count(), 5, "{text}");
+}
+
+#[tokio::test]
+async fn the_number_of_generations_that_is_averaged_is_the_one_that_there_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let run_of = |seed: u32, n: usize| {
+        let path = dir.path().join(format!("a-{seed}.csv"));
+        let lines: Vec<String> = history(1.0).lines().take(n + 1).map(str::to_owned).collect();
+        fs::write(&path, lines.join("\n")).unwrap();
+        path
+    };
+    let paths = [run_of(0, 1), run_of(1, 2), run_of(2, 2), run_of(3, 4)];
+    let title = |paths: &[PathBuf], last| {
+        let mut samples = Samples::default();
+        samples.read(paths).unwrap();
+        let report = Report::new(&samples.finish().unwrap(), last, None);
+        let text = report.to_text(crate::table::Screen::default());
+        text.lines().next().unwrap().to_owned()
+    };
+    let mean = "mean: mean fitness of a generation";
+    assert_eq!(title(&paths[1..3], 50), format!("{mean}, average of the last 2"));
+    assert_eq!(title(&paths[3..], 3), format!("{mean}, average of the last 3"));
+    assert_eq!(title(&paths, 3), format!("{mean}, average of the last 1 to 3"));
+    assert_eq!(title(&paths[..1], 50), format!("{mean}, the last one"));
+}
+
+#[tokio::test]
+async fn the_champion_files_of_run_say_their_name_and_seed_themselves() {
+    let dir = tempfile::tempdir().unwrap();
+    let champion = |file: &str, name: &str, seed: u64, mean: f64| {
+        let path = dir.path().join(file);
+        let text = format!(r#"{{"name": "{name}", "seed": {seed}, "judged": {{"mean": {mean}}}}}"#);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let paths = [
+        champion("a-1.champion.json", "a", 7, 1.0),
+        champion("a-2.champion.json", "a", 8, 2.0),
+        champion("a-9.json", "another name", 9, 3.0),
+        champion("champion.json", "b", 7, 0.5),
+    ];
+    let text = run(NOWHERE, &paths, None, OutputFormat::Json).await.unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let samples = &report["quantities"][0]["samples"];
+    assert_eq!(samples[0]["values"], serde_json::json!([1.0, 2.0, 3.0]), "the file's name counts");
+    assert_eq!((&samples[1]["sample"], &samples[1]["values"][0]), (&"b".into(), &0.5.into()));
+    let unnamed = [champion("champion.json", "", 7, 0.5)];
+    let error = run(NOWHERE, &unnamed, None, OutputFormat::Table).await.unwrap_err().to_string();
+    assert!(error.contains("NAME-SEED.json") && error.contains("its name in it"), "{error}");
 }
 
 #[tokio::test]

@@ -11,6 +11,7 @@ use crate::{
     args::{ChangedArg, IsaArgs, StepsArg, whole},
     change::SetArg,
     complete,
+    output_file::Overwrite,
 };
 
 /// Evaluate a genotype: many trials under several conditions, every step measured.
@@ -73,9 +74,8 @@ pub struct EvaluateArgs {
     /// Directory of the results; created if it does not exist.
     #[arg(long, value_name = "DIR")]
     pub to: PathBuf,
-    /// Replace the evaluation that is in the directory.
-    #[arg(long)]
-    pub replace: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
     #[command(flatten)]
     pub isa: IsaArgs,
 }

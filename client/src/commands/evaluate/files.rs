@@ -1,12 +1,7 @@
 //! The files of an evaluation. The tables have one row per condition, step or trial,
 //! and measure.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
-
-use tempfile::TempDir;
+use std::path::Path;
 
 use super::{
     conditions::Condition,
@@ -14,35 +9,23 @@ use super::{
     statistics::{Quartiles, mean},
     summary::time_mean,
 };
-use crate::error::Error;
+use crate::{
+    error::Error,
+    output_file::{OutputFiles, Overwrite},
+};
 
 /// The names of the files.
-const NAMES: [&str; 3] = ["steps.csv", "trials.csv", "summary.json"];
+pub const NAMES: [&str; 3] = ["steps.csv", "trials.csv", "summary.json"];
 
-/// The files while they are written: beside those that they replace, so that an
-/// evaluation that is interrupted leaves everything as it was.
-pub struct Results {
-    to: PathBuf,
-    /// Removed, with what is in it, when this is dropped.
-    unfinished: TempDir,
-}
+/// The files while they are written: an evaluation that is interrupted leaves everything as it
+/// was.
+pub struct Results(OutputFiles);
 
 impl Results {
     /// Refuses a directory that cannot be written, and, unless they are to be
     /// replaced, one that has such files.
-    pub fn begin(to: &Path, replace: bool) -> Result<Self, Error> {
-        if !replace && let Some(name) = NAMES.iter().find(|name| to.join(name).exists()) {
-            return Err(Error::Input(format!(
-                "{} has a {name} already; choose another directory, or replace it with --replace",
-                to.display()
-            )));
-        }
-        let parent = if to.is_dir() { Some(to) } else { to.parent() };
-        let parent = parent.filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let unfinished = fs::create_dir_all(parent)
-            .and_then(|()| tempfile::Builder::new().prefix(".unfinished-").tempdir_in(parent));
-        let unfinished = unfinished.map_err(|error| unwritable(to, &error))?;
-        Ok(Self { to: to.into(), unfinished })
+    pub fn begin(to: &Path, overwrite: Overwrite) -> Result<Self, Error> {
+        Ok(Self(overwrite.begin_files(to, &NAMES)?))
     }
 
     /// Writes steps.csv: statistics over the trials in every `every`-th step and the last
@@ -109,8 +92,7 @@ impl Results {
 
     /// Writes a file.
     pub fn write(&self, name: &str, text: &str) -> Result<(), Error> {
-        fs::write(self.unfinished.path().join(name), text)
-            .map_err(|error| unwritable(&self.to.join(name), &error))
+        self.0.write(name, text)
     }
 
     fn write_table(&self, name: &str, header: &[&str], rows: &[Vec<String>]) -> Result<(), Error> {
@@ -126,19 +108,8 @@ impl Results {
 
     /// Puts the files where they belong.
     pub fn finish(self) -> Result<(), Error> {
-        let Self { to, unfinished } = self;
-        fs::create_dir_all(&to).map_err(|error| unwritable(&to, &error))?;
-        for name in NAMES {
-            let path = to.join(name);
-            fs::rename(unfinished.path().join(name), &path)
-                .map_err(|error| unwritable(&path, &error))?;
-        }
-        Ok(())
+        self.0.finish()
     }
-}
-
-fn unwritable(path: &Path, error: &io::Error) -> Error {
-    Error::Input(format!("cannot write {}: {error}", path.display()))
 }
 
 /// The shortest number that agrees in six significant digits.
@@ -151,26 +122,6 @@ fn six_digits(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_evaluation_replaces_another_only_if_told_to_and_when_it_is_complete() {
-        let dir = tempfile::tempdir().unwrap();
-        let to = dir.path().join("a/b");
-        let write = |replace, text: &str| {
-            let results = Results::begin(&to, replace)?;
-            NAMES.iter().try_for_each(|name| results.write(name, text))?;
-            Ok::<_, Error>(results)
-        };
-        write(false, "unfinished").unwrap();
-        assert!(!to.exists());
-        write(false, "first").unwrap().finish().unwrap();
-        assert_eq!(write(false, "second").err().unwrap().exit_code(), 2);
-        write(true, "second").unwrap();
-        assert_eq!(fs::read_to_string(to.join("trials.csv")).unwrap(), "first");
-        write(true, "third").unwrap().finish().unwrap();
-        assert_eq!(fs::read_to_string(to.join("trials.csv")).unwrap(), "third");
-        assert_eq!(fs::read_dir(&to).unwrap().count(), NAMES.len());
-    }
 
     #[test]
     fn six_digits_are_kept() {

@@ -9,6 +9,7 @@ use crate::{
     args::{ChangedArg, IsaArgs, StepsArg},
     change::SetArg,
     experiment_file::{Overrides, tests::shipped},
+    output_file::Overwrite,
 };
 
 fn args() -> EvaluateArgs {
@@ -29,7 +30,7 @@ fn args() -> EvaluateArgs {
         local: true,
         workers: None,
         to: PathBuf::from("unused"),
-        replace: false,
+        overwrite: Overwrite::default(),
         isa: IsaArgs::default(),
     }
 }
@@ -162,7 +163,7 @@ fn measured() -> Measured {
 fn what_is_absent_is_left_out_of_means_and_files() {
     let dir = tempfile::tempdir().unwrap();
     let conditions = conditions("light_follower_snes", &args()).unwrap();
-    let results = Results::begin(dir.path(), false).unwrap();
+    let results = Results::begin(dir.path(), Overwrite::default()).unwrap();
     results.write_steps(&conditions, &[measured()], 1).unwrap();
     results.write_trials(&conditions, &[measured()]).unwrap();
     results.write("summary.json", "").unwrap();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 
-use crate::complete;
+use crate::{complete, output_file::Overwrite};
 
 /// Draw the fitness of runs against their generations.
 ///
@@ -35,6 +35,8 @@ pub struct PlotArgs {
     /// File of the figure; its name ends in .svg or .png.
     #[arg(long, value_name = "FILE")]
     pub to: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
 }
 
 const HELP: &str = "\

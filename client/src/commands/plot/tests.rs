@@ -8,6 +8,7 @@ use super::*;
 use crate::{
     args::OutputFormat,
     fake_coordinator::{FakeCoordinator, Script},
+    output_file::Overwrite,
     progress::tests::Captured,
 };
 
@@ -34,7 +35,14 @@ async fn run(coordinator: &str, runs: &[&str], to: PathBuf) -> Result<String, Er
     let captured = Captured::default();
     let settings = Settings { coordinator: Some(coordinator.into()), ..Settings::default() };
     let runs = runs.iter().map(ToString::to_string).collect();
-    let args = PlotArgs { runs, steps: None, metric: None, conditions: Vec::new(), to };
+    let args = PlotArgs {
+        runs,
+        steps: None,
+        metric: None,
+        conditions: Vec::new(),
+        to,
+        overwrite: Overwrite::default(),
+    };
     plot(settings, &args, &mut captured.progress(OutputFormat::Table)).await?;
     Ok(captured.lines().join("\n"))
 }

@@ -1,5 +1,7 @@
 //! Files that are written, and what is refused before one is.
 
+use std::fs;
+
 use clap::Parser;
 use serde_json::json;
 
@@ -47,14 +49,14 @@ async fn a_png_is_one_step_or_an_animation_of_several() {
     let path = directory.path().join("swarm.png");
     let to = path.to_str().unwrap();
     let frames = async |at: &str| {
-        run(directory.path(), &["--to", to, "--at", at]).await.unwrap();
+        run(directory.path(), &["--to", to, "--at", at, "--force"]).await.unwrap();
         let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(&path).unwrap()));
         let reader = decoder.read_info().unwrap();
         reader.info().animation_control().map(|control| control.num_frames)
     };
     assert_eq!(frames("99").await, None);
     assert_eq!(frames("3..7").await, Some(5));
-    let error = run(directory.path(), &["--to", to, "--at", "100"]).await.unwrap_err();
+    let error = run(directory.path(), &["--to", to, "--at", "100", "--force"]).await.unwrap_err();
     assert_eq!(error.to_string(), "--at 100: the episode has steps 0 to 99");
 }
 
@@ -63,7 +65,7 @@ async fn a_png_shows_ground_areas_in_their_colour() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("swarm.png");
     let n_green = async |changes: &[&str]| {
-        let options = [&["--to", path.to_str().unwrap(), "--at", "3"], changes].concat();
+        let options = [&["--force", "--to", path.to_str().unwrap(), "--at", "3"], changes].concat();
         run(directory.path(), &options).await.unwrap();
         let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();

@@ -13,6 +13,7 @@ use crate::{
     complete,
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
+    output_file::Overwrite,
 };
 
 /// Simulate single trials here, and show the fitness and measures of a genotype.
@@ -79,6 +80,8 @@ pub struct SimulateArgs {
     /// More columns of the trace, at the end of its rows.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "COLUMNS", requires = "trace")]
     pub trace_columns: Vec<ExtraColumns>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
     #[command(flatten)]
     pub isa: IsaArgs,
 }

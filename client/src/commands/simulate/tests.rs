@@ -10,6 +10,7 @@ use crate::{
     args::{ChangedArg, IsaArgs, OutputFormat, SeedArg, StepsArg},
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script},
+    output_file::Overwrite,
     progress::tests::Captured,
 };
 
@@ -30,6 +31,7 @@ fn args() -> SimulateArgs {
         steps: StepsArg { steps: Some(20) },
         trace: None,
         trace_columns: Vec::new(),
+        overwrite: Overwrite::default(),
         isa: IsaArgs::default(),
     }
 }
@@ -121,7 +123,8 @@ async fn genotypes_that_do_not_fit_are_refused_before_a_file_is_touched() {
         [(vec![0.5; 3], "has 3 genes, the experiment's have 424"), (outside, "gene 7 is 1.5")]
     {
         let genotype = file(&dir, &json!(genotype));
-        let args = SimulateArgs { genotype, trace: Some(trace.clone()), ..args() };
+        let overwrite = Overwrite { force: true };
+        let args = SimulateArgs { genotype, trace: Some(trace.clone()), overwrite, ..args() };
         let error = run(NOWHERE, &args).await.unwrap_err();
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().contains(expected), "{error}");

@@ -1,8 +1,7 @@
 //! The trace: the state of every robot in every step, as CSV (RFC 4180).
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Write as _},
+    io::{self, BufWriter, IntoInnerError},
     path::{Path, PathBuf},
 };
 
@@ -11,7 +10,10 @@ use experiment_file::{ExperimentConfig, RobotController};
 use indexmap::IndexSet;
 use sim_core::{Mode, ReceivedFrame, RobotRecord, StepRecord};
 
-use crate::error::Error;
+use crate::{
+    error::Error,
+    output_file::{OutputFile, Overwrite, unwritable},
+};
 
 /// Columns of a trace that have to be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -27,19 +29,20 @@ pub enum ExtraColumns {
 /// A CSV file being written: one row per trial, step and robot.
 pub struct Trace {
     path: PathBuf,
-    rows: Rows<BufWriter<File>>,
+    rows: Rows<BufWriter<OutputFile>>,
     /// The first failure; nothing is written after it.
     result: io::Result<()>,
 }
 
 impl Trace {
-    /// Creates the file, or empties it.
+    /// Begins the file, which is there when it is finished.
     pub fn create(
         path: &Path,
         config: &ExperimentConfig,
         extra: &[ExtraColumns],
+        overwrite: Overwrite,
     ) -> Result<Self, Error> {
-        let file = File::create(path).map_err(|error| unwritable(path, &error))?;
+        let file = overwrite.begin(path)?;
         let rows = Rows::new(BufWriter::new(file), config, extra);
         Ok(Self { path: path.into(), rows, result: Ok(()) })
     }
@@ -53,14 +56,12 @@ impl Trace {
 
     /// Finishes the file; returns its number of rows, or the first error of writing it.
     pub fn finish(self) -> Result<u64, Error> {
-        let Self { path, mut rows, result } = self;
-        let flushed = result.and_then(|()| rows.out.flush());
-        flushed.map(|()| rows.n_rows).map_err(|error| unwritable(&path, &error))
+        let Self { path, rows, result } = self;
+        let flushed =
+            result.and_then(|()| rows.out.into_inner().map_err(IntoInnerError::into_error));
+        flushed.map_err(|error| unwritable(&path, &error))?.finish()?;
+        Ok(rows.n_rows)
     }
-}
-
-fn unwritable(path: &Path, error: &io::Error) -> Error {
-    Error::Input(format!("cannot write {}: {error}", path.display()))
 }
 
 /// Formats the rows and writes them.

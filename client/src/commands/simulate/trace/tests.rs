@@ -109,7 +109,7 @@ fn a_failure_is_reported_at_the_end() {
     let full = Path::new("/dev/full");
     if full.exists() {
         let config = config("");
-        let mut trace = Trace::create(full, &config, &[]).unwrap();
+        let mut trace = Trace::create(full, &config, &[], Overwrite::default()).unwrap();
         let experiment = Simulation::compile(&config).unwrap();
         let genotype = vec![0.5; experiment.genotype_len()];
         experiment.simulate(&genotype, 0, 0, &mut |record| trace.record(0, record)).unwrap();
