@@ -55,6 +55,23 @@ pub struct Progress {
     followed: BTreeMap<u64, Followed>,
 }
 
+/// A part of an answer for people. Colours are a table's alone: they are added when it is printed,
+/// and its cells are escaped before.
+#[derive(Debug, Clone)]
+pub enum Part {
+    /// Lines of text.
+    Text(String),
+    /// A table, as wide as the terminal.
+    Table(Table),
+}
+
+impl Part {
+    /// Lines of text.
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+}
+
 /// What a command does when the reader of standard output goes, as `| head` does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum WhenClosed {
@@ -134,11 +151,6 @@ impl Progress {
         self.format == OutputFormat::Json
     }
 
-    /// What standard output is shown on.
-    pub fn screen(&self) -> Screen {
-        self.screen
-    }
-
     /// Prints records in the chosen format. `empty` is printed for people if there are
     /// no records.
     pub fn print_table(
@@ -160,13 +172,31 @@ impl Progress {
         self.write(&text)
     }
 
-    /// A line, or several, on standard output. Nothing in it moves the cursor or changes
-    /// the direction of text, whoever has chosen it.
+    /// A line, or several, on standard output.
     pub fn print(&mut self, text: &str) -> Result<(), Error> {
+        self.write(&self.shown(text))
+    }
+
+    /// Text and tables for people, one below the other.
+    pub fn print_parts(&mut self, parts: &[Part]) -> Result<(), Error> {
+        let shown = parts.iter().map(|part| match part {
+            Part::Text(text) => self.shown(text),
+            Part::Table(table) if self.format == OutputFormat::Wide => {
+                table.to_wide_text(self.screen)
+            }
+            Part::Table(table) => table.to_text(self.screen),
+        });
+        let shown: Vec<String> = shown.collect();
+        self.write(&shown.join("\n"))
+    }
+
+    /// Text as it is printed: nothing in it moves the cursor or changes the direction of text,
+    /// whoever has chosen it.
+    fn shown(&self, text: &str) -> String {
         let text = escape_lines(text);
         match self.screen.width.filter(|_| self.format == OutputFormat::Table) {
-            Some(width) => self.write(&text::wrapped(&text, width)),
-            None => self.write(&text),
+            Some(width) => text::wrapped(&text, width),
+            None => text.into_owned(),
         }
     }
 

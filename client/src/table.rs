@@ -90,6 +90,13 @@ impl Column {
     }
 }
 
+/// Columns of measures: where there is no room for all, the first ones stay.
+pub fn measures<'a>(names: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = Column> {
+    (1..=u8::MAX).chain(std::iter::repeat(u8::MAX)).zip(names).map(|(rank, name)| {
+        Column::number(name).dropped(rank)
+    })
+}
+
 /// Rows of as many cells as there are columns.
 #[derive(Debug, Clone)]
 pub struct Table {

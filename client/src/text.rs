@@ -22,17 +22,17 @@ pub fn generation(summary: &GenerationSummary, generations: u64) -> String {
     let done = summary.generation + 1;
     let width = generations.to_string().len();
     format!(
-        "{done:>width$}/{generations}  generation {:>width$}  {}  min {:.3}  {:.0} episodes/s",
+        "{done:>width$}/{generations}  generation {:>width$}  {}  min {}  {:.0} episodes/s",
         summary.generation,
         fitness(summary),
-        summary.min,
+        number(summary.min, 3),
         episodes_per_s(summary),
     )
 }
 
 /// Best and mean fitness of a generation.
 pub fn fitness(summary: &GenerationSummary) -> String {
-    format!("best {:.3}  mean {:.3}", summary.best, summary.mean)
+    format!("best {}  mean {}", number(summary.best, 3), number(summary.mean, 3))
 }
 
 /// Speed of a generation, in episodes per second.
@@ -59,6 +59,17 @@ pub fn large_number(number: f64) -> String {
     }
 }
 
+/// From here on a number is written with an exponent.
+const PLAIN_MAX: f64 = 1e7;
+
+/// A number with so many decimals, and never a long one: beyond ten million it has an exponent.
+pub fn number(value: f64, decimals: usize) -> String {
+    match value.is_finite() && value.abs() >= PLAIN_MAX {
+        true => format!("{value:.decimals$e}"),
+        false => format!("{value:.decimals$}"),
+    }
+}
+
 /// A share of 1, in percent.
 pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
@@ -68,10 +79,10 @@ pub fn percent(share: f64) -> String {
 pub fn log_line(experiment: &Experiment, event: &Event) -> String {
     let what = match &event.kind {
         Some(Kind::GenerationCompleted(summary)) => format!(
-            "generation {}: {}  min {:.3}  {:.0} episodes/s  digest {}",
+            "generation {}: {}  min {}  {:.0} episodes/s  digest {}",
             summary.generation,
             fitness(summary),
-            summary.min,
+            number(summary.min, 3),
             episodes_per_s(summary),
             short(&summary.digest),
         ),
@@ -221,10 +232,10 @@ pub fn end(
 ) -> String {
     let mut lines = vec![state_line(experiment)];
     if let Some(best) = first_best {
-        lines.push(row("best of the first generation", &format!("{best:.6}")));
+        lines.push(row("best of the first generation", &number(best, 6)));
     }
     if let Some(latest) = &experiment.latest {
-        lines.push(row("mean of the last generation", &format!("{:.6}", latest.mean)));
+        lines.push(row("mean of the last generation", &number(latest.mean, 6)));
     }
     if let Some(champion) = champion {
         lines.push(row("champion", &champion_line(champion)));
@@ -257,9 +268,9 @@ fn champion_line(champion: &GetChampionResponse) -> String {
 fn selection_line(champion: &GetChampionResponse) -> Option<String> {
     match (&champion.held_out, champion.fitness) {
         (Some(HeldOutFitness { mean, trials, .. }), _) => {
-            Some(format!("{mean:.6} on the {trials} trials by which it was selected"))
+            Some(format!("{} on the {trials} trials by which it was selected"))
         }
-        (None, Some(fitness)) => Some(format!("{fitness:.6} in its generation")),
+        (None, Some(fitness)) => Some(format!("{} in its generation", number(fitness, 6))),
         (None, None) => None,
     }
 }
@@ -400,6 +411,25 @@ mod tests {
     fn large_numbers_have_three_digits_and_a_unit() {
         let texts = [0.0, 999.0, 57_600.0, 1.5e9].map(large_number);
         assert_eq!(texts, ["0", "999", "57.60 thousand", "1.50 billion"]);
+    }
+
+    #[test]
+    fn a_number_is_never_long() {
+        for (value, expected) in [
+            (0.0, "0.000"),
+            (-1.2345, "-1.234"),
+            (9_999_999.0, "9999999.000"),
+            (-9e98, "-9.000e98"),
+            (f64::MAX, "1.798e308"),
+            (f64::INFINITY, "inf"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(number(value, 3), expected);
+        }
+        for exponent in -308..=308 {
+            let value = -1.234_567_891 * 10f64.powi(exponent);
+            assert!(number(value, 6).len() <= 15, "{value:e}");
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::{
 use harness::{Experiment, Outcome, binary};
 
 /// A command, and a file that it writes; where it chooses the name, the directory.
-const WRITERS: [(&str, &str); 13] = [
+const WRITERS: [(&str, &str); 14] = [
     ("plot 1 --to plot.svg", "plot.svg"),
     ("plot history.csv --to plot.png", "plot.png"),
     ("compare 1 --to compare.svg", "compare.svg"),
@@ -20,6 +20,7 @@ const WRITERS: [(&str, &str); 13] = [
     ("replay 1", "replay-1.html"),
     ("simulate 1@0/3 --trace trace.csv", "trace.csv"),
     ("evaluate 1 --trials 2 --to evaluation", "evaluation/summary.json"),
+    ("new mine", "mine.json"),
     ("man pages", "pages/swarmctl-list.1"),
     ("backup copy", "copy"),
     ("doctor --recover recovered", "recovered"),

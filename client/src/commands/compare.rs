@@ -103,11 +103,10 @@ pub async fn compare(
     if let Some(to) = &args.to {
         figure(&samples)?.write(to, args.overwrite)?;
     }
-    progress.print(&if progress.is_json() {
-        json::document(&report)
-    } else {
-        report.to_text(progress.screen())
-    })
+    match progress.is_json() {
+        true => progress.print(&json::document(&report)),
+        false => progress.print_parts(&report.to_parts()),
+    }
 }
 
 /// Prints the comparison of the runs of a group.
@@ -119,7 +118,7 @@ pub async fn of_group(
     let mut samples = Samples::default();
     samples.fetch(connection, &Subject::Group(group.to_owned()), progress).await?;
     let samples = samples.finish()?;
-    progress.print(&Report::new(&samples, LAST, None).to_text(progress.screen()))
+    progress.print_parts(&Report::new(&samples, LAST, None).to_parts())
 }
 
 /// The course of the samples, as far as all runs of a sample went.

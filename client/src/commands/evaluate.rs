@@ -22,9 +22,9 @@ use crate::{
     experiment_file::ExperimentFile,
     json,
     place::{Intent, Place},
-    progress::Progress,
+    progress::{Part, Progress},
     settings::Settings,
-    table::{Column, Table},
+    table::{self, Column, Table},
     text, waiting,
 };
 
@@ -98,12 +98,12 @@ async fn evaluate_all(
     if progress.is_json() {
         return progress.print(&json::document(&summary));
     }
-    progress.print(&table(&summary).to_text(progress.screen()))?;
-    progress.print(&format!(
+    let where_it_is = format!(
         "{} trials each; steps.csv, trials.csv and summary.json in {}",
         args.trials,
         args.to.display()
-    ))
+    );
+    progress.print_parts(&[Part::Table(table(&summary)), Part::Text(where_it_is)])
 }
 
 /// The coordinator whose fleet computes; none if that happens here, as on a data directory.
@@ -261,10 +261,9 @@ async fn ask_all(
 /// For people: means over trials and steps, with their confidence intervals.
 fn table(summary: &Summary) -> Table {
     let names = summary.metric_names();
-    let headings = ["fitness"].into_iter().chain(names.iter().map(String::as_str));
-    let headings = headings.map(Column::number);
-    let mut table =
-        Table::new(std::iter::once(Column::new("condition")).chain(headings).collect::<Vec<_>>());
+    let columns = [Column::text("condition"), Column::number("fitness")].into_iter();
+    let measures = table::measures(names.iter().map(String::as_str));
+    let mut table = Table::new(columns.chain(measures).collect::<Vec<_>>());
     for condition in &summary.conditions {
         let fitness = Some(&condition.fitness);
         let metrics = names.iter().map(|name| condition.metrics.get(name).map(|it| &it.time_mean));

@@ -77,7 +77,7 @@ impl Remote for ListArgs {
 
 fn table(experiments: &[Experiment], now_ms: u64) -> Table {
     let fitness =
-        |fitness: Option<f64>| fitness.map_or("-".into(), |fitness| format!("{fitness:.3}"));
+        |fitness: Option<f64>| fitness.map_or("-".into(), |fitness| text::number(fitness, 3));
     // Where nobody has groups, there is nothing to show of them.
     let shown_if = |is_used: bool, column: Column| if is_used { column } else { column.wide() };
     let has_groups = experiments.iter().any(|experiment| !experiment.group.is_empty());

@@ -1,16 +1,12 @@
 //! `swarmctl new`: an experiment of one's own, begun from one that evolves.
 
-use std::{
-    fs::{self, OpenOptions},
-    io::{self, Write as _},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::{Args, builder::PossibleValue};
 use coordinator::group;
 use serde::Serialize;
 
-use crate::{error::Error, json, progress::Progress};
+use crate::{error::Error, json, output_file::Overwrite, progress::Progress};
 
 /// Write an experiment file to begin with, and the script of its task.
 ///
@@ -25,6 +21,8 @@ pub struct NewArgs {
     /// The task to begin with.
     #[arg(long, value_name = "TEMPLATE", default_value = TEMPLATES[0].name, value_parser = templates())]
     task: String,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const HELP: &str = "\
@@ -144,25 +142,27 @@ struct Written<'a> {
 
 /// Writes the files into this directory.
 pub fn new(args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
-    new_in(Path::new(""), args, progress)
+    new_in(Path::new("."), args, progress)
 }
 
 fn new_in(directory: &Path, args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
-    let NewArgs { name, task } = args;
+    let NewArgs { name, task, overwrite } = args;
     let template = TEMPLATES.iter().find(|it| it.name == task);
     let template = template.expect("the command line takes no other");
-    let config = directory.join(format!("{name}.json"));
+    let config = format!("{name}.json");
     let mut files = vec![(config.clone(), template.config(name))];
     if let Some(script) = template.script() {
-        files.push((directory.join(format!("{name}.star")), script));
+        files.push((format!("{name}.star"), script));
     }
-    write_new(&files)?;
-    let files: Vec<PathBuf> = files.into_iter().map(|(path, _)| path).collect();
+    let names: Vec<&str> = files.iter().map(|(name, _)| &**name).collect();
+    let unfinished = overwrite.begin_files(directory, &names)?;
+    files.iter().try_for_each(|(name, text)| unfinished.write(name, text))?;
+    unfinished.finish()?;
+    let files: Vec<PathBuf> = files.into_iter().map(|(name, _)| name.into()).collect();
     if progress.is_json() {
         return progress.print(&json::document(&Written { name, task, files }));
     }
     let shown: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    let config = config.display();
     progress.print(&format!(
         "written: {}\n{}\nnext:\n  swarmctl validate {config}\n  swarmctl run {config}\n  swarmctl replay {name}",
         shown.join(", "),
@@ -170,29 +170,10 @@ fn new_in(directory: &Path, args: &NewArgs, progress: &mut Progress) -> Result<(
     ))
 }
 
-/// Writes files that are not there yet: all of them or none.
-fn write_new(files: &[(PathBuf, String)]) -> Result<(), Error> {
-    for (i, (path, text)) in files.iter().enumerate() {
-        let written = OpenOptions::new().write(true).create_new(true).open(path);
-        let is_there = written.as_ref().is_err_and(|it| it.kind() == io::ErrorKind::AlreadyExists);
-        if let Err(error) = written.and_then(|mut file| file.write_all(text.as_bytes())) {
-            let of_us = if is_there { i } else { i + 1 };
-            for (path, _) in &files[..of_us] {
-                let _ = fs::remove_file(path);
-            }
-            let path = path.display();
-            return Err(Error::Input(if is_there {
-                format!("{path} exists; choose another name, or move it away")
-            } else {
-                format!("cannot write {path}: {error}")
-            }));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use clap::Parser as _;
 
     use super::*;
@@ -270,11 +251,10 @@ mod tests {
         fs::write(&star, "mine").unwrap();
         let error = written(directory.path(), &["a"]).unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        assert!(error.to_string().contains("a.star exists; "), "{error}");
+        assert!(error.to_string().contains("a.star exists already; "), "{error}");
         assert_eq!(fs::read_to_string(&star).unwrap(), "mine");
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
-        let nowhere = directory.path().join("none");
-        let error = written(&nowhere, &["a"]).unwrap_err();
+        let error = written(&star, &["a"]).unwrap_err();
         assert!(error.to_string().starts_with("cannot write "), "{error}");
     }
 

@@ -17,9 +17,10 @@ use crate::{
     experiment_file::{Compiled, ExperimentFile},
     json,
     place::Intent,
-    progress::Progress,
+    progress::{Part, Progress},
     settings::Settings,
-    table::{Column, Screen, Table},
+    table::{self, Column, Table},
+    text,
 };
 
 pub use self::args::SimulateArgs;
@@ -65,11 +66,10 @@ pub async fn simulate(
         trace: args.trace.as_deref().map(Path::to_string_lossy),
         trace_rows: n_rows,
     };
-    progress.print(&if progress.is_json() {
-        json::document(&report)
-    } else {
-        report.to_text(progress.screen())
-    })
+    match progress.is_json() {
+        true => progress.print(&json::document(&report)),
+        false => progress.print_parts(&report.to_parts()),
+    }
 }
 
 /// What to simulate.
@@ -134,29 +134,30 @@ struct Trial {
 }
 
 impl SimulationReport<'_> {
-    fn to_text(&self, screen: Screen) -> String {
+    fn to_parts(&self) -> Vec<Part> {
         let Self { name, genotype, seed: Seed(seed), generation, steps, .. } = self;
-        let mut lines = vec![format!(
+        let heading = format!(
             "{name}: {genotype}, seed {seed}, generation {generation}, {steps} steps per trial"
-        )];
+        );
         let names: Vec<&str> = self.mean.measures.keys().map(|name| &**name).collect();
         let row = |name: &str, summary: &EpisodeSummary| -> Vec<String> {
             let metrics = names.iter().map(|name| summary.measures.get(*name).copied());
             let numbers = std::iter::once(Some(summary.fitness)).chain(metrics);
-            let cells = numbers.map(|n| n.map_or("-".into(), |n| format!("{n:.6}")));
+            let cells = numbers.map(|n| n.map_or("-".into(), |n| text::number(n, 6)));
             std::iter::once(name.to_owned()).chain(cells).collect()
         };
-        let headings = ["trial", "fitness"].iter().chain(&names);
-        let mut table = Table::new(headings.map(|name| Column::number(name)).collect::<Vec<_>>());
+        let columns = ["trial", "fitness"].iter().map(|name| Column::number(name));
+        let mut table =
+            Table::new(columns.chain(table::measures(names.iter().copied())).collect::<Vec<_>>());
         for trial in &self.trials {
             table.push(row(&trial.trial.to_string(), &trial.summary));
         }
         table.push(row("mean", &self.mean));
-        lines.push(table.to_text(screen));
+        let mut parts = vec![Part::Text(heading), Part::Table(table)];
         if let (Some(trace), Some(n_rows)) = (&self.trace, self.trace_rows) {
-            lines.push(format!("{n_rows} rows in {trace}"));
+            parts.push(Part::Text(format!("{n_rows} rows in {trace}")));
         }
-        lines.join("\n")
+        parts
     }
 }
 

@@ -7,7 +7,9 @@ use crate::{
         Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
         probability_of_improvement,
     },
-    table::{Column, Screen, Table},
+    progress::Part,
+    table::{Column, Table},
+    text,
 };
 
 use super::samples::{RecordedRun, Sample};
@@ -96,10 +98,10 @@ impl Report {
         Self { quantities }
     }
 
-    pub fn to_text(&self, screen: Screen) -> String {
-        let sections: Vec<String> =
-            self.quantities.iter().map(|quantity| quantity.to_text(screen)).collect();
-        sections.join("\n\n")
+    /// For people: a heading and tables for each quantity.
+    pub fn to_parts(&self) -> Vec<Part> {
+        let sections: Vec<Vec<Part>> = self.quantities.iter().map(Quantity::to_parts).collect();
+        sections.join(&Part::text(""))
     }
 }
 
@@ -133,7 +135,7 @@ impl Quantity {
         Self { averaged, ..self }
     }
 
-    fn to_text(&self, screen: Screen) -> String {
+    fn to_parts(&self) -> Vec<Part> {
         let digits = if self.less_is_better { 0 } else { 3 };
         let mut table = Table::new([
             Column::text(self.name),
@@ -159,7 +161,8 @@ impl Quantity {
                 number(fold(f64::NEG_INFINITY, f64::max), digits),
             ]);
         }
-        let mut text = format!("{}: {}\n\n{}", self.name, self.title, table.to_text(screen));
+        let heading = format!("{}: {}\n", self.name, self.title);
+        let mut parts = vec![Part::Text(heading), Part::Table(table)];
         if !self.pairs.is_empty() {
             let mut table = Table::new([
                 Column::text("better"),
@@ -178,9 +181,9 @@ impl Quantity {
                     format!("{:.4}", pair.p),
                 ]);
             }
-            text += &format!("\n\n{}", table.to_text(screen));
+            parts.extend([Part::text(""), Part::Table(table)]);
         }
-        text
+        parts
     }
 }
 
@@ -203,7 +206,7 @@ impl Pair {
 
 /// A number, or that it is infinite.
 fn number(value: f64, digits: usize) -> String {
-    if value == f64::INFINITY { "never".into() } else { format!("{value:.digits$}") }
+    if value == f64::INFINITY { "never".into() } else { text::number(value, digits) }
 }
 
 fn span(interval: &Interval, digits: usize) -> String {

@@ -8,6 +8,7 @@ use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, event::Kin
 use super::*;
 use crate::{
     args::OutputFormat,
+    progress::Part,
     fake_coordinator::{FakeCoordinator, Script},
     progress::tests::Captured,
 };
@@ -155,8 +156,8 @@ async fn the_number_of_generations_that_is_averaged_is_the_one_that_there_is() {
         let mut samples = Samples::default();
         samples.read(paths).unwrap();
         let report = Report::new(&samples.finish().unwrap(), last, None);
-        let text = report.to_text(crate::table::Screen::default());
-        text.lines().next().unwrap().to_owned()
+        let Part::Text(heading) = &report.to_parts()[0] else { panic!() };
+        heading.trim_end().to_owned()
     };
     let mean = "mean: mean fitness of a generation";
     assert_eq!(title(&paths[1..3], 50), format!("{mean}, average of the last 2"));

@@ -6,6 +6,8 @@ use std::fmt;
 use evolution::{between, deviation, finite_mean, interval::interval};
 use serde::Serialize;
 
+use crate::text::number;
+
 /// Upper 2.5 % point of the standard normal distribution: 95 % of it lie within.
 const Z: f64 = 1.959_963_984_540_054;
 
@@ -85,7 +87,8 @@ impl Estimate {
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.ci95;
-        write!(f, "{:.3} [{low:.3}, {high:.3}]", self.mean)
+        let [mean, low, high] = [self.mean, low, high].map(|value| number(value, 3));
+        write!(f, "{mean} [{low}, {high}]")
     }
 }
 

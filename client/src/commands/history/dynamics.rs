@@ -85,7 +85,7 @@ fn table(records: &[Record]) -> Table {
         Column::number("max"),
         Column::number("rank corr."),
     ]);
-    let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
+    let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| text::number(value, 4));
     for of in records {
         table.push([
             of.experiment.to_string(),
