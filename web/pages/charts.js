@@ -1,10 +1,16 @@
-// Charts as SVG: lines over bands, with axes, that zoom.
+// Charts as SVG: lines over bands, with axes, that zoom, are gone through with keys, and are saved.
 
 import { decimals, element } from "swarm/dom.js";
+import { exports, seriesTable } from "swarm/export.js";
+import { extremes, thinned, ticks } from "swarm/scales.js";
 
 const SVG = "http://www.w3.org/2000/svg";
+/** Entries of a legend that are shown while nobody has asked for more. */
+const LEGEND_MAX = 14;
+/** Lines whose values are read out. */
+const READ_MAX = 4;
 
-function shape(tag, attributes, ...children) {
+export function shape(tag, attributes, ...children) {
   const node = document.createElementNS(SVG, tag);
   for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
   node.append(...children);
@@ -14,7 +20,7 @@ function shape(tag, attributes, ...children) {
 /** A small curve without axes. */
 export function sparkline(values, width = 120, height = 28) {
   const svg = shape("svg", { class: "sparkline", viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true" });
-  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const [low, high] = extremes(values);
   if (values.length < 2) return svg;
   const x = (i) => (i / (values.length - 1)) * (width - 2) + 1;
   const y = (value) => height - 2 - ((value - low) / (high - low || 1)) * (height - 4);
@@ -22,47 +28,31 @@ export function sparkline(values, width = 120, height = 28) {
   return svg;
 }
 
-function path(points) {
+export function path(points) {
   return points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 }
 
-/** Round numbers within a range, about `n` of them. */
-function ticks(low, high, n) {
-  const raw = (high - low) / n || 1;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((candidate) => candidate >= raw);
-  const first = Math.ceil(low / step);
-  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) => (first + i) * step);
-}
-
-/** At most a few hundred points of a curve, so that ten thousand generations draw at once:
- *  of each piece its first, least and greatest. */
-function thinned(points, n) {
-  if (points.length <= 3 * n) return points;
-  const piece = Math.ceil(points.length / n);
-  const kept = [];
-  for (let i = 0; i < points.length; i += piece) {
-    const part = points.slice(i, i + piece);
-    const least = part.reduce((a, b) => (b[1] < a[1] ? b : a));
-    const greatest = part.reduce((a, b) => (b[1] > a[1] ? b : a));
-    kept.push(...[...new Set([part[0], least, greatest])].sort((a, b) => a[0] - b[0]));
-  }
-  return kept;
-}
-
 /** A chart. `show({ lines, bands, marks, xLabel, yLabel })`: a line is
- *  `{ name, color, points: [[x, y], ...] }`, a band the same with `[x, low, high]`, a mark a
- *  height with an interval. Dragging zooms along x, a double click shows all again. */
-export function chart(label) {
+ *  `{ name, color, dash, points: [[x, y], ...] }`, a band the same with `[x, low, high]`, a mark a
+ *  height with an interval. Dragging zooms along x, a double click shows all again; with the
+ *  focus, arrows go through the points, + and - zoom, and Escape shows all. `onZoom(range)`: told
+ *  which part is seen, null for all; `zoom(range)` shows one. `empty`: said while there is nothing. */
+export function chart(label, { onZoom = () => {}, empty = "there is nothing to show yet" } = {}) {
   const node = element("figure", { className: "chart" });
-  const legend = element("figcaption", {});
-  const svg = shape("svg", { role: "img", "aria-label": label, tabindex: "0" });
-  const readout = element("span", { className: "readout muted" });
-  node.append(svg, legend);
+  const legend = element("div", { className: "keys" });
+  const svg = shape("svg", { role: "group", "aria-roledescription": "chart", "aria-label": `${label}; arrow keys go through it, + and - zoom`, tabindex: "0" });
+  const readout = element("span", { className: "readout muted", role: "status" });
+  const files = exports({ svg: () => svg, table: () => seriesTable(shown.xLabel, shown.lines, shown.bands ?? []), name: () => label.replaceAll(/\W+/g, "-") });
+  node.append(svg, element("figcaption", {}, legend, readout, files));
   let shown = null;
   let zoom = null;
   let held = null;
   let frame = null;
+  /** Where the values are read out; null: nowhere. */
+  let cursor = null;
+  /** The line that stands out; null: none. */
+  let marked = null;
+  let isLong = false;
 
   const draw = () => {
     if (!shown) return;
@@ -71,32 +61,45 @@ export function chart(label) {
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const inner = { left: 58, right: width - 12, top: 10, bottom: height - 40 };
     const all = [...lines.flatMap((line) => line.points), ...bands.flatMap((band) => band.points)];
-    if (all.length === 0) return svg.replaceChildren(shape("text", { x: width / 2, y: height / 2, class: "axis", "text-anchor": "middle" }, "no generation is complete yet"));
-    const range = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
-    const [x0, x1] = zoom ?? range(all.map((point) => point[0]));
+    files.hidden = all.length === 0;
+    frame = null;
+    if (all.length === 0) {
+      legend.replaceChildren();
+      return svg.replaceChildren(shape("text", { x: width / 2, y: height / 2, class: "axis", "text-anchor": "middle" }, empty));
+    }
+    const [x0, x1] = zoom ?? extremes(all.map((point) => point[0]));
     const seen = all.filter(([x]) => x >= x0 && x <= x1);
-    let [y0, y1] = range([...seen.flatMap((point) => point.slice(1)), ...marks.flatMap((mark) => [mark.low, mark.high])]);
+    let [y0, y1] = extremes([...seen.flatMap((point) => point.slice(1)), ...marks.flatMap((mark) => [mark.low, mark.high])]);
     [y0, y1] = y1 - y0 < 1e-12 ? [y0 - 0.5, y1 + 0.5] : [y0 - 0.04 * (y1 - y0), y1 + 0.04 * (y1 - y0)];
     const x = (value) => inner.left + ((value - x0) / (x1 - x0 || 1)) * (inner.right - inner.left);
     const y = (value) => inner.bottom - ((value - y0) / (y1 - y0)) * (inner.bottom - inner.top);
-    frame = { inner, x0, x1 };
-    const parts = [];
+    frame = { inner, x0, x1, x };
+    svg.replaceChildren(...axes(frame, y0, y1, y, height, xLabel, yLabel), curves(frame, y, { lines, bands, marks }), shape("g", { class: "cursor" }));
+    drawLegend([...lines, ...marks]);
+    drawCursor();
+  };
+
+  const axes = ({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) => {
     const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
     const heights = ticks(y0, y1, 5);
     // As many as tell one from the next.
     const digits = Math.max(0, Math.ceil(-Math.log10(heights[1] - heights[0] || 1) - 1e-9));
-    for (const tick of heights) {
-      parts.push(shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }));
-      parts.push(text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" }));
-    }
-    for (const tick of ticks(x0, x1, Math.min(8, width / 90))) {
-      parts.push(text([x(tick), inner.bottom + 16], String(Math.round(tick * 1000) / 1000), { "text-anchor": "middle" }));
-    }
-    parts.push(text([(inner.left + inner.right) / 2, height - 6], xLabel, { "text-anchor": "middle" }));
     const middle = (inner.top + inner.bottom) / 2;
-    parts.push(text([14, middle], yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
+    return [
+      ...heights.flatMap((tick) => [
+        shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }),
+        text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" })]),
+      ...ticks(x0, x1, Math.min(8, (inner.right - inner.left) / 90)).map((tick) =>
+        text([x(tick), inner.bottom + 16], String(Math.round(tick * 1000) / 1000), { "text-anchor": "middle" })),
+      text([(inner.left + inner.right) / 2, height - 6], xLabel, { "text-anchor": "middle" }),
+      text([14, middle], yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }),
+    ];
+  };
+
+  const curves = ({ inner, x0, x1, x }, y, { lines, bands, marks }) => {
     const inView = (points) => points.filter((point, i) => (points[i + 1]?.[0] ?? point[0]) >= x0 && (points[i - 1]?.[0] ?? point[0]) <= x1);
-    const clipped = shape("g", { "clip-path": "inset(0)" });
+    const clip = shape("clipPath", { id: clipId }, shape("rect", { x: inner.left, y: 0, width: inner.right - inner.left, height: inner.bottom + 2 }));
+    const clipped = shape("g", { "clip-path": `url(#${clipId})` }, clip);
     for (const { color, points } of bands) {
       const kept = inView(points);
       const step = Math.ceil(kept.length / 800);
@@ -104,21 +107,64 @@ export function chart(label) {
       const outline = [...thin.map(([at, , high]) => [x(at), y(high)]), ...thin.map(([at, low]) => [x(at), y(low)]).reverse()];
       if (outline.length) clipped.append(shape("path", { d: `${path(outline)}Z`, fill: color, class: "band" }));
     }
-    for (const { name, color, points } of lines) {
+    for (const { name, color, dash, points } of lines) {
       const kept = thinned(inView(points), 500).map(([at, value]) => [x(at), y(value)]);
-      if (kept.length) clipped.append(shape("path", { d: path(kept), stroke: color, class: "line", "data-name": name }));
+      const isFaint = marked !== null && marked !== name;
+      if (kept.length) clipped.append(shape("path", { d: path(kept), stroke: color, "stroke-dasharray": dash || "none", class: isFaint ? "line faint" : "line", "data-name": name }));
     }
     for (const { low, high, value, color } of marks) {
       clipped.append(shape("rect", { x: inner.left, width: inner.right - inner.left, y: y(high), height: Math.max(1, y(low) - y(high)), fill: color, class: "band" }));
       clipped.append(shape("line", { x1: inner.left, x2: inner.right, y1: y(value), y2: y(value), stroke: color, "stroke-dasharray": "5 4" }));
     }
-    svg.replaceChildren(...parts, clipped);
-    const keys = [...lines, ...marks].map(({ name, color }) => {
-      const swatch = element("i");
-      swatch.style.background = color;
-      return element("span", { className: "key" }, swatch, name);
+    return clipped;
+  };
+
+  const drawLegend = (entries) => {
+    const says = JSON.stringify([entries.map((it) => [it.name, it.color, it.dash]), marked, isLong]);
+    if (legend.dataset.says === says) return;
+    legend.dataset.says = says;
+    const held = legend.contains(document.activeElement) ? document.activeElement.dataset.name : null;
+    const keys = entries.map(({ name, color, dash }) => {
+      const swatch = shape("svg", { class: "swatch", viewBox: "0 0 22 8", "aria-hidden": "true" }, shape("line", { x1: 1, x2: 21, y1: 4, y2: 4, stroke: color, "stroke-dasharray": dash || "none" }));
+      const key = element("button", { type: "button", className: "key", title: "let it stand out", "aria-pressed": String(marked === name), onclick: () => {
+        marked = marked === name ? null : name;
+        draw();
+      } }, swatch, name);
+      key.dataset.name = name;
+      return key;
     });
-    legend.replaceChildren(...keys.slice(0, 14), readout);
+    const rest = keys.length - LEGEND_MAX;
+    const more = rest > 0 ? element("button", { type: "button", className: "key muted", onclick: () => {
+      isLong = !isLong;
+      draw();
+    } }, isLong ? "fewer" : `${rest} more`) : null;
+    legend.replaceChildren(...(isLong ? keys : keys.slice(0, LEGEND_MAX)), ...(more ? [more] : []));
+    if (held) [...legend.children].find((it) => it.dataset.name === held)?.focus();
+  };
+
+  /** Reads out the points next to the cursor. */
+  const drawCursor = () => {
+    const group = svg.querySelector(".cursor");
+    if (!group || !frame || cursor === null) {
+      group?.replaceChildren();
+      readout.textContent = "";
+      return;
+    }
+    const nearest = (points) => points.reduce((a, b) => (Math.abs(b[0] - cursor) < Math.abs(a[0] - cursor) ? b : a));
+    const lines = shown.lines.filter((line) => line.points.length);
+    const read = marked === null ? lines.slice(0, READ_MAX) : lines.filter((line) => line.name === marked);
+    const values = read.map((line) => [line.name, nearest(line.points)]);
+    const at = values[0]?.[1][0] ?? cursor;
+    readout.textContent = `${shown.xLabel} ${Math.round(at)}: ${values.map(([name, [, value]]) => `${name} ${decimals(value, 3)}`).join(", ")}`;
+    const x = frame.x(at);
+    group.replaceChildren(shape("line", { x1: x, x2: x, y1: frame.inner.top, y2: frame.inner.bottom }));
+  };
+
+  const zoomTo = (range, isOurs = true) => {
+    if (String(range) === String(zoom)) return;
+    zoom = range;
+    draw();
+    if (isOurs) onZoom(zoom);
   };
 
   const xAt = (event) => {
@@ -132,27 +178,55 @@ export function chart(label) {
     svg.setPointerCapture(event.pointerId);
   });
   svg.addEventListener("pointermove", (event) => {
-    if (!frame || !shown) return;
-    const at = xAt(event);
-    const nearest = (points) => points.reduce((a, b) => (Math.abs(b[0] - at) < Math.abs(a[0] - at) ? b : a));
-    const values = shown.lines.slice(0, 4).filter((line) => line.points.length).map((line) => `${line.name} ${decimals(nearest(line.points)[1], 3)}`);
-    readout.textContent = `${shown.xLabel} ${Math.round(at)}: ${values.join(", ")}`;
+    if (!frame) return;
+    cursor = xAt(event);
+    drawCursor();
+  });
+  svg.addEventListener("pointerleave", () => {
+    cursor = null;
+    drawCursor();
   });
   svg.addEventListener("pointerup", (event) => {
-    if (held === null) return;
+    if (held === null || !frame) return;
     const [from, to] = [held, xAt(event)].sort((a, b) => a - b);
     held = null;
-    if ((to - from) / (frame.x1 - frame.x0) > 0.02) zoom = [from, to];
-    draw();
+    if ((to - from) / (frame.x1 - frame.x0) > 0.02) zoomTo([from, to]);
   });
-  svg.addEventListener("dblclick", () => {
-    zoom = null;
-    draw();
+  svg.addEventListener("dblclick", () => zoomTo(null));
+  svg.addEventListener("keydown", (event) => {
+    if (!frame || event.ctrlKey || event.altKey || event.metaKey) return;
+    const points = shown.lines.find((line) => line.points.length)?.points ?? [];
+    const inside = points.map(([x]) => x).filter((x) => x >= frame.x0 && x <= frame.x1);
+    const place = cursor === null ? -1 : inside.findLastIndex((x) => x <= cursor);
+    const go = (to) => (cursor = inside[Math.max(0, Math.min(inside.length - 1, to))] ?? null);
+    const by = event.shiftKey ? 10 : 1;
+    const scaled = (factor) => {
+      const middle = cursor ?? (frame.x0 + frame.x1) / 2;
+      const [low, high] = extremes(points.map(([x]) => x));
+      const range = [middle - (middle - frame.x0) * factor, middle + (frame.x1 - middle) * factor];
+      const isAll = range[0] <= low && range[1] >= high;
+      zoomTo(isAll ? null : [Math.max(low, range[0]), Math.min(high, range[1])]);
+    };
+    const actions = {
+      ArrowRight: () => go(place + by), ArrowLeft: () => go((place < 0 ? inside.length : place) - by), Home: () => go(0), End: () => go(inside.length - 1),
+      "+": () => scaled(0.5), "=": () => scaled(0.5), "-": () => scaled(2), Escape: () => {
+        cursor = null;
+        zoomTo(null);
+      },
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+    drawCursor();
   });
   new ResizeObserver(draw).observe(node);
   node.show = (content) => {
     shown = content;
     draw();
   };
+  node.zoom = (range) => zoomTo(range, false);
+  const clipId = `clip-${++n_charts}`;
   return node;
 }
+
+let n_charts = 0;

@@ -1,14 +1,18 @@
-// The fitness of every individual of every generation; a click on a cell plays it.
+// The fitness of every individual of every generation in one picture, that zooms with the curve
+// above it; a click on a cell plays it.
 
 import { canvas, decimals, element } from "swarm/dom.js";
-import { ask, complain, resolve } from "swarm/page.js";
+import { path, shape } from "swarm/charts.js";
+import { exports } from "swarm/export.js";
+import { FitnessPages } from "swarm/fitness-pages.js";
+import { complain, resolve } from "swarm/page.js";
+import { ticks } from "swarm/scales.js";
 
-/** Pixels of a cell: least and most along the generations, least among the individuals. */
-const CELL_MIN = 14;
-const CELL_MAX = 80;
-const ROW_MIN = 3;
-/** Generations that are asked for at once. */
-const PAGE = 500;
+/** Around the cells, pixels; left and right as those of charts, so that generations are below
+ *  one another. */
+const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
+/** Pixels of a cell from which there are lines between cells. */
+const LINES_FROM = 7;
 
 /** Colours from bad to good: seen by all eyes, and in grey. */
 const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
@@ -20,36 +24,37 @@ function colorOf(share) {
   return STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
 }
 
-/** The map of an experiment; `update(n_generations)` shows more of it. */
-export function heatMap(id) {
-  /** Per generation the fitness of its individuals, sorted as they are numbered. */
-  const generations = new Map();
-  const asked = new Set();
-  /** Pictures of pages of generations, a pixel for each individual, so that scrolling draws few
-   *  of them instead of every cell. */
+/** The map of an experiment; `update(n_generations)` shows more of it. `onZoom(range)`: told which
+ *  generations are seen, null for all; `zoom(range)` shows some. */
+export function heatMap(id, onZoom = () => {}) {
+  const pages = new FitnessPages(id);
+  /** Pictures of pages, a pixel for each individual, so that few images are drawn and not cells. */
   const pictures = new Map();
   let n_generations = 0;
-  let first = 0;
-  let n_individuals = 0;
-  let range = [Infinity, -Infinity];
+  let range = null;
   let isSorted = false;
-  let atEnd = true;
+  /** The cell that is read out: a generation, and a place among its individuals. */
+  let cursor = null;
+  let held = null;
 
-  const title = element("span", { className: "readout" });
-  const sort = element("input", { type: "checkbox", id: "sort-individuals", onchange: () => { isSorted = sort.checked; pictures.clear(); picture.redraw(); } });
-  const spacer = element("div", { className: "spacer" });
-  const picture = canvas((context, width, height) => draw(context, width, height), "fitness of every individual");
-  const scroller = element("div", { className: "scroller", tabIndex: 0, "aria-label": "generations, left to right" }, spacer, picture);
+  const readout = element("span", { className: "readout muted", role: "status" });
+  const sort = element("input", { type: "checkbox", id: "sort-individuals", onchange: () => {
+    isSorted = sort.checked;
+    pictures.clear();
+    draw();
+  } });
+  const picture = canvas((context, width, height) => paint(context, width, height), "");
+  const axes = shape("svg", { "aria-hidden": "true" });
+  const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "heat map", "aria-label": "fitness of every individual of every generation; arrow keys go through them, Enter plays one, + and - zoom" }, axes, picture);
+  const scale = element("span", { className: "scale muted small" });
+  const files = exports({ svg: () => whole(), table: () => table(), name: () => `individuals-${id}` });
   const node = element("section", { className: "panel heat-map" },
-    element("header", {}, element("h2", {}, "Every individual"), element("span", { className: "muted" }, "click one to play it"),
-      element("span", { className: "space" }), title,
-      element("label", {}, sort, "best on top")),
-    scroller);
+    element("header", {}, element("h2", {}, "Every individual"), element("span", { className: "muted" }, "click one to play it, drag to zoom"),
+      element("span", { className: "space" }), scale, element("label", {}, sort, "best on top")),
+    stage, element("p", { className: "row small" }, readout, files));
 
-  const rowHeight = () => Math.max(ROW_MIN, Math.min(CELL_MIN, 320 / Math.max(1, n_individuals)));
-
-  /** Few generations fill the width, many scroll. */
-  const cellWidth = () => Math.max(CELL_MIN, Math.min(CELL_MAX, Math.floor(scroller.clientWidth / Math.max(1, n_generations))));
+  /** The generations that are seen, as places: the first one's beginning, the last one's end. */
+  const window = () => (range ? [Math.max(0, Math.round(range[0]) - 0.5), Math.min(n_generations - 1, Math.round(range[1])) + 0.5] : [-0.5, n_generations - 0.5]);
 
   /** Individuals of a generation in the order of the rows. */
   const order = (values) => {
@@ -57,108 +62,226 @@ export function heatMap(id) {
     return isSorted ? indices.sort((a, b) => values[b] - values[a]) : indices;
   };
 
-  /** The picture of the generations from `page * PAGE` on. */
+  /** The picture of a page, in which a pixel is a generation that was asked for. */
   const pictureOf = (page) => {
-    if (pictures.has(page)) return pictures.get(page);
-    const drawn = element("canvas", { width: PAGE, height: n_individuals });
+    const key = `${page.from}/${page.every}`;
+    const known = pictures.get(key);
+    if (known?.count === page.count && known.low === pages.low && known.high === pages.high) return known.drawn;
+    const n_columns = Math.ceil((page.to - page.from) / page.every);
+    const drawn = element("canvas", { width: n_columns, height: Math.max(1, pages.n_individuals) });
     const context = drawn.getContext("2d");
-    const image = context.createImageData(PAGE, n_individuals);
-    const [low, high] = range;
-    for (let column = 0; column < PAGE; column++) {
-      const values = generations.get(page * PAGE + column);
+    const image = context.createImageData(n_columns, drawn.height);
+    const { low, high } = pages;
+    for (let column = 0; column < n_columns; column++) {
+      const values = pages.at(page.from + column * page.every);
       if (!values) continue;
       order(values).forEach((individual, place) => {
-        image.data.set([...colorOf((values[individual] - low) / (high - low || 1)), 255], 4 * (place * PAGE + column));
+        image.data.set([...colorOf((values[individual] - low) / (high - low || 1)), 255], 4 * (place * n_columns + column));
       });
     }
     context.putImageData(image, 0, 0);
-    pictures.set(page, drawn);
+    pictures.set(key, { drawn, count: page.count, low, high });
     return drawn;
   };
 
-  const draw = (context, width, height) => {
+  const paint = (context, width, height) => {
     context.clearRect(0, 0, width, height);
-    if (n_generations === 0) return;
-    const left = scroller.scrollLeft;
-    const cell = cellWidth();
-    const from = Math.max(first, Math.floor(left / cell));
-    const to = Math.min(n_generations, Math.ceil((left + width) / cell));
-    const row = rowHeight();
-    for (let generation = from; generation < to; generation++) if (!generations.has(generation)) load(generation);
-    if (n_individuals === 0) return;
-    context.imageSmoothingEnabled = false;
-    for (let page = Math.floor(from / PAGE); page * PAGE < to; page++) {
-      const begin = Math.max(from, page * PAGE);
-      const n = Math.min(to, (page + 1) * PAGE) - begin;
-      context.drawImage(pictureOf(page), begin - page * PAGE, 0, n, n_individuals, begin * cell - left, 0, n * cell, n_individuals * row);
+    const n_rows = pages.n_individuals;
+    const [from, to] = window();
+    const cell = width / (to - from);
+    const needed = pages.needed(from + 0.5, to + 0.5, width, n_generations);
+    load(needed);
+    if (n_rows > 0) {
+      const row = height / n_rows;
+      context.imageSmoothingEnabled = cell * needed[0].every < 1 || row < 1;
+      for (const page of needed) {
+        const image = pictureOf(page);
+        context.drawImage(image, (page.from - 0.5 - from) * cell, 0, image.width * page.every * cell, height);
+      }
+      if (cell > LINES_FROM) for (let generation = Math.ceil(from); generation < to; generation++) context.clearRect(Math.round((generation + 0.5 - from) * cell) - 1, 0, 1, height);
+      if (row > LINES_FROM) for (let place = 1; place < n_rows; place++) context.clearRect(0, Math.round(place * row) - 1, width, 1);
+      if (cursor) mark(context, (cursor.generation - 0.5 - from) * cell, cursor.place * row, Math.max(cell, 3), Math.max(row, 3));
     }
-    // Lines between the cells.
-    for (let generation = from; generation < to; generation++) context.clearRect((generation + 1) * cell - left - 1, 0, 1, height);
-    for (let place = 1; row > 4 && place <= n_individuals; place++) context.clearRect(0, place * row - 1, width, 1);
+    if (held?.to !== undefined) {
+      const [left, right] = [held.at, held.to].sort((a, b) => a - b);
+      context.fillStyle = "rgb(128 128 128 / 40%)";
+      context.fillRect(left, 0, right - left, height);
+    }
   };
 
-  /** Asks for the generations around one, unless that is under way. */
-  const load = async (generation) => {
-    const from = Math.floor(generation / PAGE) * PAGE;
-    const key = `${from}/${Math.min(from + PAGE, n_generations)}`;
-    if (asked.has(key)) return;
-    asked.add(key);
+  /** A frame that is seen on every colour. */
+  const mark = (context, x, y, width, height) => {
+    for (const [style, wide] of [["#000000", 4], ["#ffffff", 2]]) {
+      context.strokeStyle = style;
+      context.lineWidth = wide;
+      context.strokeRect(x, y, width, height);
+    }
+  };
+
+  const drawAxes = () => {
+    const [width, height] = [stage.clientWidth, stage.clientHeight];
+    if (!width || n_generations === 0) return;
+    axes.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    const [from, to] = window();
+    const bottom = height - EDGE.bottom;
+    const x = (generation) => EDGE.left + ((generation - from) / (to - from)) * (width - EDGE.left - EDGE.right);
+    const y = (place) => EDGE.top + ((place + 0.5) / Math.max(1, pages.n_individuals)) * (bottom - EDGE.top);
+    const text = (at, content, more) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
+    const middle = (EDGE.top + bottom) / 2;
+    const whole = (low, high, n) => ticks(low, high, n).filter(Number.isInteger);
+    axes.replaceChildren(
+      ...whole(Math.max(0, from + 0.5), to - 0.5, Math.min(8, width / 90)).map((it) => text([x(it), bottom + 16], String(it), { "text-anchor": "middle" })),
+      ...whole(0, pages.n_individuals - 1, 5).map((it) => text([EDGE.left - 6, y(it) + 4], String(it), { "text-anchor": "end" })),
+      text([(EDGE.left + width - EDGE.right) / 2, height - 6], "generation", { "text-anchor": "middle" }),
+      text([14, middle], isSorted ? "rank" : "individual", { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
+  };
+
+  /** What the colours mean. */
+  const drawScale = () => {
+    if (!Number.isFinite(pages.low)) return;
+    const stops = STOPS.map((color) => `rgb(${color.join(" ")})`).join(", ");
+    const ramp = element("i", { className: "ramp" });
+    ramp.style.background = `linear-gradient(to right, ${stops})`;
+    scale.replaceChildren(`fitness ≤ ${decimals(pages.low, 2)} `, ramp, ` ≥ ${decimals(pages.high, 2)}`);
+  };
+
+  const draw = () => {
+    const n = pages.n_individuals;
+    stage.style.height = `${Math.max(120, Math.min(360, 14 * n, Math.max(220, 3 * n))) + EDGE.top + EDGE.bottom}px`;
+    drawAxes();
+    drawScale();
+    drawReadout();
+    picture.redraw();
+  };
+
+  /** Asks for what is seen and not known, unless that is under way. */
+  const load = async (needed) => {
     try {
-      const response = await ask(`/api/experiments/${id}/fitness?from=${from}`);
-      const buffer = await response.arrayBuffer();
-      const [start, n, individuals] = new Uint32Array(buffer, 0, 3);
-      const values = new Float32Array(buffer, 12);
-      for (let i = 0; i < n; i++) {
-        const row = values.subarray(i * individuals, (i + 1) * individuals);
-        generations.set(start + i, row);
-        for (const value of row) if (!Number.isNaN(value)) range = [Math.min(range[0], value), Math.max(range[1], value)];
-      }
-      if (from === 0 || start > from) first = Math.max(first, start);
-      n_individuals = Math.max(n_individuals, individuals);
-      pictures.clear();
+      if (await pages.load(needed, n_generations)) draw();
       resolve("map");
-      resize();
     } catch (error) {
-      asked.delete(key);
       complain(error, "map");
     }
   };
 
-  const resize = () => {
-    spacer.style.width = `${n_generations * cellWidth()}px`;
-    scroller.style.height = `${Math.max(40, n_individuals * rowHeight()) + 18}px`;
-    picture.style.height = `${Math.max(40, n_individuals * rowHeight())}px`;
-    if (atEnd) scroller.scrollLeft = scroller.scrollWidth;
-    picture.redraw();
+  const found = () => {
+    const values = cursor && pages.at(cursor.generation);
+    const individual = values && order(values)[cursor.place];
+    return individual === undefined || individual === null ? null : { ...cursor, individual, fitness: values[individual] };
   };
 
-  /** The individual under the pointer. */
-  const cell = (event) => {
-    const box = picture.getBoundingClientRect();
-    const generation = Math.floor((event.clientX - box.left + scroller.scrollLeft) / cellWidth());
-    const values = generations.get(generation);
-    const place = Math.floor((event.clientY - box.top) / rowHeight());
-    if (!values || place < 0 || place >= values.length) return null;
-    const individual = order(values)[place];
-    return { generation, individual, fitness: values[individual] };
+  const drawReadout = () => {
+    const it = found();
+    readout.textContent = it ? `generation ${it.generation}, individual ${it.individual}: ${decimals(it.fitness, 4)}` : "";
   };
-  scroller.addEventListener("scroll", () => {
-    atEnd = scroller.scrollLeft + scroller.clientWidth > scroller.scrollWidth - 3 * cellWidth();
-    requestAnimationFrame(() => picture.redraw());
+
+  const zoomTo = (to, isOurs = true) => {
+    if (String(to) === String(range)) return;
+    range = to;
+    cursor = null;
+    draw();
+    if (isOurs) onZoom(range);
+  };
+
+  const play = () => {
+    const it = found();
+    if (it) location.assign(`/replay/${id}@${it.generation}/${it.individual}`);
+  };
+
+  /** The cell at a place of the picture. */
+  const at = (event) => {
+    const box = picture.getBoundingClientRect();
+    const [from, to] = window();
+    const generation = Math.round(from + ((event.clientX - box.left) / box.width) * (to - from));
+    return { x: event.clientX - box.left, width: box.width, generation: pages.nearest(Math.max(0, Math.min(n_generations - 1, generation))), place: Math.floor(((event.clientY - box.top) / box.height) * pages.n_individuals) };
+  };
+  picture.addEventListener("pointerdown", (event) => {
+    held = { at: at(event).x };
+    picture.setPointerCapture(event.pointerId);
   });
   picture.addEventListener("pointermove", (event) => {
-    const found = cell(event);
-    title.textContent = found ? `generation ${found.generation}, individual ${found.individual}: ${decimals(found.fitness, 4)}` : "";
+    const { x, generation, place } = at(event);
+    cursor = { generation, place };
+    if (held && Math.abs(x - held.at) > 5) held.to = x;
+    drawReadout();
+    picture.redraw();
+  });
+  picture.addEventListener("pointerup", (event) => {
+    const drag = held;
+    held = null;
+    if (!drag) return;
+    const { width } = at(event);
+    if (drag.to === undefined) return;
+    const [from, to] = window();
+    const ends = [drag.at, drag.to].sort((a, b) => a - b).map((x) => from + (x / width) * (to - from));
+    zoomTo([Math.max(0, Math.round(ends[0])), Math.min(n_generations - 1, Math.round(ends[1]))]);
+    drag.isOver = true;
+    picture.dataset.dragged = "1";
   });
   picture.addEventListener("click", (event) => {
-    const found = cell(event);
-    if (found) location.assign(`/replay/${id}@${found.generation}/${found.individual}`);
+    if (picture.dataset.dragged) return void delete picture.dataset.dragged;
+    const { generation, place } = at(event);
+    cursor = { generation, place };
+    play();
   });
+  picture.addEventListener("dblclick", () => zoomTo(null));
+  picture.addEventListener("pointerleave", () => {
+    cursor = null;
+    drawReadout();
+    picture.redraw();
+  });
+  stage.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || n_generations === 0) return;
+    const [from, to] = [Math.ceil(window()[0]), Math.floor(window()[1])];
+    const now = cursor ?? { generation: from, place: -1 };
+    const by = event.shiftKey ? 10 : 1;
+    const go = (generation, place) => (cursor = { generation: pages.nearest(Math.max(from, Math.min(to, generation))), place: Math.max(0, Math.min(pages.n_individuals - 1, place)) });
+    const scaled = (factor) => {
+      const half = ((to - from) * factor) / 2;
+      const middle = cursor?.generation ?? (from + to) / 2;
+      const next = [Math.max(0, Math.round(middle - half)), Math.min(n_generations - 1, Math.round(middle + half))];
+      zoomTo(next[0] === 0 && next[1] === n_generations - 1 ? null : next);
+    };
+    const actions = {
+      ArrowRight: () => go(now.generation + by, Math.max(0, now.place)), ArrowLeft: () => go(now.generation - by, Math.max(0, now.place)),
+      ArrowDown: () => go(now.generation, now.place + by), ArrowUp: () => go(now.generation, now.place - by),
+      Home: () => go(from, Math.max(0, now.place)), End: () => go(to, Math.max(0, now.place)), Enter: play, "+": () => scaled(0.5), "=": () => scaled(0.5), "-": () => scaled(2), Escape: () => zoomTo(null),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+    draw();
+  });
+  new ResizeObserver(draw).observe(stage);
+
+  /** Axes and cells as one figure. */
+  const whole = () => {
+    const svg = axes.cloneNode(true);
+    const box = { x: EDGE.left, y: EDGE.top, width: picture.clientWidth, height: picture.clientHeight };
+    svg.append(shape("image", { ...box, preserveAspectRatio: "none", href: picture.toDataURL() }), shape("path", { d: `${path([[box.x, box.y], [box.x, box.y + box.height], [box.x + box.width, box.y + box.height]])}`, fill: "none" }));
+    // Only what is on a page has a style.
+    svg.style.position = "absolute";
+    svg.style.visibility = "hidden";
+    stage.append(svg);
+    queueMicrotask(() => svg.remove());
+    return svg;
+  };
+
+  /** What is seen as a table. */
+  const table = () => {
+    const [from, to] = window();
+    const rows = [["generation", "individual", "fitness"]];
+    for (let generation = Math.ceil(from); generation < to; generation++) {
+      pages.at(generation)?.forEach((value, individual) => Number.isNaN(value) || rows.push([generation, individual, value]));
+    }
+    return rows;
+  };
+
   node.update = (n) => {
     if (n === n_generations) return;
     n_generations = n;
-    if (!generations.has(n - 1)) load(n - 1);
-    resize();
+    draw();
   };
+  node.zoom = (to) => zoomTo(to, false);
   return node;
 }

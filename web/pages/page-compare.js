@@ -4,8 +4,8 @@ import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
 import { allExperiments } from "swarm/experiment-list.js";
 import { askJson, bar, complain, main, resolve } from "swarm/page.js";
+import { quantile, seriesStyle } from "swarm/scales.js";
 
-const COLORS = ["#4269d0", "#ff725c", "#3ca951", "#a463f2", "#efb118", "#6cc5b0", "#ff8ab7", "#9c6b4e", "#97bbf5", "#9498a0"];
 /** What runs are laid along: its name, and its value after each generation. */
 const AXES = {
   generation: { label: "generation", values: (rows) => rows.map((row) => row[0]) },
@@ -51,12 +51,6 @@ async function history(id) {
 /** What a run is grouped by. */
 const kind = (it) => [it.group || it.name, it.variant].filter(Boolean).join(" ");
 
-function quantile(sorted, share) {
-  const at = share * (sorted.length - 1);
-  const low = Math.floor(at);
-  return sorted[low] + (sorted[Math.min(low + 1, sorted.length - 1)] - sorted[low]) * (at - low);
-}
-
 async function show() {
   const words = new URLSearchParams({ runs: [...chosen].join(","), along: axis.value, value: column.value, as: grouping.value });
   window.history.replaceState(null, "", `?${words}`);
@@ -70,7 +64,7 @@ async function show() {
     }));
     const content = { xLabel: label, yLabel: `${column.value} fitness`, lines: [], bands: [] };
     if (grouping.value === "runs") {
-      content.lines = curves.map(({ it, points }, i) => ({ name: `${it.id} ${kind(it)} seed ${it.seed}`, color: COLORS[i % COLORS.length], points }));
+      content.lines = curves.map(({ it, points }, i) => ({ name: `${it.id} ${kind(it)} seed ${it.seed}`, ...seriesStyle(i, curves.length), points }));
     } else {
       [...new Set(curves.map(({ it }) => kind(it)))].forEach((name, i) => {
         const members = curves.filter(({ it }) => kind(it) === name).map(({ points }) => points).filter((points) => points.length);

@@ -21,9 +21,11 @@ const title = element("h1", {});
 const state = element("span", {});
 const facts = element("p", { className: "muted" });
 const actions = element("div", { className: "row actions" });
-const fitness = chart("fitness by generation");
-const spread = chart("standard deviation of fitness by generation");
-const map = heatMap(id);
+/** All figures over generations show the same ones. */
+const onZoom = (range) => [fitness, spread, map].forEach((it) => it.zoom(range));
+const fitness = chart("fitness by generation", { onZoom });
+const spread = chart("standard deviation of fitness by generation", { onZoom });
+const map = heatMap(id, onZoom);
 const championBox = element("section", { className: "panel" });
 const dynamics = dynamicsPanel(id);
 const doing = element("section", { className: "panel" });

@@ -3,6 +3,7 @@
 
 import { canvas, decimals, element } from "swarm/dom.js";
 import { palette, pixels, rgb } from "swarm/drawing.js";
+import { extremes } from "swarm/scales.js";
 
 /** A picture over all steps with a mark at the current one. `paint(context, width, height)`
  *  is called once per size and theme. */
@@ -72,11 +73,6 @@ function curve(values, view, seek, label) {
     context.stroke();
   });
   return { node, low, high };
-}
-
-/** The least and the greatest of values that may be too many for arguments. */
-function extremes(values) {
-  return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
 }
 
 /** All tracks of an episode; `redraw` marks the current step. */

@@ -215,7 +215,7 @@ export class World {
       const way = this.wayBack(robot, first, x, y);
       const length = way.reduce((most, [dx, dy]) => Math.max(most, Math.abs(dx), Math.abs(dy)), 0);
       if (length < 1) continue;
-      context.globalAlpha = view.robot === null || view.robot === robot ? 0.8 : 0.25;
+      context.globalAlpha = view.robot === null || view.robot === robot ? 1 : 0.3;
       camera.eachImage(x, y, length * camera.scale, (sx, sy) => {
         context.beginPath();
         context.moveTo(sx, sy);

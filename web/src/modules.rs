@@ -28,6 +28,8 @@ modules!(
     "charts.js",
     "episode.js",
     "experiment-list.js",
+    "export.js",
+    "fitness-pages.js",
     "fleet-timeline.js",
     "heat-map.js",
     "list-columns.js",
@@ -44,6 +46,7 @@ modules!(
     "player.js",
     "replay-file.js",
     "robot-panel.js",
+    "scales.js",
     "timeline.js",
     "world.js",
 );

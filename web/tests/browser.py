@@ -18,7 +18,7 @@ import threading
 import unittest
 import urllib.request
 
-from harness import CLIENT_TOKEN, CONFIG, DEADLINE, PROGRAMS, WORKER_TOKEN, BrowserTest, Fleet
+from harness import CLIENT_TOKEN, CONFIG, DEADLINE, NARROW, PROGRAMS, WORKER_TOKEN, BrowserTest, Fleet
 
 from selenium import webdriver
 from selenium.webdriver.common.by import By
@@ -176,8 +176,7 @@ class Pages(BrowserTest):
         for path, ready in [("/", "tr[data-id='1']"), ("/experiment/1", ".state"), ("/replay/1", ".player"), ("/fleet", "tr[data-id]"), ("/compare", ".chart path")]:
             self.open(path)
             self.find(ready)
-            widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
-            self.assertLessEqual(widths[0], widths[1], f"{path} is too wide")
+            self.assertLessEqual(self.width(), NARROW, f"{path} is too wide")
             self.picture(f"narrow{path.replace('/', '-')}")
         grounds = []
         for scheme in ["light", "dark"]:
@@ -238,8 +237,7 @@ class Live(BrowserTest):
         self.wait_for_text(".broken", "right: lost with its worker, experiment 1, generation")
         self.picture("timeline-lost")
         self.narrow()
-        widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
-        self.assertLessEqual(widths[0], widths[1])
+        self.assertLessEqual(self.width(), NARROW)
         self.picture("narrow-timeline")
 
     def test_pages_are_encrypted_where_the_coordinator_is(self):
@@ -330,7 +328,7 @@ class Live(BrowserTest):
             canvas = self.find(".heat-map canvas")
             self.wait(lambda: canvas.size["height"] > 100, "the map is empty")
             self.script("document.querySelector('.heat-map').scrollIntoView()")
-            wide = self.script("return Math.floor(document.querySelector('.heat-map .scroller').clientWidth / 60)")
+            wide = canvas.size["width"] / 60
             x, y = int((generation + 0.5) * wide), 5
             webdriver.ActionChains(self.browser).move_to_element_with_offset(
                 canvas, x - canvas.size["width"] // 2, y - canvas.size["height"] // 2

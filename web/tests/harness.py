@@ -36,6 +36,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 # Only what hangs takes so long.
 DEADLINE = 120
+# A phone's, pixels.
+NARROW = 390
 
 
 def free_port():
@@ -134,8 +136,12 @@ class BrowserTest(unittest.TestCase):
         self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
     def narrow(self):
-        size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+        size = {"width": NARROW, "height": 844, "deviceScaleFactor": 1, "mobile": True}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+    def width(self):
+        """That of all that a page has; a phone shrinks what is too wide, and so its window grows."""
+        return self.script("return document.documentElement.scrollWidth")
 
     def wait(self, condition, what):
         return WebDriverWait(self.browser, DEADLINE, 0.05).until(lambda _: condition(), what)

@@ -6,7 +6,7 @@ import subprocess
 import tempfile
 import unittest
 
-from harness import CONFIG, PROGRAMS, BrowserTest, Fleet
+from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
 
 from selenium import webdriver
 from selenium.webdriver.common.by import By
@@ -147,8 +147,7 @@ class Replays(BrowserTest):
             finger("touchMove", y - by)
         finger("touchEnd")
         self.wait(lambda: self.script("return window.scrollY") > 50, "the world blocks scrolling")
-        widths = self.script("return [document.documentElement.scrollWidth, window.innerWidth]")
-        self.assertLessEqual(*widths)
+        self.assertLessEqual(self.width(), NARROW)
 
     def test_an_address_that_is_pasted_leads_to_its_step(self):
         self.open("/replay/1#step=5")
@@ -181,6 +180,17 @@ class Replays(BrowserTest):
 
 class Files(BrowserTest):
     """A replay in a file."""
+
+    def test_a_file_that_is_sent_says_nothing_of_the_machine(self):
+        with tempfile.TemporaryDirectory() as directory:
+            genotype, html = (pathlib.Path(directory) / name for name in ("genes.json", "swarm.html"))
+            genotype.write_text(json.dumps([0.6] * 424))
+            command = ["replay", "--config", CONFIG, "--genotype", genotype, "--to", html]
+            subprocess.run([PROGRAMS / "swarmctl", *command], check=True, capture_output=True)
+            self.browser.get(html.as_uri())
+            self.wait_for_text("h1", "genotype in genes.json")
+            self.assertEqual(self.text("h1"), "genotype in genes.json")
+            self.assertNotIn(directory, self.script("return document.body.innerText + document.title"))
 
     def test_a_hidden_frame_does_not_stop_the_page_around_it(self):
         with tempfile.TemporaryDirectory() as directory:

@@ -1,5 +1,7 @@
 """Pages of what is not there, or does not go on, in a real browser; called as `browser.py` is."""
 
+import json
+import pathlib
 import unittest
 
 from harness import CLIENT_TOKEN, CONFIG, WORKER_TOKEN, BrowserTest, Fleet
@@ -61,6 +63,26 @@ class Standing(BrowserTest):
         self.wait_for_text(".standing", "the lab moves")
         fleet.swarmctl("cancel", "1")
         self.wait_for_text(".standing", "before a generation was complete")
+
+    def test_a_failed_experiment_says_why_and_has_no_blank_panels(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        config = json.loads(CONFIG.read_text())
+        del config["algorithm"]["fitness_function"]
+        config["task"] = {"script": "task.star"}
+        directory = pathlib.Path(fleet.directory.name)
+        (directory / "task.star").write_text("def fitness(world):\n    return 1.0 / (world.step - 95)\n")
+        (directory / "fails.json").write_text(json.dumps(config))
+        fleet.start_worker()
+        fleet.swarmctl("submit", str(directory / "fails.json"))
+        self.browser.get(fleet.pages + "/experiment/1")
+        self.wait_for_text(".state", "failed")
+        self.wait_for_text(".standing", "swarmctl retry 1")
+        self.wait_for_text(".standing .bad", "division")
+        shown = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, ".panel") if it.is_displayed()]
+        self.assertEqual([it for it in shown if not it or "no generation is complete yet" in it], [])
+        headings = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, ".panel h2") if it.is_displayed()]
+        self.assertEqual(headings, ["Failed", "Events"])
 
     def test_a_refusal_stays_until_somebody_has_read_it(self):
         self.expected_complaints = ["400 (Bad Request)"]

@@ -105,7 +105,7 @@ pub async fn replay(
         Overrides { seed: args.seed.seed, steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.changed(&changes).and_then(|file| file.compile(&overrides));
     let compiled = compiled.map_err(|error| file.invalid(&error))?;
-    let name = genotype.to_string();
+    let name = args.title(&genotype);
     let episode = Episode {
         config: &compiled.config,
         simulation: &compiled.experiment,
@@ -219,6 +219,14 @@ impl ReplayArgs {
         let generation = found.individual.generation;
         let judged = found.individual.judged.filter(|judged| judged.trials > 0);
         Ok(Subject { file, genotype: Genotype::found(address, found), generation, judged })
+    }
+
+    /// Who plays, for those who get the file: of a path, which is this machine's, the name.
+    fn title(&self, genotype: &Genotype) -> String {
+        match self.genotype.as_deref().and_then(Path::file_name) {
+            Some(name) => format!("genotype in {}", name.display()),
+            None => genotype.to_string(),
+        }
     }
 
     /// The file to write.

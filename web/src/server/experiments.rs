@@ -1,5 +1,7 @@
 //! What is stored of experiments.
 
+use std::num::NonZeroUsize;
+
 use axum::{
     Json,
     extract::State,
@@ -94,15 +96,33 @@ pub async fn events(
     Ok(Json(json!({ "events": events })))
 }
 
+/// Of which generations the fitness is wanted.
+#[derive(Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Wanted {
+    from: u64,
+    /// From there on, at most [`FITNESS_MAX`].
+    n: u32,
+    /// One in so many.
+    every: NonZeroUsize,
+}
+
+impl Default for Wanted {
+    fn default() -> Self {
+        Self { from: 0, n: FITNESS_MAX, every: NonZeroUsize::MIN }
+    }
+}
+
 /// The fitness of every individual of some generations: the first generation (u32), the
 /// number of generations (u32), of individuals (u32), and then `[generation][individual]` as
 /// f32, NaN where there is none; all little-endian.
 pub async fn fitness(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
-    Query(From { from }): Query<From>,
+    Query(Wanted { from, n, every }): Query<Wanted>,
 ) -> Result<Response, Problem> {
-    let (first, fitness) = shared.archive.fitness(id, from, FITNESS_MAX).await?;
+    let (first, fitness) = shared.archive.fitness(id, from, n.min(FITNESS_MAX)).await?;
+    let fitness: Vec<Vec<f32>> = fitness.into_iter().step_by(every.get()).collect();
     let n_individuals = fitness.iter().map(Vec::len).max().unwrap_or_default();
     let head = [first as u32, fitness.len() as u32, n_individuals as u32];
     let mut body: Vec<u8> = head.iter().flat_map(|number| number.to_le_bytes()).collect();

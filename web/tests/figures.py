@@ -1,0 +1,150 @@
+"""Curves and maps in a real browser: with keys, linked, saved, and told apart; called as `browser.py` is."""
+
+import csv
+import io
+import itertools
+import re
+import unittest
+import xml.etree.ElementTree
+
+from harness import CONFIG, BrowserTest, Fleet
+
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+N_GENERATIONS, N_INDIVIDUALS = 12, 32
+
+
+class Figures(BrowserTest):
+    @classmethod
+    def setUpClass(cls):
+        cls.fleet = Fleet()
+        cls.addClassCleanup(cls.fleet.stop)
+        cls.fleet.start_worker()
+        cls.fleet.swarmctl("submit", str(CONFIG), "--generations", str(N_GENERATIONS), "--watch")
+
+    def open(self, path):
+        self.browser.get(self.fleet.pages + path)
+
+    def press(self, selector, *keys):
+        self.script(f"document.querySelector('{selector}').focus()")
+        webdriver.ActionChains(self.browser).send_keys(*keys).perform()
+
+    def saved(self, selector):
+        """What a button saves."""
+        return self.browser.execute_async_script("""
+            const [selector, done] = arguments;
+            const make = URL.createObjectURL;
+            URL.createObjectURL = (blob) => (blob.text().then(done), make(blob));
+            HTMLAnchorElement.prototype.click = () => {};
+            document.querySelector(selector).click();
+        """, selector)
+
+    def test_keys_go_through_a_curve_and_zoom_it(self):
+        self.open("/experiment/1")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        self.press(".chart > svg", Keys.HOME)
+        self.assertIn("generation 0: best", self.text(".chart .readout"))
+        self.press(".chart > svg", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+        self.assertIn("generation 2: best", self.text(".chart .readout"))
+        self.press(".chart > svg", Keys.END)
+        self.assertIn(f"generation {N_GENERATIONS - 1}: best", self.text(".chart .readout"))
+        labels = lambda: self.script("return document.querySelector('.chart > svg').textContent")
+        whole = labels()
+        self.press(".chart > svg", "+")
+        self.assertNotEqual(labels(), whole)
+        self.press(".chart > svg", Keys.ESCAPE)
+        self.assertEqual(labels(), whole)
+
+    def test_keys_go_through_the_map_and_enter_plays(self):
+        self.open("/experiment/1")
+        readout = ".heat-map .readout"
+        self.wait_for_text(".heat-map .scale", "fitness ≤")
+        self.press(".cells", Keys.ARROW_DOWN)
+        self.wait_for_text(readout, "generation 0, individual 0:")
+        self.press(".cells", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_DOWN, Keys.ARROW_DOWN, Keys.ARROW_UP)
+        self.wait_for_text(readout, "generation 2, individual 1:")
+        axes = self.text(".cells svg")
+        self.assertIn("generation", axes)
+        self.assertIn("individual", axes)
+        self.press(".cells", Keys.ENTER)
+        self.wait(lambda: "/replay/1@2/1" in self.browser.current_url, "it does not play")
+
+    def test_curve_and_map_show_the_same_generations(self):
+        self.open("/experiment/1")
+        self.wait_for_text(".heat-map .scale", "fitness ≤")
+        ticks = lambda selector: self.script(f"return [...document.querySelector('{selector}').querySelectorAll('text[text-anchor=middle]')].map((it) => it.textContent).filter((it) => /^[0-9]+$/.test(it)).map(Number)")
+        self.assertEqual(max(ticks(".cells svg")), max(ticks(".chart > svg")))
+        self.press(".chart > svg", Keys.HOME, "+", "+")
+        self.wait(lambda: max(ticks(".cells svg")) < 6, "the map does not follow the curve")
+        self.press(".cells", Keys.ESCAPE)
+        self.wait(lambda: max(ticks(".chart > svg")) >= 10, "the curve does not follow the map")
+        cells = self.find(".cells canvas")
+        drag = webdriver.ActionChains(self.browser).move_to_element_with_offset(cells, -100, 0)
+        drag.click_and_hold().move_by_offset(200, 0).release().perform()
+        self.wait(lambda: min(ticks(".chart > svg")) > 0, "dragging in the map does not zoom the curve")
+        self.assertIn("/experiment/1", self.browser.current_url)
+
+    def test_figures_are_saved_as_svg_and_csv(self):
+        self.open("/experiment/1")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        self.wait_for_text(".heat-map .scale", "fitness ≤")
+        rows = list(csv.reader(io.StringIO(self.saved(".chart .save:last-child"))))
+        self.assertEqual(rows[0], ["generation", "best", "mean", "band low", "band high"])
+        self.assertEqual([int(it[0]) for it in rows[1:]], list(range(N_GENERATIONS)))
+        answer = self.script("return fetch('/api/experiments/1/generations').then((it) => it.json())")
+        self.assertEqual([float(it[1]) for it in rows[1:]], [it[1] for it in answer["generations"]])
+        self.open("/experiment/1")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        svg = self.saved(".chart .save")
+        lines = [it for it in xml.etree.ElementTree.fromstring(svg).iter() if it.get("data-name") == "mean"]
+        self.assertEqual(len(lines), 1)
+        self.assertRegex(lines[0].get("stroke"), r"^rgb|^#")
+        self.open("/experiment/1")
+        self.wait_for_text(".heat-map .scale", "fitness ≤")
+        cells = list(csv.reader(io.StringIO(self.saved(".heat-map .save:last-child"))))
+        self.assertEqual(len(cells), 1 + N_GENERATIONS * N_INDIVIDUALS)
+        self.open("/experiment/1")
+        self.wait_for_text(".heat-map .scale", "fitness ≤")
+        self.assertIn("data:image/png", self.saved(".heat-map .save"))
+
+    def test_thirty_runs_have_thirty_looks(self):
+        self.open("/compare")
+        self.find(".chart")
+        for n in [1, 5, 10, 11, 30, 90]:
+            looks = self.browser.execute_async_script("""
+                const [n, done] = arguments;
+                import('swarm/scales.js').then(({ seriesStyle }) => done(Array.from({ length: n }, (_, i) => Object.values(seriesStyle(i, n)).join())));
+            """, n)
+            self.assertEqual(len(set(looks)), n)
+
+    def test_borders_of_controls_and_trails_are_seen(self):
+        self.open("/")
+        for scheme in ["light", "dark"]:
+            self.prefer(scheme)
+            color = lambda name: self.script(f"return getComputedStyle(document.documentElement).getPropertyValue('--{name}').trim()")
+            for mark, grounds in [("control", ["panel", "page"]), ("trail", ["ground"]), ("robot", ["ground"]), ("line", ["panel"]), ("relay", ["panel"])]:
+                for ground in grounds:
+                    ratio = contrast(color(mark), color(ground))
+                    self.assertGreaterEqual(ratio, 3, f"{mark} on {ground}, {scheme}")
+            for text, ground in itertools.product(["ink", "muted", "accent", "good", "bad"], ["panel", "page"]):
+                self.assertGreaterEqual(contrast(color(text), color(ground)), 4.5, f"{text} on {ground}, {scheme}")
+        border = self.script("return getComputedStyle(document.querySelector('input[type=search]')).borderTopColor")
+        self.assertEqual([int(it) for it in re.findall(r"\d+", border)], [int(color("control")[i : i + 2], 16) for i in (1, 3, 5)])
+
+
+def contrast(a, b):
+    """As WCAG 2 has it."""
+
+    def luminance(color):
+        parts = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        red, green, blue = (it / 12.92 if it <= 0.03928 else ((it + 0.055) / 1.055) ** 2.4 for it in parts)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    low, high = sorted([luminance(a), luminance(b)])
+    return (high + 0.05) / (low + 0.05)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
