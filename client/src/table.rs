@@ -92,9 +92,10 @@ impl Column {
 
 /// Columns of measures: where there is no room for all, the first ones stay.
 pub fn measures<'a>(names: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = Column> {
-    (1..=u8::MAX).chain(std::iter::repeat(u8::MAX)).zip(names).map(|(rank, name)| {
-        Column::number(name).dropped(rank)
-    })
+    (1..=u8::MAX)
+        .chain(std::iter::repeat(u8::MAX))
+        .zip(names)
+        .map(|(rank, name)| Column::number(name).dropped(rank))
 }
 
 /// Rows of as many cells as there are columns.
@@ -207,27 +208,43 @@ impl Table {
     }
 }
 
-/// Records as CSV (RFC 4180, but for the line ends), one column per key. Numbers
-/// read back to the same bits; what is missing or not finite is empty. Text that a
-/// spreadsheet would take for a formula has an apostrophe before it.
+/// Records as CSV (RFC 4180, but for the line ends), one column per key; `a.b` is the value `b` of
+/// the object `a`, in a column `a_b`. Numbers read back to the same bits; what is missing or not
+/// finite is empty. Text that a spreadsheet would take for a formula has an apostrophe before it.
 pub fn csv(keys: &[&str], records: &[impl Serialize]) -> String {
-    let mut lines = vec![keys.join(",")];
+    let headings: Vec<String> = keys.iter().map(|key| key.replace('.', "_")).collect();
+    let mut lines = vec![headings.join(",")];
     for record in records {
         let record = serde_json::to_value(record).expect("plain data serialises");
         let fields: Vec<String> = keys
             .iter()
-            .map(|key| match &record[key] {
-                Value::Null => String::new(),
-                Value::String(text) if text.starts_with(FORMULA_STARTS) => {
-                    quoted(&format!("'{text}"))
-                }
-                Value::String(text) => quoted(text),
-                value => quoted(&value.to_string()),
+            .map(|key| match key.split('.').fold(&record, |value, key| &value[key]) {
+                Value::Number(number) => number.to_string(),
+                value => quoted(&without_formula(cell(value))),
             })
             .collect();
         lines.push(fields.join(","));
     }
     lines.join("\n")
+}
+
+/// A value in one cell: what an object or a list holds is separated by semicolons.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(cell).collect::<Vec<_>>().join("; "),
+        Value::Object(values) => {
+            let pairs = values.iter().map(|(key, value)| format!("{key}={}", cell(value)));
+            pairs.collect::<Vec<_>>().join("; ")
+        }
+        value => value.to_string(),
+    }
+}
+
+/// Text that a spreadsheet takes for text.
+fn without_formula(text: String) -> String {
+    if text.starts_with(FORMULA_STARTS) { format!("'{text}") } else { text }
 }
 
 fn quoted(text: &str) -> String {
@@ -305,6 +322,21 @@ mod tests {
         }
         assert_eq!(csv(&["name"], &[json!({"name": "\r=1"})]), "name\n\"'\r=1\"");
         assert_eq!(csv(&["name"], &[json!({"name": "a=1"})]), "name\na=1");
+    }
+
+    #[test]
+    fn csv_has_what_is_nested() {
+        let record = json!({
+            "labels": {"user": "ada", "for": "a, b"},
+            "changes": ["-x=1", "y=2"],
+            "latest": {"best": -9e98},
+        });
+        let keys = ["labels", "changes", "latest.best", "latest.mean", "none.best"];
+        assert_eq!(
+            csv(&keys, &[record]),
+            "labels,changes,latest_best,latest_mean,none_best\n\
+             \"for=a, b; user=ada\",'-x=1; y=2,-9e+98,,"
+        );
     }
 
     #[test]

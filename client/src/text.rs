@@ -258,7 +258,8 @@ fn champion_line(champion: &GetChampionResponse) -> String {
     };
     match &champion.judged {
         Some(JudgedFitness { mean, low, high, trials, .. }) => {
-            format!("{mean:.6}, 95 % {low:.6} to {high:.6}, on {trials} new trials ({source})")
+            let [mean, low, high] = [mean, low, high].map(|value| number(*value, 6));
+            format!("{mean}, 95 % {low} to {high}, on {trials} new trials ({source})")
         }
         None => format!("not judged ({source})"),
     }
@@ -268,7 +269,7 @@ fn champion_line(champion: &GetChampionResponse) -> String {
 fn selection_line(champion: &GetChampionResponse) -> Option<String> {
     match (&champion.held_out, champion.fitness) {
         (Some(HeldOutFitness { mean, trials, .. }), _) => {
-            Some(format!("{} on the {trials} trials by which it was selected"))
+            Some(format!("{} on the {trials} trials by which it was selected", number(*mean, 6)))
         }
         (None, Some(fitness)) => Some(format!("{} in its generation", number(fitness, 6))),
         (None, None) => None,

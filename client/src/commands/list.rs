@@ -21,7 +21,7 @@ use crate::{
 use self::filter::Filter;
 
 /// Columns of the CSV: keys of [`ExperimentDocument`].
-const CSV_KEYS: [&str; 16] = [
+const CSV_KEYS: [&str; 28] = [
     "id",
     "name",
     "state",
@@ -38,13 +38,25 @@ const CSV_KEYS: [&str; 16] = [
     "eta_ms",
     "group",
     "variant",
+    "labels",
+    "archived",
+    "forked_from.experiment",
+    "forked_from.generation",
+    "forked_from.changes",
+    "latest.generation",
+    "latest.best",
+    "latest.mean",
+    "latest.min",
+    "latest.standard_deviation",
+    "genotype_len",
+    "config_digest",
 ];
 
 /// List all experiments, or those of a group.
 ///
 /// `judged` is the mean fitness of the champion on trials that selected nothing, once the
 /// run has ended; `selection` that on the held-out trials by which it was selected, which
-/// is optimistic. `eta` is the time that the generations left take if they are as fast as the
+/// is optimistic. `best` and `mean` are those of the latest generation. `eta` is the time that the generations left take if they are as fast as the
 /// latest ones. A narrow terminal shows fewer columns, `--output wide` all.
 #[derive(Debug, Args)]
 #[command(visible_alias = "ls", after_help = HELP)]
@@ -93,6 +105,8 @@ fn table(experiments: &[Experiment], now_ms: u64) -> Table {
         Column::number("seed").dropped(4),
         Column::new("algorithm").dropped(6),
         Column::number("age").dropped(5),
+        Column::number("best").wide(),
+        Column::number("mean").wide(),
         Column::number("priority").wide(),
         Column::number("population").wide(),
         Column::number("genes").wide(),
@@ -117,6 +131,8 @@ fn table(experiments: &[Experiment], now_ms: u64) -> Table {
             experiment.seed.to_string(),
             experiment.algorithm.clone(),
             clock::duration_ms(now_ms.saturating_sub(experiment.submitted_at_ms) / 1000 * 1000),
+            fitness(experiment.latest.as_ref().map(|latest| latest.best)),
+            fitness(experiment.latest.as_ref().map(|latest| latest.mean)),
             experiment.priority.to_string(),
             experiment.population_size.to_string(),
             experiment.genotype_len.to_string(),

@@ -25,6 +25,7 @@ use crate::{
     place::Intent,
     progress::Progress,
     settings::Settings,
+    text,
 };
 
 /// Write an HTML file in which an episode can be watched, step by step, in any browser.
@@ -164,8 +165,9 @@ fn judged_trial(
     let trial = median(&fitness);
     let value = fitness.get(trial as usize).copied().unwrap_or_default();
     let what = format!(
-        "playing trial {trial} of the {n} by which it was judged, the median: fitness {value:.6}; \
-         others: --judged N, or --trial N of its generation"
+        "playing trial {trial} of the {n} by which it was judged, the median: fitness {}; \
+         others: --judged N, or --trial N of its generation",
+        text::number(value, 6)
     );
     Ok((trial, what))
 }

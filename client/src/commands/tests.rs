@@ -308,6 +308,28 @@ async fn answers_fit_the_terminal() {
 }
 
 #[tokio::test]
+async fn one_huge_number_makes_no_table_wide() {
+    let commands = ["list", "history 3", "logs 3", "list --output wide", "history 3 --output wide"];
+    let huge = GenerationSummary { best: 9e98, mean: -9e98, min: f64::MIN, ..summary(2) };
+    let script = |past: Vec<Event>| {
+        let mut script = Script { past, ..script() };
+        script.experiment.champion_fitness = Some(-9e98);
+        script.experiment.champion_selection_fitness = Some(f64::MAX);
+        script.experiment.latest = Some(huge.clone());
+        script
+    };
+    for width in [40, 80, 200] {
+        let past = vec![event(1, Kind::GenerationCompleted(huge.clone()))];
+        let text = transcript_on(Some(width), script(past), &commands).await;
+        let (narrow, wide) = text.split_once("$ swarmctl list --output wide").unwrap();
+        let widest = |text: &str| text.lines().map(console::measure_text_width).max().unwrap();
+        assert!(widest(narrow) <= width, "{width}: {narrow}");
+        assert!(widest(wide) <= 250, "{wide}");
+        insta::assert_snapshot!(format!("huge_numbers_at_{width}_columns"), text);
+    }
+}
+
+#[tokio::test]
 async fn a_name_stands_for_the_number() {
     for command in ["champion X", "individual X@1/7", "logs X", "explain X", "get X"] {
         let [by_number, by_name] = ["3", "leader"].map(|name| command.replace('X', name));

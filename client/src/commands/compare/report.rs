@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use crate::{
+    progress::Part,
     statistics::{
         Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
         probability_of_improvement,
     },
-    progress::Part,
     table::{Column, Table},
     text,
 };

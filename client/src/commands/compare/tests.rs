@@ -8,8 +8,8 @@ use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, event::Kin
 use super::*;
 use crate::{
     args::OutputFormat,
-    progress::Part,
     fake_coordinator::{FakeCoordinator, Script},
+    progress::Part,
     progress::tests::Captured,
 };
 

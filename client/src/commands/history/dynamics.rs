@@ -8,6 +8,7 @@ use crate::{
     error::Error,
     progress::Progress,
     table::{Column, Table},
+    text,
 };
 
 const CSV_KEYS: [&str; 10] = [

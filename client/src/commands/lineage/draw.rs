@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use swarm_proto::v1::{Ancestor, PopulationLineage};
 
 use super::operator;
+use crate::text;
 
 /// Ancestors by generation and index.
 type Ancestors<'a> = BTreeMap<(u64, u32), &'a Ancestor>;
@@ -57,8 +58,12 @@ impl Tree<'_> {
             None => String::new(),
         };
         self.lines.push(format!(
-            "{before}{branch}{}@{}/{}  fitness {:.6}, {} genes{born}{again}",
-            self.experiment, of.generation, of.individual, of.fitness, of.genes
+            "{before}{branch}{}@{}/{}  fitness {}, {} genes{born}{again}",
+            self.experiment,
+            of.generation,
+            of.individual,
+            text::number(of.fitness, 6),
+            of.genes
         ));
         if !is_new {
             return;
@@ -91,8 +96,9 @@ pub fn graph(populations: &[PopulationLineage]) -> String {
         for of in ancestors {
             let (g, i) = (of.generation, of.individual);
             lines.push(format!(
-                "  \"{p}_{g}_{i}\" [label=\"{label}{g}/{i}\\n{:.4}\\n{} genes\"];",
-                of.fitness, of.genes
+                "  \"{p}_{g}_{i}\" [label=\"{label}{g}/{i}\\n{}\\n{} genes\"];",
+                text::number(of.fitness, 4),
+                of.genes
             ));
             for parent in &of.parents {
                 let Some(before) = g.checked_sub(1) else { continue };
