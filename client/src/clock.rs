@@ -3,9 +3,14 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Milliseconds since 1970 UTC.
-#[expect(clippy::disallowed_methods, reason = "ages are told from now")]
 pub fn unix_ms() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64
+    today().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis() as u64
+}
+
+/// The time, to compare dates with.
+#[expect(clippy::disallowed_methods, reason = "ages are told from now")]
+pub fn today() -> SystemTime {
+    SystemTime::now()
 }
 
 /// The time, for measuring durations.

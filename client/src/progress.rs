@@ -15,10 +15,12 @@ use swarm_telemetry::{escape, escape_lines};
 
 use crate::{
     args::OutputFormat,
+    clock,
     commands::Finding,
     error::Error,
     json,
     place::Place,
+    settings::Settings,
     table::{self, Screen, Table},
     text,
 };
@@ -231,8 +233,18 @@ impl Progress {
 
     /// Says which place is taken if nobody has named it.
     pub fn found(&self, place: &Place) {
-        if let Place::Directory { path, is_found: true } = place {
-            self.remark(&text::found(path));
+        match place {
+            Place::Directory { path, is_found: true } => self.remark(&text::found(path)),
+            Place::Directory { .. } => {}
+            Place::Coordinator(settings) => self.expiring(settings),
+        }
+    }
+
+    /// Says which certificates for the way to a coordinator expire soon.
+    pub fn expiring(&self, settings: &Settings) {
+        let now = clock::today();
+        for expiry in settings.credentials.expiries().near(now) {
+            self.remark(&format!("warning: {}", expiry.text(now)));
         }
     }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::FalseyValueParser;
 use coordinator::{Access, AccessError, Tls, Tokens};
-use swarm_transport::{Identity, PemError, Token, TokenError, certificates};
+use swarm_transport::{Expiries, Identity, PemError, Token, TokenError, certificates};
 
 const CLIENT_TOKEN: &str = "SWARM_CLIENT_TOKEN";
 const WORKER_TOKEN: &str = "SWARM_WORKER_TOKEN";
@@ -74,6 +74,11 @@ impl AccessArgs {
             }
         };
         Ok(Access { tokens, tls: self.load_tls()?, plaintext: self.plaintext })
+    }
+
+    /// When the certificates in these files expire.
+    pub fn expiries(&self) -> Expiries {
+        Expiries::of(self.tls_cert.as_deref(), self.tls_client_ca.as_deref())
     }
 
     /// Reads the files of TLS.

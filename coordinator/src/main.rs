@@ -2,7 +2,12 @@
 
 mod access_args;
 
-use std::{net::SocketAddr, path::PathBuf, process::ExitCode, time::Duration};
+use std::{
+    net::SocketAddr,
+    path::PathBuf,
+    process::ExitCode,
+    time::{Duration, SystemTime},
+};
 
 use access_args::{AccessArgs, AccessInputError};
 use clap::{Parser, Subcommand};
@@ -169,6 +174,12 @@ async fn report_health(args: &Args) -> ExitCode {
     }
 }
 
+/// The time, to compare dates with.
+#[expect(clippy::disallowed_methods, reason = "certificates expire by the clock")]
+fn now() -> SystemTime {
+    SystemTime::now()
+}
+
 async fn serve(args: &Args) -> anyhow::Result<()> {
     // Before anything else, so that an early signal is not lost.
     let mut terminate = signal(SignalKind::terminate())?;
@@ -185,6 +196,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         ..CoordinatorConfig::new(args.listen, args.data_dir.clone())
     })
     .await?;
+    let expiries = tokio::spawn(args.access.expiries().watch(now));
     let ended = tokio::select! {
         _ = terminate.recv() => Ok(()),
         _ = interrupt.recv() => Ok(()),
@@ -193,6 +205,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
     if ended.is_ok() {
         info!("coordinator stops");
     }
+    expiries.abort();
     // Whatever the reason, it is the last line of the log.
     coordinator.shutdown().await;
     Ok(ended?)

@@ -1,10 +1,14 @@
 //! Who is let in, what they are told otherwise, and what nobody gets to see.
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
-use std::{fs, process::Command};
+use std::{
+    fs,
+    process::Command,
+    time::{Duration, SystemTime},
+};
 
 use harness::{
-    CoordinatorProcess, Experiment, Outcome, PythonClient, WorkerProcess, binary, swarmctl,
+    CoordinatorProcess, Experiment, LogLine, Outcome, PythonClient, WorkerProcess, binary, swarmctl,
 };
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
 use swarm_proto::{
@@ -308,6 +312,29 @@ fn a_fleet_works_over_tls_with_certificates_on_both_sides() {
         4,
         &["client certificate", "--tls-cert"],
     );
+}
+
+#[test]
+fn a_certificate_that_expires_soon_is_said_by_all_who_use_it() {
+    let files = Files::new().with_certificates();
+    let mut params = CertificateParams::new(["localhost".to_owned()]).unwrap();
+    #[expect(clippy::disallowed_methods, reason = "the programs compare it with their clock")]
+    let end = SystemTime::now() + Duration::from_hours(5 * 24 + 1);
+    params.not_after = end.into();
+    let key = KeyPair::generate().unwrap();
+    let certificate = params.self_signed(&key).unwrap();
+    files.write("own.pem", &certificate.pem());
+    files.write("own.key", &key.serialize_pem());
+    let coordinator = files.coordinator("--tls-cert @own.pem --tls-key @own.key");
+    let is_said =
+        |line: &str| line.contains("own.pem expires on ") && line.contains(", in 5 days; ");
+    let is_logged = |line: &LogLine| line["message"].as_str().is_some_and(is_said);
+    coordinator.process.wait_for("the date", is_logged);
+    let url = https(&coordinator);
+    let worker = files.worker(&url, "--tls-ca @own.pem --token-file @worker.token");
+    worker.process.wait_for("the date", is_logged);
+    let outcome = files.list(&url, "--tls-ca @own.pem --token-file @client.token");
+    assert!(outcome.code == Some(0) && is_said(&outcome.stderr), "{outcome:#?}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
     sync::Arc,
     thread,
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 
 use clap::Parser;
@@ -133,6 +133,7 @@ async fn work(args: Args) -> ExitCode {
             return EXIT_INPUT.into();
         }
     };
+    tokio::spawn(args.credentials.expiries().watch(now));
     let isa = args.isa.unwrap_or_else(Isa::best);
     let config = WorkerConfig {
         credentials,
@@ -177,6 +178,12 @@ async fn work(args: Args) -> ExitCode {
             }
         }
     }
+}
+
+/// The time, to compare dates with.
+#[expect(clippy::disallowed_methods, reason = "certificates expire by the clock")]
+fn now() -> SystemTime {
+    SystemTime::now()
 }
 
 /// Has the worker finish when its life is over, and ends the process if that takes too long.

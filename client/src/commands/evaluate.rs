@@ -121,6 +121,7 @@ async fn remote(
             Ok(None)
         }
         Place::Coordinator(settings) => {
+            progress.expiring(&settings);
             let connection = Connection::new(settings.address(), &settings.credentials()?)?;
             Ok(Some(connection.with_patience(PATIENCE_WHILE_FOLLOWING)))
         }

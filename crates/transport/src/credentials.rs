@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::FalseyValueParser;
 use tonic::transport::Certificate;
 
-use crate::{Identity, PemError, Token, TokenError, certificates};
+use crate::{Expiries, Identity, PemError, Token, TokenError, certificates};
 
 /// Credentials of a worker or client, and the authorities that it trusts.
 #[derive(Debug, Clone, Default)]
@@ -79,6 +79,11 @@ pub struct CredentialArgs {
 }
 
 impl CredentialArgs {
+    /// When the certificates in these files expire.
+    pub fn expiries(&self) -> Expiries {
+        Expiries::of(self.tls_cert.as_deref(), self.tls_ca.as_deref())
+    }
+
     /// Reads all files. The token is in a file or in an environment variable.
     pub fn load(
         &self,

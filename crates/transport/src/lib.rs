@@ -8,6 +8,7 @@
 mod address;
 mod banner;
 mod credentials;
+mod expiry;
 mod link;
 pub mod listening;
 mod pem;
@@ -20,6 +21,7 @@ mod token;
 pub use address::listen_address;
 pub use banner::{Banner, banner};
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
+pub use expiry::{Expiries, Expiry};
 pub use link::{Bearer, Link, LinkError, is_loopback};
 pub use pem::{Identity, PemError, certificates};
 pub use pinned::{PinError, pinned};

@@ -2,7 +2,7 @@
 
 use std::{error::Error, io};
 
-use rustls::{AlertDescription, CertificateError, Error as TlsError, pki_types::UnixTime};
+use rustls::{AlertDescription, CertificateError, Error as TlsError};
 use time::{OffsetDateTime, format_description::well_known::Rfc3339};
 use tonic::{ConnectError, TimeoutExpired};
 
@@ -38,9 +38,9 @@ pub(crate) fn is_break(error: &(dyn Error + 'static)) -> bool {
     has_cause
 }
 
-/// A day and time for people.
-fn date(at: UnixTime) -> String {
-    let seconds = i64::try_from(at.as_secs()).unwrap_or(i64::MAX);
+/// A day and time for people, of seconds since 1970.
+pub(crate) fn date(seconds: u64) -> String {
+    let seconds = i64::try_from(seconds).unwrap_or(i64::MAX);
     let known = OffsetDateTime::from_unix_timestamp(seconds).ok();
     let text = known.and_then(|at| at.format(&Rfc3339).ok());
     text.unwrap_or_else(|| format!("second {seconds} since 1970"))
@@ -59,14 +59,14 @@ fn explain(error: &TlsError) -> String {
             format!(
                 "its certificate expired on {}; whoever runs it needs a new one \
                  (docs/security.md), unless the clock of this machine is wrong",
-                date(*not_after)
+                date(not_after.as_secs())
             )
         }
         TlsError::InvalidCertificate(CertificateError::NotValidYetContext {
             not_before, ..
         }) => format!(
             "its certificate is valid from {} on; is the clock of this machine right?",
-            date(*not_before)
+            date(not_before.as_secs())
         ),
         TlsError::InvalidCertificate(problem) => format!("its certificate is not valid: {problem}"),
         TlsError::InvalidMessage(_) => "it does not speak TLS; use http://".into(),
@@ -87,6 +87,8 @@ fn explain(error: &TlsError) -> String {
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
+
+    use rustls::pki_types::UnixTime;
 
     use super::*;
 
