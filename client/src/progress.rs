@@ -166,7 +166,9 @@ impl Progress {
             OutputFormat::Json => return self.print(&json::document(&records)),
             // For programs, to the byte.
             OutputFormat::Csv => table::csv(csv_keys, records),
-            OutputFormat::Table | OutputFormat::Wide if records.is_empty() => empty.to_owned(),
+            OutputFormat::Table | OutputFormat::Wide if records.is_empty() => {
+                return self.print(empty);
+            }
             // Their cells are escaped; what is left are colours.
             OutputFormat::Table => table.to_text(self.screen),
             OutputFormat::Wide => table.to_wide_text(self.screen),
@@ -265,22 +267,33 @@ impl Progress {
         };
         self.followed = experiments.iter().map(|it| (it.id, followed(it))).collect();
         if self.has_terminal && !self.is_json() {
-            let template = match self.screen.width {
-                Some(..BAR_SCREEN_WIDTH) => "{pos}/{len}  {msg}",
-                _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
-            };
-            let style = ProgressStyle::with_template(template).expect("the template is valid");
             let name = experiments.first().map_or("", |first| match experiments.len() {
                 1 => &first.name,
                 _ => &first.group,
             });
-            self.bar.set_style(style);
-            self.bar.set_length(experiments.iter().map(|it| it.generations).sum());
-            self.bar.set_prefix(text::cut(&escape(name), NAME_WIDTH_MAX));
-            self.bar.set_message("waiting for the first generation");
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-            self.bar.tick();
+            let name = text::cut(&escape(name), NAME_WIDTH_MAX);
+            let length = experiments.iter().map(|it| it.generations).sum();
+            self.show_bar(name, length, "waiting for the first generation");
         }
+    }
+
+    /// Shows the bar, and beside it as much of a message as there is room for.
+    fn show_bar(&self, name: String, length: u64, message: &str) {
+        let template = match self.screen.width {
+            Some(..BAR_SCREEN_WIDTH) => "{pos}/{len}  {msg}",
+            _ if name.is_empty() => "{bar:24} {pos}/{len}  {msg}",
+            _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
+        };
+        let style = ProgressStyle::with_template(template).expect("the template is valid");
+        self.bar.set_style(style);
+        self.bar.set_length(length);
+        self.bar.set_prefix(name);
+        self.bar.set_message(text::cut(message, self.message_room()));
+        // Another target does not know what the one before has drawn, and would draw below it.
+        if self.bar.is_hidden() {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+        self.bar.tick();
     }
 
     /// Shows a generation of an experiment that is followed.
@@ -342,13 +355,8 @@ impl Progress {
     /// Shows how much of something long is done, if there is a terminal.
     pub fn step(&mut self, n_done: u64, n_all: u64, what: &str) {
         if self.has_terminal && !self.is_json() {
-            let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {msg}");
-            self.bar.set_style(style.expect("the template is valid"));
-            self.bar.set_length(n_all);
             self.bar.set_position(n_done);
-            self.bar.set_message(escape(what).into_owned());
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
-            self.bar.tick();
+            self.show_bar(String::new(), n_all, &escape(what));
         }
     }
 

@@ -428,7 +428,7 @@ mod tests {
             assert_eq!(number(value, 3), expected);
         }
         for exponent in -308..=308 {
-            let value = -1.234_567_891 * 10f64.powi(exponent);
+            let value: f64 = format!("-1.234567891e{exponent}").parse().unwrap();
             assert!(number(value, 6).len() <= 15, "{value:e}");
         }
     }

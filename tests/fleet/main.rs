@@ -6,6 +6,7 @@
 mod budgets;
 mod bundles;
 mod command_line;
+mod data_directory;
 mod determinism;
 mod evaluation;
 mod explain;
@@ -29,4 +30,5 @@ mod slurm;
 mod starved;
 mod steering;
 mod strangers;
+mod terminals;
 mod written_files;

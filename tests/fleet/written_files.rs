@@ -3,10 +3,9 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
-use harness::{Experiment, Outcome, binary};
+use crate::data_directory::DataDirectory;
 
 /// A command, and a file that it writes; where it chooses the name, the directory.
 const WRITERS: [(&str, &str); 14] = [
@@ -26,24 +25,6 @@ const WRITERS: [(&str, &str); 14] = [
     ("doctor --recover recovered", "recovered"),
 ];
 
-/// A directory with a run of two generations in `swarm-data`.
-fn directory() -> tempfile::TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    let experiment = Experiment::tiny(2);
-    fs::copy(experiment.path(), directory.path().join("experiment.json")).unwrap();
-    in_directory(directory.path(), "run experiment.json").expect_success();
-    let history = in_directory(directory.path(), "history 1 --output csv").expect_success();
-    fs::write(directory.path().join("history.csv"), history.stdout).unwrap();
-    directory
-}
-
-/// Runs a command in a directory.
-fn in_directory(directory: &Path, line: &str) -> Outcome {
-    let mut command = Command::new(binary("swarmctl"));
-    command.args(line.split(' ')).current_dir(directory).env("SWARM_DATA_DIR", "swarm-data");
-    Outcome::of(&mut command)
-}
-
 /// All files below a path, with their contents.
 fn files(path: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     if path.is_file() {
@@ -57,11 +38,10 @@ fn files(path: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 #[test]
 fn no_command_writes_over_a_file_unless_it_is_told_to() {
-    let directory = directory();
-    let in_directory = |line: &str| in_directory(directory.path(), line);
+    let directory = DataDirectory::new();
     for (line, file) in WRITERS {
         let path = directory.path().join(file);
-        in_directory(line).expect_success();
+        directory.swarmctl(line).expect_success();
         let written = files(&path);
         assert!(
             !written.is_empty() && written.iter().all(|(_, bytes)| !bytes.is_empty()),
@@ -74,7 +54,7 @@ fn no_command_writes_over_a_file_unless_it_is_told_to() {
             written.iter().for_each(|(path, _)| fs::write(path, &precious).unwrap());
         }
         let before = files(&path);
-        let refused = in_directory(line);
+        let refused = directory.swarmctl(line);
         assert_eq!(refused.code, Some(2), "{line}: {refused:#?}");
         assert_eq!(refused.stderr.lines().count(), 1, "{line}: {}", refused.stderr);
         for part in ["exists already", "--force", file.split('/').next().unwrap()] {
@@ -82,7 +62,7 @@ fn no_command_writes_over_a_file_unless_it_is_told_to() {
         }
         assert!(files(&path) == before, "{line} has changed something");
 
-        let forced = in_directory(&format!("{line} --force")).expect_success();
+        let forced = directory.swarmctl(&format!("{line} --force")).expect_success();
         assert!(!forced.stderr.contains("error"), "{line}: {}", forced.stderr);
         let names = |files: &[(PathBuf, _)]| -> Vec<PathBuf> {
             files.iter().map(|(path, _)| path.clone()).collect()
@@ -98,29 +78,28 @@ fn no_command_writes_over_a_file_unless_it_is_told_to() {
 
 #[test]
 fn force_replaces_data_directories_that_nobody_uses_and_nothing_else() {
-    let directory = directory();
-    let in_directory = |line: &str| in_directory(directory.path(), line);
+    let directory = DataDirectory::new();
     fs::create_dir(directory.path().join("thesis")).unwrap();
     fs::write(directory.path().join("thesis/chapter.tex"), "precious").unwrap();
     for line in ["backup thesis --force", "doctor --recover thesis --force"] {
-        let refused = in_directory(line);
+        let refused = directory.swarmctl(line);
         assert_eq!(refused.code, Some(2), "{line}: {refused:#?}");
     }
     assert_eq!(files(&directory.path().join("thesis")).len(), 1);
-    let itself = in_directory("backup swarm-data --force");
+    let itself = directory.swarmctl("backup swarm-data --force");
     assert_eq!(itself.code, Some(2), "{itself:#?}");
     assert!(itself.stderr.contains("the directory that is read"), "{}", itself.stderr);
-    in_directory("history 1").expect_success();
+    directory.swarmctl("history 1").expect_success();
 }
 
 #[test]
 fn the_champion_file_of_run_is_brought_up_to_date() {
-    let directory = directory();
+    let directory = DataDirectory::new();
     let kept = files(&directory.path().join("swarm-data"));
     let is_champion = |path: &PathBuf| path.to_string_lossy().ends_with("-1.champion.json");
     let path = kept.into_iter().map(|(path, _)| path).find(is_champion).unwrap();
     let first = fs::read(&path).unwrap();
     fs::write(&path, "half a file").unwrap();
-    in_directory(directory.path(), "run experiment.json").expect_success();
+    directory.swarmctl("run experiment.json").expect_success();
     assert!(fs::read(&path).unwrap() == first);
 }

@@ -14,6 +14,7 @@ mod prometheus;
 mod proxy;
 mod python;
 mod skip;
+mod terminal;
 
 pub use binaries::binary;
 pub use experiment::{Experiment, workspace_file};
@@ -26,3 +27,4 @@ pub use prometheus::{Prometheus, promtool_check_config, promtool_check_metrics};
 pub use proxy::{Direction, Proxy, Traffic};
 pub use python::{PythonClient, RunningPythonClient, python_with};
 pub use skip::{skipped, skipped_for_want_of};
+pub use terminal::Terminal;

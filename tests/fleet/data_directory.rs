@@ -1,0 +1,37 @@
+//! A directory in which somebody has worked: a run in `swarm-data`, its experiment file and its
+//! history.
+
+use std::{fs, path::Path, process::Command};
+
+use harness::{Experiment, Outcome, binary};
+
+/// A directory of its own.
+pub struct DataDirectory(tempfile::TempDir);
+
+impl DataDirectory {
+    /// With `experiment.json`, of two generations, which has run as experiment 1, and `history.csv`.
+    pub fn new() -> Self {
+        let this = Self(tempfile::tempdir().unwrap());
+        let experiment = Experiment::tiny(2);
+        fs::copy(experiment.path(), this.path().join("experiment.json")).unwrap();
+        this.swarmctl("run experiment.json").expect_success();
+        let history = this.swarmctl("history 1 --output csv").expect_success();
+        fs::write(this.path().join("history.csv"), history.stdout).unwrap();
+        this
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    /// Runs `swarmctl ARGS` in it to its end.
+    pub fn swarmctl(&self, args: &str) -> Outcome {
+        let mut command = Command::new(binary("swarmctl"));
+        command
+            .args(args.split(' '))
+            .current_dir(self.path())
+            .env("SWARM_DATA_DIR", "swarm-data")
+            .env("SWARM_CONFIG", "");
+        Outcome::of(&mut command)
+    }
+}
