@@ -479,7 +479,7 @@ impl FleetService for FakeCoordinator {
         _: Request<ListWorkersRequest>,
     ) -> Result<Response<ListWorkersResponse>, Status> {
         let workers = self.script(|script| script.workers.clone());
-        Ok(Response::new(ListWorkersResponse { workers, now_ms: 0 }))
+        Ok(Response::new(ListWorkersResponse { workers, ..Default::default() }))
     }
 
     async fn readmit_worker(

@@ -50,6 +50,16 @@ pub fn counted(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
 
+/// That evaluations are computed, or wait, beside experiments.
+pub fn evaluations(number: usize) -> Option<String> {
+    let what = match number {
+        0 => return None,
+        1 => "1 evaluation is not done".to_owned(),
+        n => format!("{n} evaluations are not done"),
+    };
+    Some(format!("{what}, too; `swarmctl explain` says what is waited for"))
+}
+
 /// A count that may be large, to three digits, such as "1.50 billion".
 pub fn large_number(number: f64) -> String {
     let units = [(1e12, "trillion"), (1e9, "billion"), (1e6, "million"), (1e3, "thousand")];

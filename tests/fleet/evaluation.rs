@@ -1,9 +1,10 @@
 //! Evaluations: the same files whoever computes them, and whatever happens meanwhile.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path, process::Command, thread, time::Duration};
 
 use harness::{
-    CoordinatorProcess, Experiment, HandWorker, Outcome, WorkerProcess, hello, swarmctl,
+    CoordinatorProcess, Experiment, HandWorker, Outcome, WorkerProcess, binary, hello, swarmctl,
+    swarmctl_process,
 };
 use serde_json::{Value, json};
 use swarm_proto::v1::{
@@ -97,7 +98,7 @@ fn one_process_one_worker_and_workers_that_are_killed_give_the_same_files() {
     let mut workers = WorkerProcess::start_many(&coordinator, 3);
     let args = subject.args("killed", &CONDITIONS);
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
-    std::thread::scope(|scope| {
+    thread::scope(|scope| {
         let evaluating = scope.spawn(|| coordinator.swarmctl(&args).expect_success());
         for worker in &mut workers[..2] {
             let (_, assigned) = coordinator
@@ -121,7 +122,7 @@ fn a_coordinator_that_is_killed_is_asked_again() {
     let mut coordinator = CoordinatorProcess::start();
     let args = subject.args("killed", &[]);
     let url = coordinator.url();
-    std::thread::scope(|scope| {
+    thread::scope(|scope| {
         let args = ["--coordinator", &url].into_iter().map(str::to_owned).chain(args);
         let evaluating = scope.spawn(|| swarmctl(args).expect_success());
         // There is no worker, so it cannot be done.
@@ -320,4 +321,42 @@ async fn the_work_of_a_client_that_goes_away_is_dropped() {
             break;
         }
     }
+}
+
+/// What people read.
+fn shown(coordinator: &CoordinatorProcess, command: &str) -> Outcome {
+    let mut process = Command::new(binary("swarmctl"));
+    process.args([command, "--coordinator", &coordinator.url()]);
+    Outcome::of(&mut process).expect_success()
+}
+
+#[test]
+fn an_evaluation_that_waits_for_a_worker_is_seen_by_everybody() {
+    /// Only a coordinator that hangs is asked so often.
+    const N_QUESTIONS_MAX: usize = 600;
+    let subject = Subject::new();
+    let coordinator = CoordinatorProcess::start();
+    let url = coordinator.url();
+    let mut args = vec!["--coordinator".to_owned(), url.clone()];
+    args.extend(subject.args("waits", &[]));
+    let mut evaluation = swarmctl_process(&args);
+    let explained = (0..N_QUESTIONS_MAX).find_map(|_| {
+        let fleet = coordinator.swarmctl(&["explain"]).expect_success().json();
+        thread::sleep(Duration::from_millis(100));
+        fleet["evaluations"].get(0).cloned()
+    });
+    let explained = explained.expect("the evaluation is seen");
+    assert_eq!((&explained["episodes"], &explained["episodes_left"]), (&json!(12), &json!(12)));
+    assert_eq!(explained["workers_available"], 0);
+    let said = shown(&coordinator, "explain").stdout;
+    let start = format!("no worker is connected\n  -> start some: worker --coordinator {url}\n");
+    assert!(said.contains(": 0 of 12 episodes done in ") && said.contains(&start), "{said}");
+    for command in ["list", "workers"] {
+        let said = shown(&coordinator, command).stderr;
+        assert!(said.contains("1 evaluation is not done"), "{said}");
+    }
+    let _worker = WorkerProcess::start(&coordinator, "w");
+    assert!(evaluation.wait().success());
+    let fleet = coordinator.swarmctl(&["explain"]).expect_success().json();
+    assert_eq!(fleet["evaluations"], json!([]));
 }

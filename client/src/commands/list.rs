@@ -5,7 +5,7 @@ mod filter;
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use console::Style;
-use swarm_proto::v1::Experiment;
+use swarm_proto::v1::{Experiment, ListWorkersRequest};
 
 use super::Remote;
 use crate::{
@@ -83,7 +83,12 @@ impl Remote for ListArgs {
         });
         let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
         let table = table(&experiments, clock::unix_ms());
-        progress.print_table(&table, &CSV_KEYS, &documents, "no such experiments")
+        progress.print_table(&table, &CSV_KEYS, &documents, "no such experiments")?;
+        let request = ListWorkersRequest {};
+        let answer = connection.call_fleet(async |client| client.list_workers(request).await);
+        let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
+        text::evaluations(n_evaluations).iter().for_each(|it| progress.remark(it));
+        Ok(())
     }
 }
 

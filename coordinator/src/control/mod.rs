@@ -30,7 +30,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::{
     driver::{DriverEvent, EventSender},
-    engine::{TimelineEntry, WorkerStatus},
+    engine::{EvaluationActivity, TimelineEntry, WorkerStatus},
     ids::ExperimentId,
     limits::{EVALUATIONS_MAX, REQUESTS_LEN_MAX, UNFINISHED_MAX},
     memory::Shortage,
@@ -168,6 +168,11 @@ impl Control {
     /// The connected workers, in the order in which they joined.
     pub async fn workers(&self) -> Result<Vec<WorkerStatus>, ControlError> {
         self.ask(DriverEvent::WorkersRequested).await
+    }
+
+    /// What is evaluated, experiments aside.
+    pub async fn evaluations(&self) -> Result<Vec<EvaluationActivity>, ControlError> {
+        self.ask(DriverEvent::EvaluationsRequested).await
     }
 
     /// Who computed what lately.

@@ -7,7 +7,10 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    engine::{Assignment, Introduction, ItemResult, JobActivity, TimelineEntry, WorkerStatus},
+    engine::{
+        Assignment, EvaluationActivity, Introduction, ItemResult, JobActivity, TimelineEntry,
+        WorkerStatus,
+    },
     ids::{AssignmentId, ExperimentId, JobId, WorkerId},
     memory::Shortage,
     runs::{Evaluation, Request, Runnable},
@@ -52,6 +55,8 @@ pub enum DriverEvent {
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
+    /// A client wants to see what is evaluated, experiments aside.
+    EvaluationsRequested(oneshot::Sender<Vec<EvaluationActivity>>),
     /// Somebody wants to see who computed what lately.
     TimelineRequested(oneshot::Sender<Vec<TimelineEntry>>),
     /// A client lets a worker out of quarantine.

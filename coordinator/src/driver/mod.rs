@@ -188,6 +188,9 @@ impl Driver {
             DriverEvent::WorkersRequested(reply) => {
                 drop(reply.send(self.engine.worker_status(now)));
             }
+            DriverEvent::EvaluationsRequested(reply) => {
+                drop(reply.send(self.engine.evaluations(now)));
+            }
             DriverEvent::TimelineRequested(reply) => {
                 drop(reply.send(self.engine.timeline(now)));
             }

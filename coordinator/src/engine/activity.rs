@@ -1,12 +1,15 @@
 //! What a job is doing at a moment, and what it waits for.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use sim_core::TrialSet;
 
 use crate::ids::{JobId, WorkerId};
 
-use super::{Engine, batch::BatchInProgress, worker::Worker};
+use super::{Engine, batch::BatchInProgress, job::JobWork, worker::Worker};
 
 /// What a job is doing, and which workers could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -89,7 +92,26 @@ pub struct HeldItems {
     pub silent_for: Duration,
 }
 
+/// An evaluation that has not ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvaluationActivity {
+    /// Its experiment's name.
+    pub name: Arc<str>,
+    /// What it is doing.
+    pub activity: JobActivity,
+}
+
 impl Engine {
+    /// What all evaluations are doing, in the order in which they came.
+    pub fn evaluations(&self, now: Instant) -> Vec<EvaluationActivity> {
+        let evaluations = self.jobs.iter().filter(|(id, _)| id.experiment().is_none());
+        let activity = |(&id, work): (&JobId, &JobWork)| EvaluationActivity {
+            name: Arc::clone(&work.name),
+            activity: self.activity(now, id),
+        };
+        evaluations.map(activity).collect()
+    }
+
     /// What a job is doing; without a batch if the engine does not know it.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
         let work = self.jobs.get(&id);

@@ -76,7 +76,9 @@ use crate::{
     priority::Priority,
 };
 
-pub use activity::{BatchActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker};
+pub use activity::{
+    BatchActivity, EvaluationActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker,
+};
 use audits::Doubted;
 use batch::BatchInProgress;
 use crash_loops::CrashLoops;

@@ -10,7 +10,7 @@ use tonic::Status;
 
 use crate::{
     driver::ToWorker,
-    engine::{Assignment, ItemResult, WorkerStatus},
+    engine::{Assignment, BatchActivity, EvaluationActivity, ItemResult, WorkerStatus},
     ids::{AssignmentId, JobId},
     priority::Priority,
     queries::{Address, DynamicsPage, Individuals, Lineage, Page},
@@ -137,6 +137,21 @@ pub fn worker(worker: WorkerStatus, now_ms: u64) -> v1::Worker {
         distrusted: worker.quarantined.unwrap_or_default(),
         waits: worker.waits.unwrap_or_default(),
         experiments: worker.experiments.to_string(),
+    }
+}
+
+/// An evaluation for clients.
+pub fn evaluation(evaluation: EvaluationActivity) -> v1::RunningEvaluation {
+    let EvaluationActivity { name, activity } = evaluation;
+    let batch = activity.batch.as_ref();
+    let of_batch = |count: fn(&BatchActivity) -> usize| batch.map_or(0, count);
+    v1::RunningEvaluation {
+        name: name.to_string(),
+        episodes: of_batch(|batch| batch.n_episodes) as u64,
+        episodes_left: of_batch(|batch| batch.n_episodes_left) as u64,
+        items_queued: of_batch(|batch| batch.n_items_queued) as u32,
+        workers_available: activity.n_workers_available as u32,
+        running_ms: batch.map_or(0, |batch| batch.running_for.as_millis() as u64),
     }
 }
 

@@ -29,7 +29,9 @@ impl FleetService for Fleet {
         let workers = self.control.workers().await?;
         let now_ms = clock::unix_ms();
         let workers = workers.into_iter().map(|worker| convert::worker(worker, now_ms)).collect();
-        Ok(Response::new(ListWorkersResponse { workers, now_ms }))
+        let evaluations = self.control.evaluations().await?;
+        let evaluations = evaluations.into_iter().map(convert::evaluation).collect();
+        Ok(Response::new(ListWorkersResponse { workers, now_ms, evaluations }))
     }
 
     async fn readmit_worker(

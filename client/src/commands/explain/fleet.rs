@@ -1,11 +1,11 @@
 //! What the whole fleet does, and what its experiments wait for.
 
 use serde::Serialize;
-use swarm_proto::v1::{ExplainExperimentResponse, ListWorkersRequest};
+use swarm_proto::v1::{ExplainExperimentResponse, ListWorkersRequest, RunningEvaluation};
 
 use super::{Explanation, explain, finding::Finding};
 use crate::{
-    connection::Connection, error::Error, json, json::has_ended, progress::Progress, text,
+    clock, connection::Connection, error::Error, json, json::has_ended, progress::Progress, text,
 };
 
 /// The fleet, as JSON.
@@ -13,14 +13,65 @@ use crate::{
 struct Fleet<'a> {
     workers: usize,
     slots: u64,
+    evaluations: Vec<Evaluation<'a>>,
     experiments: Vec<Explanation<'a>>,
+}
+
+/// An evaluation that somebody waits for, as JSON.
+#[derive(Debug, Serialize)]
+struct Evaluation<'a> {
+    name: &'a str,
+    episodes: u64,
+    episodes_left: u64,
+    items_queued: u32,
+    workers_available: u32,
+    running_ms: u64,
+}
+
+impl<'a> From<&'a RunningEvaluation> for Evaluation<'a> {
+    fn from(evaluation: &'a RunningEvaluation) -> Self {
+        Self {
+            name: &evaluation.name,
+            episodes: evaluation.episodes,
+            episodes_left: evaluation.episodes_left,
+            items_queued: evaluation.items_queued,
+            workers_available: evaluation.workers_available,
+            running_ms: evaluation.running_ms,
+        }
+    }
+}
+
+/// What an evaluation waits for, and what to do about it.
+fn evaluation_lines(evaluation: &RunningEvaluation, n_workers: usize, address: &str) -> String {
+    let RunningEvaluation { name, episodes, episodes_left, .. } = evaluation;
+    let done = episodes.saturating_sub(*episodes_left);
+    let time = clock::duration_ms(evaluation.running_ms);
+    let queued = text::counted(evaluation.items_queued.into(), "item");
+    let mut lines = vec![format!(
+        "an evaluation of {name}: {done} of {episodes} episodes done in {time}; {queued} without a \
+         worker"
+    )];
+    if evaluation.workers_available == 0 {
+        lines.push(match n_workers {
+            0 => "no worker is connected".to_owned(),
+            n => format!("none of {} takes it", text::counted(n as u64, "connected worker")),
+        });
+        if n_workers > 0 {
+            lines.push("  -> see why: swarmctl workers --output wide".to_owned());
+        }
+        lines.push(format!("  -> start some: worker --coordinator {address}"));
+        lines.push(
+            "  -> or compute it where it was asked for: swarmctl evaluate --local".to_owned(),
+        );
+    }
+    lines.join("\n")
 }
 
 /// Explains every experiment that has not ended. What holds for all is said once.
 pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
     let request = ListWorkersRequest {};
-    let workers =
-        connection.call_fleet(async |client| client.list_workers(request).await).await?.workers;
+    let answer = connection.call_fleet(async |client| client.list_workers(request).await).await?;
+    let (workers, evaluations) = (answer.workers, answer.evaluations);
     let slots = workers.iter().map(|worker| u64::from(worker.slots)).sum();
     let mut explained: Vec<(ExplainExperimentResponse, Vec<Finding>)> = Vec::new();
     for experiment in connection.experiments().await? {
@@ -36,6 +87,7 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
         return progress.print(&json::document(&Fleet {
             workers: workers.len(),
             slots,
+            evaluations: evaluations.iter().map(Into::into).collect(),
             experiments,
         }));
     }
@@ -54,6 +106,8 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
             text::counted(slots, "slot"),
         ),
     }];
+    let lines = |it| evaluation_lines(it, workers.len(), connection.address());
+    sections.extend(evaluations.iter().map(lines));
     // With an experiment, what the workers are for is known: only then they may be too few.
     let mut of_fleet: Vec<String> = Vec::new();
     let mut of_experiments = Vec::new();
