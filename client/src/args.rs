@@ -169,7 +169,7 @@ pub struct ExperimentArgs {
     #[command(flatten)]
     pub sweep: SweepArgs,
     /// Label it, to find it by: `list --label KEY=VALUE`; may be given several times.
-    #[arg(long = "label", value_name = "KEY=VALUE")]
+    #[arg(long = "label", value_name = "KEY=VALUE", add = ArgValueCompleter::new(complete::labels))]
     pub labels: Vec<Label>,
 }
 

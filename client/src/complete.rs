@@ -1,10 +1,16 @@
 //! Numbers and names of experiments, for a shell that completes them.
 
-use std::{collections::BTreeMap, env, ffi::OsStr, thread, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    env,
+    ffi::OsStr,
+    thread,
+    time::Duration,
+};
 
 use clap::Parser as _;
 use clap_complete::{CompletionCandidate, PathCompleter, engine::ValueCompleter as _};
-use swarm_proto::v1::Experiment;
+use swarm_proto::v1::{Experiment, ListWorkersRequest};
 use tokio::time::timeout;
 
 use crate::{
@@ -21,14 +27,39 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// What a word may become that stands for an experiment or a group: what there is in the place of
 /// the command line, the environment and the settings file; nothing if it does not answer.
 pub fn experiments(word: &OsStr) -> Vec<CompletionCandidate> {
-    // The shell asks from within this program's runtime, which nothing may block.
-    let all = thread::spawn(fetch).join().ok().flatten().unwrap_or_default();
-    let word = word.to_string_lossy();
-    candidates(&all)
-        .into_iter()
-        .filter(|(value, _)| value.starts_with(&*word))
-        .map(|(value, help)| CompletionCandidate::new(value).help(Some(help.into())))
-        .collect()
+    offered(word, candidates(&all_experiments()))
+}
+
+/// The groups that there are.
+pub fn groups(word: &OsStr) -> Vec<CompletionCandidate> {
+    let all = all_experiments();
+    let groups = all.iter().filter(|it| !it.group.is_empty()).map(|it| it.group.clone());
+    offered(word, described(groups.collect(), "group"))
+}
+
+/// The labels that experiments have.
+pub fn labels(word: &OsStr) -> Vec<CompletionCandidate> {
+    let all = all_experiments();
+    let labels = all.iter().flat_map(|it| &it.labels).map(|(key, value)| format!("{key}={value}"));
+    offered(word, described(labels.collect(), "label"))
+}
+
+/// The keys of these.
+pub fn label_keys(word: &OsStr) -> Vec<CompletionCandidate> {
+    let all = all_experiments();
+    let keys = all.iter().flat_map(|it| it.labels.keys().cloned());
+    offered(word, described(keys.collect(), "label"))
+}
+
+/// The workers in quarantine.
+pub fn quarantined(word: &OsStr) -> Vec<CompletionCandidate> {
+    let workers = fetched(async |connection| {
+        let request = ListWorkersRequest {};
+        Some(connection.call_fleet(async |it| it.list_workers(request).await).await.ok()?.workers)
+    });
+    let workers = workers.unwrap_or_default().into_iter();
+    let distrusted = workers.filter(|it| !it.distrusted.is_empty());
+    offered(word, distrusted.map(|it| (it.name, it.distrusted)).collect())
 }
 
 /// The same, and files.
@@ -54,16 +85,41 @@ fn place() -> Vec<String> {
     found
 }
 
-fn fetch() -> Option<Vec<Experiment>> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().ok()?;
-    let args = Args::try_parse_from(place()).ok()?;
-    runtime.block_on(async {
-        let silent = Progress::new(OutputFormat::Json).silent();
-        let connection = Connection::open(args.settings, Intent::Read, &silent);
-        let connection = timeout(PATIENCE, connection).await.ok()?.ok()?;
-        let asking = connection.with_patience(Duration::ZERO);
-        timeout(PATIENCE, asking.experiments()).await.ok()?.ok()
-    })
+fn all_experiments() -> Vec<Experiment> {
+    fetched(async |connection| connection.experiments().await.ok()).unwrap_or_default()
+}
+
+/// What the place answers in time. The shell asks from within this program's runtime, which nothing
+/// may block.
+fn fetched<T: Send + 'static>(
+    ask: impl AsyncFnOnce(Connection) -> Option<T> + Send + 'static,
+) -> Option<T> {
+    let fetch = || {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().ok()?;
+        let args = Args::try_parse_from(place()).ok()?;
+        runtime.block_on(async {
+            let silent = Progress::new(OutputFormat::Json).silent();
+            let connection = Connection::open(args.settings, Intent::Read, &silent);
+            let connection = timeout(PATIENCE, connection).await.ok()?.ok()?;
+            timeout(PATIENCE, ask(connection.with_patience(Duration::ZERO))).await.ok()?
+        })
+    };
+    thread::spawn(fetch).join().ok().flatten()
+}
+
+/// Each with the same help.
+fn described(values: BTreeSet<String>, help: &str) -> Vec<(String, String)> {
+    values.into_iter().map(|value| (value, help.to_owned())).collect()
+}
+
+/// Those that a word may become.
+fn offered(word: &OsStr, candidates: Vec<(String, String)>) -> Vec<CompletionCandidate> {
+    let word = word.to_string_lossy();
+    candidates
+        .into_iter()
+        .filter(|(value, _)| value.starts_with(&*word))
+        .map(|(value, help)| CompletionCandidate::new(value).help(Some(help.into())))
+        .collect()
 }
 
 /// Numbers, then names that stand for one experiment or a group, each with what it is.
@@ -91,7 +147,47 @@ fn candidates(all: &[Experiment]) -> Vec<(String, String)> {
 
 #[cfg(test)]
 mod tests {
+    use clap::{Arg, Command, CommandFactory as _, ValueHint};
+    use clap_complete::ArgValueCompleter;
+
     use super::*;
+
+    /// All arguments that take a value, each with the command that has it.
+    fn arguments(command: &Command) -> Vec<(String, Arg)> {
+        let of_command = command.get_arguments().filter(|arg| arg.get_action().takes_values());
+        let name = command.get_name();
+        let own = of_command.map(|arg| (format!("{name} {arg}"), arg.clone()));
+        own.chain(command.get_subcommands().flat_map(arguments)).collect()
+    }
+
+    #[test]
+    fn whatever_a_place_has_is_offered_wherever_it_is_meant() {
+        /// What is new, and so is nowhere yet.
+        const NEW: [&str; 3] = ["fork --name <NAME>", "new <NAME>", "slurm --job-name <NAME>"];
+        /// What files say that are named beside it.
+        const OF_FILES: [&str; 2] = ["plot --metric <NAME>", "plot --condition <NAME>"];
+        let mut definition = Args::command();
+        definition.build();
+        let (mut n_things, mut n_paths) = (0, 0);
+        for (shown, arg) in arguments(&definition) {
+            let names = arg.get_value_names().unwrap_or_default();
+            let words: Vec<&str> = names.iter().flat_map(|name| name.split('|')).collect();
+            let means = |known: &[&str]| words.iter().any(|word| known.contains(word));
+            let is_new = NEW.contains(&&*shown) || OF_FILES.contains(&&*shown);
+            let offers = arg.get::<ArgValueCompleter>().is_some();
+            let things = ["ID", "ID@G", "ID@G/I", "ADDRESS", "GROUP", "NAME"];
+            let labels = ["KEY=VALUE", "KEY[=VALUE]", "KEY"];
+            if (means(&things) || means(&labels)) && !is_new && !shown.contains("--tls-domain") {
+                assert!(offers, "{shown}");
+                n_things += 1;
+            }
+            if means(&["FILE", "DIR", "DIRECTORY", "CONFIG", "PROGRAM"]) {
+                assert!(offers || arg.get_value_hint() != ValueHint::Unknown, "{shown}");
+                n_paths += 1;
+            }
+        }
+        assert!(n_things > 30 && n_paths > 60, "{n_things} {n_paths}");
+    }
 
     #[test]
     fn numbers_names_and_groups_are_completed_and_names_of_several_are_not() {

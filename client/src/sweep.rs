@@ -3,6 +3,7 @@
 use std::{collections::BTreeSet, str::FromStr};
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use coordinator::group::Membership;
 use experiment_file::{ConfigError, ExperimentConfig};
 use sha2::{Digest as _, Sha256};
@@ -11,6 +12,7 @@ use swarm_proto::v1::SubmitExperimentRequest;
 use crate::{
     args::{ExperimentArgs, Label},
     change::{Change, SetArg},
+    complete,
     error::Error,
     experiment_file::{ExperimentFile, Overrides, random_request_id},
     interrupt, json,
@@ -29,7 +31,7 @@ pub struct SweepArgs {
     #[command(flatten)]
     pub set: SetArg,
     /// Name of the group [default: the name of the experiment, if there are several runs]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", add = ArgValueCompleter::new(complete::groups))]
     pub group: Option<String>,
 }
 

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueHint};
 use serde::Serialize;
 use swarm_proto::v1::{ExperimentState, ExplainExperimentRequest};
 use swarm_telemetry::parse_positive_duration;
@@ -72,7 +72,7 @@ struct SlurmArgs {
     #[arg(long, value_name = "TIME", default_value = "15s", value_parser = parse_positive_duration)]
     interval: Duration,
     /// The worker's program on the nodes.
-    #[arg(long, value_name = "PROGRAM", env = "SWARM_WORKER", default_value = "worker")]
+    #[arg(long, value_name = "PROGRAM", value_hint = ValueHint::ExecutablePath, env = "SWARM_WORKER", default_value = "worker")]
     worker: String,
     /// Name of the jobs, of no other jobs [default: swarm-HOST-PORT of the coordinator]
     #[arg(long, value_name = "NAME")]

@@ -2,6 +2,7 @@
 //! they are found by.
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use swarm_proto::v1::{
     ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, LabelExperimentRequest,
     PruneExperimentRequest,
@@ -13,6 +14,7 @@ use super::{
 };
 use crate::{
     args::{Label, Target},
+    complete,
     connection::{Connection, present},
     consent::Consent,
     error::Error,
@@ -142,10 +144,10 @@ pub struct LabelArgs {
     #[command(flatten)]
     target: Target,
     /// Labels to add, or to give another value.
-    #[arg(value_name = "KEY=VALUE", required_unless_present = "remove")]
+    #[arg(value_name = "KEY=VALUE", add = ArgValueCompleter::new(complete::labels), required_unless_present = "remove")]
     labels: Vec<Label>,
     /// Keys of labels to remove.
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", add = ArgValueCompleter::new(complete::label_keys))]
     remove: Vec<String>,
 }
 

@@ -62,7 +62,7 @@ const CSV_KEYS: [&str; 28] = [
 #[command(visible_alias = "ls", after_help = HELP)]
 pub struct ListArgs {
     /// Name of a group of experiments [default: all experiments]
-    #[arg(value_name = "GROUP", add = ArgValueCompleter::new(complete::experiments))]
+    #[arg(value_name = "GROUP", add = ArgValueCompleter::new(complete::groups))]
     group: Option<String>,
     #[command(flatten)]
     filter: Filter,

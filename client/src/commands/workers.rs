@@ -1,13 +1,14 @@
 //! `swarmctl workers`: the connected workers, and letting one out of quarantine.
 
 use clap::Args;
+use clap_complete::ArgValueCompleter;
 use console::Style;
 use serde::Serialize;
 use swarm_proto::v1::{ListWorkersRequest, ReadmitWorkerRequest, Worker};
 
 use super::Remote;
 use crate::{
-    clock,
+    clock, complete,
     connection::Connection,
     error::Error,
     place::Intent,
@@ -81,7 +82,7 @@ impl<'a> From<&'a Worker> for Record<'a> {
 #[derive(Debug, Args)]
 pub struct WorkersArgs {
     /// Let this worker out of quarantine: it gets items again.
-    #[arg(long, value_name = "NAME", allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME", add = ArgValueCompleter::new(complete::quarantined), allow_hyphen_values = true)]
     readmit: Option<String>,
 }
 

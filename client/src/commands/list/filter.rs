@@ -3,9 +3,10 @@
 use std::cmp::{Ordering, Reverse};
 
 use clap::{Args, ValueEnum};
+use clap_complete::ArgValueCompleter;
 use swarm_proto::v1::{Experiment, ExperimentState};
 
-use crate::text;
+use crate::{complete, text};
 
 /// Which experiments to list, and in which order.
 #[derive(Debug, Default, Args)]
@@ -14,7 +15,7 @@ pub struct Filter {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "STATE")]
     state: Vec<State>,
     /// Only those with this label, with any value or with this one; of several all.
-    #[arg(long, value_name = "KEY[=VALUE]")]
+    #[arg(long, value_name = "KEY[=VALUE]", add = ArgValueCompleter::new(complete::labels))]
     label: Vec<String>,
     /// Those that are archived, too.
     #[arg(long)]
