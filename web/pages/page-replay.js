@@ -3,38 +3,22 @@
 
 import { element } from "swarm/dom.js";
 import { unpack } from "swarm/episode.js";
-import { ask, bar, complain, main, resolve } from "swarm/page.js";
+import { ask, askJson, bar, complain, main, resolve } from "swarm/page.js";
 import { NOWHERE, Player, heading, readAddress } from "swarm/player.js";
+import { trialStrip } from "swarm/trials.js";
+import { changesOf, whatIf } from "swarm/what-if.js";
 
 const address = decodeURIComponent(location.pathname.slice("/replay/".length));
 const [id, at] = address.split("@");
+const where = `${encodeURIComponent(id)}${at ? `@${at}` : ""}`;
 bar(`Replay ${address}`, "");
 
-/** What may be different, as the form shows it. */
-const FIELDS = [
-  ["trial", "trial", { type: "number", min: 0, max: 999 }],
-  ["generation", "worlds of generation", { type: "number", min: 0 }],
-  ["seed", "seed", { type: "number", min: 0 }],
-  ["robots", "robots", { type: "number", min: 1, max: 10000 }],
-  ["steps", "steps", { type: "number", min: 1, max: 100000 }],
-];
-const INHIBIT = ["wireless_receiver:msg", "wireless_receiver:signal", "wireless_receiver:receiving_direction", "wireless_receiver:sending_direction", "wireless_receiver:state", "light_sensor", "distance_sensor", "ground_sensor"];
-const PERTURB = ["leader_failure", "topology_switch"];
-
-const words = new URLSearchParams(location.search);
-const inputs = Object.fromEntries(FIELDS.map(([name, , attributes]) => [name, element("input", { ...attributes, id: `what-if-${name}`, value: words.get(name) ?? "", className: "number" })]));
-const choice = (name, options) => {
-  inputs[name] = element("select", { id: `what-if-${name}` }, ...["", ...options].map((option) => element("option", { value: option, selected: option === (words.get(name) ?? "") }, option || "nothing")));
-  return inputs[name];
-};
-const form = element("form", { className: "panel what-if" }, element("b", {}, "What if"),
-  ...FIELDS.map(([name, text]) => element("label", {}, text, inputs[name])),
-  element("label", {}, "nobody gets", choice("inhibit", INHIBIT)), element("label", {}, "trouble", choice("perturb", PERTURB)),
-  element("button", { type: "submit", id: "again" }, "Simulate"),
-  element("button", { type: "button", id: "beside", title: "the one above, and the changed one next to it", onclick: () => go(true) }, "Side by side"));
-const stage = element("div", { className: "replays" });
 const neighbours = element("p", { className: "row" }, element("a", { href: `/experiment/${id}` }, `experiment ${id}`));
-main.replaceChildren(neighbours, stage, form);
+const loading = element("p", { className: "loading muted", role: "status" });
+const stage = element("div", { className: "replays" });
+const strip = element("div");
+const formPlace = element("div");
+main.replaceChildren(neighbours, loading, stage, strip, formPlace);
 
 if (at?.includes("/") && !at.endsWith("mean")) {
   const [generation, individual] = at.split("/").map(Number);
@@ -46,14 +30,19 @@ if (at?.includes("/") && !at.endsWith("mean")) {
   neighbours.append(element("a", { href: `/replay/${id}` }, "champion"));
 }
 
-/** What the form says, without what is left to the experiment. */
-function query() {
-  const filled = Object.entries(inputs).map(([name, input]) => [name, input.value.trim()]).filter(([, value]) => value !== "");
-  return new URLSearchParams(filled);
+/** Says what is waited for, if that takes longer than a moment. */
+async function waitingFor(text, work) {
+  const timer = setTimeout(() => (loading.textContent = text), 300);
+  try {
+    return await work;
+  } finally {
+    clearTimeout(timer);
+    loading.textContent = "";
+  }
 }
 
 async function simulated(words) {
-  const response = await ask(`/api/replay/${encodeURIComponent(id)}${at ? `@${at}` : ""}?${words}`);
+  const response = await ask(`/api/replay/${where}?${words}`);
   return unpack(await response.arrayBuffer());
 }
 
@@ -61,24 +50,37 @@ async function simulated(words) {
 let players = [];
 /** Counts what was asked for: only the latest answer is shown. */
 let asked = 0;
+let config = null;
+let trials = null;
+let form = null;
+/** The trial of the judgement that is played; null: the one that is played by itself. */
+let judged = new URLSearchParams(location.search).get("judged");
+
+/** The words of an address that choose a world: of the judgement, unless a generation is named. */
+function withWorld(words) {
+  if (judged === null || words.has("generation") || words.has("trial")) return words;
+  return new URLSearchParams([["judged", judged], ...words]);
+}
 
 /** Shows the episode of the address: changed, or as it was with the changed one beside it. */
 async function show(words, isBeside) {
   const mine = ++asked;
   stage.setAttribute("aria-busy", "true");
   try {
-    const wanted = isBeside ? [new URLSearchParams(), words] : [words];
-    const episodes = await Promise.all(wanted.map(simulated));
+    const wanted = isBeside ? [withWorld(new URLSearchParams()), words] : [words];
+    const episodes = await waitingFor("simulating …", Promise.all(wanted.map(simulated)));
     if (mine !== asked) return;
     const old = players[0];
     old?.clock.pause();
     const first = new Player(episodes[0]);
     const others = episodes.slice(1).map((episode) => new Player(episode, { place: NOWHERE, clock: first.clock, suffix: "-beside" }));
     players = [first, ...others];
-    stage.replaceChildren(...players.map((player) => element("div", {}, heading(player.episode, player.suffix), player.node)));
+    const changes = wanted.map((words) => changesOf(words, config));
+    stage.replaceChildren(...players.map((player, i) => element("div", {}, heading(player.episode, { suffix: player.suffix, trials, changes: changes[i] }), player.node)));
     stage.classList.toggle("two", isBeside);
+    drawStrip(episodes[0]);
     // Who fills in the form goes on with that.
-    if (!form.contains(document.activeElement)) first.node.focus({ preventScroll: true });
+    if (!form?.node.contains(document.activeElement)) first.node.focus({ preventScroll: true });
     resolve("replay");
   } catch (error) {
     if (mine === asked) complain(error, "replay");
@@ -86,21 +88,50 @@ async function show(words, isBeside) {
   if (mine === asked) stage.removeAttribute("aria-busy");
 }
 
-/** Shows what the form says, and keeps it in the address. */
-function go(isBeside) {
-  if (!form.reportValidity()) return undefined;
-  const words = query();
-  const shown = new URLSearchParams([...words, ...(isBeside ? [["beside", 1]] : [])]);
-  history.replaceState(null, "", `${location.pathname}?${shown}${location.hash}`);
-  return show(words, isBeside);
+/** The trials to pick from, if there are several. */
+function drawStrip(episode) {
+  if (!trials || trials.fitness.length < 2) return;
+  const isOneOfThem = episode.trial_set === (trials.is_judgement ? "judgement" : "generation") && episode.generation === trials.generation;
+  strip.replaceChildren(trialStrip(trials, isOneOfThem ? episode.trial : null, (trial) => {
+    const words = form.query();
+    for (const name of ["generation", "trial"]) words.delete(name);
+    if (trials.is_judgement) judged = String(trial);
+    else words.set("trial", trial);
+    remember(words, false);
+    show(withWorld(words), false);
+  }));
 }
 
-form.addEventListener("submit", (event) => {
-  event.preventDefault();
-  go(false);
-});
+/** Keeps what is shown in the address. */
+function remember(words, isBeside) {
+  const shown = new URLSearchParams([...withWorld(words), ...(isBeside ? [["beside", 1]] : [])]);
+  history.replaceState(null, "", `${location.pathname}${shown.size ? `?${shown}` : ""}${location.hash}`);
+}
+
+/** Shows what the form says. */
+function go(isBeside) {
+  if (!form.node.reportValidity()) return undefined;
+  const words = form.query();
+  remember(words, isBeside);
+  return show(withWorld(words), isBeside);
+}
+
+async function start() {
+  // Somebody clicked an individual to see it move; an address with a step is to be looked at.
+  const plays = location.hash === "" && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const words = new URLSearchParams(location.search);
+  const isBeside = words.has("beside");
+  for (const name of ["beside", "judged"]) words.delete(name);
+  const answers = Promise.all([askJson(`/api/experiments/${id}`), askJson(`/api/trials/${where}`)]);
+  const [experiment, known] = await waitingFor("simulating the trials by which it is known …", answers);
+  config = experiment.config;
+  trials = known;
+  const played = trials.is_judgement ? { trial_set: "judgement" } : { trial_set: "generation", generation: trials.generation, trial: 0 };
+  form = whatIf({ config, words, played, go });
+  formPlace.replaceChildren(form.node);
+  await show(withWorld(words), isBeside);
+  if (plays) players[0]?.clock.toggle();
+}
+
 addEventListener("hashchange", () => players[0]?.goTo(readAddress()));
-// Somebody clicked an individual to see it move; an address with a step is to be looked at.
-const plays = location.hash === "" && !matchMedia("(prefers-reduced-motion: reduce)").matches;
-await show(query(), words.has("beside"));
-if (plays) players[0]?.clock.toggle();
+start().catch((error) => complain(error, "replay"));

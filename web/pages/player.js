@@ -4,6 +4,7 @@ import { Clock, clamp } from "swarm/clock.js";
 import { decimals, element } from "swarm/dom.js";
 import { robotPanel } from "swarm/robot-panel.js";
 import { timeline } from "swarm/timeline.js";
+import { worthOf } from "swarm/trials.js";
 import { World } from "swarm/world.js";
 
 const HELP = [
@@ -193,16 +194,21 @@ function isTyped({ target, key }) {
   return key === " " && target.closest?.("button, summary, a, input[type=checkbox]") !== null;
 }
 
-/** What an episode is, above it. `suffix`: as that of its player. */
-export function heading(episode, suffix = "") {
-  const worlds = episode.generation === null ? "worlds of evaluations" : `worlds of generation ${episode.generation}`;
+/** Which worlds an episode is of, for people. */
+function worlds({ trial_set: set, generation, trial }) {
+  const names = { judgement: `trial ${trial} of its judgement`, "held-out": `held-out trial ${trial} after generation ${generation}`, evaluation: `trial ${trial} of evaluations` };
+  return names[set] ?? `trial ${trial} of generation ${generation}`;
+}
+
+/** What an episode is, above it. `suffix`: as that of its player; `trials`: those that the
+ *  individual is known by; `changes`: what is different from how it evolved. */
+export function heading(episode, { suffix = "", trials = null, changes = [] } = {}) {
   const measures = Object.entries(episode.measures).map(([name, mean]) => `${name.replaceAll("_", " ")} ${decimals(mean, 3)}`);
   return element("header", { className: "episode" },
-    element("h1", {}, episode.name),
-    element("p", { className: "muted" },
-      `${episode.experiment}, ${episode.n_robots} robots, seed ${episode.seed}, ${worlds}, trial ${episode.trial}`),
-    element("p", { id: `result${suffix}` }, element("b", {}, `fitness ${decimals(episode.fitness, 4)}`), ` (${episode.fitness_function})`,
-      element("span", { className: "muted" }, measures.length ? ` · ${measures.join(" · ")}` : "")));
+    element("h1", {}, episode.name, ...changes.map((text) => element("span", { className: "change" }, text))),
+    element("p", { className: "muted" }, `${episode.experiment}, ${episode.n_robots} robots, seed ${episode.seed}, ${worlds(episode)}`),
+    element("p", { id: `result${suffix}` }, element("b", {}, `this trial ${decimals(episode.fitness, 4)}`), ...worthOf(trials),
+      element("span", { className: "muted" }, ` · ${episode.fitness_function}${measures.length ? ` · ${measures.join(" · ")}` : ""}`)));
 }
 
 /** Step and robot after the # of an address. */

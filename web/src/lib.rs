@@ -1,6 +1,7 @@
 //! What people see of experiments in a browser: pages, and the replay of episodes.
 //!
 //! - [`Replay`]: an episode, simulated again and packed for the player
+//! - [`Trials`]: the trials of which a replay shows one
 //! - [`replay_file`]: the player with an episode, as one HTML file
 //! - [`Site`]: the pages over HTTP, made of what an [`Archive`] and a [`Control`] say
 //! - `modules`: the JavaScript and the style, from the folder `pages`
@@ -13,9 +14,11 @@ mod replay;
 mod replay_file;
 mod server;
 mod source;
+mod trials;
 mod what_if;
 
 pub use replay::{Episode, Replay, ReplayError};
 pub use replay_file::replay_file;
 pub use server::Site;
 pub use source::{Action, Archive, Assignment, Control, Fate};
+pub use trials::Trials;

@@ -48,6 +48,8 @@ modules!(
     "robot-panel.js",
     "scales.js",
     "timeline.js",
+    "trials.js",
+    "what-if.js",
     "world.js",
 );
 

@@ -16,8 +16,10 @@ pub struct WhatIf {
     pub seed: Option<u64>,
     /// Whose worlds.
     pub generation: Option<u64>,
-    /// Which of them.
-    pub trial: u32,
+    /// Which of them; unless one of these is named, a champion plays a trial of its judgement.
+    pub trial: Option<u32>,
+    /// Which trial of the judgement; the median without a number.
+    pub judged: Option<u32>,
     /// Steps of the episode.
     pub steps: Option<u32>,
     /// Robots of the object that evolves.

@@ -148,7 +148,7 @@ class Pages(BrowserTest):
     def test_what_if_there_were_more_robots(self):
         self.open("/replay/1#step=50")
         self.wait_for_text(".episode", "5 robots")
-        self.find("#what-if-robots").send_keys("9")
+        self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "9")
         self.find("#beside").click()
         self.wait(lambda: len(self.browser.find_elements(By.CSS_SELECTOR, ".player")) == 2, "one player")
         headings = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, ".episode")]

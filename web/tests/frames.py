@@ -47,7 +47,7 @@ class Frames(BrowserTest):
         robots["initializers"]["positions"]["params"].update(low=0, high=1000)
         file, html = (directory / f"{n_robots}.{end}" for end in ("json", "html"))
         file.write_text(json.dumps(config))
-        command = ["replay", "--config", file, "--genotype", ROOT / "results/champions/light_follower_snes-0.json"]
+        command = ["replay", "--config", file, "--genotype", ROOT / "results/champions/light_follower_snes-0.json", "--changed-conditions"]
         subprocess.run([PROGRAMS / "swarmctl", *command, "--steps", str(STEPS), "--to", html], check=True, capture_output=True)
         return html
 

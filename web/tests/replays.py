@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import tempfile
 import unittest
+import urllib.request
 
 from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
 
@@ -39,11 +40,11 @@ class Replays(BrowserTest):
             self.find("#what-if-robots").send_keys(Keys.ENTER)
 
         for expected, act in [
-            ("7 robots", lambda: (self.find("#what-if-robots").send_keys("7"), press("#again"))),
+            ("7 robots", lambda: (self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "7"), press("#again"))),
             ("6 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("6"), enter())),
             ("6 robots", lambda: press("#beside")),
             ("8 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("8"), press("#beside"))),
-            ("9 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys("9"), press("#again"), press("#again"))),
+            ("9 robots", lambda: (self.find("#what-if-robots").clear(), self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "9"), press("#again"), press("#again"))),
         ]:
             if expected == "7 robots":
                 self.open("/replay/1")
@@ -54,6 +55,58 @@ class Replays(BrowserTest):
             self.script("document.querySelector('#play').click()")
             before = self.texts(".step")
             self.wait(lambda: self.texts(".step") != before, "it does not play")
+
+    def test_a_champion_plays_the_median_of_its_trials_and_others_are_a_click_away(self):
+        self.open("/replay/1")
+        self.wait_for_text("#result", "judged")
+        known = self.script("return fetch('/api/trials/1').then((it) => it.json())")
+        fitness, median, worst = known["fitness"], known["median"], known["worst"]
+        self.assertEqual((len(fitness), sorted(fitness)[99], min(fitness)), (200, fitness[median], fitness[worst]))
+        self.wait_for_text(".episode", f"trial {median} of its judgement")
+        low, high = (f"{it:.4f}" for it in known["interval"])
+        self.assertIn(f"this trial {fitness[median]:.4f}, judged {known['mean']:.4f} ({low} to {high}, 200 trials)", self.text("#result"))
+        self.assertEqual(len(self.browser.find_elements(By.CSS_SELECTOR, ".strip .bar")), 200)
+        self.find("#trial-worst").click()
+        self.wait_for_text(".episode", f"trial {worst} of its judgement")
+        self.assertIn(f"this trial {fitness[worst]:.4f}", self.text("#result"))
+        self.assertIn(f"judged={worst}", self.browser.current_url)
+        self.browser.refresh()
+        self.wait_for_text(".episode", f"trial {worst} of its judgement")
+        # The strip goes from the worst to the best.
+        second = sorted(range(200), key=lambda it: (fitness[it], it))[1]
+        self.script("document.querySelector('.strip').focus()")
+        webdriver.ActionChains(self.browser).send_keys(Keys.ARROW_RIGHT, Keys.ENTER).perform()
+        self.wait_for_text(".episode", f"trial {second} of its judgement")
+        # What is simulated is one of them, to the same bits.
+        self.assertIn(f"this trial {fitness[second]:.4f}", self.text("#result"))
+
+    def test_a_file_of_a_champion_says_which_trial_it_plays_and_what_it_is_worth(self):
+        html = pathlib.Path(self.fleet.directory.name) / "champion.html"
+        self.fleet.swarmctl("replay", "1", "--to", str(html))
+        self.browser.get(html.as_uri())
+        known = json.loads(urllib.request.urlopen(self.fleet.pages + "/api/trials/1").read())
+        self.wait_for_text(".episode", f"trial {known['median']} of its judgement")
+        self.assertIn(f"judged {known['mean']:.4f}", self.text("#result"))
+
+    def test_the_form_has_todays_values_and_marks_what_is_changed(self):
+        self.open("/replay/1#step=5")
+        value = lambda name: self.find(f"#what-if-{name}").get_attribute("value")
+        self.wait_for_text(".what-if", "robots")
+        self.assertEqual([value(name) for name in ["robots", "steps"]], ["5", "100"])
+        self.assertFalse(self.texts(".changed"))
+        offered = self.texts("#what-if-inhibit option")
+        self.assertEqual(offered, ["nothing", "direction", "message", "mode"])
+        self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "8")
+        self.assertEqual(self.script("return document.querySelector('.changed input').id"), "what-if-robots")
+        self.script("document.querySelector('#what-if-inhibit').value = 'wireless_receiver:msg'; document.querySelector('#what-if-inhibit').dispatchEvent(new Event('input', { bubbles: true }))")
+        self.find("#again").click()
+        self.wait_for_text("h1", "8 robotsnobody gets message")
+        words = self.browser.current_url
+        self.assertIn("robots=8", words)
+        self.assertNotIn("steps=", words)
+        self.find("#reset").click()
+        self.wait(lambda: "8 robots" not in self.text("h1"), "it stays changed")
+        self.assertNotIn("robots=", self.browser.current_url)
 
     def test_a_world_without_a_size_is_not_drawn_and_comes_back(self):
         self.open("/replay/1#step=3")
@@ -95,7 +148,7 @@ class Replays(BrowserTest):
     def test_two_side_by_side_are_locked_and_stay_so(self):
         self.open("/replay/1#step=50")
         self.wait_for_text(".episode", "5 robots")
-        self.find("#what-if-robots").send_keys("9")
+        self.find("#what-if-robots").send_keys(Keys.BACKSPACE, "9")
         self.find("#beside").click()
         self.wait(lambda: len(self.texts(".player")) == 2, "one player")
         ids = "return [...document.querySelectorAll('[id]')].map((it) => it.id)"

@@ -9,7 +9,7 @@ use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
 use sim_core::TrialSet;
 use swarm_proto::v1::JudgedFitness;
-use swarm_web::{Episode, Replay, ReplayError, replay_file};
+use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
 
 use self::picture::Moments;
 use super::simulate::genotype::Genotype;
@@ -102,6 +102,8 @@ pub async fn replay(
         let parsed = Change::parse_all(text);
         changes.extend(parsed.map_err(|problem| Error::Input(format!("--set {problem}")))?);
     }
+    let is_as_evolved =
+        changes.is_empty() && args.seed.seed.is_none() && args.steps.steps.is_none();
     let overrides =
         Overrides { seed: args.seed.seed, steps: args.steps.steps, ..Overrides::default() };
     let compiled = file.changed(&changes).and_then(|file| file.compile(&overrides));
@@ -115,10 +117,16 @@ pub async fn replay(
         trial_set: TrialSet::Generation(args.generation.unwrap_or(generation)),
         trial: args.trial.unwrap_or_default(),
     };
+    let mut trials = None;
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
-            let (trial, what) = judged_trial(&episode, &judged, args.judged)?;
+            let all = Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
+                .map_err(|error| Error::Input(format!("{name}: {error}")))?
+                .expect("nothing stops it");
+            let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
             progress.remark(&what);
+            // Of a changed swarm, nothing was judged.
+            trials = is_as_evolved.then_some(all);
             Episode { trial_set: TrialSet::Judgement(judged.generation), trial, ..episode }
         }
         None if args.judged.is_some() => {
@@ -129,7 +137,7 @@ pub async fn replay(
         _ => episode,
     };
     let bytes = match format {
-        Format::Html => html(&episode)?.into_bytes(),
+        Format::Html => html(&episode, trials)?.into_bytes(),
         Format::Png => png(&episode, args.at)?,
     };
     args.overwrite.write(&path, &bytes)?;
@@ -146,12 +154,7 @@ struct Subject {
 }
 
 /// The trial of a judgement that is wanted, or the median one; and what is to be said of it.
-fn judged_trial(
-    episode: &Episode<'_>,
-    judged: &JudgedFitness,
-    wanted: Option<u32>,
-) -> Result<(u32, String), Error> {
-    let JudgedFitness { generation, trials: n, .. } = *judged;
+fn judged_trial(trials: &Trials, n: u32, wanted: Option<u32>) -> Result<(u32, String), Error> {
     if let Some(trial) = wanted {
         if trial >= n {
             let last = n.saturating_sub(1);
@@ -159,24 +162,14 @@ fn judged_trial(
         }
         return Ok((trial, format!("playing trial {trial} of the {n} by which it was judged")));
     }
-    let trial_set = TrialSet::Judgement(generation);
-    let fitness = episode.simulation.evaluate(episode.genotype, trial_set, 0..n);
-    let fitness = fitness.map_err(|error| Error::Input(format!("{}: {error}", episode.name)))?;
-    let trial = median(&fitness);
-    let value = fitness.get(trial as usize).copied().unwrap_or_default();
+    let trial = trials.median();
+    let value = trials.fitness(trial);
     let what = format!(
         "playing trial {trial} of the {n} by which it was judged, the median: fitness {}; \
          others: --judged N, or --trial N of its generation",
         text::number(value, 6)
     );
     Ok((trial, what))
-}
-
-/// Where the median is; of two, the lower one.
-fn median(fitness: &[f64]) -> u32 {
-    let mut order: Vec<u32> = (0..fitness.len() as u32).collect();
-    order.sort_by(|&a, &b| fitness[a as usize].total_cmp(&fitness[b as usize]));
-    order.get(fitness.len().saturating_sub(1) / 2).copied().unwrap_or_default()
 }
 
 /// What a file holds.
@@ -186,12 +179,15 @@ enum Format {
     Png,
 }
 
-fn html(episode: &Episode<'_>) -> Result<String, Error> {
+fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> {
     let replay = Replay::simulate(episode).map_err(|error| match error {
         ReplayError::Evaluate(error) => Error::Input(format!("{}: {error}", episode.name)),
         error => Error::Input(error.to_string()),
     })?;
-    Ok(replay_file(&replay))
+    Ok(replay_file(&match trials {
+        Some(trials) => replay.of_trials(trials),
+        None => replay,
+    }))
 }
 
 fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error> {

@@ -21,6 +21,7 @@ use self::{
     robots::{ROBOT_COLUMNS, RobotColumn},
     scene::Scene,
 };
+use crate::trials::Trials;
 
 /// Values of all robots in all steps: some 1,000 steps of 1,000 robots, or 250 MB.
 const VALUES_MAX: usize = 64_000_000;
@@ -107,6 +108,13 @@ impl Replay {
             simulation.simulate_while(genotype, trial_set, trial, keep_going, &mut observe)?;
         let summary = summary.ok_or(ReplayError::Stopped)?;
         Ok(Self { scene, summary, columns: columns.into_vec() })
+    }
+
+    /// The same, that says of which trials it shows one.
+    #[must_use]
+    pub fn of_trials(mut self, trials: Trials) -> Self {
+        self.scene.trials = Some(trials);
+        self
     }
 
     /// What the player reads.

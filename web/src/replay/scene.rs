@@ -7,6 +7,7 @@ use serde::Serialize;
 use sim_core::{MeasureName, TrialSet};
 
 use super::Episode;
+use crate::trials::Trials;
 
 /// An episode but for its steps.
 #[derive(Debug, Serialize)]
@@ -18,7 +19,11 @@ pub struct Scene {
     seed: Seed,
     /// Of the worlds, if they are a generation's.
     generation: Option<u64>,
+    /// What the trials are for.
+    trial_set: &'static str,
     trial: u32,
+    /// All of them, as far as that is known.
+    pub trials: Option<Trials>,
     fitness_function: &'static str,
     pub steps: u32,
     /// cm
@@ -52,6 +57,8 @@ struct Robots {
     stimuli: Vec<Rows>,
     /// Whether a network decides.
     has_network: bool,
+    sees_lights: bool,
+    sees_areas: bool,
 }
 
 /// Rows that have a name together.
@@ -64,6 +71,8 @@ struct Rows {
 /// A light, or a ground area.
 #[derive(Debug, Serialize)]
 pub struct Disc {
+    /// The object's, such as `nest`.
+    name: String,
     color: String,
     /// cm
     range: f64,
@@ -78,19 +87,26 @@ impl Scene {
         let n_inputs = |robots: &Robots| robots.stimuli.iter().map(|it| it.n as usize).sum();
         let message_len = config.robots().filter_map(|(_, robot)| message_len(robot)).max();
         let discs = |of: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
-            let kinds = config.world.objects.values().filter_map(of);
-            let disc = |range, color: &str| Disc { color: color.into(), range };
-            kinds.flat_map(|(n, range, color)| (0..n).map(move |_| disc(range, color))).collect()
+            let objects = config.world.objects.iter();
+            let kinds = objects.filter_map(|(name, object)| Some((name, of(object)?)));
+            let each = kinds.flat_map(|(name, (n, range, color))| {
+                (0..n).map(move |_| Disc { name: name.clone(), color: color.into(), range })
+            });
+            each.collect()
         };
         Self {
             name: episode.name.to_owned(),
             experiment: config.name.clone(),
             seed: Seed(config.seed),
-            generation: match episode.trial_set {
-                TrialSet::Generation(generation) => Some(generation),
-                _ => None,
+            generation: episode.trial_set.generation(),
+            trial_set: match episode.trial_set {
+                TrialSet::Generation(_) => "generation",
+                TrialSet::HeldOut { .. } => "held-out",
+                TrialSet::Judgement(_) => "judgement",
+                TrialSet::Evaluation => "evaluation",
             },
             trial: episode.trial,
+            trials: None,
             fitness_function: config.algorithm.fitness_function.name(),
             steps: config.algorithm.evaluation_steps,
             width: config.world.width,
@@ -137,6 +153,8 @@ impl Robots {
                 rows([("light_sensor", light)].into_iter())
             },
             has_network,
+            sees_lights: light > 0,
+            sees_areas: robot.sensors.reading_len(SensorQuery::Ground).is_some_and(|n| n > 0),
         }
     }
 }

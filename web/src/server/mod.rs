@@ -41,6 +41,7 @@ use self::{
     list::List,
     live::Latest,
     problem::Problem,
+    replays::Judgements,
 };
 
 /// What is served, and to whom.
@@ -66,6 +67,7 @@ struct Shared {
     explanations: Arc<Explanations>,
     latest: Arc<Latest>,
     list: Arc<List>,
+    judgements: Arc<Judgements>,
     replays: Arc<Semaphore>,
     shutdown: CancellationToken,
 }
@@ -97,6 +99,7 @@ impl Site {
             explanations: Arc::default(),
             latest: Arc::default(),
             list: Arc::default(),
+            judgements: Arc::default(),
             replays: Arc::new(Semaphore::new(REPLAYS_MAX)),
             shutdown,
         };
@@ -115,6 +118,7 @@ impl Site {
             .route("/experiments/{id}/explain", get(fleet::explain))
             .route("/experiments/{id}/{action}", post(fleet::steer))
             .route("/replay/{*address}", get(replays::replay))
+            .route("/trials/{*address}", get(replays::trials))
             .fallback(Problem::nowhere)
             .method_not_allowed_fallback(Problem::nowhere)
             .layer(middleware::from_fn(compression::compress))

@@ -1,8 +1,9 @@
 //! Episodes for the player, simulated when they are asked for.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use axum::{
+    Json,
     extract::State,
     http::{StatusCode, header::CONTENT_TYPE},
     response::{IntoResponse, Response},
@@ -11,6 +12,7 @@ use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
 use sim_core::{FINGERPRINT, Simulation, TrialSet};
 use swarm_proto::v1::GetChampionResponse;
+use tokio::sync::{Mutex, OnceCell};
 
 use super::{
     Shared,
@@ -18,8 +20,112 @@ use super::{
 };
 use crate::{
     replay::{Episode, Replay},
+    trials::Trials,
     what_if::WhatIf,
 };
+
+/// Judgements whose trials were simulated again, by experiment and generation.
+#[derive(Debug, Default)]
+pub struct Judgements(Mutex<BTreeMap<(u64, u64), Arc<OnceCell<Trials>>>>);
+
+/// Judgements that are kept for other pages.
+const JUDGEMENTS_MAX: usize = 64;
+
+impl Judgements {
+    async fn of(&self, experiment: u64, generation: u64) -> Arc<OnceCell<Trials>> {
+        let mut known = self.0.lock().await;
+        if known.len() >= JUDGEMENTS_MAX {
+            known.clear();
+        }
+        Arc::clone(known.entry((experiment, generation)).or_default())
+    }
+}
+
+/// Somebody who can be simulated again.
+#[derive(Clone)]
+struct Subject {
+    experiment: u64,
+    config_json: String,
+    individual: GetChampionResponse,
+    name: String,
+}
+
+impl Subject {
+    async fn find(shared: &Shared, address: &str) -> Result<Self, Problem> {
+        let experiment = address.split('@').next().and_then(|id| id.parse().ok());
+        let experiment =
+            experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
+        let individual = shared.archive.individual(address).await?;
+        let found = shared.archive.experiment(experiment).await?;
+        let simulation = found.experiment.map(|it| it.simulation).unwrap_or_default();
+        if simulation != FINGERPRINT {
+            let why =
+                format!("it was computed with \"{simulation}\", and this is \"{FINGERPRINT}\"");
+            return Err(Problem::new(StatusCode::CONFLICT, why));
+        }
+        let name = name(address, &individual);
+        Ok(Self { experiment, config_json: found.config_json, individual, name })
+    }
+
+    /// The experiment with what is to be different.
+    fn compile(&self, what_if: &WhatIf) -> Result<(ExperimentConfig, Simulation), Problem> {
+        let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
+        let config = ExperimentConfig::from_json(&self.config_json, "", ALGORITHMS);
+        let (config, _) = config.map_err(|error| bad(&error))?;
+        let config = what_if.apply(config).map_err(|error| bad(&error))?;
+        let simulation = Simulation::compile(&config).map_err(|error| bad(&error))?;
+        Ok((config, simulation))
+    }
+
+    /// Its trials: those of its judgement, or else of its generation.
+    async fn trials(&self, shared: &Shared) -> Result<Trials, Problem> {
+        let GetChampionResponse { generation, trial_fitness, judged, .. } = &self.individual;
+        let Some(judged) = judged.filter(|judged| judged.trials > 0) else {
+            return Ok(Trials::of_generation(*generation, trial_fitness.clone()));
+        };
+        let known = shared.judgements.of(self.experiment, judged.generation).await;
+        let subject = self.clone();
+        let trials = known.get_or_try_init(|| {
+            work(shared, move |keep_going| {
+                let (_, simulation) = subject.compile(&WhatIf::default())?;
+                let genotype = &subject.individual.genotype;
+                Trials::of_judgement(&simulation, genotype, &judged, keep_going)
+                    .map_err(|error| Problem::bad(error.to_string()))?
+                    .ok_or_else(stopping)
+            })
+        });
+        trials.await.cloned()
+    }
+}
+
+fn stopping() -> Problem {
+    Problem::new(StatusCode::SERVICE_UNAVAILABLE, "the server stops")
+}
+
+/// Simulates when it is its turn; ends with the server, and when the browser goes away.
+async fn work<T: Send + 'static>(
+    shared: &Shared,
+    simulate: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    let permit = Arc::clone(&shared.replays).acquire_owned().await.map_err(|_| stopping())?;
+    let end = shared.shutdown.child_token();
+    let _ended_with_the_request = end.clone().drop_guard();
+    let simulating = tokio::task::spawn_blocking(move || {
+        let _permit = permit;
+        simulate(&|| !end.is_cancelled())
+    });
+    simulating.await.map_err(|_| {
+        Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "simulating panicked; please report this")
+    })?
+}
+
+/// The trials of whoever is at an address.
+pub async fn trials(
+    State(shared): State<Shared>,
+    Path(address): Path<String>,
+) -> Result<Json<Trials>, Problem> {
+    Ok(Json(Subject::find(&shared, &address).await?.trials(&shared).await?))
+}
 
 /// The episode of the individual at an address, with what is to be different.
 pub async fn replay(
@@ -27,54 +133,46 @@ pub async fn replay(
     Path(address): Path<String>,
     Query(what_if): Query<WhatIf>,
 ) -> Result<Response, Problem> {
-    let experiment = address.split('@').next().and_then(|id| id.parse().ok());
-    let experiment = experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
-    let individual = shared.archive.individual(&address).await?;
-    let found = shared.archive.experiment(experiment).await?;
-    let simulation = found.experiment.map(|it| it.simulation).unwrap_or_default();
-    if simulation != FINGERPRINT {
-        let why = format!("it was computed with \"{simulation}\", and this is \"{FINGERPRINT}\"");
-        return Err(Problem::new(StatusCode::CONFLICT, why));
-    }
-    let stopping = || Problem::new(StatusCode::SERVICE_UNAVAILABLE, "the server stops");
-    let permit = Arc::clone(&shared.replays).acquire_owned().await.map_err(|_| stopping())?;
-    // Ends with the server, and when the browser goes away.
-    let end = shared.shutdown.child_token();
-    let _ended_with_the_request = end.clone().drop_guard();
-    let simulating = tokio::task::spawn_blocking(move || {
-        let _permit = permit;
-        let keep_going = || !end.is_cancelled();
-        simulate(&found.config_json, &individual, &address, &what_if, &keep_going)
+    let subject = Subject::find(&shared, &address).await?;
+    let (trial_set, trial) = world(&shared, &subject, &what_if).await?;
+    let packed = work(&shared, move |keep_going| {
+        let (config, simulation) = subject.compile(&what_if)?;
+        let Subject { individual, name, .. } = &subject;
+        let (config, simulation, genotype) = (&config, &simulation, &*individual.genotype);
+        let episode = Episode { config, simulation, genotype, name, trial_set, trial };
+        let replay = Replay::simulate_while(&episode, keep_going);
+        Ok(replay.map_err(|error| Problem::bad(error.to_string()))?.encode())
     });
-    let packed = simulating.await.map_err(|_| {
-        Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "simulating panicked; please report this")
-    })??;
-    Ok(([(CONTENT_TYPE, "application/octet-stream")], packed).into_response())
+    Ok(([(CONTENT_TYPE, "application/octet-stream")], packed.await?).into_response())
 }
 
-fn simulate(
-    config_json: &str,
-    individual: &GetChampionResponse,
-    address: &str,
+/// In which world it plays: a champion in the median one of those by which it was judged.
+async fn world(
+    shared: &Shared,
+    subject: &Subject,
     what_if: &WhatIf,
-    keep_going: &dyn Fn() -> bool,
-) -> Result<Vec<u8>, Problem> {
-    let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
-    let (config, _) =
-        ExperimentConfig::from_json(config_json, "", ALGORITHMS).map_err(|error| bad(&error))?;
-    let config = what_if.apply(config).map_err(|error| bad(&error))?;
-    let simulation = Simulation::compile(&config).map_err(|error| bad(&error))?;
-    let generation = what_if.generation.unwrap_or(individual.generation);
-    let episode = Episode {
-        config: &config,
-        simulation: &simulation,
-        genotype: &individual.genotype,
-        name: &name(address, individual),
-        trial_set: TrialSet::Generation(generation),
-        trial: what_if.trial,
-    };
-    let replay = Replay::simulate_while(&episode, keep_going);
-    Ok(replay.map_err(|error| bad(&error))?.encode())
+) -> Result<(TrialSet, u32), Problem> {
+    let individual = &subject.individual;
+    let judged = individual.judged.filter(|judged| judged.trials > 0);
+    let is_named = what_if.trial.is_some() || what_if.generation.is_some();
+    match (what_if.judged, judged) {
+        (Some(trial), Some(judged)) if trial < judged.trials => {
+            Ok((TrialSet::Judgement(judged.generation), trial))
+        }
+        (Some(trial), Some(judged)) => {
+            let last = judged.trials - 1;
+            Err(Problem::bad(format!("judged={trial}: the trials are 0 to {last}")))
+        }
+        (Some(_), None) => Err(Problem::bad("it has not been judged")),
+        (None, Some(judged)) if !is_named => {
+            let median = subject.trials(shared).await?.median();
+            Ok((TrialSet::Judgement(judged.generation), median))
+        }
+        (None, _) => {
+            let generation = what_if.generation.unwrap_or(individual.generation);
+            Ok((TrialSet::Generation(generation), what_if.trial.unwrap_or_default()))
+        }
+    }
 }
 
 /// Who is at an address, for people.

@@ -1,0 +1,86 @@
+//! The trials of which a replay shows one: the fitness of each, and which of them is the median.
+
+use serde::Serialize;
+use sim_core::{EvaluateError, Simulation, TrialSet};
+use swarm_proto::v1::JudgedFitness;
+
+/// The trials that an individual is known by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trials {
+    /// Whether they are those of its judgement, which selected nothing; else its generation's.
+    is_judgement: bool,
+    generation: u64,
+    /// Of each trial, in their order.
+    fitness: Vec<f64>,
+    mean: f64,
+    /// Ends of the 95 % confidence interval of the mean, of a judgement.
+    interval: Option<(f64, f64)>,
+    median: u32,
+    worst: u32,
+    best: u32,
+}
+
+impl Trials {
+    /// Those by which a champion was judged, simulated again; none if `keep_going` says no on
+    /// the way.
+    pub fn of_judgement(
+        simulation: &Simulation,
+        genotype: &[f64],
+        judged: &JudgedFitness,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, EvaluateError> {
+        let JudgedFitness { mean, low, high, trials, generation } = *judged;
+        let set = TrialSet::Judgement(generation);
+        let fitness = simulation.evaluate_while(genotype, set, 0..trials, keep_going)?;
+        Ok(fitness.map(|fitness| {
+            let interval = Some((low, high));
+            Self { is_judgement: true, mean, interval, ..Self::of_generation(generation, fitness) }
+        }))
+    }
+
+    /// Those of the generation in which an individual took part.
+    pub fn of_generation(generation: u64, fitness: Vec<f64>) -> Self {
+        let mut order: Vec<u32> = (0..fitness.len() as u32).collect();
+        order.sort_by(|&a, &b| fitness[a as usize].total_cmp(&fitness[b as usize]));
+        let nth = |n: usize| order.get(n).copied().unwrap_or_default();
+        let last = fitness.len().saturating_sub(1);
+        Self {
+            is_judgement: false,
+            generation,
+            mean: fitness.iter().sum::<f64>() / fitness.len().max(1) as f64,
+            interval: None,
+            // Of two, the lower one.
+            median: nth(last / 2),
+            worst: nth(0),
+            best: nth(last),
+            fitness,
+        }
+    }
+
+    /// The trial that is the median.
+    pub fn median(&self) -> u32 {
+        self.median
+    }
+
+    /// The fitness in a trial; 0 if there is no such trial.
+    pub fn fitness(&self, trial: u32) -> f64 {
+        self.fitness.get(trial as usize).copied().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_a_trial_and_the_lower_one_of_two() {
+        let of = |fitness: &[f64]| {
+            let trials = Trials::of_generation(3, fitness.to_vec());
+            (trials.worst, trials.median, trials.best)
+        };
+        assert_eq!(of(&[5.0, 1.0, 3.0]), (1, 2, 0));
+        assert_eq!(of(&[5.0, 1.0, 3.0, 2.0]), (1, 3, 0));
+        assert_eq!(of(&[7.0]), (0, 0, 0));
+        assert_eq!(of(&[]), (0, 0, 0));
+    }
+}
