@@ -26,13 +26,16 @@ use crate::{
 
 /// Judgements whose trials were simulated again, by experiment and generation.
 #[derive(Debug, Default)]
-pub struct Judgements(Mutex<BTreeMap<(u64, u64), Arc<OnceCell<Trials>>>>);
+pub struct Judgements(Mutex<BTreeMap<(u64, u64), Judgement>>);
+
+/// Its trials, once somebody has asked for them.
+type Judgement = Arc<OnceCell<Trials>>;
 
 /// Judgements that are kept for other pages.
 const JUDGEMENTS_MAX: usize = 64;
 
 impl Judgements {
-    async fn of(&self, experiment: u64, generation: u64) -> Arc<OnceCell<Trials>> {
+    async fn of(&self, experiment: u64, generation: u64) -> Judgement {
         let mut known = self.0.lock().await;
         if known.len() >= JUDGEMENTS_MAX {
             known.clear();
