@@ -1,9 +1,12 @@
 //! Waiting aloud: whatever a command waits for is said on standard error after two seconds,
-//! and again from time to time.
+//! and again from time to time; and whatever it computes, likewise.
 
 use std::{
     io::{self, Write as _},
+    panic::resume_unwind,
     pin::pin,
+    sync::mpsc::{self, RecvTimeoutError},
+    thread,
     time::Duration,
 };
 
@@ -36,6 +39,31 @@ async fn aloud_to<T>(
     }
 }
 
+/// Computes, and says so if that takes long.
+pub fn computing<T: Send>(what: &str, work: impl FnOnce() -> T + Send) -> T {
+    computing_to(|| say(&format!("computing {what}")), SILENCE_MAX, work)
+}
+
+fn computing_to<T: Send>(
+    mut say: impl FnMut(),
+    mut silence: Duration,
+    work: impl FnOnce() -> T + Send,
+) -> T {
+    thread::scope(|scope| {
+        // Closed when the work is done, or has panicked.
+        let (working, done) = mpsc::channel::<()>();
+        let work = scope.spawn(move || {
+            let _working = working;
+            work()
+        });
+        while done.recv_timeout(silence) == Err(RecvTimeoutError::Timeout) {
+            say();
+            silence = REMINDER;
+        }
+        work.join().unwrap_or_else(|panic| resume_unwind(panic))
+    })
+}
+
 /// A line on standard error.
 fn say(line: &str) {
     // If standard error is closed there is no place left to report to.
@@ -59,6 +87,15 @@ mod tests {
         });
         assert_eq!(done.await, 7);
         said
+    }
+
+    #[test]
+    fn a_long_computation_is_said_and_a_short_one_is_not() {
+        let (say, heard) = mpsc::channel();
+        let until_said = move || heard.recv().unwrap();
+        let value = computing_to(|| say.send(7).unwrap(), Duration::from_millis(1), until_said);
+        assert_eq!(value, 7);
+        computing_to(|| panic!("it took no time"), Duration::from_secs(600), || ());
     }
 
     #[tokio::test(start_paused = true)]

@@ -25,7 +25,7 @@ use crate::{
     place::Intent,
     progress::Progress,
     settings::Settings,
-    text,
+    text, waiting,
 };
 
 /// Write an HTML file in which an episode can be watched, step by step, in any browser.
@@ -120,9 +120,13 @@ pub async fn replay(
     let mut trials = None;
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
-            let all = Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
-                .map_err(|error| Error::Input(format!("{name}: {error}")))?
-                .expect("nothing stops it");
+            let n = judged.trials;
+            let what = format!("the {n} trials by which it was judged; --trial N plays one alone");
+            let all = waiting::computing(&what, || {
+                Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
+            });
+            let all = all.map_err(|error| Error::Input(format!("{name}: {error}")))?;
+            let all = all.expect("nothing stops it");
             let (trial, what) = judged_trial(&all, judged.trials, args.judged)?;
             progress.remark(&what);
             // Of a changed swarm, nothing was judged.
@@ -136,10 +140,10 @@ pub async fn replay(
         }
         _ => episode,
     };
-    let bytes = match format {
-        Format::Html => html(&episode, trials)?.into_bytes(),
-        Format::Png => png(&episode, args.at)?,
-    };
+    let bytes = waiting::computing("the episode", || match format {
+        Format::Html => html(&episode, trials).map(String::into_bytes),
+        Format::Png => png(&episode, args.at),
+    })?;
     args.overwrite.write(&path, &bytes)?;
     progress.print(&path.display().to_string())
 }

@@ -20,7 +20,7 @@ use crate::{
     progress::{Part, Progress},
     settings::Settings,
     table::{self, Column, Table},
-    text,
+    text, waiting,
 };
 
 pub use self::args::SimulateArgs;
@@ -44,16 +44,21 @@ pub async fn simulate(
         }
         None => None,
     };
-    let mut trials = Vec::new();
-    for trial in 0..compiled.config.algorithm.num_evaluations {
-        let observe: &mut dyn FnMut(&_) = match &mut trace {
-            Some(trace) => &mut |record| trace.record(trial, record),
-            None => &mut |_| {},
-        };
-        let simulated = compiled.experiment.simulate(&genotype.genes, generation, trial, observe);
-        let summary = simulated.map_err(|error| Error::Input(error.to_string()))?;
-        trials.push(Trial { trial, summary });
-    }
+    let trials =
+        waiting::computing("the trials; --trials has fewer, --steps shorter ones", || {
+            let mut trials = Vec::new();
+            for trial in 0..compiled.config.algorithm.num_evaluations {
+                let observe: &mut dyn FnMut(&_) = match &mut trace {
+                    Some(trace) => &mut |record| trace.record(trial, record),
+                    None => &mut |_| {},
+                };
+                let simulated =
+                    compiled.experiment.simulate(&genotype.genes, generation, trial, observe);
+                let summary = simulated.map_err(|error| Error::Input(error.to_string()))?;
+                trials.push(Trial { trial, summary });
+            }
+            Ok::<_, Error>(trials)
+        })?;
     let n_rows = trace.map(Trace::finish).transpose()?;
     let report = SimulationReport {
         name: &compiled.config.name,

@@ -3,12 +3,12 @@
 use std::fs;
 
 use clap::Parser;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::*;
 use crate::{
     args::{Args, OutputFormat},
-    commands::Command,
+    commands::{Command, one_world::output},
     experiment_file::tests::quickstart,
     progress::tests::Captured,
 };
@@ -114,4 +114,35 @@ async fn what_cannot_be_played_leaves_no_file() {
     let error = run(directory.path(), &["--to", nowhere.to_str().unwrap()]).await.unwrap_err();
     assert!(error.to_string().starts_with("cannot write"), "{error}");
     assert_eq!(error.exit_code(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_champion_plays_the_median_of_the_trials_that_judged_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let data = directory.path().join("data");
+    let at = ["--data-dir", data.to_str().unwrap()];
+    output(&format!("run {} --generations 2", quickstart().display()), &at).await;
+    let found: Value = serde_json::from_str(&output("individual 1", &at).await).unwrap();
+    let genes: Vec<f64> = serde_json::from_value(found["genotype"].clone()).unwrap();
+    let file = ExperimentFile::read(&quickstart()).unwrap();
+    let simulation = file.compile(&Overrides::default()).unwrap().experiment;
+    let fitness = simulation.evaluate(&genes, TrialSet::Judgement(1), 0..200).unwrap();
+    let n = |is_counted: &dyn Fn(f64) -> bool| fitness.iter().filter(|it| is_counted(**it)).count();
+    // Of 200, the hundredth.
+    let is_median = |value: f64| n(&|it| it < value) < 100 && n(&|it| it <= value) >= 100;
+    let medians: Vec<usize> = (0..200).filter(|&trial| is_median(fitness[trial])).collect();
+    let files = async |option: String| {
+        let path = directory.path().join("a.html");
+        output(&format!("replay 1 --force --to {}{option}", path.display()), &at).await;
+        fs::read_to_string(path).unwrap()
+    };
+    let played = files(String::new()).await;
+    let mut equal = Vec::new();
+    for trial in 0..200 {
+        if medians.contains(&trial) || trial < 3 {
+            equal.push((trial, files(format!(" --judged {trial}")).await == played));
+        }
+    }
+    let found: Vec<usize> = equal.iter().filter(|it| it.1).map(|it| it.0).collect();
+    assert!(matches!(found[..], [trial] if medians.contains(&trial)), "{found:?} {medians:?}");
 }

@@ -6,6 +6,8 @@ use tonic::Status;
 use super::*;
 use crate::{
     args::{OutputFormat, Subject},
+    commands::one_world::output,
+    experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script, generation, state, unreachable_connection},
     progress::tests::Captured,
 };
@@ -105,4 +107,31 @@ async fn a_coordinator_that_stays_away_is_unreachable() {
     let error = follower.run(1).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
     assert!(error.to_string().to_lowercase().contains("connection refused"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_group_ends_with_its_comparison_and_the_next_commands() {
+    let directory = tempfile::tempdir().unwrap();
+    let data = directory.path().join("data");
+    let at = ["--data-dir", data.to_str().unwrap()];
+    let run = format!("run {} --generations 2 --group pair --seeds", quickstart().display());
+    let said = output(&format!("{run} 0..1"), &at).await;
+    let end = said.rfind("completed after 2 of 2 generations").unwrap();
+    let after = &said[end..];
+    let compared = after.find("mean").unwrap();
+    let next = after.find("\nnext:\n").unwrap();
+    assert!(compared < next, "{after}");
+    for command in ["compare pair --to comparison.svg", "plot pair --to fitness.svg", "list pair"] {
+        let line = format!("\n  swarmctl {command} --data-dir {}", data.display());
+        assert!(after[next..].contains(&line), "{after}");
+        // It is what it says: a command that works.
+        let to = directory.path().join("figure.svg");
+        let words = command.replace("comparison.svg", to.to_str().unwrap());
+        let words = words.replace("fitness.svg", to.to_str().unwrap());
+        let forced = if words.contains("--to") { " --force" } else { "" };
+        let answer = output(&format!("{words}{forced}"), &at).await;
+        assert!(!answer.contains("[exit code"), "{answer}");
+    }
+    let one = output(&run.replace(" --group pair --seeds", " --seed 9"), &at).await;
+    assert!(!one.contains("\nnext:"), "{one}");
 }
