@@ -8,14 +8,13 @@ use std::{
 };
 
 use coordinator::{Door, InProcess, store::Holder};
-use experiment_file::suggestion;
 use swarm_proto::v1::{
     CompletedGeneration, EvaluateFitnessRequest, EvaluateRequest, EvaluateResponse, Event,
     Experiment, ExportExperimentRequest, GenerationDynamics, GetChampionRequest,
     GetChampionResponse, GetExperimentRequest, ImportExperimentRequest, ListDynamicsRequest,
-    ListEventsRequest, ListExperimentsRequest, ListGenerationsRequest, SubmitExperimentRequest,
-    SubmitExperimentResponse, WatchExperimentRequest, WatchExperimentResponse,
-    WatchExplanationRequest, WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse,
+    ListEventsRequest, ListGenerationsRequest, SubmitExperimentRequest, SubmitExperimentResponse,
+    WatchExperimentRequest, WatchExperimentResponse, WatchExplanationRequest,
+    WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse,
     evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
@@ -31,7 +30,6 @@ use tonic::{
 use worker::Backoff;
 
 use crate::{
-    args::Subject,
     error::{Error, is_transient, reason},
     interrupt,
     place::{DEFAULT_DATA_DIR, Intent, Place},
@@ -253,31 +251,6 @@ impl Connection {
         let request = GetExperimentRequest { experiment_id };
         let response = self.call(async |client| client.get_experiment(request).await).await?;
         present(response.experiment)
-    }
-
-    /// All experiments, oldest first.
-    pub async fn experiments(&self) -> Result<Vec<Experiment>, Error> {
-        let request = ListExperimentsRequest {};
-        let response = self.call(async |client| client.list_experiments(request).await).await?;
-        Ok(response.experiments)
-    }
-
-    /// One experiment, or all of a group.
-    pub async fn subject(&self, subject: &Subject) -> Result<Vec<Experiment>, Error> {
-        match subject {
-            Subject::Experiment(id) => Ok(vec![self.experiment(*id).await?]),
-            Subject::Group(name) => self.group(name).await,
-        }
-    }
-
-    /// The one experiment of a number or a name; an error if it is a group of several.
-    pub async fn one(&self, subject: &Subject) -> Result<Experiment, Error> {
-        one(&subject.to_string(), self.subject(subject).await?)
-    }
-
-    /// The experiments of a group, oldest first; or the one experiment of that name.
-    pub async fn group(&self, name: &str) -> Result<Vec<Experiment>, Error> {
-        named(name, &self.experiments().await?)
     }
 
     /// The measures of a genotype, as a stream; tried once.
@@ -518,47 +491,6 @@ fn endpoint(link: &Link) -> Endpoint {
 /// The delays between attempts: short, because a person may be waiting.
 pub fn backoff() -> Backoff {
     Backoff::new(Duration::from_millis(250), Duration::from_secs(2))
-}
-
-/// The experiments of a group, in their order; or the one experiment of that name.
-pub fn named(name: &str, all: &[Experiment]) -> Result<Vec<Experiment>, Error> {
-    let of = |has: fn(&Experiment) -> &str| {
-        let found = all.iter().filter(|experiment| has(experiment) == name);
-        found.cloned().collect::<Vec<Experiment>>()
-    };
-    let members = of(|experiment| &experiment.group);
-    if !members.is_empty() {
-        return Ok(members);
-    }
-    let named = of(|experiment| &experiment.name);
-    if !named.is_empty() {
-        return if named.len() == 1 { Ok(named) } else { Err(several(name, &named)) };
-    }
-    let names = all.iter().flat_map(|experiment| [&*experiment.group, &*experiment.name]);
-    let mut names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
-    names.sort_unstable();
-    names.dedup();
-    let what = format!("no group or experiment is named `{name}`");
-    Err(Error::NotFound(match names.is_empty() {
-        true => format!("{what}: there are no experiments"),
-        false => format!("{what}; {}", suggestion(name, &names)),
-    }))
-}
-
-/// The only one of the experiments that a name stands for.
-pub fn one(name: &str, mut found: Vec<Experiment>) -> Result<Experiment, Error> {
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        _ => Err(several(name, &found)),
-    }
-}
-
-/// The error that a name stands for several experiments where one is meant.
-fn several(name: &str, experiments: &[Experiment]) -> Error {
-    let ids: Vec<String> = experiments.iter().take(10).map(|it| it.id.to_string()).collect();
-    let more = if experiments.len() > ids.len() { ", ..." } else { "" };
-    let ids = ids.join(", ");
-    Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

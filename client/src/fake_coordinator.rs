@@ -144,9 +144,17 @@ impl ExperimentService for FakeCoordinator {
 
     async fn list_experiments(
         &self,
-        _: Request<ListExperimentsRequest>,
+        request: Request<ListExperimentsRequest>,
     ) -> Result<Response<ListExperimentsResponse>, Status> {
-        let experiments = vec![self.script(|script| script.experiment.clone())];
+        let ListExperimentsRequest { labels, without_archived, .. } = request.into_inner();
+        let mut experiments = vec![self.script(|script| script.experiment.clone())];
+        experiments.retain(|only| {
+            let has = |label: &String| match label.split_once('=') {
+                Some((key, value)) => only.labels.get(key).is_some_and(|found| found == value),
+                None => only.labels.contains_key(label),
+            };
+            labels.iter().all(has) && !(without_archived && only.archived)
+        });
         Ok(Response::new(ListExperimentsResponse { experiments }))
     }
 

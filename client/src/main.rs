@@ -12,6 +12,7 @@ mod connection;
 mod consent;
 mod error;
 mod experiment_file;
+mod experiments;
 #[cfg(test)]
 mod fake_coordinator;
 mod figure;

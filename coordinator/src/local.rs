@@ -94,7 +94,9 @@ impl LocalRun {
     /// As it stands.
     pub fn record(&self) -> Result<ExperimentRecord, StoreError> {
         let found = self.store.experiment(self.id)?;
-        found.ok_or_else(|| StoreError::Corrupt(format!("experiment {} is gone", self.id)))
+        found
+            .map(|found| found.record)
+            .ok_or_else(|| StoreError::Corrupt(format!("experiment {} is gone", self.id)))
     }
 
     /// Evolution after the latest generation.

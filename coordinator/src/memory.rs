@@ -5,7 +5,8 @@ use std::fmt;
 
 use evolution::ALGORITHMS;
 use experiment_file::Keeps;
-use serde::Deserialize;
+
+use crate::store::Summary;
 
 /// Bytes per gene of a generation, as measured at the most: the genotypes, the draws
 /// behind them, and those of the generation before, which the allocator has not given
@@ -24,26 +25,11 @@ const CONFIG_COPIES: u64 = 4;
 /// Bytes of everything else.
 const BYTES_PER_EXPERIMENT: u64 = 64 << 10;
 
-/// The parts of a canonical configuration that memory depends on.
-#[derive(Debug, Deserialize)]
-struct Config {
-    algorithm: Algorithm,
-}
-
-#[derive(Debug, Deserialize)]
-struct Algorithm {
-    name: String,
-    population_size: u64,
-    num_evaluations: u64,
-    champion_trials: u64,
-    judgement_trials: u64,
-}
-
-/// Bytes that an experiment takes at the most, about. `config_json`: its canonical
-/// configuration; one of another release, which does not run, may count as nothing.
-pub fn estimate(config_json: &str, genotype_len: u64) -> u64 {
-    let Ok(Config { algorithm }) = serde_json::from_str(config_json) else { return 0 };
-    let description = ALGORITHMS.iter().find(|description| description.name == algorithm.name);
+/// Bytes that an experiment takes at the most, about; one of another release, which does not
+/// run, may count as nearly nothing.
+pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
+    let algorithm = summary;
+    let description = ALGORITHMS.iter().find(|description| description.name == algorithm.algorithm);
     let keeps = description.map_or(Keeps::Population, |description| description.keeps);
     let n_genes = algorithm.population_size.saturating_mul(genotype_len);
     let state = match keeps {
@@ -60,7 +46,7 @@ pub fn estimate(config_json: &str, genotype_len: u64) -> u64 {
             .saturating_add(algorithm.champion_trials.max(algorithm.judgement_trials))
             .saturating_mul(BYTES_PER_TRIAL),
         algorithm.population_size.saturating_mul(BYTES_PER_INDIVIDUAL),
-        CONFIG_COPIES * config_json.len() as u64,
+        CONFIG_COPIES.saturating_mul(summary.config_len),
         BYTES_PER_EXPERIMENT,
     ]
     .into_iter()
@@ -117,16 +103,19 @@ impl fmt::Display for Shortage {
 mod tests {
     use super::*;
 
-    fn config(algorithm: &str, population_size: u64, n_trials: u64) -> String {
-        format!(
-            r#"{{"name": "x", "algorithm": {{"name": "{algorithm}",
-                "population_size": {population_size}, "num_evaluations": {n_trials},
-                "champion_trials": 50, "judgement_trials": 200, "populations": {{}}}}, "world": {{}}}}"#
-        )
+    fn summary(algorithm: &str, population_size: u64, n_trials: u64) -> Summary {
+        Summary {
+            algorithm: algorithm.to_owned(),
+            population_size,
+            num_evaluations: n_trials,
+            champion_trials: 50,
+            judgement_trials: 200,
+            ..Summary::default()
+        }
     }
 
     fn mib(algorithm: &str, population_size: u64, n_trials: u64, genotype_len: u64) -> u64 {
-        estimate(&config(algorithm, population_size, n_trials), genotype_len) >> 20
+        estimate(&summary(algorithm, population_size, n_trials), genotype_len) >> 20
     }
 
     /// Of a coordinator process with a worker over three generations, less what it
@@ -146,9 +135,9 @@ mod tests {
         assert!(mib("SNES", 1_000, 10, 40_000) > 80 * base);
         assert!(mib("SNES", 1_000, 1_000, 400) > 25 + base);
         assert!(mib("xNES", 10, 1, 1_000) >= 91);
-        let long = config("SNES", 1, 1).replace(r#""x""#, &format!("{:?}", "x".repeat(1 << 20)));
-        assert!(estimate(&long, 1) > 4 << 20);
-        assert!(estimate(&config("SNES", u64::MAX, 2), u64::MAX) == u64::MAX, "no overflow");
+        let long = Summary { config_len: 1 << 20, ..summary("SNES", 1, 1) };
+        assert!(estimate(&long, 1) >= 4 << 20);
+        assert!(estimate(&summary("SNES", u64::MAX, 2), u64::MAX) == u64::MAX, "no overflow");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::{
     group::Membership,
     labels::Labels,
     priority::Priority,
-    store::{ExperimentRecord, ForkRecord, NewExperiment},
+    store::{ForkRecord, NewExperiment, StoredExperiment},
 };
 use evolution::{ALGORITHMS, Digest, Evolution, Fork};
 
@@ -40,7 +40,7 @@ pub struct Submission {
 #[derive(Debug, Clone)]
 pub struct Parent {
     /// The other experiment.
-    pub experiment: ExperimentRecord,
+    pub experiment: StoredExperiment,
     /// Its evolution after the last generation that is shared.
     pub evolution: Evolution,
 }

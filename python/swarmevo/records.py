@@ -66,7 +66,8 @@ class Records(ABC):
             run = self._run(arguments.whole(experiment, "an experiment is a name, or a number: it", 1))
             run.refresh()
             return run
-        found = [it.id for it in self._call("ListExperiments").experiments if it.name == experiment]
+        named = self._call("ListExperiments", named=experiment).experiments
+        found = [it.id for it in named if it.name == experiment]
         if len(found) != 1:
             which = "no experiment is" if not found else f"experiments {found} are"
             raise KeyError(f"{which} named {experiment!r}; name one by its number")

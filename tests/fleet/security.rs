@@ -196,7 +196,7 @@ impl Caller {
 
     async fn list(&self) -> Code {
         let mut client = ExperimentServiceClient::new(self.channel.clone());
-        code(client.list_experiments(self.request(ListExperimentsRequest {})).await)
+        code(client.list_experiments(self.request(ListExperimentsRequest::default())).await)
     }
 
     async fn list_workers(&self) -> Code {

@@ -36,7 +36,7 @@ async fn list(url: &str) {
     let endpoint = Endpoint::from_shared(url.to_owned()).unwrap();
     let call = async {
         let mut client = ExperimentServiceClient::new(endpoint.connect().await.unwrap());
-        let mut request = Request::new(ListExperimentsRequest {});
+        let mut request = Request::new(ListExperimentsRequest::default());
         let value = format!("Bearer {CLIENT_TOKEN}").parse().unwrap();
         request.metadata_mut().insert("authorization", value);
         client.list_experiments(request).await.unwrap();

@@ -10,7 +10,7 @@ use std::{
 
 use clap::{Args, Subcommand, ValueHint};
 use serde::Serialize;
-use swarm_proto::v1::{ExperimentState, ExplainExperimentRequest};
+use swarm_proto::v1::ExplainExperimentRequest;
 use swarm_telemetry::parse_positive_duration;
 use tokio::time::{Instant, sleep};
 
@@ -188,10 +188,7 @@ impl Look<'_> {
 /// Items of running experiments that wait for a worker or are with one.
 async fn open_items(connection: &Connection) -> Result<u64, Error> {
     let mut n_items = 0;
-    for experiment in connection.experiments().await? {
-        if experiment.state() != ExperimentState::Running {
-            continue;
-        }
+    for experiment in connection.running().await? {
         let request = ExplainExperimentRequest { experiment_id: experiment.id };
         let answer = connection.call(async |client| client.explain_experiment(request).await);
         if let Some(round) = answer.await?.round {

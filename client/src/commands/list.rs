@@ -77,10 +77,14 @@ impl Remote for ListArgs {
     const HAS_TABLE: bool = true;
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let experiments = self.filter.apply(match &self.group {
-            Some(group) => connection.group(group).await?,
-            None => connection.experiments().await?,
-        });
+        let mut experiments = connection.list(self.filter.wanted(self.group.clone())).await?;
+        if let Some(group) = &self.group
+            && experiments.is_empty()
+        {
+            // Says so if there is no such name.
+            connection.group(group).await?;
+        }
+        self.filter.sort(&mut experiments);
         let documents: Vec<ExperimentDocument<'_>> = experiments.iter().map(Into::into).collect();
         let table = table(&experiments, clock::unix_ms());
         progress.print_table(&table, &CSV_KEYS, &documents, "no such experiments")?;

@@ -12,7 +12,7 @@ use std::{
 
 use clap::Args;
 use evolution::Digest;
-use swarm_proto::v1::{Experiment, ExperimentState, ListWorkersRequest};
+use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest, ListWorkersRequest};
 use swarm_telemetry::escape;
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
@@ -122,12 +122,7 @@ async fn evolve(
     args: &RunArgs,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let unfinished: Vec<Experiment> = connection
-        .experiments()
-        .await?
-        .into_iter()
-        .filter(|experiment| experiment.state() == ExperimentState::Running)
-        .collect();
+    let unfinished = connection.running().await?;
     let submitted = match existing(connection, runs, args).await? {
         Some((existing, name)) => {
             progress.remark(&already_completed(&existing, &name));
@@ -163,13 +158,19 @@ async fn existing(
     let compiled = run.file.check(&args.experiment.overrides());
     let config = compiled.map_err(|error| run.file.invalid(&error))?.config;
     let digest = Digest::of_config(&config, sim_core::FINGERPRINT).to_string();
+    let wanted = ListExperimentsRequest {
+        config_digest: digest.clone(),
+        states: vec![ExperimentState::Completed.into()],
+        ..Default::default()
+    };
+    // A coordinator of an earlier version sends others, too.
     let is_it = |it: &Experiment| {
         it.state() == ExperimentState::Completed
             && it.config_digest == digest
             && it.generations == config.algorithm.generations
             && it.forked_from.is_none()
     };
-    let same = connection.experiments().await?.into_iter().filter(is_it);
+    let same = connection.list(wanted).await?.into_iter().filter(is_it);
     let same = same.max_by_key(|it| (it.name == config.name, it.group.is_empty(), it.id));
     Ok(same.map(|it| (it, config.name)))
 }

@@ -43,7 +43,7 @@ impl Control {
         Ok(Explanation {
             incompatible: queries::incompatibility(&experiment),
             store_trouble: self.store.trouble(),
-            experiment,
+            experiment: experiment.record,
             activity,
             shortage,
             notices,

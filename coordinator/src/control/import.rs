@@ -7,7 +7,7 @@ use tokio::sync::OwnedSemaphorePermit;
 use crate::{
     clock,
     memory::{self, Shortage},
-    store::{ExperimentRecord, ExperimentState, ForkRecord, Imported, Store, StoreError},
+    store::{ExperimentRecord, ExperimentState, ForkRecord, Imported, Store, StoreError, Summary},
 };
 
 use super::{Control, ControlError};
@@ -45,14 +45,15 @@ fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
     let mut verification =
         Verification::begin(&bundle, Sample::Drawn(0)).map_err(|flaw| invalid(&flaw))?;
     let genotype_len = verification.simulation().genotype_len();
-    let needed = memory::estimate(&bundle.config_json, genotype_len as u64);
+    let config = ExperimentConfig::from_canonical_json(&bundle.config_json)?;
+    let summary = Summary::of(&config, &bundle.config_json);
+    let needed = memory::estimate(&summary, genotype_len as u64);
     Shortage::check(needed, 0, memory_budget).map_err(ControlError::NoMemory)?;
     while verification.advance().map_err(|flaw| invalid(&flaw))?.is_some() {}
     let champion = verification.finish().champion;
     let state = ExperimentState::from_name(&bundle.manifest.state);
     let state = state.filter(|state| !state.is_unfinished());
     let state = state.ok_or_else(|| invalid(&"it says of no end that there is"))?;
-    let config = ExperimentConfig::from_canonical_json(&bundle.config_json)?;
     Ok(Imported { name: config.name, genotype_len, state, champion, fork: None, bundle })
 }
 

@@ -191,7 +191,7 @@ impl Control {
     }
 
     async fn find(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
-        Ok(self.store.read(move |store| queries::experiment(store, id)).await?)
+        Ok(self.store.read(move |store| queries::experiment(store, id)).await?.record)
     }
 }
 

@@ -11,7 +11,10 @@ use crate::{
     limits::UNFINISHED_MAX,
     memory::{self, Shortage},
     runs::Runnable,
-    store::{ExperimentRecord, ExperimentState, ForkRecord, NewExperiment, Store, StoreError},
+    store::{
+        ExperimentRecord, ExperimentState, ForkRecord, NewExperiment, Store, StoreError,
+        StoredExperiment, Summary, Wanted,
+    },
 };
 
 use super::{ControlError, reopen};
@@ -47,19 +50,17 @@ pub fn place(
     existing: Existing,
     memory_budget: u64,
 ) -> Result<(Placement, Option<ExperimentId>), StoreError> {
-    let experiments = store.experiments()?;
-    let identical = identical(&experiments, &new);
-    let completed = identical.filter(|same| same.state == ExperimentState::Completed);
+    let identical = identical(store, &new)?;
+    let completed = identical.as_ref().filter(|same| same.state == ExperimentState::Completed);
     let placement = match completed {
         Some(completed) if existing.reuse => Placement::RunsAlready(completed.id),
-        _ => place_beside(store, &experiments, &new, existing.resume_unfinished, memory_budget)?,
+        _ => place_beside(store, &new, existing.resume_unfinished, memory_budget)?,
     };
     Ok((placement, identical.map(|same| same.id)))
 }
 
 fn place_beside(
     store: &mut Store,
-    experiments: &[ExperimentRecord],
     new: &NewExperiment,
     resume_unfinished: bool,
     memory_budget: u64,
@@ -70,11 +71,13 @@ fn place_beside(
         return Ok(Placement::RunsAlready(id));
     }
     let config_json = new.config.to_canonical_json();
-    let shortage = shortage(experiments, &config_json, new.genotype_len as u64, memory_budget);
-    if resume_unfinished && let Some(placement) = resume(store, experiments, new, shortage)? {
+    let unfinished = store.experiments(&Wanted::unfinished())?;
+    let summary = Summary::of(&new.config, &config_json);
+    let shortage = shortage(&unfinished, &summary, new.genotype_len as u64, memory_budget);
+    if resume_unfinished && let Some(placement) = resume(store, new, &config_json, shortage)? {
         return Ok(placement);
     }
-    if are_too_many(experiments) {
+    if unfinished.len() >= UNFINISHED_MAX {
         return Ok(Placement::TooMany);
     }
     if let Some(shortage) = shortage {
@@ -84,7 +87,7 @@ fn place_beside(
     Ok(if is_new {
         let genotype_len = new.genotype_len as u64;
         // Those that a fork shares with its parent.
-        let latest = store.experiment(id)?.and_then(|stored| stored.latest);
+        let latest = store.experiment(id)?.and_then(|stored| stored.record.latest);
         let runnable = Runnable::new(id, new.config.clone(), genotype_len, new.priority);
         Placement::Runs(Box::new(Runnable { latest, ..runnable }))
     } else {
@@ -94,21 +97,28 @@ fn place_beside(
 
 /// An experiment of the same file, but for its name, of the same seed and version, and from the
 /// same state: the latest that has completed, or else the latest that has not ended.
-fn identical<'a>(
-    experiments: &'a [ExperimentRecord],
-    new: &NewExperiment,
-) -> Option<&'a ExperimentRecord> {
-    // The digest tells versions of the simulation apart.
-    let config_digest = new.config_digest.to_string();
+fn identical(store: &Store, new: &NewExperiment) -> Result<Option<ExperimentRecord>, StoreError> {
     let link = |fork: &Option<ForkRecord>| fork.as_ref().map(|fork| fork.link.clone());
-    let is_same = |it: &&ExperimentRecord| {
-        it.config_digest == config_digest
-            && link(&it.fork) == link(&new.fork)
-            && differs_in_name_only(&it.config_json, &new.config)
-    };
-    let same = || experiments.iter().rev().filter(is_same);
-    let completed = same().find(|it| it.state == ExperimentState::Completed);
-    completed.or_else(|| same().find(|it| it.state.is_unfinished()))
+    let mut same = of_the_same_digest(store, new)?;
+    same.retain(|found| {
+        link(&found.fork) == link(&new.fork)
+            && differs_in_name_only(&found.config_json, &new.config)
+    });
+    let completed = same.iter().position(|found| found.state == ExperimentState::Completed);
+    let found = completed.or_else(|| same.iter().position(|found| found.state.is_unfinished()));
+    Ok(found.map(|i| same.swap_remove(i).record))
+}
+
+/// The experiments of the same file, version and seed, but for their length; the latest first.
+fn of_the_same_digest(
+    store: &Store,
+    new: &NewExperiment,
+) -> Result<Vec<StoredExperiment>, StoreError> {
+    // The digest tells versions of the simulation apart.
+    let config_digest = Some(new.config_digest.to_string());
+    let found = store.experiments(&Wanted { config_digest, ..Wanted::default() })?;
+    let stored = found.iter().rev().map(|found| store.experiment(found.id));
+    Ok(stored.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
@@ -118,38 +128,32 @@ fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
 
 /// Whether an experiment can become unfinished beside those that are; else why not.
 pub fn check_room(
-    experiments: &[ExperimentRecord],
-    config_json: &str,
+    store: &Store,
+    summary: &Summary,
     genotype_len: u64,
     memory_budget: u64,
 ) -> Result<(), ControlError> {
-    if are_too_many(experiments) {
+    let unfinished = store.experiments(&Wanted::unfinished())?;
+    if unfinished.len() >= UNFINISHED_MAX {
         return Err(ControlError::TooManyUnfinished);
     }
-    match shortage(experiments, config_json, genotype_len, memory_budget) {
+    match shortage(&unfinished, summary, genotype_len, memory_budget) {
         Some(shortage) => Err(ControlError::NoMemory(shortage)),
         None => Ok(()),
     }
 }
 
-fn are_too_many(experiments: &[ExperimentRecord]) -> bool {
-    let n_unfinished = experiments.iter().filter(|e| e.state.is_unfinished()).count();
-    n_unfinished >= UNFINISHED_MAX
-}
-
 /// Why there is no memory for another experiment, if there is none.
 fn shortage(
-    experiments: &[ExperimentRecord],
-    config_json: &str,
+    unfinished: &[ExperimentRecord],
+    summary: &Summary,
     genotype_len: u64,
     memory_budget: u64,
 ) -> Option<Shortage> {
     // One of another release does not run.
-    let takes_memory =
-        |e: &&ExperimentRecord| e.state.is_unfinished() && e.fingerprint == sim_core::FINGERPRINT;
-    let taken = experiments.iter().filter(takes_memory);
-    let in_use = taken.map(|e| memory::estimate(&e.config_json, e.genotype_len)).sum();
-    let needed = memory::estimate(config_json, genotype_len);
+    let taken = unfinished.iter().filter(|other| other.fingerprint == sim_core::FINGERPRINT);
+    let in_use = taken.map(|other| memory::estimate(&other.summary, other.genotype_len)).sum();
+    let needed = memory::estimate(summary, genotype_len);
     Shortage::check(needed, in_use, memory_budget).err()
 }
 
@@ -157,36 +161,31 @@ fn shortage(
 /// unfinished, or one that was asked for fewer generations.
 fn resume(
     store: &mut Store,
-    experiments: &[ExperimentRecord],
     new: &NewExperiment,
+    config_json: &str,
     shortage: Option<Shortage>,
 ) -> Result<Option<Placement>, StoreError> {
-    let config_json = new.config.to_canonical_json();
-    // The digest tells versions of the simulation apart.
-    let config_digest = new.config_digest.to_string();
+    let mut same_bits = of_the_same_digest(store, new)?;
     // A fork has other bits than an experiment that begins with its file.
-    let is_same = |e: &&ExperimentRecord| e.config_digest == config_digest && e.fork.is_none();
-    let same_bits = experiments.iter().rev().filter(is_same);
-    let is_unfinished = |e: &&ExperimentRecord| e.state.is_unfinished();
-    let mut unfinished = same_bits.clone().filter(is_unfinished);
-    if let Some(same) = unfinished.find(|e| e.config_json == config_json) {
+    same_bits.retain(|found| found.fork.is_none());
+    let mut unfinished = same_bits.iter().filter(|found| found.state.is_unfinished());
+    if let Some(same) = unfinished.find(|found| found.config_json == config_json) {
         return Ok(Some(Placement::RunsAlready(same.id)));
     }
     for experiment in same_bits {
-        let n_done = experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1);
         let can_go_on = experiment.can_be_continued()
-            && n_done < new.config.algorithm.generations
+            && experiment.n_generations() < new.config.algorithm.generations
             && differs_in_generations_only(&experiment.config_json, &new.config);
         if !can_go_on {
             continue;
         }
-        match reopen::runnable(store, experiment.id, &config_json) {
+        match reopen::runnable(store, experiment.id, config_json) {
             Ok(_) if let Some(shortage) = shortage => {
                 return Ok(Some(Placement::NoMemory(shortage)));
             }
             Ok(runnable) => {
                 let (completed, why) = (ExperimentState::Completed, "more generations");
-                store.reopen(experiment.id, completed, &config_json, why, clock::unix_ms())?;
+                store.reopen(experiment.id, completed, config_json, why, clock::unix_ms())?;
                 return Ok(Some(Placement::Runs(Box::new(runnable))));
             }
             // It is computed anew instead.

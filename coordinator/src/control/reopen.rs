@@ -10,7 +10,7 @@ use crate::{
     ids::ExperimentId,
     queries,
     runs::{Request, Runnable},
-    store::{ExperimentRecord, ExperimentState, Store, StoreError},
+    store::{ExperimentRecord, ExperimentState, Store, StoreError, StoredExperiment},
 };
 
 use super::{Control, ControlError, placement};
@@ -79,12 +79,8 @@ fn prepare(
     if let Some(incompatible) = queries::incompatibility(&experiment) {
         return Err(ControlError::NotNow(format!("experiment {id} cannot go on: {incompatible}")));
     }
-    placement::check_room(
-        &store.experiments()?,
-        &config_json,
-        experiment.genotype_len,
-        memory_budget,
-    )?;
+    // More generations take no more memory.
+    placement::check_room(store, &experiment.summary, experiment.genotype_len, memory_budget)?;
     let runnable = runnable(store, id, &config_json)?;
     let why = match reopening {
         Reopening::Extend(generations) => format!("extended to {generations} generations"),
@@ -96,9 +92,10 @@ fn prepare(
 }
 
 /// The configuration under which an experiment goes on, or why it cannot.
-fn config_of(experiment: &ExperimentRecord, reopening: Reopening) -> Result<String, ControlError> {
+fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<String, ControlError> {
     use ExperimentState::{Cancelled, Completed, Failed, Paused, Running};
-    let ExperimentRecord { id, state, config_json, .. } = experiment;
+    let (ExperimentRecord { id, state, .. }, config_json) =
+        (&experiment.record, &experiment.config_json);
     let not_now = |what: String| Err(ControlError::NotNow(format!("experiment {id} {what}")));
     match (reopening, state) {
         (Reopening::Retry, Failed) | (Reopening::Resume, Cancelled) => Ok(config_json.clone()),
@@ -126,7 +123,7 @@ fn config_of(experiment: &ExperimentRecord, reopening: Reopening) -> Result<Stri
 }
 
 /// The configuration of a completed experiment with more generations.
-fn longer(experiment: &ExperimentRecord, generations: u64) -> Result<String, ControlError> {
+fn longer(experiment: &StoredExperiment, generations: u64) -> Result<String, ControlError> {
     let n_done = experiment.n_generations();
     if generations <= n_done {
         let message = format!(
@@ -150,6 +147,6 @@ pub fn runnable(
     config_json: &str,
 ) -> Result<Runnable, StoreError> {
     let (experiment, checkpoint) = store.resumable(id)?;
-    let experiment = ExperimentRecord { config_json: config_json.to_owned(), ..experiment };
+    let experiment = StoredExperiment { config_json: config_json.to_owned(), ..experiment };
     Runnable::restore(&experiment, &checkpoint).map_err(|what| store.unsound(id, what))
 }

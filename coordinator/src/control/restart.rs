@@ -9,7 +9,7 @@ use crate::{
     driver::DriverEvent,
     ids::ExperimentId,
     runs::Runnable,
-    store::{ExperimentRecord, ExperimentState, StoreError},
+    store::{ExperimentRecord, ExperimentState, StoreError, Wanted},
 };
 
 use super::{Control, ControlError};
@@ -19,8 +19,8 @@ impl Control {
     /// first those that are not paused, as memory may not suffice for all. One that is
     /// damaged is paused, and the others go on.
     pub async fn run_unfinished(&self) -> Result<(), StoreError> {
-        let mut experiments = self.store.read(|store| store.experiments()).await?;
-        experiments.retain(|experiment| experiment.state.is_unfinished());
+        let unfinished = Wanted::unfinished();
+        let mut experiments = self.store.read(move |store| store.experiments(&unfinished)).await?;
         experiments.sort_by_key(|experiment| experiment.state == ExperimentState::Paused);
         for ExperimentRecord { id, .. } in experiments {
             match self.restore(id).await {
@@ -35,10 +35,10 @@ impl Control {
 
     /// Takes nothing up that is unfinished: [`Self::take_up`] does when it is asked for.
     pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
-        let experiments = self.store.read(|store| store.experiments()).await?;
-        let unfinished = experiments.into_iter().filter(|it| it.state.is_unfinished());
+        let unfinished = Wanted::unfinished();
+        let unfinished = self.store.read(move |store| store.experiments(&unfinished)).await?;
         let mut left = self.left_alone.lock().unwrap_or_else(PoisonError::into_inner);
-        left.extend(unfinished.map(|experiment| experiment.id));
+        left.extend(unfinished.into_iter().map(|experiment| experiment.id));
         Ok(())
     }
 

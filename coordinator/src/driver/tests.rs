@@ -92,7 +92,7 @@ impl Rig {
     }
 
     async fn stored(&self) -> ExperimentRecord {
-        self.driver.disk.store.read(|store| store.experiment(ID)).await.unwrap().unwrap()
+        self.driver.disk.store.read(|store| store.experiment(ID)).await.unwrap().unwrap().record
     }
 }
 

@@ -6,14 +6,14 @@ use swarm_telemetry::VERSION;
 
 use crate::{
     ids::ExperimentId,
-    store::{Evidence, ExperimentRecord, ForkRecord, GenerationRecord, Store},
+    store::{Evidence, ExperimentRecord, ForkRecord, GenerationRecord, Store, StoredExperiment},
 };
 
 use super::{QueryError, experiment, generation::Gap};
 
 /// An ended experiment, and everything that its results follow from.
 pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
-    let experiment = experiment(store, id)?;
+    let StoredExperiment { record: experiment, config_json } = experiment(store, id)?;
     if experiment.state.is_unfinished() {
         return Err(QueryError::NotEnded(id));
     }
@@ -69,7 +69,7 @@ pub fn bundle(store: &Store, id: ExperimentId) -> Result<Bundle, QueryError> {
             submitted_at_ms: experiment.submitted_at_ms,
             fork: fork.transpose()?,
         },
-        config_json: experiment.config_json,
+        config_json,
     })
 }
 

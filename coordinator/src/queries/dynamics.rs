@@ -28,7 +28,7 @@ impl StoredDynamics {
     /// Reads what is needed of at most a page of generations from `from` on; of a fork, from
     /// its own first one on.
     pub fn read(store: &Store, id: ExperimentId, from: u64) -> Result<Self, QueryError> {
-        let experiment = experiment(store, id)?;
+        let experiment = experiment(store, id)?.record;
         let n_generations = experiment.n_generations();
         let own = experiment.fork.as_ref().map_or(0, |fork| fork.generation + 1);
         let first = from.max(own);

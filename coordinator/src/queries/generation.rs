@@ -6,7 +6,7 @@ use evolution::{Checkpoint, Evolution, Generation, Told};
 
 use crate::{
     ids::ExperimentId,
-    store::{ExperimentRecord, ForkRecord, GenerationRecord, LogGap, Store},
+    store::{ExperimentRecord, ForkRecord, GenerationRecord, LogGap, Store, StoredExperiment},
 };
 
 use super::{QueryError, experiment};
@@ -15,7 +15,7 @@ use super::{QueryError, experiment};
 #[derive(Debug)]
 pub struct StoredGeneration {
     /// Its experiment.
-    pub experiment: ExperimentRecord,
+    pub experiment: StoredExperiment,
     /// Its row of the history.
     pub of: GenerationRecord,
     checkpoint: Checkpoint,

@@ -6,7 +6,7 @@ use sim_core::Simulation;
 
 use crate::{
     limits::{INDIVIDUALS_LEN_MAX, PAGE_LEN_MAX},
-    store::{ExperimentRecord, Store},
+    store::{Store, StoredExperiment},
 };
 
 use super::{Address, QueryError, StoredGeneration, Who, experiment, generation::Replayed};
@@ -15,7 +15,7 @@ use super::{Address, QueryError, StoredGeneration, Who, experiment, generation::
 #[derive(Debug)]
 pub enum StoredIndividuals {
     /// A champion.
-    Champion(ExperimentRecord, Champion),
+    Champion(StoredExperiment, Champion),
     /// Some of a generation.
     OfGeneration(StoredGeneration, Wanted),
 }
@@ -40,7 +40,7 @@ pub enum Wanted {
 #[derive(Debug)]
 pub struct Individuals {
     /// Their experiment.
-    pub experiment: ExperimentRecord,
+    pub experiment: StoredExperiment,
     /// In the order of their indices.
     pub individuals: Vec<Champion>,
     /// The network that the genotype of a single one encodes, as JSON; none if another

@@ -5,7 +5,7 @@ use experiment_file::ExperimentConfig;
 
 use crate::{
     limits::{ANCESTORS_MAX, LINEAGE_GENES_MAX},
-    store::{ExperimentRecord, LogEntry, Store},
+    store::{LogEntry, Store, StoredExperiment},
 };
 
 use super::{Address, QueryError, Who, experiment, generation::check_in_log};
@@ -13,7 +13,7 @@ use super::{Address, QueryError, Who, experiment, generation::check_in_log};
 /// What a lineage is computed from.
 #[derive(Debug)]
 pub struct StoredLineage {
-    experiment: ExperimentRecord,
+    experiment: StoredExperiment,
     individual: u32,
     /// Of the earliest generation.
     checkpoint: Checkpoint,

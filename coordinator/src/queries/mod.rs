@@ -17,7 +17,7 @@ mod watch;
 
 use crate::{
     ids::ExperimentId,
-    store::{ExperimentRecord, Store, StoreError},
+    store::{Store, StoreError, StoredExperiment},
 };
 
 pub use address::{Address, NotAnAddress, Who};
@@ -129,6 +129,6 @@ pub enum QueryError {
 }
 
 /// Reads one experiment.
-pub fn experiment(store: &Store, id: ExperimentId) -> Result<ExperimentRecord, QueryError> {
+pub fn experiment(store: &Store, id: ExperimentId) -> Result<StoredExperiment, QueryError> {
     store.experiment(id)?.ok_or(QueryError::NotFound(id))
 }

@@ -14,7 +14,10 @@ use crate::{
     ids::{AssignmentId, JobId},
     priority::Priority,
     queries::{Address, DynamicsPage, Individuals, Lineage, Page},
-    store::{Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord},
+    store::{
+        Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, StoredExperiment,
+        Wanted,
+    },
     text::printable,
 };
 use evolution::{Ancestor, Champion, ChampionSource, Dynamics, HeldOut, Judged, Operator};
@@ -157,19 +160,19 @@ pub fn evaluation(evaluation: EvaluationActivity) -> v1::RunningEvaluation {
 
 /// An experiment for clients.
 pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
-    let summary = ConfigSummary::of(&experiment.config_json);
+    let summary = experiment.summary;
     let (group, variant) =
         experiment.membership.map_or_else(Default::default, |it| (it.group, it.variant));
     v1::Experiment {
         id: experiment.id.0,
-        name: summary.name,
+        name: experiment.name,
         state: state(experiment.state).into(),
         reason: experiment.reason,
         generations_done: experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1),
         generations: summary.generations,
         seed: summary.seed,
         algorithm: summary.algorithm,
-        population_size: summary.population_size,
+        population_size: summary.population_size.try_into().unwrap_or(u32::MAX),
         genotype_len: experiment.genotype_len as u32,
         submitted_at_ms: experiment.submitted_at_ms,
         latest: experiment.latest.map(generation),
@@ -193,33 +196,32 @@ pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
     }
 }
 
-/// What of a canonical configuration clients see in a list.
-#[derive(Default)]
-struct ConfigSummary {
-    name: String,
-    seed: u64,
-    generations: u64,
-    algorithm: String,
-    population_size: u32,
-}
-
-impl ConfigSummary {
-    /// Reads the keys without the rest of the schema: listing must work for
-    /// experiments of any version.
-    fn of(config_json: &str) -> Self {
-        let Ok(config) = serde_json::from_str::<serde_json::Value>(config_json) else {
-            return Self::default();
-        };
-        let algorithm = &config["algorithm"];
-        let text = |value: &serde_json::Value| value.as_str().unwrap_or_default().to_owned();
-        Self {
-            name: text(&config["name"]),
-            seed: config["seed"].as_u64().unwrap_or_default(),
-            generations: algorithm["generations"].as_u64().unwrap_or_default(),
-            algorithm: text(&algorithm["name"]),
-            population_size: algorithm["population_size"].as_u64().unwrap_or_default() as u32,
-        }
-    }
+/// Which experiments a client wants; INVALID_ARGUMENT for a state that there is not.
+pub fn wanted(request: v1::ListExperimentsRequest) -> Result<Wanted, Status> {
+    let states = request.states().map(stored_state).collect::<Result<_, _>>()?;
+    let v1::ListExperimentsRequest {
+        named,
+        labels,
+        without_archived,
+        config_digest,
+        after,
+        page_size,
+        ..
+    } = request;
+    let some = |text: String| (!text.is_empty()).then_some(text);
+    let label = |label: String| match label.split_once('=') {
+        Some((key, value)) => (key.to_owned(), Some(value.to_owned())),
+        None => (label, None),
+    };
+    Ok(Wanted {
+        named: some(named),
+        states,
+        labels: labels.into_iter().map(label).collect(),
+        without_archived,
+        config_digest: some(config_digest),
+        after,
+        limit: (page_size > 0).then_some(page_size),
+    })
 }
 
 /// A priority from a client; INVALID_ARGUMENT beyond its range.
@@ -230,9 +232,9 @@ pub fn priority(weight: u32) -> Result<Priority, Status> {
 }
 
 /// An experiment and its file for clients.
-pub fn stored_experiment(stored: ExperimentRecord) -> v1::GetExperimentResponse {
-    let config_json = stored.config_json.clone();
-    v1::GetExperimentResponse { experiment: Some(experiment(stored)), config_json }
+pub fn stored_experiment(stored: StoredExperiment) -> v1::GetExperimentResponse {
+    let StoredExperiment { record, config_json } = stored;
+    v1::GetExperimentResponse { experiment: Some(experiment(record)), config_json }
 }
 
 /// An address from a client; INVALID_ARGUMENT if it is none.
@@ -379,6 +381,19 @@ fn generation(generation: GenerationRecord) -> v1::GenerationSummary {
         workers: generation.workers as u32,
         idle_share: generation.idle_share,
     }
+}
+
+fn stored_state(state: v1::ExperimentState) -> Result<ExperimentState, Status> {
+    Ok(match state {
+        v1::ExperimentState::Running => ExperimentState::Running,
+        v1::ExperimentState::Paused => ExperimentState::Paused,
+        v1::ExperimentState::Completed => ExperimentState::Completed,
+        v1::ExperimentState::Failed => ExperimentState::Failed,
+        v1::ExperimentState::Cancelled => ExperimentState::Cancelled,
+        v1::ExperimentState::Unspecified => {
+            return Err(Status::invalid_argument("no experiment is in the unspecified state"));
+        }
+    })
 }
 
 fn state(state: ExperimentState) -> v1::ExperimentState {

@@ -134,9 +134,10 @@ impl ExperimentService for Experiments {
 
     async fn list_experiments(
         &self,
-        _request: Request<ListExperimentsRequest>,
+        request: Request<ListExperimentsRequest>,
     ) -> Result<Response<ListExperimentsResponse>, Status> {
-        let experiments = self.store.read(|store| store.experiments()).await?;
+        let wanted = convert::wanted(request.into_inner())?;
+        let experiments = self.store.read(move |store| store.experiments(&wanted)).await?;
         let experiments = experiments.into_iter().map(convert::experiment).collect();
         Ok(Response::new(ListExperimentsResponse { experiments }))
     }

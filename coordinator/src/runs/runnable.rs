@@ -9,7 +9,7 @@ use crate::{
     ids::ExperimentId,
     memory,
     priority::Priority,
-    store::{ExperimentRecord, ExperimentState, GenerationRecord},
+    store::{ExperimentRecord, ExperimentState, GenerationRecord, StoredExperiment, Summary},
 };
 
 /// An experiment that can run. Its evolution is read from the store once there is
@@ -41,12 +41,12 @@ impl Runnable {
         priority: Priority,
     ) -> Self {
         let spec: Arc<str> = config.to_canonical_json().into();
-        let memory = memory::estimate(&spec, genotype_len);
+        let memory = memory::estimate(&Summary::of(&config, &spec), genotype_len);
         Self { id, spec, config, memory, latest: None, priority, is_paused: false }
     }
 
     /// An experiment as the store has it, or what contradicts what.
-    pub fn restore(experiment: &ExperimentRecord, checkpoint: &Checkpoint) -> Result<Self, String> {
+    pub fn restore(experiment: &StoredExperiment, checkpoint: &Checkpoint) -> Result<Self, String> {
         let (id, config) = (experiment.id, config(experiment)?);
         evolution(experiment, &config, checkpoint)?;
         let is_paused = experiment.state == ExperimentState::Paused;
@@ -58,13 +58,13 @@ impl Runnable {
 
 /// Evolution of an experiment as the store has it, or what contradicts what.
 pub fn restore_evolution(
-    experiment: &ExperimentRecord,
+    experiment: &StoredExperiment,
     checkpoint: &Checkpoint,
 ) -> Result<Evolution, String> {
     evolution(experiment, &config(experiment)?, checkpoint)
 }
 
-fn config(experiment: &ExperimentRecord) -> Result<ExperimentConfig, String> {
+fn config(experiment: &StoredExperiment) -> Result<ExperimentConfig, String> {
     let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
         .map_err(|error| format!("its configuration is not valid: {error}"))?;
     Ok(config)
@@ -106,13 +106,15 @@ mod tests {
     use crate::{labels::Labels, store::LogGap, submission::Submission};
 
     /// A new experiment and its checkpoint.
-    fn stored() -> (ExperimentRecord, Checkpoint) {
+    fn stored() -> (StoredExperiment, Checkpoint) {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
         let config_json = fs::read_to_string(path).unwrap();
         let new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
-        let experiment = ExperimentRecord {
+        let config_json = new.config.to_canonical_json();
+        let record = ExperimentRecord {
             id: ExperimentId(1),
-            config_json: new.config.to_canonical_json(),
+            name: new.config.name.clone(),
+            summary: Summary::of(&new.config, &config_json),
             config_digest: new.config_digest.to_string(),
             fingerprint: sim_core::FINGERPRINT.to_owned(),
             genotype_len: new.genotype_len as u64,
@@ -133,7 +135,8 @@ mod tests {
             log_gap: LogGap::None,
             fork: None,
         };
-        (experiment, Checkpoint { keyframe: new.keyframe, log: Vec::new() })
+        let stored = StoredExperiment { record, config_json };
+        (stored, Checkpoint { keyframe: new.keyframe, log: Vec::new() })
     }
 
     #[test]
@@ -143,7 +146,7 @@ mod tests {
 
         let config_json = sound.config_json.replacen("\"seed\":1", "\"seed\":2", 1);
         assert_ne!(config_json, sound.config_json);
-        let edited = ExperimentRecord { config_json, ..sound.clone() };
+        let edited = StoredExperiment { config_json, ..sound.clone() };
         let what = Runnable::restore(&edited, &checkpoint).unwrap_err();
         assert!(what.contains("its configuration has the digest"), "{what}");
 
@@ -156,7 +159,8 @@ mod tests {
             workers: 1,
             idle_share: 0.0,
         };
-        let ahead = ExperimentRecord { latest: Some(latest), ..sound.clone() };
+        let mut ahead = sound.clone();
+        ahead.record.latest = Some(latest);
         let what = Runnable::restore(&ahead, &checkpoint).unwrap_err();
         assert!(what.contains("its history has 1 generations"), "{what}");
 

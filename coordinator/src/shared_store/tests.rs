@@ -5,7 +5,10 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-use crate::{store::NewExperiment, submission::Submission};
+use crate::{
+    store::{NewExperiment, Wanted},
+    submission::Submission,
+};
 
 use super::*;
 
@@ -24,7 +27,7 @@ fn new_experiment() -> NewExperiment {
 }
 
 async fn n_experiments(store: &SharedStore) -> usize {
-    store.read(|store| store.experiments()).await.unwrap().len()
+    store.read(|store| store.experiments(&Wanted::default())).await.unwrap().len()
 }
 
 async fn pragma(store: &SharedStore, name: &'static str, value: u32) {

@@ -3,7 +3,7 @@
 
 use bundle::Bundle;
 use evolution::Champion;
-use rusqlite::{Transaction, params};
+use rusqlite::{OptionalExtension, Transaction, params};
 
 use super::{
     Evidence, ExperimentRecord, ExperimentState, ForkRecord, GenerationRecord, LogGap, Result,
@@ -52,18 +52,32 @@ impl Store {
 
     /// Adds an ended experiment, unless it is there already: then returns that one.
     pub fn import(&mut self, imported: &Imported, now_ms: u64) -> Result<(ExperimentId, bool)> {
-        let digest = imported.bundle.manifest.digest.to_string();
-        let is_same = |it: &ExperimentRecord| {
-            it.digest == digest && it.config_json == imported.bundle.config_json
-        };
-        if let Some(same) = self.experiments()?.iter().find(|it| is_same(it)) {
-            return Ok((same.id, false));
+        if let Some(id) = self.same_as(&imported.bundle)? {
+            return Ok((id, false));
         }
         self.write(|transaction, sealer| {
             let id = put_row(transaction, sealer, imported)?;
             put_evidence(transaction, sealer, id, imported)?;
             put_events(transaction, id, imported, now_ms)?;
             Ok((id, true))
+        })
+    }
+
+    /// The experiment of a bundle, if it is here.
+    fn same_as(&self, bundle: &Bundle) -> Result<Option<ExperimentId>> {
+        let manifest = &bundle.manifest;
+        let (config_digest, digest) =
+            (manifest.config_digest.to_string(), manifest.digest.to_string());
+        self.read(|connection| {
+            let mut statement = connection.prepare_cached(
+                "SELECT id FROM experiments
+                 WHERE config_digest = ?1 AND digest = ?2 AND config = ?3 ORDER BY id",
+            )?;
+            let id = statement
+                .query_row(params![config_digest, digest, bundle.config_json], |row| {
+                    row.get(0).map(ExperimentId)
+                });
+            Ok(id.optional()?)
         })
     }
 

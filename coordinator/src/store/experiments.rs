@@ -1,41 +1,121 @@
 //! Experiments as their rows have them, with their latest generation.
 
-use rusqlite::{Connection, OptionalExtension, Row};
+use rusqlite::{Connection, OptionalExtension, Row, params_from_iter, types::Value};
 
 use crate::{group::Membership, ids::ExperimentId, priority::Priority};
 
 use super::{
-    ExperimentRecord, ExperimentState, ForkRecord, LogGap, StoreError, error::Result, history,
-    labels,
+    ExperimentRecord, ExperimentState, ForkRecord, LogGap, StoreError, StoredExperiment, Summary,
+    error::Result, history, labels,
 };
 
-/// One of them.
-pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
+/// Which experiments a list has: those that are all of what is said here.
+#[derive(Debug, Clone, Default)]
+pub struct Wanted {
+    /// Of the group of this name, or, if there is none, the experiments of this name.
+    pub named: Option<String>,
+    /// In one of these states; empty: in any.
+    pub states: Vec<ExperimentState>,
+    /// With each of these labels, with any value or with this one.
+    pub labels: Vec<(String, Option<String>)>,
+    /// Whether those that are archived are left out.
+    pub without_archived: bool,
+    /// Of the file with this digest.
+    pub config_digest: Option<String>,
+    /// Those with larger numbers.
+    pub after: u64,
+    /// At most so many, those with the smallest numbers; none: all.
+    pub limit: Option<u32>,
+}
+
+impl Wanted {
+    /// Those that have not ended.
+    pub fn unfinished() -> Self {
+        let states = vec![ExperimentState::Running, ExperimentState::Paused];
+        Self { states, ..Self::default() }
+    }
+
+    /// The condition, and what its `?` stand for.
+    fn condition(&self) -> (String, Vec<Value>) {
+        let (mut conditions, mut values) = (Vec::new(), Vec::<Value>::new());
+        let mut add = |condition: String, of: Vec<Value>| {
+            conditions.push(condition);
+            values.extend(of);
+        };
+        if self.after > 0 {
+            // SQLite's integers are signed.
+            add("e.id > ?".into(), vec![i64::try_from(self.after).unwrap_or(i64::MAX).into()]);
+        }
+        if let Some(name) = &self.named {
+            let condition = "(e.group_name = ? OR e.name = ? AND NOT EXISTS
+                              (SELECT 1 FROM experiments WHERE group_name = ?))";
+            add(condition.into(), vec![name.clone().into(); 3]);
+        }
+        if !self.states.is_empty() {
+            let places = vec!["?"; self.states.len()].join(", ");
+            let names = self.states.iter().map(|state| state.name().to_owned().into());
+            add(format!("e.state IN ({places})"), names.collect());
+        }
+        for (key, value) in &self.labels {
+            let of_label = "SELECT 1 FROM json_each(e.labels) WHERE key = ?";
+            match value {
+                None => add(format!("EXISTS ({of_label})"), vec![key.clone().into()]),
+                Some(value) => {
+                    let values = vec![key.clone().into(), value.clone().into()];
+                    add(format!("EXISTS ({of_label} AND value = ?)"), values);
+                }
+            }
+        }
+        if self.without_archived {
+            add("NOT e.archived".into(), Vec::new());
+        }
+        if let Some(digest) = &self.config_digest {
+            add("e.config_digest = ?".into(), vec![digest.clone().into()]);
+        }
+        let condition = match conditions.is_empty() {
+            true => "true".to_owned(),
+            false => conditions.join(" AND "),
+        };
+        (condition, values)
+    }
+}
+
+/// One of them, with its file.
+pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<StoredExperiment>> {
     if i64::try_from(id.0).is_err() {
         return Ok(None); // SQLite's integers are signed.
     }
-    let mut statement = connection.prepare_cached(&format!("{SELECT} WHERE e.id = ?1"))?;
-    statement.query_row([id.0], read).optional()?.transpose()
+    let sql = format!("SELECT {COLUMNS}, e.config FROM {TABLES} WHERE e.id = ?1");
+    let mut statement = connection.prepare_cached(&sql)?;
+    let stored = statement.query_row([id.0], |row| Ok((read(row)?, row.get("config")?)));
+    let Some((record, config_json)) = stored.optional()? else { return Ok(None) };
+    Ok(Some(StoredExperiment { record: record?, config_json }))
 }
 
-/// All of them, oldest first.
-pub fn all(connection: &Connection) -> Result<Vec<ExperimentRecord>> {
-    let mut statement = connection.prepare_cached(&format!("{SELECT} ORDER BY e.id"))?;
-    let rows = statement.query_map([], read)?;
+/// Those that are wanted, oldest first.
+pub fn list(connection: &Connection, wanted: &Wanted) -> Result<Vec<ExperimentRecord>> {
+    let (condition, values) = wanted.condition();
+    let limit = wanted.limit.map_or(-1, i64::from);
+    let sql =
+        format!("SELECT {COLUMNS} FROM {TABLES} WHERE {condition} ORDER BY e.id LIMIT {limit}");
+    let mut statement = connection.prepare_cached(&sql)?;
+    let rows = statement.query_map(params_from_iter(values), read)?;
     rows.map(|row| row?).collect()
 }
 
-const SELECT: &str =
-    "SELECT e.id, e.config, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
-            e.submitted_at_ms, e.digest, c.held_out_mean, c.judged_mean,
-            g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
-            g.duration_ms, g.episodes, g.workers, g.idle_share, e.priority,
-            (SELECT max(sequence) FROM events WHERE experiment_id = e.id),
-            e.group_name, e.variant, e.log_from, e.log_gap,
-            f.parent_id, f.generation, f.link, f.changes, e.labels, e.archived,
-            (SELECT avg(r.duration_ms) FROM generations r
-             WHERE r.experiment_id = e.id AND r.generation > g.generation - 10)
-     FROM experiments e
+const COLUMNS: &str =
+    "e.id, e.name, e.config_digest, e.fingerprint, e.genotype_len, e.state, e.reason,
+     e.submitted_at_ms, e.digest, c.held_out_mean, c.judged_mean,
+     g.generation, g.best, g.mean, g.min, g.standard_deviation, g.digest,
+     g.duration_ms, g.episodes, g.workers, g.idle_share, e.priority,
+     (SELECT max(sequence) FROM events WHERE experiment_id = e.id),
+     e.group_name, e.variant, e.log_from, e.log_gap,
+     f.parent_id, f.generation, f.link, f.changes, e.labels, e.archived,
+     (SELECT avg(r.duration_ms) FROM generations r
+      WHERE r.experiment_id = e.id AND r.generation > g.generation - 10),
+     e.summary";
+
+const TABLES: &str = "experiments e
      LEFT JOIN forks f ON f.experiment_id = e.id
      LEFT JOIN champions c ON c.experiment_id = e.id
      LEFT JOIN generations g ON g.experiment_id = e.id AND g.generation =
@@ -57,7 +137,8 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> {
     };
     Ok(Ok(ExperimentRecord {
         id,
-        config_json: row.get(1)?,
+        name: row.get(1)?,
+        summary: Summary::from_column(row.get_ref(34)?.as_str_or_null()?),
         config_digest: row.get(2)?,
         fingerprint: row.get(3)?,
         genotype_len: row.get(4)?,
@@ -91,4 +172,84 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Result<ExperimentRecord>> {
 /// The place in a group that a row has.
 fn membership(group: Option<String>, variant: Option<String>) -> Option<Membership> {
     group.map(|group| Membership { group, variant: variant.unwrap_or_default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{
+        labels::Labels,
+        store::{Store, tests::new_experiment},
+    };
+
+    use super::*;
+
+    /// Runs named a, b, b, a; the last three in the groups b, b and c; the first one ended, the
+    /// second one archived, the third one paused.
+    fn store() -> (tempfile::TempDir, Store) {
+        let directory = tempfile::tempdir().unwrap();
+        let mut store = Store::open(directory.path()).unwrap();
+        let runs = [
+            ("a", None, "ada"),
+            ("b", Some("b"), "eve"),
+            ("x", Some("b"), "ada"),
+            ("a", Some("c"), "eve"),
+        ];
+        for (name, group, user) in runs {
+            let mut new = new_experiment(None);
+            new.config.name = name.to_owned();
+            new.membership =
+                group.map(|group| Membership { group: group.into(), variant: String::new() });
+            new.labels = Labels::from([
+                ("user".to_owned(), user.to_owned()),
+                ("a b".to_owned(), String::new()),
+            ]);
+            store.create(&new, 0).unwrap();
+        }
+        for id in [1, 2] {
+            store.set_state(ExperimentId(id), 1, ExperimentState::Cancelled, "").unwrap();
+        }
+        store.set_archived(ExperimentId(2), true).unwrap();
+        store.set_state(ExperimentId(3), 1, ExperimentState::Paused, "").unwrap();
+        (directory, store)
+    }
+
+    fn ids(store: &Store, wanted: Wanted) -> Vec<u64> {
+        store.experiments(&wanted).unwrap().iter().map(|found| found.id.0).collect()
+    }
+
+    #[test]
+    fn a_name_is_that_of_a_group_before_it_is_that_of_experiments() {
+        let (_directory, store) = store();
+        let named =
+            |name: &str| ids(&store, Wanted { named: Some(name.into()), ..Wanted::default() });
+        assert_eq!(named("a"), [1, 4]);
+        assert_eq!(named("b"), [2, 3]);
+        assert_eq!(named("c"), [4]);
+        assert_eq!(named("x"), [3]);
+        assert_eq!(named("?"), [0_u64; 0]);
+    }
+
+    #[test]
+    fn all_that_is_wanted_holds_together() {
+        let (_directory, store) = store();
+        let all = Wanted::default;
+        assert_eq!(ids(&store, all()), [1, 2, 3, 4]);
+        assert_eq!(ids(&store, Wanted::unfinished()), [3, 4]);
+        assert_eq!(ids(&store, Wanted { without_archived: true, ..all() }), [1, 3, 4]);
+        let label =
+            |key: &str, value: Option<&str>| vec![(key.to_owned(), value.map(str::to_owned))];
+        assert_eq!(ids(&store, Wanted { labels: label("user", None), ..all() }), [1, 2, 3, 4]);
+        assert_eq!(ids(&store, Wanted { labels: label("a b", Some("")), ..all() }), [1, 2, 3, 4]);
+        let of_ada = || label("user", Some("ada"));
+        assert_eq!(ids(&store, Wanted { labels: of_ada(), ..all() }), [1, 3]);
+        assert_eq!(ids(&store, Wanted { labels: of_ada(), ..Wanted::unfinished() }), [3]);
+        assert_eq!(ids(&store, Wanted { labels: label("us%", None), ..all() }), [0_u64; 0]);
+        assert_eq!(ids(&store, Wanted { after: 2, ..all() }), [3, 4]);
+        assert_eq!(ids(&store, Wanted { after: 1, limit: Some(2), ..all() }), [2, 3]);
+        assert_eq!(ids(&store, Wanted { after: u64::MAX, ..all() }), [0_u64; 0]);
+        let config_digest = Some(store.experiments(&all()).unwrap()[0].config_digest.clone());
+        assert_eq!(ids(&store, Wanted { config_digest, ..all() }), [1, 2, 3, 4]);
+        let config_digest = Some("0".to_owned());
+        assert_eq!(ids(&store, Wanted { config_digest, ..all() }), [0_u64; 0]);
+    }
 }

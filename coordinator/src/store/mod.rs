@@ -20,6 +20,7 @@ mod records;
 mod schema;
 mod seals;
 mod soundness;
+mod summary;
 mod write_ahead_log;
 
 use std::path::{Path, PathBuf};
@@ -31,6 +32,7 @@ use evolution::{Champion, Checkpoint};
 
 pub use error::StoreError;
 pub use evidence::Imported;
+pub use experiments::Wanted;
 pub use file::{Holder, holder};
 pub use fitness_log::Entry;
 pub use forks::ForkRecord;
@@ -40,8 +42,9 @@ pub use inspection::{
 pub use quarantine::QuarantinedWorker;
 pub use records::{
     Event, EventKind, Evidence, ExperimentRecord, ExperimentState, GenerationRecord, LogEntry,
-    LogGap, NewExperiment,
+    LogGap, NewExperiment, StoredExperiment,
 };
+pub use summary::Summary;
 
 use error::Result;
 use file::Locks;
@@ -334,8 +337,8 @@ impl Store {
         })
     }
 
-    /// Reads one experiment.
-    pub fn experiment(&self, id: ExperimentId) -> Result<Option<ExperimentRecord>> {
+    /// Reads one experiment, with its file.
+    pub fn experiment(&self, id: ExperimentId) -> Result<Option<StoredExperiment>> {
         self.read(|connection| experiments::get(connection, id))
     }
 
@@ -391,9 +394,9 @@ impl Store {
         })
     }
 
-    /// Reads all experiments, oldest first.
-    pub fn experiments(&self) -> Result<Vec<ExperimentRecord>> {
-        self.read(experiments::all)
+    /// Reads those of the experiments that are wanted, oldest first.
+    pub fn experiments(&self, wanted: &Wanted) -> Result<Vec<ExperimentRecord>> {
+        self.read(|connection| experiments::list(connection, wanted))
     }
 
     /// The champion so far; none before the first generation.

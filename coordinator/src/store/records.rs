@@ -1,9 +1,11 @@
 //! What the store keeps, as plain data.
 
+use std::ops::Deref;
+
 use bundle::Keyframes;
 use experiment_file::ExperimentConfig;
 
-use super::ForkRecord;
+use super::{ForkRecord, Summary};
 use crate::{group::Membership, ids::ExperimentId, labels::Labels, priority::Priority};
 use evolution::{Champion, Digest, Statistics};
 
@@ -72,13 +74,33 @@ pub struct NewExperiment {
     pub champion: Option<Champion>,
 }
 
-/// An experiment as it stands.
+/// An experiment as it stands, with its file.
+#[derive(Debug, Clone)]
+pub struct StoredExperiment {
+    /// Everything else.
+    pub record: ExperimentRecord,
+    /// Canonical configuration, as JSON.
+    pub config_json: String,
+}
+
+impl Deref for StoredExperiment {
+    type Target = ExperimentRecord;
+
+    fn deref(&self) -> &ExperimentRecord {
+        &self.record
+    }
+}
+
+/// An experiment as it stands, as lists have it: without its file, which is longer than all the
+/// rest.
 #[derive(Debug, Clone)]
 pub struct ExperimentRecord {
     /// Its id.
     pub id: ExperimentId,
-    /// Canonical configuration, as JSON.
-    pub config_json: String,
+    /// Its name.
+    pub name: String,
+    /// Some keys of its file.
+    pub summary: Summary,
     /// Link -1 of the digest chain.
     pub config_digest: String,
     /// The simulation that computes it.

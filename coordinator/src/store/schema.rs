@@ -4,6 +4,18 @@ use rusqlite::{Connection, TransactionBehavior};
 
 use super::{StoreError, seals};
 
+/// Makes the column `summary` of the column `config`: a list of what
+/// [`Summary`](super::Summary) has. `->` keeps all digits of a seed.
+macro_rules! summary {
+    () => {
+        "CASE WHEN json_valid(config) THEN json_array(
+             config -> '$.seed', config -> '$.algorithm.generations', config -> '$.algorithm.name',
+             config -> '$.algorithm.population_size', config -> '$.algorithm.num_evaluations',
+             config -> '$.algorithm.champion_trials', config -> '$.algorithm.judgement_trials',
+             length(CAST(config AS BLOB))) END"
+    };
+}
+
 /// Statements that lead from version i to version i + 1. Never change an entry
 /// that has been released; add one.
 const MIGRATIONS: &[&str] = &[
@@ -239,6 +251,56 @@ const MIGRATIONS: &[&str] = &[
     ALTER TABLE experiments ADD COLUMN archived INTEGER NOT NULL DEFAULT 0
           CHECK (archived IN (0, 1));
 ",
+    // Lists of many experiments leave out their files: these come last in their rows, as SQLite
+    // reads a row up to the column that it needs.
+    concat!(
+        "
+    CREATE TABLE listed_experiments (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        request_id TEXT UNIQUE,
+        name TEXT NOT NULL,
+        config_digest TEXT NOT NULL,
+        fingerprint TEXT NOT NULL,
+        genotype_len INTEGER NOT NULL,
+        state TEXT NOT NULL
+              CHECK (state IN ('running', 'paused', 'completed', 'failed', 'cancelled')),
+        reason TEXT NOT NULL DEFAULT '',
+        submitted_at_ms INTEGER NOT NULL,
+        digest TEXT NOT NULL DEFAULT '',
+        priority INTEGER NOT NULL DEFAULT 100 CHECK (priority BETWEEN 1 AND 1000),
+        seal BLOB NOT NULL DEFAULT x'',
+        group_name TEXT,
+        variant TEXT,
+        log_from INTEGER NOT NULL DEFAULT 0,
+        log_gap TEXT NOT NULL DEFAULT ''
+                CHECK (log_gap IN ('', 'older', 'pruned', 'damaged', 'forked')),
+        labels TEXT NOT NULL DEFAULT '{}',
+        archived INTEGER NOT NULL DEFAULT 0 CHECK (archived IN (0, 1)),
+        -- Some keys of the file, as a JSON list.
+        summary TEXT GENERATED ALWAYS AS (",
+        summary!(),
+        ") STORED,
+        config TEXT NOT NULL
+    ) STRICT;
+    INSERT INTO listed_experiments
+           (id, request_id, name, config_digest, fingerprint, genotype_len, state, reason,
+            submitted_at_ms, digest, priority, seal, group_name, variant, log_from, log_gap,
+            labels, archived, config)
+    SELECT id, request_id, name, config_digest, fingerprint, genotype_len, state, reason,
+           submitted_at_ms, digest, priority, seal, group_name, variant, log_from, log_gap,
+           labels, archived, config
+    FROM experiments;
+    -- Numbers of deleted experiments are not used again.
+    DELETE FROM sqlite_sequence WHERE name = 'listed_experiments';
+    UPDATE sqlite_sequence SET name = 'listed_experiments' WHERE name = 'experiments';
+    DROP TABLE experiments;
+    ALTER TABLE listed_experiments RENAME TO experiments;
+    CREATE INDEX experiments_by_name ON experiments (name);
+    CREATE INDEX experiments_by_group ON experiments (group_name);
+    CREATE INDEX experiments_by_digest ON experiments (config_digest);
+    CREATE INDEX experiments_by_state ON experiments (state);
+"
+    ),
 ];
 
 /// The first version with seals.
@@ -261,6 +323,9 @@ const FORKS: i64 = 9;
 
 /// The first version with labels and an archive.
 const LABELS: i64 = 10;
+
+/// The first version with summaries.
+const SUMMARIES: i64 = 11;
 
 /// The version that this code writes.
 pub const VERSION: i64 = MIGRATIONS.len() as i64;
@@ -380,7 +445,9 @@ pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result
     );
     let group = if_before(GROUPS, ", NULL AS group_name, NULL AS variant");
     let labels = if_before(LABELS, ", '{}' AS labels, 0 AS archived");
-    let experiments = format!("*{priority}{group}{seal}{log}{labels} FROM main.experiments");
+    let summary = if_before(SUMMARIES, concat!(", ", summary!(), " AS summary"));
+    let experiments =
+        format!("*{priority}{group}{seal}{log}{labels}{summary} FROM main.experiments");
     views.push(("experiments", experiments));
     for (name, select) in views {
         connection.execute_batch(&format!("CREATE TEMP VIEW {name} AS SELECT {select}"))?;
@@ -419,12 +486,36 @@ mod tests {
             .expect_err("references are checked again");
         connection
             .execute(
-                "INSERT INTO experiments SELECT NULL, NULL, name, config, config_digest,
-                      fingerprint, genotype_len, state, reason, submitted_at_ms, digest, priority,
-                      seal, NULL, NULL, log_from, log_gap, labels, archived FROM experiments",
+                "INSERT INTO experiments (name, config, config_digest, fingerprint, genotype_len,
+                                          state, submitted_at_ms)
+                 SELECT name, config, config_digest, fingerprint, genotype_len, state,
+                        submitted_at_ms FROM experiments",
                 [],
             )
             .unwrap();
         assert_eq!(connection.last_insert_rowid(), 4, "ids are not reused");
+    }
+
+    #[test]
+    fn the_number_of_a_deleted_experiment_is_not_used_again_in_a_later_version() {
+        let put = "INSERT INTO experiments (name, config, config_digest, fingerprint, genotype_len,
+                                            state, submitted_at_ms)
+                   VALUES ('n', '{\"seed\": 5}', 'd', 'f', 5, 'failed', 7);";
+        for kept in ["", put] {
+            let mut connection = Connection::open_in_memory().unwrap();
+            for statements in &MIGRATIONS[..SUMMARIES as usize - 1] {
+                connection.execute_batch(statements).unwrap();
+            }
+            connection.execute_batch(&format!("{put}{put}DELETE FROM experiments;")).unwrap();
+            connection.execute_batch(&format!("{kept}PRAGMA user_version = 10;")).unwrap();
+            migrate(&mut connection).unwrap();
+            connection.execute_batch(put).unwrap();
+            let n_before = 2 + i64::from(!kept.is_empty());
+            assert_eq!(connection.last_insert_rowid(), n_before + 1);
+            let summary: String = connection
+                .query_row("SELECT summary FROM experiments", [], |row| row.get(0))
+                .unwrap();
+            assert!(summary.starts_with("[5,null,"), "{summary}");
+        }
     }
 }

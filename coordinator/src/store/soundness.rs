@@ -4,7 +4,7 @@ use evolution::Checkpoint;
 use rusqlite::{Connection, params};
 
 use super::{
-    ExperimentRecord, ExperimentState, Result, Store, StoreError, add_notice, add_state_event,
+    ExperimentState, Result, Store, StoreError, StoredExperiment, add_notice, add_state_event,
     experiments, fitness_log, forks,
     seals::{self, Sealer},
 };
@@ -14,7 +14,7 @@ impl Store {
     /// An experiment and its checkpoint, both as they were stored;
     /// [`StoreError::Unsound`] if one of them is not, [`StoreError::NoCheckpoint`] if it has ended
     /// and kept none.
-    pub fn resumable(&self, id: ExperimentId) -> Result<(ExperimentRecord, Checkpoint)> {
+    pub fn resumable(&self, id: ExperimentId) -> Result<(StoredExperiment, Checkpoint)> {
         self.read(|connection| {
             let what = match resumable(connection, &self.sealer, id)? {
                 Ok(found) => return Ok(found),
@@ -59,7 +59,7 @@ pub fn resumable(
     connection: &Connection,
     sealer: &Sealer,
     id: ExperimentId,
-) -> Result<Result<(ExperimentRecord, Checkpoint), String>> {
+) -> Result<Result<(StoredExperiment, Checkpoint), String>> {
     let found = match experiments::get(connection, id) {
         Err(StoreError::Corrupt(what)) => return Ok(Err(what)),
         other => other?,

@@ -95,6 +95,11 @@ pub const WITHOUT_LOG: &str = "
                          WHERE k.experiment_id = l.experiment_id);
     DROP TABLE keyframes;
     DROP TABLE fitness_log;
+    DROP INDEX experiments_by_name;
+    DROP INDEX experiments_by_group;
+    DROP INDEX experiments_by_digest;
+    DROP INDEX experiments_by_state;
+    ALTER TABLE experiments DROP COLUMN summary;
     ALTER TABLE experiments DROP COLUMN labels;
     ALTER TABLE experiments DROP COLUMN archived;
     ALTER TABLE experiments DROP COLUMN log_from;
@@ -202,7 +207,7 @@ fn a_request_id_creates_one_experiment() {
     assert_eq!(store.create(&new_experiment(Some("key")), 6).unwrap(), (first, false));
     let (other, is_new) = store.create(&new_experiment(None), 7).unwrap();
     assert!(is_new && other != first);
-    assert_eq!(store.experiments().unwrap().len(), 2);
+    assert_eq!(store.experiments(&Wanted::default()).unwrap().len(), 2);
 }
 
 #[test]
@@ -359,7 +364,7 @@ fn labels_and_the_archive_are_kept_through_recovery() {
     drop(store);
     let copy = directory.path().join("copy");
     recover(directory.path(), &copy).unwrap();
-    let found = Store::open(&copy).unwrap().experiment(id).unwrap().unwrap();
+    let found = Store::open(&copy).unwrap().experiment(id).unwrap().unwrap().record;
     assert_eq!((found.labels, found.is_archived), (labels("grace"), true));
     assert_eq!(found.recent_generation_ms, Some(found.latest.unwrap().duration_ms as f64));
 }
@@ -429,7 +434,8 @@ fn a_wall_clock_that_jumps_changes_no_order() {
     drop(store);
 
     let store = Store::open(directory.path()).unwrap();
-    let ids: Vec<ExperimentId> = store.experiments().unwrap().iter().map(|e| e.id).collect();
+    let ids: Vec<ExperimentId> =
+        store.experiments(&Wanted::default()).unwrap().iter().map(|e| e.id).collect();
     assert_eq!(ids, [first, second], "by id, not by time of submission");
     let events = store.events(first, 1, 100).unwrap();
     let times: Vec<u64> = events.iter().map(|event| event.at_ms).collect();
@@ -460,7 +466,7 @@ fn a_pause_is_kept_with_its_reason_and_takes_a_evaluated_generation() {
 
     let mut store = Store::open(directory.path()).unwrap();
     let state = |store: &Store| {
-        let experiment = store.experiment(id).unwrap().unwrap();
+        let experiment = store.experiment(id).unwrap().unwrap().record;
         (experiment.state, experiment.reason)
     };
     assert_eq!(state(&store), (ExperimentState::Paused, "for dinner".to_owned()));

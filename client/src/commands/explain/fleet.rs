@@ -1,12 +1,13 @@
 //! What the whole fleet does, and what its experiments wait for.
 
 use serde::Serialize;
-use swarm_proto::v1::{ExplainExperimentResponse, ListWorkersRequest, RunningEvaluation};
+use swarm_proto::v1::{
+    ExperimentState, ExplainExperimentResponse, ListExperimentsRequest, ListWorkersRequest,
+    RunningEvaluation,
+};
 
 use super::{Explanation, explain, finding::Finding};
-use crate::{
-    clock, connection::Connection, error::Error, json, json::has_ended, progress::Progress, text,
-};
+use crate::{clock, connection::Connection, error::Error, json, progress::Progress, text};
 
 /// The fleet, as JSON.
 #[derive(Debug, Serialize)]
@@ -74,10 +75,10 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
     let (workers, evaluations) = (answer.workers, answer.evaluations);
     let slots = workers.iter().map(|worker| u64::from(worker.slots)).sum();
     let mut explained: Vec<(ExplainExperimentResponse, Vec<Finding>)> = Vec::new();
-    for experiment in connection.experiments().await? {
-        if !has_ended(experiment.state()) {
-            explained.push(explain(connection, experiment.id).await?);
-        }
+    let states = vec![ExperimentState::Running.into(), ExperimentState::Paused.into()];
+    let unfinished = ListExperimentsRequest { states, ..Default::default() };
+    for experiment in connection.list(unfinished).await? {
+        explained.push(explain(connection, experiment.id).await?);
     }
     if progress.is_json() {
         let experiments = explained.iter().filter_map(|(answer, findings)| {

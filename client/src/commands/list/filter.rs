@@ -4,7 +4,7 @@ use std::cmp::{Ordering, Reverse};
 
 use clap::{Args, ValueEnum};
 use clap_complete::ArgValueCompleter;
-use swarm_proto::v1::{Experiment, ExperimentState};
+use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{complete, text};
 
@@ -61,21 +61,20 @@ impl From<State> for ExperimentState {
 }
 
 impl Filter {
-    /// Those that are wanted, in order. Experiments come in the order of their numbers.
-    pub fn apply(&self, mut experiments: Vec<Experiment>) -> Vec<Experiment> {
-        experiments.retain(|experiment| self.has(experiment));
-        experiments.sort_by(|a, b| self.sort.compare(a, b));
-        experiments
+    /// Which experiments they are; `named`: the name of a group, or of an experiment.
+    pub fn wanted(&self, named: Option<String>) -> ListExperimentsRequest {
+        ListExperimentsRequest {
+            named: named.unwrap_or_default(),
+            states: self.state.iter().map(|&state| ExperimentState::from(state).into()).collect(),
+            labels: self.label.clone(),
+            without_archived: !self.all,
+            ..Default::default()
+        }
     }
 
-    fn has(&self, experiment: &Experiment) -> bool {
-        let state = experiment.state();
-        let is_state = self.state.is_empty() || self.state.iter().any(|&it| state == it.into());
-        let has_label = |label: &String| match label.split_once('=') {
-            Some((key, value)) => experiment.labels.get(key).is_some_and(|it| it == value),
-            None => experiment.labels.contains_key(label),
-        };
-        is_state && self.label.iter().all(has_label) && (self.all || !experiment.archived)
+    /// Brings experiments that come in the order of their numbers into the wanted one.
+    pub fn sort(&self, experiments: &mut [Experiment]) {
+        experiments.sort_by(|a, b| self.sort.compare(a, b));
     }
 }
 
@@ -136,24 +135,14 @@ mod tests {
     }
 
     fn ids(filter: Filter) -> Vec<u64> {
-        filter.apply(experiments()).iter().map(|it| it.id).collect()
-    }
-
-    #[test]
-    fn filters_hold_together() {
-        let label = |text: &str| Filter { label: vec![text.into()], ..Filter::default() };
-        assert_eq!(ids(Filter::default()), [1, 2]);
-        assert_eq!(ids(Filter { all: true, ..Filter::default() }), [1, 2, 3]);
-        assert_eq!(ids(label("user")), [1, 2]);
-        assert_eq!(ids(label("user=ada")), [1]);
-        assert_eq!(ids(Filter { state: vec![State::Running], ..label("user=ada") }), [0_u64; 0]);
-        let states = vec![State::Running, State::Completed];
-        assert_eq!(ids(Filter { state: states, ..Filter::default() }), [1, 2]);
+        let mut experiments = experiments();
+        filter.sort(&mut experiments);
+        experiments.iter().map(|it| it.id).collect()
     }
 
     #[test]
     fn what_is_not_known_comes_last() {
-        let sorted = |sort| ids(Filter { sort, all: true, ..Filter::default() });
+        let sorted = |sort| ids(Filter { sort, ..Filter::default() });
         assert_eq!(sorted(Sort::Best), [2, 1, 3]);
         assert_eq!(sorted(Sort::Age), [2, 1, 3]);
         assert_eq!(sorted(Sort::Eta), [2, 1, 3]);

@@ -14,7 +14,7 @@ use super::{
     *,
 };
 use crate::store::{
-    Entry, ExperimentState, GenerationCommit, GenerationRecord, LogGap, Store, StoreError,
+    Entry, ExperimentState, GenerationCommit, GenerationRecord, LogGap, Store, StoreError, Wanted,
 };
 
 /// Commits a generation of a real evolution, whose fitness is its index.
@@ -81,7 +81,7 @@ pub fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
 
 /// Everything of the experiments in a directory, bit for bit.
 fn contents(store: &Store) -> Vec<String> {
-    let experiments = store.experiments().unwrap();
+    let experiments = store.experiments(&Wanted::default()).unwrap();
     let all = experiments.iter().map(|experiment| {
         let id = experiment.id;
         let generations = store.generations(id, 0, 100).unwrap();
@@ -180,7 +180,7 @@ fn a_copy_without_its_log_is_found_and_what_is_in_it_can_be_kept() {
     let to = copied.path().join("new");
     assert_eq!(fates(&recover(copied.path(), &to).unwrap()), [Fate::Kept; 4]);
     let recovered = Store::open(&to).unwrap();
-    let latest = recovered.experiment(ExperimentId(2)).unwrap().unwrap().latest.unwrap();
+    let latest = recovered.experiment(ExperimentId(2)).unwrap().unwrap().record.latest.unwrap();
     assert_eq!(latest.generation, 1, "the third one was in the log");
 }
 

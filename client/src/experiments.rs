@@ -1,0 +1,95 @@
+//! The experiments of a place: all, some of them, and those that a name stands for.
+
+use experiment_file::suggestion;
+use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
+
+use crate::{args::Subject, connection::Connection, error::Error};
+
+/// Experiments in one answer: far fewer than make a message too long.
+const PAGE_LEN: u32 = 2_000;
+
+impl Connection {
+    /// The experiments that are wanted, oldest first.
+    pub async fn list(&self, wanted: ListExperimentsRequest) -> Result<Vec<Experiment>, Error> {
+        let mut request = ListExperimentsRequest { page_size: PAGE_LEN, ..wanted };
+        let mut all: Vec<Experiment> = Vec::new();
+        loop {
+            let page = request.clone();
+            let answer = self.call(async |client| client.list_experiments(page.clone()).await);
+            let page = answer.await?.experiments;
+            // A coordinator of an earlier version knows no pages, and sends everything.
+            let is_last = page.len() != PAGE_LEN as usize;
+            request.after = page.last().map_or(0, |last| last.id);
+            all.extend(page);
+            if is_last {
+                return Ok(all);
+            }
+        }
+    }
+
+    /// All experiments, oldest first.
+    pub async fn experiments(&self) -> Result<Vec<Experiment>, Error> {
+        self.list(ListExperimentsRequest::default()).await
+    }
+
+    /// Those that are running, oldest first.
+    pub async fn running(&self) -> Result<Vec<Experiment>, Error> {
+        let states = vec![ExperimentState::Running.into()];
+        self.list(ListExperimentsRequest { states, ..Default::default() }).await
+    }
+
+    /// One experiment, or all of a group.
+    pub async fn subject(&self, subject: &Subject) -> Result<Vec<Experiment>, Error> {
+        match subject {
+            Subject::Experiment(id) => Ok(vec![self.experiment(*id).await?]),
+            Subject::Group(name) => self.group(name).await,
+        }
+    }
+
+    /// The one experiment of a number or a name; an error if it is a group of several.
+    pub async fn one(&self, subject: &Subject) -> Result<Experiment, Error> {
+        let mut found = self.subject(subject).await?;
+        match found.len() {
+            1 => Ok(found.remove(0)),
+            _ => Err(several(&subject.to_string(), &found)),
+        }
+    }
+
+    /// The experiments of a group, oldest first; or the one experiment of that name.
+    pub async fn group(&self, name: &str) -> Result<Vec<Experiment>, Error> {
+        let wanted = ListExperimentsRequest { named: name.to_owned(), ..Default::default() };
+        // A coordinator of an earlier version sends others, too.
+        let (members, others): (Vec<Experiment>, Vec<Experiment>) =
+            self.list(wanted).await?.into_iter().partition(|it| it.group == name);
+        if !members.is_empty() {
+            return Ok(members);
+        }
+        let named: Vec<Experiment> = others.into_iter().filter(|it| it.name == name).collect();
+        match named.len() {
+            0 => Err(unknown(name, &self.experiments().await?)),
+            1 => Ok(named),
+            _ => Err(several(name, &named)),
+        }
+    }
+}
+
+/// The error that a name stands for nothing.
+fn unknown(name: &str, all: &[Experiment]) -> Error {
+    let names = all.iter().flat_map(|experiment| [&*experiment.group, &*experiment.name]);
+    let mut names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let what = format!("no group or experiment is named `{name}`");
+    Error::NotFound(match names.is_empty() {
+        true => format!("{what}: there are no experiments"),
+        false => format!("{what}; {}", suggestion(name, &names)),
+    })
+}
+
+/// The error that a name stands for several experiments where one is meant.
+fn several(name: &str, experiments: &[Experiment]) -> Error {
+    let ids: Vec<String> = experiments.iter().take(10).map(|it| it.id.to_string()).collect();
+    let more = if experiments.len() > ids.len() { ", ..." } else { "" };
+    let ids = ids.join(", ");
+    Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))
+}

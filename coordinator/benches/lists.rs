@@ -1,0 +1,107 @@
+//! How long lists take in a data directory with ten thousand experiments of the size of A, from
+//! request to answer: all of them, those that run, those of a name, and the first open of the
+//! database. An argument is another number of experiments; with TMPDIR=/dev/shm they are written
+//! much faster.
+#![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
+
+use std::{env, time::Instant};
+
+use coordinator::{
+    BlockingReader,
+    priority::Priority,
+    store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
+};
+use evolution::{ALGORITHMS, Digest, Evolution, Statistics};
+use experiment_file::ExperimentConfig;
+use prost::Message as _;
+use swarm_proto::v1::{ExperimentState, ListExperimentsRequest, ListExperimentsResponse};
+
+const SNES: &str = include_str!("../../configs/leader_selection_snes.json");
+/// How often each request is sent; the median counts.
+const REPETITIONS: usize = 9;
+
+fn main() {
+    let n = env::args().find_map(|argument| argument.parse().ok()).unwrap_or(10_000);
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let mut store = Store::open(directory.path()).expect("a new database");
+    let new = new_experiment();
+    for i in 0..n {
+        put(&mut store, &new, i);
+    }
+    drop(store);
+    let started = Instant::now();
+    let reader = BlockingReader::open(directory.path()).expect("it is sound");
+    println!("{:<28} {:>8.1} ms", "open", started.elapsed().as_secs_f64() * 1e3);
+    let running = vec![ExperimentState::Running.into()];
+    let named = format!("run-{}", n / 2);
+    let requests = [
+        ("all", ListExperimentsRequest::default(), n),
+        (
+            "running",
+            ListExperimentsRequest { states: running, ..Default::default() },
+            n.div_ceil(100),
+        ),
+        ("of a name", ListExperimentsRequest { named, ..Default::default() }, 1),
+    ];
+    for (what, request, expected) in requests {
+        let mut seconds: Vec<f64> = (0..REPETITIONS)
+            .map(|_| {
+                let started = Instant::now();
+                let answer = reader.call("ListExperiments", request.encode_to_vec());
+                let answer = ListExperimentsResponse::decode(&*answer.expect("it is sound"));
+                assert_eq!(answer.expect("it is an answer").experiments.len(), expected);
+                started.elapsed().as_secs_f64()
+            })
+            .collect();
+        seconds.sort_by(f64::total_cmp);
+        println!("{what:<28} {:>8.1} ms", seconds[REPETITIONS / 2] * 1e3);
+    }
+}
+
+fn new_experiment() -> NewExperiment {
+    let (config, _) = ExperimentConfig::from_json(SNES, "", ALGORITHMS).expect("the file is right");
+    let simulation = sim_core::Simulation::compile(&config).expect("the file is right");
+    let segments = simulation.population_segments();
+    NewExperiment {
+        request_id: None,
+        config_digest: Digest::of_config(&config, sim_core::FINGERPRINT),
+        genotype_len: simulation.genotype_len(),
+        keyframe: Evolution::new(&config, segments, sim_core::FINGERPRINT).keyframe(),
+        priority: Priority::default(),
+        membership: None,
+        labels: Default::default(),
+        fork: None,
+        champion: None,
+        config,
+    }
+}
+
+/// An experiment with 12 generations; one in a hundred goes on.
+fn put(store: &mut Store, new: &NewExperiment, i: usize) {
+    let mut new = new.clone();
+    new.config.name = format!("run-{i}");
+    new.config.seed = i as u64;
+    let (id, _) = store.create(&new, 0).expect("the database can be written");
+    let n_generations = 12;
+    for generation in 0..n_generations {
+        let record = GenerationRecord {
+            generation,
+            statistics: Statistics::of(&[0.1, 0.2]),
+            digest: Digest::of_config(&new.config, "").to_string(),
+            duration_ms: 1,
+            episodes: 500,
+            workers: 2,
+            idle_share: 0.5,
+        };
+        let is_last = generation + 1 == n_generations && !i.is_multiple_of(100);
+        let commit = GenerationCommit {
+            generation: &record,
+            entry: Entry { told: &[0; 400], keyframe: None },
+            champion: None,
+            digest: &record.digest,
+            notices: &[],
+            completed: is_last.then_some(""),
+        };
+        store.commit_generation(id, 0, &commit).expect("the database can be written");
+    }
+}
