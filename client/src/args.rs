@@ -197,12 +197,15 @@ pub struct StepsArg {
     pub steps: Option<u32>,
 }
 
-/// Whether a champion meets another experiment file than that in which it was evolved.
+/// The group of options that take a genotype from elsewhere than the experiment file.
+pub const FOREIGN: &str = "foreign";
+
+/// Whether a genotype meets another experiment file than that in which it was evolved.
 #[derive(Debug, Clone, Copy, Default, ClapArgs)]
 pub struct ChangedArg {
-    /// Take a champion file with an experiment file in which it was not evolved; without this
+    /// Take a genotype with an experiment file in which it was not evolved; without this
     /// option that is refused.
-    #[arg(long, requires = "genotype")]
+    #[arg(long, requires = FOREIGN)]
     pub changed_conditions: bool,
 }
 

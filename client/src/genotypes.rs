@@ -16,6 +16,7 @@ use crate::{
 /// A genotype, and what it was evolved with.
 #[derive(Debug)]
 pub struct Found {
+    pub experiment: Experiment,
     /// The file of its experiment in canonical form.
     pub config_json: String,
     pub individual: GetChampionResponse,
@@ -61,10 +62,10 @@ impl Connection {
                 "`{address}` is a whole generation; name one of it, such as {address}/0"
             )));
         }
-        let (_, config_json) = self.stored(address.experiment.0).await?;
+        let (experiment, config_json) = self.stored(address.experiment.0).await?;
         let answer = self.individuals(address, 0).await?;
         let individual = present(answer.individuals.into_iter().next())?;
-        Ok(Found { config_json, individual })
+        Ok(Found { experiment, config_json, individual })
     }
 }
 

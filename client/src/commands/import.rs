@@ -7,10 +7,10 @@ use clap::Args;
 use super::{Remote, export};
 use crate::{connection::Connection, error::Error, json, place::Intent, progress::Progress, text};
 
-/// Take the experiment of a bundle into the coordinator.
+/// Take the experiment of a bundle into a coordinator or a data directory.
 ///
-/// It is listed, plotted, compared and forked like any other that has ended. The coordinator
-/// checks everything that follows from the fitness log before it stores anything; whether the
+/// It is listed, plotted, compared and forked like any other that has ended. Everything that
+/// follows from the fitness log is checked before anything is stored; whether the
 /// fitness is what a simulation gives, `swarmctl verify` says. To import again changes nothing.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
@@ -42,7 +42,7 @@ impl Remote for ImportArgs {
             let title = text::title(&experiment);
             match is_new {
                 true => format!("{title}: imported"),
-                false => format!("{title}: the coordinator has it already"),
+                false => format!("{title}: it is there already"),
             }
         })
     }

@@ -15,7 +15,7 @@ use self::picture::Moments;
 use super::simulate::genotype::Genotype;
 use crate::{
     address::NamedAddress,
-    args::{ChangedArg, SeedArg, StepsArg, whole},
+    args::{ChangedArg, FOREIGN, SeedArg, StepsArg, whole},
     change::{Change, SetArg},
     complete,
     connection::Connection,
@@ -46,7 +46,7 @@ pub struct ReplayArgs {
     config: Option<PathBuf>,
     /// File with the genotype: a JSON list of genes, or an object with a `genotype`,
     /// such as a champion file; with --config.
-    #[arg(long, value_name = "FILE", requires = "config")]
+    #[arg(long, value_name = "FILE", group = FOREIGN, requires = "config")]
     genotype: Option<PathBuf>,
     #[command(flatten)]
     changed: ChangedArg,

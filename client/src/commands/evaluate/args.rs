@@ -8,7 +8,7 @@ use experiment_file::limits;
 
 use crate::{
     address::NamedAddress,
-    args::{ChangedArg, IsaArgs, StepsArg, whole},
+    args::{ChangedArg, FOREIGN, IsaArgs, StepsArg, whole},
     change::SetArg,
     complete,
     output_file::Overwrite,
@@ -29,7 +29,7 @@ pub struct EvaluateArgs {
     #[arg(value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments), required_unless_present = "genotype")]
     pub address: Option<NamedAddress>,
     /// File with the genotype, such as a champion file.
-    #[arg(long, value_name = "FILE", conflicts_with = "address", requires = "config")]
+    #[arg(long, value_name = "FILE", group = FOREIGN, conflicts_with = "address", requires = "config")]
     pub genotype: Option<PathBuf>,
     /// The experiment file that goes with --genotype.
     #[arg(long, value_name = "FILE", requires = "genotype")]

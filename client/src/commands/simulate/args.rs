@@ -9,7 +9,7 @@ use experiment_file::limits;
 use super::trace::ExtraColumns;
 use crate::{
     address::NamedAddress,
-    args::{ChangedArg, IsaArgs, SeedArg, StepsArg, whole},
+    args::{ChangedArg, FOREIGN, IsaArgs, SeedArg, StepsArg, whole},
     complete,
     error::Error,
     experiment_file::{Compiled, ExperimentFile, Overrides},
@@ -34,11 +34,11 @@ pub struct SimulateArgs {
     /// Without this option, without --experiment and without an address, genes are drawn uniformly from
     /// the streams (seed, generation 0, trial 0, evolution, population), as those of
     /// the first individual of a GA.
-    #[arg(long, value_name = "FILE", conflicts_with = "experiment")]
+    #[arg(long, value_name = "FILE", group = FOREIGN, conflicts_with = "experiment")]
     pub genotype: Option<PathBuf>,
     /// Use a genotype of an experiment: ID or NAME, the champion; ID@G/I, individual I of
     /// generation G; ID@G/mean, the mean of the distribution after it.
-    #[arg(long, value_name = "ADDRESS", add = ArgValueCompleter::new(complete::experiments))]
+    #[arg(long, value_name = "ADDRESS", group = FOREIGN, add = ArgValueCompleter::new(complete::experiments))]
     pub experiment: Option<NamedAddress>,
     #[command(flatten)]
     pub changed: ChangedArg,

@@ -1,11 +1,10 @@
-//! A champion file says in what experiment it was evolved; here it meets an experiment file.
-
-use std::path::Path;
+//! A genotype says in what experiment it was evolved; here it meets an experiment file.
 
 use evolution::Digest;
 use experiment_file::Seed;
 use serde::Deserialize;
 use serde_json::Value;
+use swarm_proto::v1::Experiment;
 
 use crate::{
     args::ChangedArg,
@@ -16,7 +15,7 @@ use crate::{
 /// Characters of a digest that tell configurations apart for people.
 const SHOWN: usize = 12;
 
-/// In what a champion was evolved.
+/// In what a genotype was evolved.
 #[derive(Debug, PartialEq, Eq, Deserialize)]
 pub struct Origin {
     config_digest: String,
@@ -35,11 +34,19 @@ impl Origin {
         }
     }
 
-    /// Refuses an experiment file, as it is and with the champion's seed, that is another
-    /// experiment than the champion's, unless that is wanted.
+    /// That of an experiment's genotypes; none if its coordinator does not say.
+    pub fn of_experiment(experiment: &Experiment) -> Option<Self> {
+        let Experiment { config_digest, name, seed, simulation, .. } = experiment.clone();
+        let simulation = Some(simulation).filter(|it| !it.is_empty());
+        let origin = Self { config_digest, name, seed: Some(Seed(seed)), simulation };
+        Some(origin).filter(|it| !it.config_digest.is_empty())
+    }
+
+    /// Refuses an experiment file, as it is and with the genotype's seed, that is another
+    /// experiment than the genotype's, unless that is wanted. `genotype`: where it comes from.
     pub fn check(
         &self,
-        champion: &Path,
+        genotype: &str,
         file: &ExperimentFile,
         ChangedArg { changed_conditions }: ChangedArg,
     ) -> Result<(), Error> {
@@ -56,10 +63,9 @@ impl Origin {
         let seed = seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
         let digest: String = self.config_digest.chars().take(SHOWN).collect();
         Err(Error::Input(format!(
-            "{}: the champion was evolved in `{}`{seed}, configuration {digest}, and {} is another \
-             experiment; give the file of the champion's, or --changed-conditions to take this one \
+            "{genotype}: it was evolved in `{}`{seed}, configuration {digest}, and {} is another \
+             experiment; give the file of that one, or --changed-conditions to take this one \
              knowingly",
-            champion.display(),
             self.name.escape_debug(),
             file.path().display()
         )))
@@ -68,7 +74,7 @@ impl Origin {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, path::Path};
 
     use serde_json::json;
 
@@ -94,7 +100,7 @@ mod tests {
     fn check(champion: &Value, file: &Path, changed: ChangedArg) -> Result<(), String> {
         let origin = Origin::of(champion).unwrap().unwrap();
         let file = ExperimentFile::read(file).unwrap();
-        origin.check("c.json".as_ref(), &file, changed).map_err(|error| error.to_string())
+        origin.check("c.json", &file, changed).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -35,7 +35,7 @@ impl Genotype {
             Error::Input(format!("no genotype in {}: {problem}", path.display()))
         })?;
         if let Some(origin) = origin {
-            origin.check(path, file, changed)?;
+            origin.check(&path.display().to_string(), file, changed)?;
         }
         Ok(Self { genes, source: format!("genotype in {}", path.display()) })
     }
@@ -59,7 +59,11 @@ impl Genotype {
         if let Some(address) = &args.experiment {
             let connection = Connection::open(settings, Intent::Read, progress).await?;
             let address = connection.resolve(address).await?;
-            return Ok(Self::found(address, connection.genotype(address).await?));
+            let found = connection.genotype(address).await?;
+            if let Some(origin) = Origin::of_experiment(&found.experiment) {
+                origin.check(&described(address), file, args.changed)?;
+            }
+            return Ok(Self::found(address, found));
         }
         Ok(Self { genes: random(compiled), source: "random genotype".into() })
     }

@@ -55,7 +55,7 @@ fn file(dir: &tempfile::TempDir, genotype: &Value) -> Option<PathBuf> {
 #[tokio::test]
 async fn a_champion_is_the_same_from_a_file_and_from_a_coordinator() {
     let genotype: Vec<f64> = (0..N_GENES).map(|i| i as f64 / N_GENES as f64).collect();
-    let (_fake, connection) = FakeCoordinator::serve(Script {
+    let (fake, connection) = FakeCoordinator::serve(Script {
         experiment: Experiment { id: 3, ..Experiment::default() },
         champion: Some(GetChampionResponse { genotype: genotype.clone(), ..Default::default() }),
         ..Script::default()
@@ -68,6 +68,17 @@ async fn a_champion_is_the_same_from_a_file_and_from_a_coordinator() {
     let read = run(NOWHERE, &from_file).await.unwrap();
     assert_eq!(fetched["trials"], read["trials"]);
     assert_eq!(fetched["genotype"], "champion of experiment 3");
+
+    // One that was evolved in another file is taken only knowingly.
+    fake.script(|script| script.experiment.config_digest = "ab".repeat(32));
+    let error = run(connection.address(), &from_coordinator).await.unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    for part in ["champion of experiment 3", "quickstart.json", "--changed-conditions"] {
+        assert!(error.to_string().contains(part), "{error}");
+    }
+    let changed = ChangedArg { changed_conditions: true };
+    let knowingly = SimulateArgs { changed, ..from_coordinator };
+    assert_eq!(run(connection.address(), &knowingly).await.unwrap(), fetched);
 
     let unknown = SimulateArgs { experiment: "4".parse().ok(), ..args() };
     assert_eq!(run(connection.address(), &unknown).await.unwrap_err().exit_code(), 3);
