@@ -141,6 +141,24 @@ impl Change {
     }
 }
 
+impl Change {
+    /// Says that the file has no object of the name that the path leads through.
+    pub fn missing(&self, file: &Json) -> Option<(String, String)> {
+        let keys: Vec<&str> = self.path.split('.').collect();
+        let mut place = file;
+        for (i, key) in keys[..keys.len() - 1].iter().enumerate() {
+            let object = place.object()?;
+            let Some(inner) = object.get(*key) else {
+                let known: Vec<String> = object.keys().map(|it| format!("`{it}`")).collect();
+                let path = keys[..=i].join(".");
+                return Some((path, format!("the file has none; it has {}", known.join(", "))));
+            };
+            place = inner;
+        }
+        None
+    }
+}
+
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.value.text().map_or_else(|| json::line(&self.value), str::to_owned);

@@ -11,7 +11,7 @@ use swarm_telemetry::EXIT_STARVED;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
 
-use crate::text::with_reason;
+use crate::{file_kind, text::with_reason};
 
 /// Why a command did not succeed.
 #[derive(Debug, thiserror::Error)]
@@ -200,6 +200,14 @@ impl Error {
             | StoreError::WithoutLog { .. }
             | StoreError::NothingSound { .. } => Self::Damaged(text),
             StoreError::Bug(_) => Self::Internal(text),
+            StoreError::NoDatabase { path } => {
+                let directory = path.parent().unwrap_or(Path::new(""));
+                let other = file_kind::expect(directory, &[], "a data directory");
+                Self::Input(match other {
+                    Err(what) => format!("{}: {what}", directory.display()),
+                    Ok(()) => text,
+                })
+            }
             _ => Self::Input(text),
         }
     }

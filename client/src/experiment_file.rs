@@ -14,6 +14,7 @@ use crate::{
     change::{Change, Json, apply_all},
     clock,
     error::{Error, prefix_lines},
+    file_kind::{self, Kind},
     input::{is_stdin, read_text},
     interrupt, json,
 };
@@ -76,6 +77,8 @@ impl ExperimentFile {
                 message: format!("cannot be read: {what}"),
             }],
         };
+        file_kind::expect(path, &[Kind::Experiment], "an experiment file")
+            .map_err(|message| ConfigError { problems: vec![unlocated(message)] })?;
         let text =
             read_text(path, limits::FILE_BYTES).map_err(|error| problem("", error.to_string()))?;
         let Some((script, place)) = script_path(&text) else {
@@ -100,12 +103,22 @@ impl ExperimentFile {
         let read = |text: &str| ExperimentConfig::from_json(text, &self.default_name(), ALGORITHMS);
         read(&self.text)?;
         let mut file = Json::parse(&plain(&self.text));
+        let missing: Vec<_> = changes.iter().filter_map(|it| it.missing(&file)).collect();
         apply_all(changes, &mut file).map_err(|problems| ConfigError {
             problems: problems.into_iter().map(unlocated).collect(),
         })?;
         let text = json::line(&file);
-        read(&text).map_err(without_lines)?;
-        Ok(Self { path: self.path.clone(), text })
+        match read(&text).map_err(without_lines) {
+            Ok(_) => Ok(Self { path: self.path.clone(), text }),
+            // What is wrong with an object that is there by mistake does not matter.
+            Err(mut error) => {
+                for (path, message) in missing {
+                    error.problems.retain(|problem| !problem.path.starts_with(&path));
+                    error.problems.push(Problem { path, line: None, message });
+                }
+                Err(error)
+            }
+        }
     }
 
     /// Checks the experiment as the coordinator will.
@@ -312,6 +325,15 @@ pub mod tests {
         assert!(!error.contains("line "), "{error}");
         let nowhere = [change("seed.x", "3"), change("name.y", "0")];
         assert_eq!(file.changed(&nowhere).unwrap_err().problems.len(), 2);
+    }
+
+    #[test]
+    fn a_change_of_an_object_that_is_not_there_names_those_that_are() {
+        let file = ExperimentFile::read(&quickstart()).unwrap();
+        let path = "world.objects.robotA.num_instances".into();
+        let error = file.changed(&[Change::new(path, Json::from(3))]).unwrap_err();
+        let expected = "world.objects.robotA: the file has none; it has `robot`";
+        assert_eq!(error.to_string(), expected);
     }
 
     #[test]

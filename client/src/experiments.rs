@@ -3,7 +3,7 @@
 use experiment_file::suggestion;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
-use crate::{args::Subject, connection::Connection, error::Error};
+use crate::{args::Subject, connection::Connection, error::Error, file_kind};
 
 /// Experiments in one answer: far fewer than make a message too long.
 const PAGE_LEN: u32 = 2_000;
@@ -80,9 +80,10 @@ fn unknown(name: &str, all: &[Experiment]) -> Error {
     names.sort_unstable();
     names.dedup();
     let what = format!("no group or experiment is named `{name}`");
-    Error::NotFound(match names.is_empty() {
-        true => format!("{what}: there are no experiments"),
-        false => format!("{what}; {}", suggestion(name, &names)),
+    Error::NotFound(match file_kind::of_word(name) {
+        Some(file) => format!("{what}, and {file}"),
+        None if names.is_empty() => format!("{what}: there are no experiments"),
+        None => format!("{what}; {}", suggestion(name, &names)),
     })
 }
 

@@ -101,7 +101,15 @@ fn shown(arg: clap::Arg, command: &str, extent: Extent) -> clap::Arg {
     let is_subject = arg.get_id() == "data_dir" && ON_A_DIRECTORY.contains(&command);
     let is_hidden = arg.is_hide_set()
         || extent == Extent::Ordinary && arg.get_help_heading() == Some(CONNECTION) && !is_subject;
-    arg.hide(is_hidden)
+    // A negative number is a value that an option refuses, and no option of that name.
+    let is_value = arg.get_action().takes_values();
+    arg.hide(is_hidden).allow_negative_numbers(is_value)
+}
+
+/// The definition of the command line, as it is read.
+#[cfg(test)]
+pub fn definition_for_tests() -> Command {
+    definition(Extent::Ordinary, None)
 }
 
 /// The list of commands, group by group, in lines of the width.

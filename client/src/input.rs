@@ -23,7 +23,9 @@ pub fn read_text(path: &Path, max_bytes: usize) -> io::Result<String> {
     if bytes.len() > max_bytes {
         return Err(invalid(format!("it has more than {} KiB", max_bytes / 1024)));
     }
-    let mut text = String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))?;
+    let mut text = String::from_utf8(bytes).map_err(|error| {
+        invalid(format!("it is no text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
+    })?;
     // Some editors begin a file with a byte order mark.
     if text.starts_with('\u{feff}') {
         text.drain(..'\u{feff}'.len_utf8());

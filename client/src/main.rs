@@ -16,6 +16,7 @@ mod experiments;
 #[cfg(test)]
 mod fake_coordinator;
 mod figure;
+mod file_kind;
 mod genotypes;
 mod group;
 mod help;

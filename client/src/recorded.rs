@@ -10,6 +10,7 @@ use crate::{
     connection::{Connection, present},
     error::Error,
     figure::Point,
+    file_kind::{self, Kind},
     input::{TABLE_BYTES, read_text},
 };
 
@@ -116,6 +117,7 @@ impl Run {
     /// A history in a file.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
+        file_kind::expect(path, &[Kind::History], "the history of a run").map_err(problem)?;
         let text = read_text(path, TABLE_BYTES).map_err(|error| problem(error.to_string()))?;
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let generations: Vec<Row> =

@@ -5,7 +5,7 @@ use clap::{
     error::{ContextKind, ContextValue, ErrorKind},
 };
 
-use crate::args::Args;
+use crate::{args::Args, file_kind};
 
 /// Other words, and what to suggest for them.
 const SYNONYMS: [(&[&str], &str); 10] = [
@@ -29,8 +29,27 @@ const SIMILARITY_MIN: f64 = 0.85;
 /// An error of the command line; for an unknown command with commands that were
 /// probably meant, instead of those that merely have the same letters.
 pub fn with_suggestions(mut error: Error) -> Error {
-    if error.kind() != ErrorKind::InvalidSubcommand {
-        return error;
+    match error.kind() {
+        ErrorKind::InvalidSubcommand => {}
+        ErrorKind::ValueValidation => {
+            if let Some(ContextValue::String(value)) = error.get(ContextKind::InvalidValue)
+                && let Some(tip) = file_kind::of_word(value)
+            {
+                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+            }
+            return error;
+        }
+        ErrorKind::UnknownArgument => {
+            if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg)
+                && word.starts_with('-')
+                && word[1..].starts_with(|c: char| c.is_ascii_digit())
+            {
+                let tip = "a value that begins with - is joined to its option: --OPTION=VALUE";
+                error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+            }
+            return error;
+        }
+        _ => return error,
     }
     let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidSubcommand).cloned()
     else {
@@ -71,6 +90,33 @@ mod tests {
             let answer = answer(word);
             assert!(answer.contains(command), "{answer}");
         }
+    }
+
+    #[test]
+    fn a_file_where_an_experiment_is_expected_is_said_to_be_one() {
+        let file = crate::experiment_file::tests::quickstart();
+        for line in [["watch", file.to_str().unwrap()], ["replay", file.to_str().unwrap()]] {
+            let error = Args::try_parse_from(["swarmctl"].iter().chain(&line)).unwrap_err();
+            let answer = with_suggestions(error).to_string();
+            assert!(
+                answer.contains("is an experiment file; take it with: swarmctl run"),
+                "{answer}"
+            );
+        }
+    }
+
+    #[test]
+    fn negative_numbers_are_values_and_are_refused_as_such() {
+        for line in ["run a.json --seed -1", "simulate 1 --trials -3", "evaluate 1 --robots -3"] {
+            let line = format!("swarmctl {line}");
+            let error = crate::help::definition_for_tests().try_get_matches_from(line.split(' '));
+            let answer = with_suggestions(error.unwrap_err()).to_string();
+            assert!(answer.contains("invalid value '-"), "{answer}");
+            assert!(!answer.contains("-- -"), "{answer}");
+        }
+        let error = Args::try_parse_from(["swarmctl", "run", "a.json", "--seeds", "-1..3"]);
+        let answer = with_suggestions(error.unwrap_err()).to_string();
+        assert!(answer.contains("--OPTION=VALUE") && !answer.contains("-- -"), "{answer}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod determinism;
 mod evaluation;
 mod explain;
 mod faults;
+mod file_kinds;
 mod forks;
 mod groups;
 mod health;

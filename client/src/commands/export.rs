@@ -16,6 +16,7 @@ use crate::{
     args::{Subject, Target},
     connection::{Connection, present},
     error::Error,
+    file_kind::{self, Kind},
     json,
     output_file::Overwrite,
     progress::Progress,
@@ -133,6 +134,8 @@ async fn events(
 /// Reads a bundle that others may have made: no more of it than one can have.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     let failed = |source: io::Error| Error::Input(format!("{}: {source}", path.display()));
+    file_kind::expect(path, &[Kind::Bundle], "a bundle")
+        .map_err(|what| failed(io::Error::other(what)))?;
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     file.take(LEN_MAX + 1).read_to_end(&mut bytes).map_err(failed)?;

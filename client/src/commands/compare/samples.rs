@@ -13,6 +13,7 @@ use crate::{
     args::Subject,
     connection::Connection,
     error::Error,
+    file_kind::{self, Kind},
     input::{GENOTYPE_BYTES, read_text},
     progress::Progress,
     recorded::{GenerationFitness, Run},
@@ -82,6 +83,8 @@ impl Samples {
     }
 
     fn read_file(&mut self, path: &Path) -> Result<(), String> {
+        let kinds = [Kind::History, Kind::Champion];
+        file_kind::expect(path, &kinds, "the history of a run or a champion file")?;
         let of_file = name_and_seed(path);
         let source = path.display().to_string();
         if path.extension().is_some_and(|ending| ending == "json") {

@@ -9,6 +9,7 @@ use crate::recorded::plain;
 use crate::{
     error::Error,
     figure::{Curve, Figure, Point},
+    file_kind::{self, Kind},
 };
 
 /// The columns of `steps.csv` that are drawn.
@@ -25,6 +26,8 @@ struct Row {
 /// The median of a measure between its quartiles, per condition of the evaluation in
 /// a directory. No measure need be named if there is only one; no conditions are all.
 pub fn figure(dir: &Path, metric: Option<&str>, conditions: &[String]) -> Result<Figure, Error> {
+    file_kind::expect(dir, &[Kind::EvaluationDirectory], "the directory of an evaluation")
+        .map_err(|what| Error::Input(format!("{}: {what}", dir.display())))?;
     let path = dir.join("steps.csv");
     let problem = |problem: String| Error::Input(format!("{}: {problem}", path.display()));
     let mut reader = csv::Reader::from_path(&path).map_err(|error| problem(plain(&error)))?;

@@ -12,6 +12,7 @@ use crate::{
     connection::Connection,
     error::Error,
     experiment_file::{Compiled, ExperimentFile},
+    file_kind::{self, Kind},
     genotypes::{Found, described},
     input::{GENOTYPE_BYTES, read_text},
     place::Intent,
@@ -77,6 +78,7 @@ impl fmt::Display for Genotype {
 
 /// Reads a list of genes, or the one in an object, and what that says of its experiment.
 fn read(path: &Path) -> Result<(Vec<f64>, Option<Origin>), String> {
+    file_kind::expect(path, &[Kind::Champion, Kind::Genes], "a file with a genotype")?;
     let text = read_text(path, GENOTYPE_BYTES).map_err(|error| error.to_string())?;
     let value: Value = serde_json::from_str(&text).map_err(|error| error.to_string())?;
     let genes = match &value {
