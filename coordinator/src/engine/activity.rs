@@ -126,7 +126,7 @@ impl Engine {
             n_workers_available: takers.len(),
             n_workers_of_others: others.len(),
             withheld: self.withheld(now),
-            questions: self.questions.of(id).map(|(_, question)| question.activity()).collect(),
+            questions: self.trust.open_questions(id),
             rivals: rivals.map(|(&other, _)| other).collect(),
         }
     }
@@ -136,8 +136,11 @@ impl Engine {
             let quarantined = worker.quarantined.clone();
             let is_quarantined = quarantined.is_some();
             let reason = quarantined.or_else(|| worker.waits(now))?;
-            let name =
-                self.quarantine.name(&worker.introduction).unwrap_or(worker.name()).to_owned();
+            let name = self
+                .trust
+                .quarantine_name(&worker.introduction)
+                .unwrap_or(worker.name())
+                .to_owned();
             (!worker.is_draining).then_some(WithheldWorker {
                 worker: id,
                 name,

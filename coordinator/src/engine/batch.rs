@@ -14,8 +14,12 @@ use sim_core::{Output, TrialSet};
 use crate::ids::{AssignmentId, WorkerId};
 
 use super::{
-    Batch, EvaluatedBatch, SharedGenotype, audits::Audits, fleet_time::FleetTime, item::Item,
-    known_results::KnownResults, losses::LossRecord, queue::Queue,
+    Batch, EvaluatedBatch, SharedGenotype,
+    fleet_time::FleetTime,
+    item::Item,
+    known_results::KnownResults,
+    queue::Queue,
+    trust::{Audits, LossRecord},
 };
 
 /// Numbers of one item of measures, half a MiB: results travel in messages of

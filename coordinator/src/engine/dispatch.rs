@@ -115,26 +115,22 @@ impl Engine {
             self.virtual_now = self.virtual_now.max(self.jobs[&job].virtual_time);
             let item = match source {
                 Source::Audits => {
-                    let name = self.workers[&worker].name().to_owned();
-                    let work = self.jobs.get_mut(&job).expect("just seen");
-                    let batch = work.batch.as_mut().expect("just seen");
-                    batch.audits.pop_for(&name, &self.doubted)
+                    let name = self.workers[&worker].name();
+                    let batch = self.jobs.get_mut(&job).and_then(|work| work.batch.as_mut());
+                    batch.and_then(|batch| self.trust.pop_audit_for(name, &mut batch.audits))
                 }
-                Source::Suspects => self.batch_mut(job).pop_suspect(),
+                Source::Suspects => self.batch_mut(job).and_then(BatchInProgress::pop_suspect),
                 Source::Queue => {
                     let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
                     let is_short = self.is_short(job);
-                    let batch = self.batch_mut(job);
-                    if is_short {
-                        batch.pop_whole_first(n_trials)
-                    } else {
-                        batch.pop_front(n_trials)
-                    }
+                    self.batch_mut(job).and_then(|batch| match is_short {
+                        true => batch.pop_whole_first(n_trials),
+                        false => batch.pop_front(n_trials),
+                    })
                 }
             };
-            let item = item.expect("it was just seen");
+            let (Some(item), Some(work)) = (item, self.jobs.get_mut(&job)) else { return };
             let pace = self.workers[&worker].pace;
-            let work = self.jobs.get_mut(&job).expect("just seen");
             let charge = work.charge(item.trials.len(), pace);
             let was = work.virtual_time;
             work.add_charge(charge);
@@ -162,7 +158,7 @@ impl Engine {
             if !batch.audits.is_empty() {
                 let mut workers = self.takers(&self.jobs[&id]).map(|(_, worker)| worker);
                 let may = |id: &WorkerId| {
-                    batch.audits.has_clear_for(self.workers[id].name(), &self.doubted)
+                    self.trust.has_audit_for(self.workers[id].name(), &batch.audits)
                 };
                 if let Some(auditor) = workers.find(may) {
                     return Some((id, auditor, Source::Audits));
@@ -264,7 +260,7 @@ impl Engine {
                 Some((holder, assignment_id))
             });
         let Some((holder, assignment_id)) = candidate else { return false };
-        let assignment = self.recall(now, holder, assignment_id);
+        let Some(assignment) = self.recall(now, holder, assignment_id) else { return false };
         self.requeue(assignment.job, &assignment.item);
         true
     }
@@ -287,7 +283,9 @@ impl Engine {
         if other(self, &item).is_none() {
             return false;
         }
-        self.batch_mut(job).uncovered.remove(&key);
+        if let Some(batch) = self.batch_mut(job) {
+            batch.uncovered.remove(&key);
+        }
         let n_per_part = item.trials.len().div_ceil(n_parts) as u32;
         for _ in 0..n_copies {
             let mut start = item.trials.start;
@@ -323,15 +321,15 @@ impl Engine {
         charge: Duration,
     ) {
         let (is_audit, is_suspect) = (source == Source::Audits, source == Source::Suspects);
-        self.n_items_assigned += 1;
-        let id = AssignmentId(self.n_items_assigned);
-        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
+        let Some(work) = self.jobs.get_mut(&job) else { return };
         let worker = &self.workers[&worker_id];
         let expected = work.expected(item.trials.len(), worker.pace).unwrap_or_default();
         // What it has been given before comes first.
         let n_before = (worker.load() / FULL_LOAD) as u32;
         let expected = now + expected * (n_before + 1);
-        let batch = work.batch.as_mut().expect("the caller has seen it");
+        let Some(batch) = &mut work.batch else { return };
+        self.n_items_assigned += 1;
+        let id = AssignmentId(self.n_items_assigned);
         batch.add_holder(id, worker_id, &item, is_audit);
         // A copy of a suspect might take another worker down.
         if source == Source::Queue {
@@ -356,17 +354,17 @@ impl Engine {
         self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 
-    /// Ends an assignment and gives its worker the credit back.
+    /// Ends an assignment and gives its worker the credit back; none if the worker does not
+    /// have it.
     pub(super) fn take_assignment(
         &mut self,
         worker: WorkerId,
         assignment_id: AssignmentId,
-    ) -> AssignedItem {
+    ) -> Option<AssignedItem> {
         let assignment =
-            self.update_worker(worker, |worker| worker.in_flight.remove(assignment_id));
-        let assignment = assignment.expect("the caller has seen it");
+            self.update_worker(worker, |worker| worker.in_flight.remove(assignment_id))??;
         self.forget_holder(assignment_id, &assignment);
-        assignment
+        Some(assignment)
     }
 
     /// A worker computes an assignment no more.
@@ -377,22 +375,22 @@ impl Engine {
         batch.uncovered.remove(&(assignment.expected, assignment_id));
     }
 
-    /// Takes an assignment back: its worker is told to drop it.
+    /// Takes an assignment back: its worker is told to drop it. None if it does not have it.
     pub(super) fn recall(
         &mut self,
         now: Instant,
         id: WorkerId,
         assignment_id: AssignmentId,
-    ) -> AssignedItem {
-        let assignment = self.take_assignment(id, assignment_id);
+    ) -> Option<AssignedItem> {
+        let assignment = self.take_assignment(id, assignment_id)?;
         self.counters.n_items_recalled += 1;
         self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
         self.outgoing.recalled.entry(id).or_default().push(assignment_id);
-        let worker = self.workers.get_mut(&id).expect("it had the assignment");
+        let worker = self.workers.get_mut(&id)?;
         let ended = assignment.clone();
         self.timeline.add(now, (id, worker), ended, Fate::TakenBack, Duration::ZERO);
         worker.remember_recalled(assignment_id, assignment.clone());
-        assignment
+        Some(assignment)
     }
 
     /// Has a worker draw the genotypes of its assignments where that is possible, if it has

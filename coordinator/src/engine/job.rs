@@ -7,7 +7,7 @@ use std::{
 
 use crate::priority::Priority;
 
-use super::{batch::BatchInProgress, item::Item, unaudited::Unaudited};
+use super::{batch::BatchInProgress, item::Item, trust::Unaudited};
 
 /// What a call costs beside its trials, in trials. Measured: one trial of the
 /// shipped experiments takes 1.38 to 1.8 times as long as one of several.

@@ -31,17 +31,14 @@
 //!   the results of a batch.
 //! - Trouble with workers is settled by proof, and never fails a job. What an item comes
 //!   to is the same everywhere, so the *referee*, a process of the coordinator's, is asked
-//!   (`questions`): when a worker reports a failure; when two results for the same place
-//!   differ in their bits; when workers were lost again and again with the same item
-//!   (`losses`). If the item fails there, too, it fails its job, and no other. A worker
+//!   (`trust`): when a worker reports a failure; when two results for the same place
+//!   differ in their bits; when workers were lost again and again with the same item. If the item fails there, too, it fails its job, and no other. A worker
 //!   whose word was wrong is put in quarantine, and what it computed for the batch is
 //!   computed again. To find such workers, a share of the individuals can be audited:
 //!   computed by a second worker, too, if there is one.
 
 mod activity;
-mod audits;
 mod batch;
-mod crash_loops;
 mod dispatch;
 mod fleet_time;
 mod in_flight;
@@ -49,19 +46,15 @@ mod item;
 mod job;
 mod known_results;
 mod load_index;
-mod losses;
 mod messages;
 mod name_pattern;
-mod quarantine;
-mod questions;
 mod queue;
 mod results;
 mod sanity;
 mod stalls;
 mod stats;
 mod timeline;
-mod unaudited;
-mod verdicts;
+mod trust;
 mod worker;
 
 use std::{
@@ -79,9 +72,7 @@ use crate::{
 pub use activity::{
     BatchActivity, EvaluationActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker,
 };
-use audits::Doubted;
 use batch::BatchInProgress;
-use crash_loops::CrashLoops;
 use dispatch::Outgoing;
 use fleet_time::FleetTime;
 use job::JobWork;
@@ -91,12 +82,11 @@ pub use messages::{
     SharedGenotype, WorkerStatus,
 };
 pub use name_pattern::NamePattern;
-use quarantine::Quarantine;
-use questions::Questions;
 use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
 use timeline::Timeline;
 pub use timeline::{Fate, TimelineEntry};
+use trust::Trust;
 use worker::{AssignedItem, Worker};
 
 /// How an engine decides.
@@ -134,12 +124,7 @@ pub struct Engine {
     /// The present virtual time: that of the job that was given workers last. A job
     /// that comes back from waiting starts here, so that nobody saves up time.
     virtual_now: u128,
-    /// When there were last two workers that can audit each other, or the engine began.
-    auditors_seen: Instant,
-    questions: Questions,
-    doubted: Doubted,
-    quarantine: Quarantine,
-    crash_loops: CrashLoops,
+    trust: Trust,
     outgoing: Outgoing,
     commands: VecDeque<Command>,
     fleet_time: FleetTime,
@@ -160,11 +145,7 @@ impl Engine {
             jobs: BTreeMap::new(),
             ready_queue: BTreeSet::new(),
             virtual_now: 0,
-            auditors_seen: now,
-            questions: Questions::default(),
-            doubted: Doubted::new(),
-            quarantine: Quarantine::default(),
-            crash_loops: CrashLoops::default(),
+            trust: Trust::new(now),
             outgoing: Outgoing::default(),
             commands: VecDeque::new(),
             fleet_time: FleetTime::new(now),
@@ -200,9 +181,9 @@ impl Engine {
         self.counters.n_workers_joined += 1;
         let id = WorkerId(self.n_workers_seen);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
-        let rest = self.crash_loops.rest(&introduction.name);
+        let rest = self.trust.rest(&introduction.name);
         let mut worker = Worker::new(introduction, now);
-        worker.quarantined = self.quarantine.reason(&worker.introduction).map(str::to_owned);
+        worker.quarantined = self.trust.quarantine_reason(&worker.introduction).map(str::to_owned);
         worker.is_on_probation = rest.is_some();
         worker.resting_until = rest.filter(|&until| until > now && self.has_usable_worker());
         self.load_index.add(id, &worker);
@@ -392,7 +373,7 @@ impl Engine {
             self.counters.n_workers_left += 1;
         } else {
             self.counters.n_workers_lost += 1;
-            self.crash_loops.on_lost(now, worker.name());
+            self.trust.on_lost(now, worker.name());
         }
         self.load_index.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
@@ -468,16 +449,21 @@ impl Engine {
         }
     }
 
-    fn batch_mut(&mut self, id: JobId) -> &mut BatchInProgress {
-        let work = self.jobs.get_mut(&id);
-        work.and_then(|work| work.batch.as_mut()).expect("what is assigned is being evaluated")
+    /// The batch that a job computes at present.
+    fn batch_mut(&mut self, id: JobId) -> Option<&mut BatchInProgress> {
+        self.jobs.get_mut(&id)?.batch.as_mut()
     }
 
-    fn update_worker<T>(&mut self, id: WorkerId, change: impl FnOnce(&mut Worker) -> T) -> T {
-        let worker = self.workers.get_mut(&id).expect("the caller has seen it");
+    /// Changes a worker; none if it has left.
+    fn update_worker<T>(
+        &mut self,
+        id: WorkerId,
+        change: impl FnOnce(&mut Worker) -> T,
+    ) -> Option<T> {
+        let worker = self.workers.get_mut(&id)?;
         self.load_index.remove(id, worker);
         let result = change(worker);
         self.load_index.add(id, worker);
-        result
+        Some(result)
     }
 }

@@ -13,20 +13,10 @@ use super::{
     Command, Engine, ItemResult,
     batch::BatchInProgress,
     item::Item,
-    known_results::{Disagreement, REFEREE},
-    losses::AfterLoss,
-    questions::{Doubt, Party},
     timeline::Fate,
-    verdicts::{place, wrong},
+    trust::{AfterLoss, Doubt},
     worker::{AssignedItem, Worker},
 };
-
-/// An audit waits for so long for a second worker to come, or to come back: else one that
-/// lies would only have to be the first that is there after the coordinator's start.
-const AUDITOR_GRACE: Duration = Duration::from_secs(30);
-
-/// Questions of a job, at a time, about items that workers were lost with.
-const LOSS_QUESTIONS_MAX: usize = 4;
 
 /// Why an item has no result yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,9 +64,9 @@ impl Engine {
         }
         let is_ok = result.outcome.is_ok();
         if is_ok {
-            self.crash_loops.on_result(&self.workers[&id]);
+            self.trust.on_result(&self.workers[&id]);
         }
-        let (assignment, busy) = self.end_assignment(now, id, &result);
+        let Some((assignment, busy)) = self.end_assignment(now, id, &result) else { return };
         if is_in_flight {
             self.forget_holder(result.id, &assignment);
         }
@@ -105,11 +95,6 @@ impl Engine {
         batch.is_none_or(|batch| batch.output() == output)
     }
 
-    /// A connected worker, as one whose word may be in doubt.
-    fn party(&self, id: WorkerId) -> Party {
-        Party { id, name: self.workers[&id].name().into() }
-    }
-
     /// Ends an assignment that is answered, and learns how long things take, and that its
     /// worker is at work; returns the assignment and how long it took, as far as that can
     /// be true. One change of the worker, as this is done for every result.
@@ -118,14 +103,16 @@ impl Engine {
         now: Instant,
         id: WorkerId,
         result: &ItemResult,
-    ) -> (AssignedItem, Duration) {
+    ) -> Option<(AssignedItem, Duration)> {
         let is_ok = result.outcome.is_ok();
         let jobs = &self.jobs;
-        let worker = self.workers.get_mut(&id).expect("the caller has seen it");
+        let worker = self.workers.get_mut(&id)?;
         self.load_index.remove(id, worker);
         let assignment = worker.in_flight.remove(result.id);
-        let assignment = assignment.or_else(|| worker.written_off.remove(&result.id));
-        let assignment = assignment.expect("the caller has seen it");
+        let Some(assignment) = assignment.or_else(|| worker.written_off.remove(&result.id)) else {
+            self.load_index.add(id, worker);
+            return None;
+        };
         let n_trials = assignment.item.trials.len();
         let busy = worker.time.add_result(now, assignment.assigned, result.compute_time);
         let pace = worker.pace;
@@ -138,19 +125,19 @@ impl Engine {
         self.load_index.add(id, worker);
         let fate = if is_ok { Fate::Computed } else { Fate::Failed };
         self.timeline.add(now, (id, worker), assignment.clone(), fate, busy);
-        let work = self.jobs.get_mut(&assignment.job).expect("it is assigned");
-        if is_ok {
+        if is_ok && let Some(work) = self.jobs.get_mut(&assignment.job) {
             work.learn(&assignment.item, busy, pace, self.workers.len());
         }
         self.correct_charge(assignment.job, assignment.charge, busy);
-        (assignment, busy)
+        Some((assignment, busy))
     }
 
     fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, values: &[f64]) {
         let (job, item) = (assignment.job, &assignment.item);
-        if let Err(disagreement) = self.batch_mut(job).known.compare(item, values) {
+        let Some(batch) = self.batch_mut(job) else { return };
+        if let Err(disagreement) = batch.known.compare(item, values) {
             if assignment.is_audit {
-                self.batch_mut(job).push_audit(item);
+                batch.push_audit(item);
                 self.update_readiness(job);
             } else {
                 self.requeue(job, item);
@@ -162,7 +149,7 @@ impl Engine {
         let n_new = self.take_values(now, job, id, item, values, assignment.is_audit);
         if assignment.is_audit && n_new == 0 {
             let auditor = self.party(id).name;
-            let batch = self.batch_mut(job);
+            let Some(batch) = self.batch_mut(job) else { return };
             if batch.computed_by(item) == Some(&auditor) {
                 // What it was to audit is gone, and its own value in the place.
                 batch.push_audit(item);
@@ -190,8 +177,8 @@ impl Engine {
         may_be_queued: bool,
     ) -> usize {
         let is_audited = self.is_audited(job, item);
-        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
-        let batch = work.batch.as_mut().expect("the caller has seen it");
+        let Some(work) = self.jobs.get_mut(&job) else { return 0 };
+        let Some(batch) = &mut work.batch else { return 0 };
         // The referee is nobody's name.
         let name = self.workers.get(&id).map_or("", Worker::name);
         let new = if is_audited { batch.unknown(item) } else { Vec::new() };
@@ -200,11 +187,11 @@ impl Engine {
         if may_be_queued && n_new > 0 {
             batch.unqueue(item.individual);
         }
+        work.n_episodes += n_new as u64;
+        self.counters.n_episodes += n_new as u64;
         for (holder, assignment_id) in batch.redundant(item.individual) {
             self.recall(now, holder, assignment_id);
         }
-        self.jobs.get_mut(&job).expect("just seen").n_episodes += n_new as u64;
-        self.counters.n_episodes += n_new as u64;
         n_new
     }
 
@@ -217,98 +204,17 @@ impl Engine {
         values: &[f64],
     ) {
         let (job, item) = (assignment.job, &assignment.item);
-        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
-        let is_wanted = batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set);
-        if !is_wanted || self.jobs[&job].is_paused {
+        let Some(work) = self.jobs.get(&job).filter(|work| !work.is_paused) else { return };
+        let Some(batch) = &work.batch else { return };
+        if batch.trial_set() != assignment.trial_set {
             return;
         }
-        if let Err(disagreement) = self.batch_mut(job).known.compare(item, values) {
+        if let Err(disagreement) = batch.known.compare(item, values) {
             self.on_disagreement(now, job, id, item, disagreement);
         } else if !assignment.is_audit {
             self.take_values(now, job, id, item, values, true);
             self.update_readiness(job);
             self.finish_if_evaluated(now, job);
-        }
-    }
-
-    /// Another's result came first, but this one is here, so compare them.
-    fn on_late_result(
-        &mut self,
-        now: Instant,
-        id: WorkerId,
-        recalled: &AssignedItem,
-        values: &[f64],
-    ) {
-        let job = recalled.job;
-        let work = self.jobs.get(&job);
-        let batch = work.and_then(|work| work.batch.as_ref());
-        if let Some(batch) = batch
-            && batch.trial_set() == recalled.trial_set
-            && let Err(disagreement) = batch.known.compare(&recalled.item, values)
-        {
-            self.on_disagreement(now, job, id, &recalled.item, disagreement);
-        }
-    }
-
-    /// A worker says that an item fails. If it does, it fails everywhere: the referee knows.
-    fn on_failure_reported(
-        &mut self,
-        now: Instant,
-        id: WorkerId,
-        assignment: AssignedItem,
-        message: String,
-    ) {
-        let (job, item) = (assignment.job, assignment.item.clone());
-        let reporter = self.party(id);
-        if let Some(confirmed) = self.confirms(job, &item, &reporter, &message) {
-            return self.fail(now, job, &item, &confirmed);
-        }
-        // A worker whose word is in doubt already says nothing new.
-        let is_doubted = self.workers[&id].question.is_some();
-        if assignment.is_audit || is_doubted || self.jobs[&job].batch.is_none() {
-            self.retry(now, assignment, NoResult::TakenBack);
-        }
-        if !is_doubted {
-            self.ask_referee(job, item, Doubt::Failure { reporter, message });
-        }
-    }
-
-    /// Two workers differ about the same trial, so one of them is faulty: the referee
-    /// knows which. Neither gets work meanwhile.
-    fn on_disagreement(
-        &mut self,
-        now: Instant,
-        job: JobId,
-        second: WorkerId,
-        item: &Item,
-        disagreement: Disagreement,
-    ) {
-        let Disagreement { first, first_name, trial, values: [first_values, second_values] } =
-            disagreement;
-        let second = self.party(second);
-        let batch = self.jobs[&job].batch.as_ref().expect("just compared");
-        let item = Item { individual: item.individual, trials: trial..trial + 1 };
-        if first == REFEREE {
-            let reason = wrong(&second_values, &first_values, &place(&item), &batch.name());
-            return self.put_in_quarantine(now, &second, &reason);
-        }
-        let is_doubted =
-            |id| self.workers.get(&id).is_some_and(|worker: &Worker| worker.question.is_some());
-        // What they differ about will be compared again when it is clear who is right.
-        if is_doubted(first) || is_doubted(second.id) {
-            return;
-        }
-        let first = Party { id: first, name: first_name };
-        let parties = [(first, first_values), (second, second_values)];
-        self.ask_referee(job, item, Doubt::Disagreement { parties });
-    }
-
-    /// Notes when there were last two workers that can audit each other.
-    pub(super) fn note_auditors(&mut self, now: Instant) {
-        let mut auditors = self.workers.values().filter(|worker| worker.may_audit());
-        let first = auditors.next().map(Worker::name);
-        if auditors.any(|worker| Some(worker.name()) != first) {
-            self.auditors_seen = now;
         }
     }
 
@@ -332,7 +238,7 @@ impl Engine {
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
-        let is_in_grace = now < self.auditors_seen + AUDITOR_GRACE;
+        let is_in_grace = self.trust.awaits_auditor(now);
         let (workers, job) = (&self.workers, &*work);
         let has_auditor = |batch: &BatchInProgress| {
             // Of a fleet that is divided among experiments, auditors that have been seen may be
@@ -345,14 +251,14 @@ impl Engine {
             return;
         }
         if let Some(item) = batch.without_fitness() {
-            if self.questions.n_about(id, |doubt| matches!(doubt, Doubt::NoFitness)) == 0 {
+            if self.trust.n_questions(id, |doubt| matches!(doubt, Doubt::NoFitness)) == 0 {
                 self.ask_referee(id, item, Doubt::NoFitness);
             }
             return;
         }
         self.ready_queue.remove(&(work.virtual_time, id));
         self.fleet_time.advance(now);
-        let batch = work.batch.take().expect("just seen");
+        let Some(batch) = work.batch.take() else { return };
         if let sim_core::TrialSet::Generation(generation) = batch.trial_set() {
             work.unaudited.add(generation, batch.contributors());
         }
@@ -411,15 +317,6 @@ impl Engine {
         }
     }
 
-    /// Whether an item is to be computed by the referee because workers were lost with it. It
-    /// computes one at a time, and so is no help against many.
-    fn may_ask_about_losses(&self, job: JobId, item: &Item) -> bool {
-        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
-        let is_open = batch.is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
-        let n_asked = self.questions.n_about(job, |doubt| matches!(doubt, Doubt::Losses));
-        is_open && n_asked < LOSS_QUESTIONS_MAX
-    }
-
     /// Queues items that had to wait for a while.
     pub(super) fn requeue_delayed(&mut self, now: Instant) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
@@ -435,8 +332,9 @@ impl Engine {
     /// Queues what no other worker computes of an item, before all others, and lets
     /// what others compute of it be duplicated again.
     pub(super) fn requeue(&mut self, id: JobId, item: &Item) {
-        let work = self.jobs.get_mut(&id).expect("the caller has seen it");
-        let batch = work.batch.as_mut().expect("the caller has seen it");
+        let Some(batch) = self.jobs.get_mut(&id).and_then(|work| work.batch.as_mut()) else {
+            return;
+        };
         for part in batch.unclaimed(item).into_iter().rev() {
             batch.queue_front(part);
         }
@@ -454,7 +352,7 @@ impl Engine {
 
     /// An item fails wherever it is computed.
     pub(super) fn fail(&mut self, now: Instant, id: JobId, item: &Item, failure: &str) {
-        let batch = self.batch_mut(id);
+        let Some(batch) = self.batch_mut(id) else { return };
         let reason = format!(
             "individual {} of {}, trials {}..{}, fails wherever it is computed: {failure}",
             item.individual,

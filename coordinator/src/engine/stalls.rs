@@ -77,14 +77,16 @@ impl Engine {
         let in_flight: Vec<_> = worker.in_flight.keys().copied().collect();
         for (age_rank, assignment_id) in in_flight.into_iter().enumerate().rev() {
             let assignment = if age_rank < n_computing {
-                let assignment = self.take_assignment(id, assignment_id);
-                let copy = assignment.clone();
-                self.update_worker(id, |worker| worker.written_off.insert(assignment_id, copy));
-                assignment
+                self.take_assignment(id, assignment_id).inspect(|assignment| {
+                    let copy = assignment.clone();
+                    self.update_worker(id, |worker| worker.written_off.insert(assignment_id, copy));
+                })
             } else {
                 self.recall(now, id, assignment_id)
             };
-            self.retry(now, assignment, NoResult::TakenBack);
+            if let Some(assignment) = assignment {
+                self.retry(now, assignment, NoResult::TakenBack);
+            }
         }
         self.finish_waived(now);
     }

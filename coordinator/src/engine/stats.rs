@@ -82,7 +82,7 @@ impl Engine {
         FleetStats {
             counters: Counters {
                 n_items_assigned: self.n_items_assigned,
-                n_questions: self.questions.n_asked(),
+                n_questions: self.trust.n_asked(),
                 ..self.counters
             },
             n_workers_available: n_available,

@@ -15,7 +15,7 @@ use sim_core::{Output, TrialSet};
 
 use crate::ids::{JobId, QuestionId, WorkerId};
 
-use super::{Command, OpenQuestion, SharedGenotype, item::Item};
+use super::super::{Command, OpenQuestion, SharedGenotype, item::Item};
 
 /// Processes that an item must take down before it is to blame: one may be killed by
 /// chance, or by a system that is short of memory.

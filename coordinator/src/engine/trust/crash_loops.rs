@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::worker::Worker;
+use super::super::worker::Worker;
 
 /// Time after a first loss in which a worker is given nothing; doubles with each.
 const FIRST_REST: Duration = Duration::from_millis(500);

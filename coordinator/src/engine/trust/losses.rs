@@ -13,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::item::Item;
+use super::super::item::Item;
 
 /// Losses within this time are one: machines, racks and networks fail as a whole, and so
 /// several copies of an item may be lost at once, or one copy after the other.

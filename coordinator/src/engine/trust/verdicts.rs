@@ -13,21 +13,22 @@ use crate::{
 };
 
 use super::{
-    Command, Engine,
-    batch::name_of,
-    item::Item,
-    known_results::{REFEREE, same_bits},
+    super::{
+        Command, Engine,
+        batch::name_of,
+        item::Item,
+        known_results::{REFEREE, same_bits},
+        results::NoResult,
+        timeline::Fate,
+    },
     questions::{Doubt, Party, Question},
-    results::NoResult,
-    timeline::Fate,
-    worker::Worker,
 };
 
 impl Engine {
     /// The referee has answered a question.
     pub fn on_verdict(&mut self, now: Instant, id: QuestionId, verdict: Verdict) {
         // It may have been withdrawn.
-        let Some(mut question) = self.questions.take(id) else { return };
+        let Some(mut question) = self.trust.questions.take(id) else { return };
         let is_of_losses = matches!(question.doubt, Doubt::Losses);
         match verdict {
             // Of an item that no worker was lost with, that is no proof: the system may be
@@ -38,7 +39,7 @@ impl Engine {
                 if is_first && matches!(question.doubt, Doubt::Failure { .. }) {
                     self.release(&question);
                 }
-                self.questions.put_back(id, question);
+                self.trust.questions.put_back(id, question);
             }
             // The next loss asks again.
             Verdict::Unavailable(_) => self.release(&question),
@@ -46,7 +47,7 @@ impl Engine {
                 let failure = format!("it takes its process down ({how})");
                 self.settle_failure(now, id, &question, &failure);
             }
-            Verdict::Died(_) => self.questions.put_back(id, question),
+            Verdict::Died(_) => self.trust.questions.put_back(id, question),
             Verdict::Failed(failure) => self.settle_failure(now, id, &question, &failure),
             Verdict::Values(values) => self.settle_values(now, id, &question, &values),
         }
@@ -55,8 +56,8 @@ impl Engine {
 
     /// Has the referee evaluate an item of a job's batch, and gives the item to no worker
     /// meanwhile. Those whose word is in doubt get nothing.
-    pub(super) fn ask_referee(&mut self, job: JobId, item: Item, doubt: Doubt) {
-        let work = self.jobs.get_mut(&job).expect("the caller has seen it");
+    pub(in crate::engine) fn ask_referee(&mut self, job: JobId, item: Item, doubt: Doubt) {
+        let Some(work) = self.jobs.get_mut(&job) else { return };
         let spec = Arc::clone(&work.spec);
         let Some(batch) = &mut work.batch else { return };
         let what = (batch.trial_set(), batch.output(), batch.genotype(item.individual));
@@ -69,10 +70,10 @@ impl Engine {
             Doubt::Failure { .. } | Doubt::Losses => batch.hold_back(item),
         }
         for party in question.parties() {
-            *self.doubted.entry(Arc::clone(&party.name)).or_default() += 1;
+            *self.trust.doubted.entry(Arc::clone(&party.name)).or_default() += 1;
         }
         let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
-        let (id, command) = self.questions.ask(question);
+        let (id, command) = self.trust.questions.ask(question);
         for party in parties {
             if self.workers.contains_key(&party) {
                 self.update_worker(party, |worker| worker.question = Some(id));
@@ -83,21 +84,21 @@ impl Engine {
     }
 
     /// Asks again what the referee could not answer.
-    pub(super) fn ask_again(&mut self, now: Instant) {
-        self.commands.extend(self.questions.asked_again(now));
+    pub(in crate::engine) fn ask_again(&mut self, now: Instant) {
+        self.commands.extend(self.trust.questions.asked_again(now));
     }
 
     /// Whether a failure that a worker reports is reported in the same words by others, while
     /// the referee cannot be asked: by workers with most of the slots, as fewer may be
     /// faulty, and of two names at least.
-    pub(super) fn confirms(
+    pub(in crate::engine) fn confirms(
         &self,
         job: JobId,
         item: &Item,
         reporter: &Party,
         message: &str,
     ) -> Option<String> {
-        let questions = self.questions.of(job).map(|(_, question)| question);
+        let questions = self.trust.questions.of(job).map(|(_, question)| question);
         let others = questions.filter_map(|question| match &question.doubt {
             Doubt::Failure { reporter, message: same }
                 if question.trouble.is_some()
@@ -125,10 +126,14 @@ impl Engine {
     }
 
     /// Forgets questions about a job that are no longer of interest.
-    pub(super) fn withdraw_questions(&mut self, job: JobId, is_moot: impl Fn(&Question) -> bool) {
-        let moot = self.questions.of(job).filter(|(_, question)| is_moot(question));
+    pub(in crate::engine) fn withdraw_questions(
+        &mut self,
+        job: JobId,
+        is_moot: impl Fn(&Question) -> bool,
+    ) {
+        let moot = self.trust.questions.of(job).filter(|(_, question)| is_moot(question));
         for id in moot.map(|(id, _)| id).collect::<Vec<QuestionId>>() {
-            let question = self.questions.take(id).expect("just seen");
+            let Some(question) = self.trust.questions.take(id) else { continue };
             self.end_doubt(id, &question);
             self.commands.push_back(Command::WithdrawQuestion { question: id });
         }
@@ -178,11 +183,14 @@ impl Engine {
         }
         if self.batch_of(question) {
             let (job, item) = (question.job, &question.item);
-            if matches!(question.doubt, Doubt::NoFitness) {
-                self.batch_mut(job).n_without_fitness += 1;
+            if matches!(question.doubt, Doubt::NoFitness)
+                && let Some(batch) = self.batch_mut(job)
+            {
+                batch.n_without_fitness += 1;
             }
             // What a third worker returned meanwhile may be wrong, too.
-            while let Err(disagreement) = self.batch_mut(job).known.compare(item, values)
+            while let Some(progress) = self.batch_mut(job)
+                && let Err(disagreement) = progress.known.compare(item, values)
                 && disagreement.first != REFEREE
             {
                 let party = Party { id: disagreement.first, name: disagreement.first_name };
@@ -190,7 +198,9 @@ impl Engine {
                 let reason = wrong(&returned, &right, &place, &batch);
                 self.put_in_quarantine(now, &party, &reason);
             }
-            if values.len() == self.batch_mut(job).n_values(item.trials.len()) {
+            if self.batch_mut(job).map(|batch| batch.n_values(item.trials.len()))
+                == Some(values.len())
+            {
                 self.take_values(now, job, REFEREE, item, values, true);
             }
             self.update_readiness(job);
@@ -208,10 +218,10 @@ impl Engine {
     /// Whoever was in doubt because of a question is not any more.
     fn end_doubt(&mut self, id: QuestionId, question: &Question) {
         for party in question.parties() {
-            if let Some(n_questions) = self.doubted.get_mut(&party.name) {
+            if let Some(n_questions) = self.trust.doubted.get_mut(&party.name) {
                 *n_questions -= 1;
                 if *n_questions == 0 {
-                    self.doubted.remove(&party.name);
+                    self.trust.doubted.remove(&party.name);
                 }
             }
             let worker = self.workers.get(&party.id);
@@ -220,8 +230,10 @@ impl Engine {
             }
         }
         if matches!(question.doubt, Doubt::Disagreement { .. }) {
-            if self.batch_of(question) {
-                self.batch_mut(question.job).n_disagreements -= 1;
+            if self.batch_of(question)
+                && let Some(batch) = self.batch_mut(question.job)
+            {
+                batch.n_disagreements -= 1;
             }
         } else if question.holds_back() {
             self.release(question);
@@ -230,23 +242,30 @@ impl Engine {
 
     /// Gives a question's item to workers again.
     fn release(&mut self, question: &Question) {
-        if self.batch_of(question) && self.batch_mut(question.job).release(&question.item) {
+        if self.batch_of(question)
+            && self.batch_mut(question.job).is_some_and(|batch| batch.release(&question.item))
+        {
             self.requeue(question.job, &question.item);
         }
     }
 
     /// A worker is proved faulty: it gets nothing until an operator says otherwise, and what
     /// it computed for batches that are not complete counts no more.
-    pub(super) fn put_in_quarantine(&mut self, now: Instant, party: &Party, reason: &str) {
+    pub(in crate::engine) fn put_in_quarantine(
+        &mut self,
+        now: Instant,
+        party: &Party,
+        reason: &str,
+    ) {
         let process = self.workers.get(&party.id).and_then(|worker| worker.introduction.process);
-        if self.quarantine.add(&party.name, process, reason) {
+        if self.trust.quarantine.add(&party.name, process, reason) {
             self.counters.n_workers_quarantined += 1;
             let (name, reason) = (party.name.to_string(), reason.to_owned());
             self.commands.push_back(Command::Quarantine { name, reason });
         }
         let workers = self.workers.iter();
-        let its =
-            workers.filter(|(_, worker)| self.quarantine.reason(&worker.introduction).is_some());
+        let its = workers
+            .filter(|(_, worker)| self.trust.quarantine.reason(&worker.introduction).is_some());
         let its = its.map(|(&id, _)| id).chain([party.id]).collect::<BTreeSet<WorkerId>>();
         for id in its {
             if self.workers.get(&id).is_some_and(|worker| worker.quarantined.is_none()) {
@@ -266,16 +285,16 @@ impl Engine {
             worker.is_stalled = false;
             mem::take(&mut worker.written_off)
         });
-        for item in written_off.into_values() {
+        for item in written_off.into_iter().flatten().map(|(_, item)| item) {
             let who = (id, &self.workers[&id]);
             self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
         }
         for assignment_id in in_flight.into_iter().rev() {
-            let assignment = self.recall(now, id, assignment_id);
-            self.retry(now, assignment, NoResult::TakenBack);
+            if let Some(assignment) = self.recall(now, id, assignment_id) {
+                self.retry(now, assignment, NoResult::TakenBack);
+            }
         }
-        let worker: &mut Worker = self.workers.get_mut(&id).expect("just seen");
-        worker.recalled.clear();
+        self.update_worker(id, |worker| worker.recalled.clear());
     }
 
     /// Forgets the values of a faulty worker in all batches, and says which earlier ones it
@@ -283,7 +302,7 @@ impl Engine {
     fn discard(&mut self, name: &str) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
-            let work = self.jobs.get_mut(&id).expect("just listed");
+            let Some(work) = self.jobs.get_mut(&id) else { continue };
             if let Some(generations) = work.unaudited.take(name) {
                 let (first, last) = generations.into_inner();
                 work.notices.push(format!(
@@ -302,15 +321,15 @@ impl Engine {
     pub fn on_readmitted(&mut self, now: Instant, name: &str) -> bool {
         let workers = self.workers.iter();
         let its = workers
-            .filter(|(_, worker)| self.quarantine.name(&worker.introduction) == Some(name))
+            .filter(|(_, worker)| self.trust.quarantine.name(&worker.introduction) == Some(name))
             .map(|(&id, _)| id)
             .collect::<Vec<WorkerId>>();
-        if !self.quarantine.remove(name) {
+        if !self.trust.quarantine.remove(name) {
             return false;
         }
         for id in its {
             // It may be there under another name as well.
-            let reason = self.quarantine.reason(&self.workers[&id].introduction);
+            let reason = self.trust.quarantine.reason(&self.workers[&id].introduction);
             let reason = reason.map(str::to_owned);
             self.update_worker(id, |worker| worker.quarantined = reason);
         }
@@ -321,17 +340,17 @@ impl Engine {
 
     /// A worker was found to be faulty before the engine began.
     pub fn on_quarantine_restored(&mut self, name: &str, reason: &str) {
-        self.quarantine.add(name, None, reason);
+        self.trust.quarantine.add(name, None, reason);
     }
 
     /// The workers in quarantine, connected or not, and why.
     pub fn quarantine(&self) -> impl Iterator<Item = (&str, &str)> {
-        self.quarantine.iter()
+        self.trust.quarantine.iter()
     }
 }
 
 /// What an item is called in messages.
-pub(super) fn place(item: &Item) -> String {
+pub(in crate::engine) fn place(item: &Item) -> String {
     let (individual, trials) = (item.individual, &item.trials);
     if trials.len() == 1 {
         format!("trial {} of individual {individual}", trials.start)
@@ -341,7 +360,12 @@ pub(super) fn place(item: &Item) -> String {
 }
 
 /// What is wrong with numbers that a worker returned, by the first that differs.
-pub(super) fn wrong(returned: &[f64], right: &[f64], place: &str, batch: &str) -> String {
+pub(in crate::engine) fn wrong(
+    returned: &[f64],
+    right: &[f64],
+    place: &str,
+    batch: &str,
+) -> String {
     let mut pairs = returned.iter().zip(right);
     let (returned, right) = pairs
         .find(|(returned, right)| returned.to_bits() != right.to_bits())

@@ -9,7 +9,7 @@ use sim_core::TrialSet;
 
 use crate::ids::JobId;
 
-use super::{Engine, item::Item};
+use super::super::{Engine, item::Item};
 
 /// The names of workers whose word is in doubt, and for how many questions.
 pub type Doubted = BTreeMap<Arc<str>, usize>;
@@ -93,7 +93,7 @@ impl Engine {
     /// Whether the results of an item are compared with another worker's. Depends
     /// on nothing but the place of the individual, so that the same individuals are
     /// audited whoever computes them.
-    pub(super) fn is_audited(&self, id: JobId, item: &Item) -> bool {
+    pub(in crate::engine) fn is_audited(&self, id: JobId, item: &Item) -> bool {
         let Some(work) = self.jobs.get(&id) else { return false };
         let Some(batch) = &work.batch else { return false };
         let (kind, number) = match id {

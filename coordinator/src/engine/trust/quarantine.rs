@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, num::NonZeroU64};
 
-use super::Introduction;
+use super::super::Introduction;
 
 /// Most workers that are remembered; of more, only the connections get nothing.
 const N_MAX: usize = 4096;
