@@ -27,6 +27,10 @@ pub const FILE_VARIABLE: &str = "SWARM_CONFIG";
 /// The default settings file, relative to the user's configuration directory.
 const FILE: &str = "swarmevo/config.json";
 
+/// What helps where the settings cannot be used.
+const REMEDY: &str =
+    "correct it, or name another file with SWARM_CONFIG; --data-dir DIR needs none";
+
 /// Address of the coordinator and credentials, as far as they have been set.
 #[derive(Debug, Clone, Default, PartialEq, Eq, ClapArgs)]
 #[command(next_help_heading = CONNECTION)]
@@ -90,7 +94,7 @@ impl Settings {
             }
             Err(error) => {
                 return Err(Error::Input(format!(
-                    "cannot read the settings in {}: {error}",
+                    "cannot read the settings in {}: {error}; {REMEDY}",
                     path.display()
                 )));
             }
@@ -174,7 +178,7 @@ fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
         let place = format!(" at line {} column {}", error.line(), error.column());
         let message = error.to_string();
         let message = message.strip_suffix(&place).unwrap_or(&message);
-        Error::Input(format!("{}: line {}: {message}", path.display(), error.line()))
+        Error::Input(format!("{}: line {}: {message}; {REMEDY}", path.display(), error.line()))
     })?;
     Ok(file.within(path.parent().unwrap_or(Path::new(""))))
 }
@@ -253,7 +257,8 @@ mod tests {
             ("{", "config.json: line 1: EOF while parsing an object"),
         ] {
             let error = parse(path, text).unwrap_err();
-            assert_eq!((error.exit_code(), error.to_string().as_str()), (2, expected));
+            let expected = format!("{expected}; {REMEDY}");
+            assert_eq!((error.exit_code(), error.to_string()), (2, expected));
         }
     }
 }

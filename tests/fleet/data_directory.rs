@@ -26,12 +26,17 @@ impl DataDirectory {
 
     /// Runs `swarmctl ARGS` in it to its end.
     pub fn swarmctl(&self, args: &str) -> Outcome {
+        self.swarmctl_with(&[("SWARM_DATA_DIR", "swarm-data"), ("SWARM_CONFIG", "")], args)
+    }
+
+    /// The same with variables of the environment.
+    pub fn swarmctl_with(&self, environment: &[(&str, &str)], args: &str) -> Outcome {
         let mut command = Command::new(binary("swarmctl"));
         command
             .args(args.split(' '))
             .current_dir(self.path())
-            .env("SWARM_DATA_DIR", "swarm-data")
-            .env("SWARM_CONFIG", "");
+            .env_remove("SWARM_COORDINATOR")
+            .envs(environment.iter().copied());
         Outcome::of(&mut command)
     }
 }

@@ -26,6 +26,7 @@ mod read_out;
 mod reproduction;
 mod scripts;
 mod security;
+mod settings;
 mod simulate;
 mod slurm;
 mod starved;

@@ -1,0 +1,49 @@
+//! Settings that cannot be read are in the way of those only who need them.
+
+use std::fs;
+
+use crate::data_directory::DataDirectory;
+
+/// Commands that ask nobody, or a data directory that is named.
+const NEED_NONE: [&str; 16] = [
+    "--help",
+    "schema",
+    "completions bash",
+    "validate experiment.json",
+    "run experiment.json",
+    "plot history.csv --to plot.svg --force",
+    "compare champion.json",
+    "simulate experiment.json --genotype champion.json",
+    "replay --config experiment.json --genotype champion.json --to replay.html --force",
+    "evaluate --config experiment.json --genotype champion.json --local --trials 1 --to out --force",
+    "verify bundle.zip",
+    "doctor",
+    "backup copy --force",
+    "man pages --force",
+    "new mine --force",
+    "history 1 --data-dir swarm-data",
+];
+
+#[test]
+fn settings_that_cannot_be_read_stop_only_what_asks_a_coordinator() {
+    let directory = DataDirectory::new();
+    let champion = directory.swarmctl("champion 1").expect_success().stdout;
+    fs::write(directory.path().join("champion.json"), champion).unwrap();
+    directory.swarmctl("export 1 --to bundle.zip").expect_success();
+    fs::write(directory.path().join("broken.json"), "{").unwrap();
+    for settings in ["broken.json", "missing.json", "swarm-data"] {
+        let environment = [("SWARM_CONFIG", settings)];
+        for line in NEED_NONE {
+            let outcome = directory.swarmctl_with(&environment, line);
+            assert_eq!(outcome.code, Some(0), "{line}, {settings}: {outcome:#?}");
+        }
+        for line in ["list", "history 1", "watch 1", "simulate 1@0/3"] {
+            let outcome = directory.swarmctl_with(&environment, line);
+            assert_eq!(outcome.code, Some(2), "{line}: {outcome:#?}");
+            assert_eq!(outcome.stderr.lines().count(), 1, "{line}: {}", outcome.stderr);
+            for part in [settings, "correct it", "--data-dir"] {
+                assert!(outcome.stderr.contains(part), "{line}: {}", outcome.stderr);
+            }
+        }
+    }
+}
