@@ -335,7 +335,7 @@ pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
             format!("{data_dir} is a data directory, in which {holder} computes; it has no fleet")
         }
         None => format!(
-            "{data_dir} is a data directory, in which no program computes; for a fleet, start: \
+            "{data_dir} is a data directory, in which no program computes\n  -> for a fleet, start: \
              coordinator --data-dir {data_dir}"
         ),
     }

@@ -88,12 +88,15 @@ async fn explain(
     let request = ExplainExperimentRequest { experiment_id };
     let answer = connection.call(async |client| client.explain_experiment(request).await).await?;
     let experiment = present(answer.experiment.clone())?;
-    let findings = match connection.data_dir() {
+    let mut findings = match connection.data_dir() {
         Some(data_dir) if !has_ended(experiment.state()) => {
             vec![finding::in_directory(&experiment, data_dir, connection.holder().await.as_ref())]
         }
         _ => finding::findings(&experiment, &answer, connection.address()),
     };
+    if let Some(data_dir) = connection.named_place() {
+        findings.iter_mut().for_each(|finding| finding.name_place(&data_dir));
+    }
     Ok((answer, findings))
 }
 

@@ -232,12 +232,26 @@ async fn output_at(line: &str, place: &[&str], directory: &Path, name: &str) -> 
     let concrete = line.replace("TO", to.to_str().unwrap());
     let concrete = concrete.replace("FILE", &file).replace("exported.zip", &exported);
     let text = output(&concrete, place).await.replace(to.to_str().unwrap(), "TO");
+    // Advice names a directory that commands do not find by themselves.
+    let text = text.replace(&format!(" {}", place.join(" ")), "");
+    let text = if line.starts_with("list") { without_ages(&text) } else { text };
     let mut written = Vec::new();
     for ending in ["csv", "html", "png", "zip", "svg"] {
         written.extend(fs::read(to.with_extension(ending)).unwrap_or_default());
     }
     written.extend(fs::read(to.with_extension("d").join("trials.csv")).unwrap_or_default());
     (text, written)
+}
+
+/// A list without ages, which a second between two questions changes.
+fn without_ages(list: &str) -> String {
+    let words: Vec<&str> = list.split_whitespace().collect();
+    let is_unit = |word: Option<&&str>| matches!(word, Some(&("ms" | "s" | "min")));
+    let is_kept = |&(i, word): &(usize, &&str)| {
+        !(is_unit(Some(word)) || is_unit(words.get(i + 1)) && word.parse::<u64>().is_ok())
+    };
+    let kept = words.iter().enumerate().filter(is_kept).map(|(_, word)| *word);
+    kept.collect::<Vec<_>>().join(" ")
 }
 
 /// Without what differs from one computation to the next.
@@ -306,6 +320,9 @@ async fn what_nobody_computes_is_not_waited_for() {
         let text = output(line, &at).await;
         assert!(text.contains("[exit code 3]") && text.contains(&resume), "{line}: {text}");
     }
+    let text = output("explain 1", &at).await;
+    let next = format!("swarmctl history 1 --data-dir {}", path.display());
+    assert!(text.contains(&next), "{text}");
     let text = output("explain 3", &at).await;
     assert!(text.contains("no program computes it") && text.contains(&resume), "{text}");
     for line in ["workers", "explain", "fleet slurm --max 2", "logs --follow"] {

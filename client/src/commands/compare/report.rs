@@ -142,8 +142,9 @@ impl Quantity {
             Column::number("runs").dropped(1),
             Column::number("median"),
             Column::number("95 %"),
-            Column::number("IQM").dropped(3),
-            Column::number("95 %").dropped(2),
+            // Without the IQM, its interval would be taken for another one's.
+            Column::number("IQM").dropped(2),
+            Column::number("95 %").dropped(3),
             Column::number("least").dropped(4),
             Column::number("most").dropped(5),
         ]);

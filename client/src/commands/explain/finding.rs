@@ -60,6 +60,16 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
+    /// Has its next steps name the data directory, which their commands would not find.
+    pub fn name_place(&mut self, data_dir: &str) {
+        let lacks = |step: &&mut String| {
+            step.contains(": swarmctl ")
+                && !["--data-dir", "--coordinator"].iter().any(|option| step.contains(option))
+        };
+        let option = text::shell_command(["--data-dir".to_owned(), data_dir.to_owned()]);
+        self.next_steps.iter_mut().filter(lacks).for_each(|step| *step += &format!(" {option}"));
+    }
+
     /// Whether it is about the fleet, and so the same for all experiments.
     pub fn is_of_fleet(&self) -> bool {
         use Kind::{NoWorkers, NoWorkersAvailable, Quarantine, StoreTrouble, WorkersWaiting};

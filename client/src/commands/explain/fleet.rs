@@ -93,16 +93,17 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
         }));
     }
     let n_unfinished = match explained.len() {
-        1 => "1 experiment has".to_owned(),
-        n => format!("{n} experiments have"),
+        0 => "all experiments have ended".to_owned(),
+        1 => "1 experiment has not ended".to_owned(),
+        n => format!("{n} experiments have not ended"),
     };
     let mut sections = vec![match connection.data_dir() {
         Some(data_dir) => {
             let fleet = text::no_fleet(data_dir, connection.holder().await.as_ref());
-            format!("{fleet}\n{n_unfinished} not ended")
+            format!("{fleet}\n{n_unfinished}")
         }
         None => format!(
-            "{} with {}; {n_unfinished} not ended",
+            "{} with {}; {n_unfinished}",
             text::counted(workers.len() as u64, "worker"),
             text::counted(slots, "slot"),
         ),
