@@ -3,6 +3,7 @@
 //! Each program defines its own lines and metrics; `docs/logs.md` and
 //! `docs/metrics.md` list them.
 
+mod allocator;
 mod duration;
 mod endpoint;
 mod log;
