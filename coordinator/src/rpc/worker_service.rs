@@ -45,7 +45,7 @@ const COPIES: usize = 3;
 const UNIT: usize = 16 << 10;
 
 /// Room for long messages to workers.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct WorkerOutflow(Arc<Semaphore>);
 
 impl Default for WorkerOutflow {

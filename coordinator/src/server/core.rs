@@ -10,7 +10,7 @@ use super::{
     CoordinatorConfig, StartError,
     door::Door,
     gate::Gate,
-    services::{self, Services},
+    services::{self, Room, Services},
 };
 use crate::{
     control::Control,
@@ -19,7 +19,7 @@ use crate::{
     limits::{BUNDLES_MAX, RECONSTRUCTIONS_MAX, REFEREE_IDLE_TIME, SHUTDOWN_GRACE},
     metrics::{Instruments, Source},
     referee::Referee,
-    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, WorkerOutflow, Workers},
+    rpc::{Evaluations, Experiments, Fleet, WelcomeTimes, Workers},
     shared_store::SharedStore,
     store::Store,
 };
@@ -37,6 +37,7 @@ pub struct Core {
     /// What serves the doors.
     doors: JoinSet<Result<(), tonic::transport::Error>>,
     events: EventSender,
+    room: Room,
     times: WelcomeTimes,
     referee: Referee,
 }
@@ -71,7 +72,19 @@ impl Core {
         let times =
             WelcomeTimes { heartbeat_interval: config.heartbeat_interval, lease: config.lease };
         let doors = JoinSet::new();
-        Ok(Self { store, control, shutdown, instruments, driver, doors, events, times, referee })
+        let room = Room::default();
+        Ok(Self {
+            store,
+            control,
+            shutdown,
+            instruments,
+            driver,
+            doors,
+            events,
+            room,
+            times,
+            referee,
+        })
     }
 
     /// What there is to scrape.
@@ -99,7 +112,7 @@ impl Core {
         Services {
             workers: Workers {
                 events: self.events.clone(),
-                outflow: WorkerOutflow::default(),
+                outflow: self.room.to_workers.clone(),
                 times: self.times,
                 shutdown: self.shutdown.clone(),
                 refusals: Mutex::default(),
@@ -110,6 +123,7 @@ impl Core {
                 shutdown: self.shutdown.clone(),
             },
             experiments: self.experiments(),
+            room: self.room.clone(),
         }
     }
 

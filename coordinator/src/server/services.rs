@@ -33,7 +33,7 @@ use tower::util::{MapRequestLayer, MapResponseLayer};
 use super::{call_layer::CallLayer, calls::Calls, gate::Gate, intake::Intake, outflow::Outflow};
 use crate::{
     limits::{CALLS_PER_CONNECTION_MAX, HEADERS_LEN_MAX, KEEPALIVE, WINDOW_LEN},
-    rpc::{Evaluations, Experiments, Fleet, Workers},
+    rpc::{Evaluations, Experiments, Fleet, WorkerOutflow, Workers},
 };
 
 /// All services of the coordinator.
@@ -42,6 +42,15 @@ pub struct Services {
     pub fleet: Fleet,
     pub experiments: Experiments,
     pub evaluations: Evaluations,
+    pub room: Room,
+}
+
+/// Room for long messages and answers: one for all ways to the services.
+#[derive(Debug, Clone, Default)]
+pub struct Room {
+    intake: Intake,
+    outflow: Outflow,
+    pub to_workers: WorkerOutflow,
 }
 
 /// A service with limits on the length of messages.
@@ -79,8 +88,8 @@ impl Services {
         IO: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
         IO::ConnectInfo: Clone + Send + Sync + 'static,
     {
-        let Self { workers, fleet, experiments, evaluations } = self;
-        let (intake, outflow) = (Intake::default(), Outflow::default());
+        let Self { workers, fleet, experiments, evaluations, room } = self;
+        let Room { intake, outflow, .. } = room;
         let (reflection_v1, reflection_v1alpha) = reflection();
         server
             .layer(CallLayer(calls))
