@@ -5,7 +5,7 @@
 //! has met ([`Reevaluation`](super::Reevaluation)), and what the winner is worth
 //! is measured on trials that compared nobody ([`Judgement`](super::Judgement)).
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{Genotype, Real, mean};
 
@@ -49,11 +49,19 @@ pub struct HeldOut {
     /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial, infinite if squares
     /// overflow. By it, candidates are found to be close. It is no interval for what the
     /// winner is worth.
+    #[serde(deserialize_with = "interval_of_any_version")]
     pub ci95: Real,
     /// Number of trials n.
     pub n_trials: u64,
     /// Generation of the latest of them.
     pub generation: u64,
+}
+
+/// States of older versions may have NaN where sums overflowed: nothing is known of how far the
+/// mean is off, which is infinite here, as in the database.
+fn interval_of_any_version<'de, D: Deserializer<'de>>(state: D) -> Result<Real, D::Error> {
+    let unknown = Real::new(f64::INFINITY).expect("infinity is a number");
+    Ok(Real::new(f64::deserialize(state)?).unwrap_or(unknown))
 }
 
 /// Fitness in trials that selected nothing.

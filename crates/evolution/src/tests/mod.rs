@@ -312,6 +312,36 @@ fn the_formats_of_keyframes_and_of_the_log_stay() {
     );
 }
 
+/// Where sums overflowed, older versions wrote an interval that is no number.
+#[test]
+fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
+    let mut evolution = evolution(3, &[2]);
+    step(&mut evolution);
+    let mut round = evolution.reevaluation().unwrap();
+    while !round.is_over() {
+        round.learn(&evaluate(&round.genotypes()));
+    }
+    evolution.set_champion(&round);
+    let HeldOut { mean, ci95, .. } = evolution.champion().unwrap().held_out.unwrap();
+    let bytes = |mean: f64, ci95: f64| [mean.to_le_bytes(), ci95.to_le_bytes()].concat();
+    let replaced = |old: &[u8], new: &[u8]| {
+        let mut keyframe = evolution.keyframe();
+        let places = keyframe.windows(old.len()).enumerate().filter(|(_, it)| *it == old);
+        let places: Vec<usize> = places.map(|(at, _)| at).collect();
+        for &at in &places {
+            keyframe[at..at + old.len()].copy_from_slice(new);
+        }
+        assert_eq!(places.len(), 1);
+        Evolution::restore(&Checkpoint { keyframe, log: Vec::new() })
+    };
+    let known = bytes(mean.get(), ci95.get());
+    let old = replaced(&known, &bytes(mean.get(), f64::NAN)).unwrap();
+    let found = old.champion().unwrap().held_out.unwrap();
+    assert_eq!((found.mean, found.ci95.get()), (mean, f64::INFINITY));
+    assert!(Evolution::restore(&Checkpoint { keyframe: old.keyframe(), log: Vec::new() }).is_ok());
+    assert!(replaced(&known, &bytes(f64::NAN, 0.5)).is_err(), "no version kept such a mean");
+}
+
 #[test]
 fn what_is_no_checkpoint_is_an_error() {
     let mut evolution = evolution(3, &[2]);
