@@ -3,14 +3,15 @@
 
 use std::fs;
 
-use harness::{CoordinatorProcess, Experiment, workspace_file};
+use harness::{CoordinatorProcess, Experiment, HandWorker, WorkerProcess, hello, workspace_file};
 use serde_json::{Value, json};
 use swarm_proto::v1::{
-    EvaluateRequest, EvaluateResponse, SubmitExperimentRequest,
+    EvaluateRequest, EvaluateResponse, Hello, SubmitExperimentRequest,
     evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient,
 };
-use tonic::{Code, Status, Streaming, transport::Channel};
+use tokio::task::JoinSet;
+use tonic::{Code, Response, Status, Streaming, transport::Channel};
 
 /// An experiment of so many individuals with 440 genes each.
 fn large(population_size: u64) -> Experiment {
@@ -142,4 +143,83 @@ async fn evaluations_that_wait_take_no_more_memory_than_they_may() {
     while let Err(status) = client.clone().evaluate(request.clone()).await {
         assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
     }
+}
+
+/// MiB that the coordinator of a debug build takes beside what is counted.
+const PROGRAM_MIB: u64 = 150;
+
+/// Sends the same evaluation on connections of their own, all at once, and holds the answers.
+async fn evaluate_at_once(
+    coordinator: &CoordinatorProcess,
+    n_clients: usize,
+) -> (Vec<Streaming<EvaluateResponse>>, Vec<Status>) {
+    let (request, url) = (large_evaluation(), coordinator.url());
+    let mut calls = JoinSet::new();
+    for _ in 0..n_clients {
+        let (request, url) = (request.clone(), url.clone());
+        calls.spawn(async move {
+            let mut client = EvaluationServiceClient::connect(url).await.unwrap();
+            client.evaluate(request).await.map(Response::into_inner)
+        });
+    }
+    let (mut waiting, mut refused) = (Vec::new(), Vec::new());
+    while let Some(call) = calls.join_next().await {
+        match call.unwrap() {
+            Ok(answers) => waiting.push(answers),
+            Err(status) => refused.push(status),
+        }
+    }
+    (waiting, refused)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_hundred_evaluations_at_once_stay_within_what_is_stated() {
+    let coordinator = CoordinatorProcess::start();
+    let (waiting, refused) = evaluate_at_once(&coordinator, 100).await;
+    assert!((30..40).contains(&waiting.len()), "{} of 7 MB each", waiting.len());
+    for status in &refused {
+        assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+    }
+    // What waits to be evaluated, and what is on its way in.
+    let peak = coordinator.process.peak_memory_mib();
+    assert!(peak < 256 + 128 + PROGRAM_MIB, "{peak} MiB");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn workers_that_do_not_read_take_no_more_memory_than_is_stated() {
+    let coordinator = CoordinatorProcess::start();
+    let mut workers = Vec::new();
+    for _ in 0..40 {
+        let hello = Hello { slots: 8, ..hello() };
+        workers.push(HandWorker::connect(&coordinator.url(), hello).await.unwrap());
+    }
+    let (waiting, _) = evaluate_at_once(&coordinator, 40).await;
+    assert!(waiting.len() >= 30, "{} of 7 MB each", waiting.len());
+    // An evaluation goes to a worker when others have been given theirs.
+    coordinator.process.wait_for("the last that is computed", |line| {
+        line["message"] == "items assigned" && line["job"] == "evaluation 16"
+    });
+    coordinator.swarmctl(&["workers"]).expect_success();
+    let peak = coordinator.process.peak_memory_mib();
+    assert!(peak < 256 + 256 + 128 + PROGRAM_MIB, "{peak} MiB");
+}
+
+#[test]
+fn memory_of_experiments_that_have_ended_is_free_again() {
+    let coordinator = CoordinatorProcess::start();
+    let _workers = WorkerProcess::start_many(&coordinator, 2);
+    let path = Experiment::tiny(1).edit(|value| {
+        value["algorithm"]["evaluation_steps"] = json!(5);
+        value["algorithm"]["population_size"] = json!(4);
+    });
+    let path = path.path();
+    let run = |first: u64, n: u64| {
+        let seeds = format!("{first}..{}", first + n);
+        let file = path.to_str().unwrap();
+        coordinator.swarmctl(&["submit", file, "--seeds", &seeds, "--watch"]).expect_success();
+        coordinator.process.memory_mib()
+    };
+    let before = run(0, 100);
+    let after = run(100, 300);
+    assert!(after < before + 8, "{before} MiB, {after} MiB");
 }

@@ -62,9 +62,7 @@ impl EvaluationOrder {
 
     /// Checks everything about an order; work for a CPU.
     fn check(self, place: RequestPlace) -> Result<CheckedEvaluation, ControlError> {
-        let Self { config_json, mut genotype, n_trials, priority } = self;
-        // It waits, and a list that grew as it was read has room for more.
-        genotype.shrink_to_fit();
+        let Self { config_json, genotype, n_trials, priority } = self;
         if n_trials == 0 || n_trials > limits::TRIALS {
             let message = format!("trial_count is {n_trials}, not within 1..={}", limits::TRIALS);
             return Err(ControlError::Invalid(message));
@@ -108,8 +106,10 @@ impl Control {
     /// Checks everything about an order.
     pub async fn check_evaluation(
         &self,
-        order: EvaluationOrder,
+        mut order: EvaluationOrder,
     ) -> Result<CheckedEvaluation, ControlError> {
+        // It waits for its check already, and a list that grew as it was read has room for more.
+        order.genotype.shrink_to_fit();
         let place = self.requests.enter(order.len())?;
         self.requests.check(self.client, move |_| order.check(place)).await?
     }

@@ -32,7 +32,8 @@ impl FitnessOrder {
     /// Bytes that it takes until it is answered.
     fn len(&self) -> usize {
         let genes: usize = self.genotypes.iter().map(|genes| size_of_val(&**genes)).sum();
-        2 * self.config_json.len() + genes
+        // Where there are no genes, the lists are what takes memory.
+        2 * self.config_json.len() + size_of_val(&*self.genotypes) + genes
     }
 
     /// Checks everything about an order; work for a CPU.
@@ -67,7 +68,10 @@ impl FitnessOrder {
 impl Control {
     /// Has the fleet compute fitness: per genotype that of every trial. Dropping the future
     /// tells the driver that nobody waits.
-    pub async fn fitness(&self, order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
+    pub async fn fitness(&self, mut order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
+        // Lists that grew as they were read have room for more.
+        order.genotypes.iter_mut().for_each(Vec::shrink_to_fit);
+        order.genotypes.shrink_to_fit();
         let _place = self.requests.enter(order.len())?;
         let files = Arc::clone(&self.experiment_files);
         let evaluation =
