@@ -341,7 +341,7 @@ impl Connection {
             }
             Ok::<_, Status>(bytes)
         };
-        match waiting::aloud(|| Some(self.waits(None)), bundle).await {
+        match waiting::aloud(async || Some(self.waits(None)), bundle).await {
             Ok(bytes) => Ok(bytes),
             Err(status) => Err(self.diagnose(self.error(&status)).await),
         }
@@ -355,18 +355,26 @@ impl Connection {
             let answer = self.patient().import_experiment(tokio_stream::iter(requests)).await?;
             Ok::<_, Status>(answer.into_inner())
         };
-        match waiting::aloud(|| Some(self.waits(None)), imported).await {
+        match waiting::aloud(async || Some(self.waits(None)), imported).await {
             Ok(answer) => Ok((present(answer.experiment)?, answer.is_new)),
             Err(status) => Err(self.diagnose(self.error(&status)).await),
         }
     }
 
     /// The fitness of genotypes in trials of an evolution, however long that takes.
-    pub async fn fitness(&self, request: EvaluateFitnessRequest) -> Result<Vec<Vec<f64>>, Error> {
+    /// `otherwise`: what works without a fleet.
+    pub async fn fitness(
+        &self,
+        request: EvaluateFitnessRequest,
+        otherwise: &str,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let evaluations = self.way.evaluations(&self.way.patient_channel());
         let answer = self
             .with_patience(PATIENCE_WHILE_FOLLOWING)
-            .retry(async || evaluations.clone().evaluate_fitness(request.clone()).await)
+            .retry(
+                async || evaluations.clone().evaluate_fitness(request.clone()).await,
+                async || waiting::fleet(self, otherwise).await,
+            )
             .await?;
         Ok(answer.fitness.into_iter().map(|of| of.values).collect())
     }
@@ -382,7 +390,7 @@ impl Connection {
         &self,
         request: impl AsyncFn(&mut ExperimentServiceClient<Authorised>) -> Result<Response<T>, Status>,
     ) -> Result<T, Error> {
-        self.retry(async || request(&mut self.client.clone()).await).await
+        self.ask(async || request(&mut self.client.clone()).await).await
     }
 
     /// As [`Self::call`], to the fleet service.
@@ -390,12 +398,22 @@ impl Connection {
         &self,
         request: impl AsyncFn(&mut FleetServiceClient<Authorised>) -> Result<Response<T>, Status>,
     ) -> Result<T, Error> {
-        self.retry(async || request(&mut self.fleet.clone()).await).await
+        self.ask(async || request(&mut self.fleet.clone()).await).await
     }
 
+    async fn ask<T>(
+        &self,
+        request: impl AsyncFn() -> Result<Response<T>, Status>,
+    ) -> Result<T, Error> {
+        // On the heap, so that commands, which are made of such requests, take little stack.
+        Box::pin(self.retry(request, async || self.waits(None))).await
+    }
+
+    /// `waits`: for what, while the coordinator is reached.
     async fn retry<T>(
         &self,
         request: impl AsyncFn() -> Result<Response<T>, Status>,
+        waits: impl AsyncFn() -> String,
     ) -> Result<T, Error> {
         let give_up_at = Instant::now() + self.patience;
         let failure = Mutex::new(None);
@@ -414,10 +432,13 @@ impl Connection {
             }
         };
         // With little patience, whoever cannot be reached is reported soon.
-        let is_worth_a_word = |it: &Option<String>| it.is_none() || self.patience > PATIENCE;
-        let what = || {
-            let failure = lock(&failure);
-            is_worth_a_word(&failure).then(|| self.waits(failure.as_deref()))
+        let what = async || {
+            let failure = lock(&failure).clone();
+            match failure {
+                None => Some(waits().await),
+                Some(_) if self.patience <= PATIENCE => None,
+                Some(reason) => Some(self.waits(Some(&reason))),
+            }
         };
         waiting::aloud(what, repeated).await
     }

@@ -6,6 +6,7 @@ use crate::{
     args::{Subject, Target},
     connection::Connection,
     error::Error,
+    progress::Progress,
     text,
 };
 
@@ -51,10 +52,14 @@ pub async fn members(
 /// Changes experiments, one after the other. Only what would stop all of them ends it early.
 pub async fn change_each<T>(
     members: &[Experiment],
+    progress: &mut Progress,
     change: impl AsyncFn(u64) -> Result<T, Error>,
 ) -> Outcome<T> {
     let (mut changed, mut lines, mut first) = (Vec::new(), Vec::new(), None);
-    for experiment in members {
+    for (n_done, experiment) in members.iter().enumerate() {
+        if members.len() > 1 {
+            progress.step(n_done as u64, members.len() as u64, "experiments");
+        }
         match change(experiment.id).await {
             Ok(result) => changed.push(result),
             // It is said as it is, without a list.
@@ -71,6 +76,7 @@ pub async fn change_each<T>(
             }
         }
     }
+    progress.clear();
     let failure = first.map(|first| Error::Partly {
         n_changed: changed.len(),
         n_all: members.len(),
@@ -83,6 +89,11 @@ pub async fn change_each<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::args::OutputFormat;
+
+    fn quiet() -> Progress {
+        Progress::to(OutputFormat::Table, Box::new(std::io::sink()))
+    }
 
     fn group(n: u64) -> Vec<Experiment> {
         (1..=n).map(|id| Experiment { id, name: "a".into(), ..Experiment::default() }).collect()
@@ -94,7 +105,7 @@ mod tests {
             2 => Err(Error::NotFound("it has not completed".into())),
             id => Ok(id),
         };
-        let outcome = change_each(&group(3), change).await;
+        let outcome = change_each(&group(3), &mut quiet(), change).await;
         assert_eq!(outcome.changed, [1, 3]);
         let error = outcome.end().unwrap_err();
         assert_eq!(error.exit_code(), 3);
@@ -111,7 +122,7 @@ mod tests {
             2 => Err(Error::Denied { address: "x".into(), refusal: "y".into() }),
             _ => panic!("the second stops it"),
         };
-        let outcome = change_each(&group(10_000), change).await;
+        let outcome = change_each(&group(10_000), &mut quiet(), change).await;
         assert_eq!(outcome.changed, [1]);
         assert_eq!(outcome.end().unwrap_err().exit_code(), 7);
     }
@@ -119,7 +130,7 @@ mod tests {
     #[tokio::test]
     async fn the_error_of_one_alone_is_said_as_it_is() {
         let change = async |_| Err::<u64, _>(Error::NotFound("it has not ended".into()));
-        let error = change_each(&group(1), change).await.end().unwrap_err();
+        let error = change_each(&group(1), &mut quiet(), change).await.end().unwrap_err();
         assert_eq!(error.report(), "error: it has not ended");
     }
 }

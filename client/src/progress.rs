@@ -17,12 +17,13 @@ use crate::{
     args::OutputFormat,
     clock,
     commands::Finding,
+    clock,
     error::Error,
     json,
     place::Place,
     settings::Settings,
     table::{self, Screen, Table},
-    text,
+    text, waiting,
 };
 
 /// How a notice ends that is about trials which have selected somebody.
@@ -32,6 +33,8 @@ const ETA_WINDOW: usize = 20;
 /// A shorter rest is not worth a word where there is no bar.
 const ETA_MIN: Duration = Duration::from_secs(10);
 /// On narrower terminals there is no bar, and no name before it: only numbers.
+/// Where there is no bar, it is said so often how much of something long is done.
+const STEP_PAUSE: Duration = Duration::from_secs(10);
 const BAR_SCREEN_WIDTH: usize = 70;
 /// Names before the bar are cut to this width.
 const NAME_WIDTH_MAX: usize = 24;
@@ -58,6 +61,8 @@ pub struct Progress {
 }
 
 /// A part of an answer for people. Colours are a table's alone: they are added when it is printed,
+    /// When it is said next how much is done, where there is no bar.
+    next_word: Option<Instant>,
 /// and its cells are escaped before.
 #[derive(Debug, Clone)]
 pub enum Part {
@@ -140,6 +145,7 @@ impl Progress {
 
     /// Makes no remarks.
     pub fn silent(self) -> Self {
+            next_word: None,
         Self { is_silent: true, ..self }
     }
 
@@ -313,6 +319,8 @@ impl Progress {
         }
         match self.format {
             OutputFormat::Json => {
+            // One that has been removed is shown again.
+            self.bar.reset();
                 self.print(&json::line(&json::GenerationLine::new(experiment_id, summary)))
             }
             _ if self.has_terminal => {
@@ -352,7 +360,7 @@ impl Progress {
         self.followed.values().map(Followed::remaining).max().unwrap_or_default()
     }
 
-    /// Shows how much of something long is done, if there is a terminal.
+    /// Shows how much of something long is done: in a bar, or in a line now and then.
     pub fn step(&mut self, n_done: u64, n_all: u64, what: &str) {
         if self.has_terminal && !self.is_json() {
             self.bar.set_position(n_done);
@@ -375,8 +383,14 @@ impl Progress {
 
     /// Says what keeps an experiment from being computed; none: nothing any more.
     pub fn situation(&self, experiment_id: u64, finding: Option<&Finding>) {
+        if let Some(line) = self.word(clock::now(), n_done, n_all, what) {
+            return self.remark(&line);
+        }
         let what = match finding {
             Some(finding) => format!("waiting: {finding}"),
+            if self.bar.is_finished() {
+                self.bar.reset();
+            }
             None => "it is computed again".to_owned(),
         };
         let first_line = what.lines().next().unwrap_or_default();
@@ -386,6 +400,18 @@ impl Progress {
 
     /// Shows as many of these beside the bar as there is room for, the first ones.
     fn set_message(&self, parts: &[String]) {
+    /// What is said of a step, if there is no bar and it is time for a word.
+    fn word(&mut self, now: Instant, n_done: u64, n_all: u64, what: &str) -> Option<String> {
+        if self.has_terminal && !self.is_json() {
+            return None;
+        }
+        let is_first = n_done == 0 || self.next_word.is_none();
+        let next = self.next_word.filter(|_| !is_first).unwrap_or(now + waiting::SILENCE_MAX);
+        let is_due = now >= next;
+        self.next_word = Some(if is_due { now + STEP_PAUSE } else { next });
+        is_due.then(|| format!("{n_done}/{n_all} {what}"))
+    }
+
         self.bar.set_message(fitting(parts, self.message_room()));
     }
 

@@ -15,13 +15,17 @@ use swarm_proto::v1::{
     ComparisonTrials, EvaluateFitnessRequest, EvolutionTrials, Genes, evolution_trials::Trials,
 };
 
-use crate::{args::IsaArgs, connection::Connection, error::Error, settings::Settings};
+use crate::{args::IsaArgs, connection::Connection, error::Error, settings::Settings, waiting};
 
 /// Trials of a genotype that a thread simulates at once, side by side.
 const TRIALS_PER_ITEM: u32 = 25;
 
 /// Bytes of genes in one request to a coordinator.
 const REQUEST_LEN: usize = 4 << 20;
+
+/// What works without a fleet.
+const HERE: &str = "without --coordinator and SWARM_COORDINATOR this command simulates in its \
+                    own process";
 
 /// Where it is simulated.
 #[derive(Debug)]
@@ -61,7 +65,8 @@ impl Resimulation {
         match self {
             Self::Here { n_threads, isa } => {
                 let simulation = simulation.clone().with_isa(*isa);
-                here(&simulation, batch, *n_threads)
+                let what = format!("simulating {}", batch.trial_set);
+                waiting::busy(&what, || here(&simulation, batch, *n_threads))
                     .map_err(|error| Error::Flawed(format!("it cannot be simulated: {error}")))
             }
             Self::Fleet { connection, config_json } => fleet(connection, config_json, batch).await,
@@ -86,7 +91,7 @@ async fn fleet(
             trial_count: n_trials as u32,
             priority: None,
         };
-        fitness.extend(connection.fitness(request).await?);
+        fitness.extend(connection.fitness(request, HERE).await?);
     }
     Ok(fitness)
 }

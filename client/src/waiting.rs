@@ -2,30 +2,33 @@
 //! and again from time to time; and whatever it computes, likewise.
 
 use std::{
-    io::{self, Write as _},
-    panic::resume_unwind,
     pin::pin,
     sync::mpsc::{self, RecvTimeoutError},
     thread,
     time::Duration,
 };
 
-use swarm_telemetry::escape_lines;
+use swarm_proto::v1::ListWorkersRequest;
+use swarm_telemetry::report;
 use tokio::time::timeout;
+
+use crate::{connection::Connection, text};
 
 /// Nothing waits for longer without a word.
 pub const SILENCE_MAX: Duration = Duration::from_secs(2);
 /// After which it is said again.
 pub const REMINDER: Duration = Duration::from_secs(30);
+/// How long a coordinator has to say for what it waits itself.
+const ANSWER_TIME: Duration = Duration::from_secs(1);
 
 /// Waits, and says for what: `what` follows "waiting for "; none if it ends soon.
-pub async fn aloud<T>(what: impl Fn() -> Option<String>, wait: impl Future<Output = T>) -> T {
-    aloud_to(|line| say(&line), what, wait).await
+pub async fn aloud<T>(what: impl AsyncFn() -> Option<String>, wait: impl Future<Output = T>) -> T {
+    aloud_to(|line| report(&line), what, wait).await
 }
 
 async fn aloud_to<T>(
     mut say: impl FnMut(String),
-    what: impl Fn() -> Option<String>,
+    what: impl AsyncFn() -> Option<String>,
     wait: impl Future<Output = T>,
 ) -> T {
     let mut wait = pin!(wait);
@@ -33,45 +36,64 @@ async fn aloud_to<T>(
     loop {
         match timeout(silence, wait.as_mut()).await {
             Ok(done) => return done,
-            Err(_) => what().into_iter().for_each(|what| say(format!("waiting for {what}"))),
+            Err(_) => what().await.into_iter().for_each(|what| say(format!("waiting for {what}"))),
         }
         silence = REMINDER;
     }
 }
 
-/// Computes, and says so if that takes long.
-pub fn computing<T: Send>(what: &str, work: impl FnOnce() -> T + Send) -> T {
-    computing_to(|| say(&format!("computing {what}")), SILENCE_MAX, work)
+/// Does something that keeps this thread busy, and says what, such as "reading it".
+pub fn busy<T>(what: &str, work: impl FnOnce() -> T) -> T {
+    busy_to(&report, SILENCE_MAX, what, work)
 }
 
-fn computing_to<T: Send>(
-    mut say: impl FnMut(),
+fn busy_to<T>(
+    say: &(impl Fn(&str) + Sync),
     mut silence: Duration,
-    work: impl FnOnce() -> T + Send,
+    what: &str,
+    work: impl FnOnce() -> T,
 ) -> T {
     thread::scope(|scope| {
-        // Closed when the work is done, or has panicked.
-        let (working, done) = mpsc::channel::<()>();
-        let work = scope.spawn(move || {
-            let _working = working;
-            work()
+        let (end, ended) = mpsc::channel::<()>();
+        let speaker = thread::Builder::new().spawn_scoped(scope, move || {
+            while ended.recv_timeout(silence) == Err(RecvTimeoutError::Timeout) {
+                say(what);
+                silence = REMINDER;
+            }
         });
-        while done.recv_timeout(silence) == Err(RecvTimeoutError::Timeout) {
-            say();
-            silence = REMINDER;
-        }
-        work.join().unwrap_or_else(|panic| resume_unwind(panic))
+        // If there is no thread for it, the work is done in silence.
+        drop(speaker);
+        let done = work();
+        drop(end);
+        done
     })
 }
 
-/// A line on standard error.
-fn say(line: &str) {
-    // If standard error is closed there is no place left to report to.
-    let _ = writeln!(io::stderr(), "{}", escape_lines(line));
+/// What work of a coordinator's fleet waits for, as [`aloud`] says it. `otherwise`: what works
+/// without a fleet.
+pub async fn fleet(connection: &Connection, otherwise: &str) -> String {
+    let address = connection.address();
+    let impatient = connection.with_patience(Duration::ZERO);
+    let request = ListWorkersRequest {};
+    let listing = impatient.call_fleet(async |client| client.list_workers(request).await);
+    match timeout(ANSWER_TIME, listing).await.map(|answer| answer.map(|it| it.workers.len())) {
+        Ok(Ok(0)) => format!(
+            "a worker: the coordinator at {address} has none; start one with \
+             `worker --coordinator {address}`; {otherwise}"
+        ),
+        Ok(Ok(n)) => {
+            let workers = text::counted(n as u64, "worker");
+            format!("{workers} of the coordinator at {address}")
+        }
+        Ok(Err(error)) => format!("an answer: {error}; {otherwise}"),
+        Err(_) => format!("an answer: the coordinator at {address} gives none; {otherwise}"),
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use tokio::time::{Instant, sleep};
 
     use super::*;
@@ -81,7 +103,7 @@ mod tests {
         let start = Instant::now();
         let mut said = Vec::new();
         let say = |line| said.push((start.elapsed().as_secs(), line));
-        let done = aloud_to(say, || Some("it".to_owned()), async {
+        let done = aloud_to(say, async || Some("it".to_owned()), async {
             sleep(Duration::from_secs(seconds)).await;
             7
         });
@@ -89,19 +111,22 @@ mod tests {
         said
     }
 
-    #[test]
-    fn a_long_computation_is_said_and_a_short_one_is_not() {
-        let (say, heard) = mpsc::channel();
-        let until_said = move || heard.recv().unwrap();
-        let value = computing_to(|| say.send(7).unwrap(), Duration::from_millis(1), until_said);
-        assert_eq!(value, 7);
-        computing_to(|| panic!("it took no time"), Duration::from_secs(600), || ());
-    }
-
     #[tokio::test(start_paused = true)]
     async fn a_long_wait_is_said_after_two_seconds_and_again() {
         assert_eq!(said(1).await, []);
         let line = || "waiting for it".to_owned();
         assert_eq!(said(40).await, [(2, line()), (32, line())]);
+    }
+
+    #[test]
+    fn long_work_is_said_and_short_work_is_not() {
+        let (heard, hear) = mpsc::channel();
+        let heard = Mutex::new(heard);
+        let say = |line: &str| heard.lock().unwrap().send(line.to_owned()).unwrap();
+        // It ends when something has been said of it.
+        let long = busy_to(&say, Duration::ZERO, "reading it", || hear.recv().unwrap());
+        assert_eq!(long, "reading it");
+        assert_eq!(busy_to(&say, Duration::MAX, "reading it", || 7), 7);
+        assert!(hear.try_recv().is_err());
     }
 }

@@ -13,6 +13,7 @@ use crate::{
     error::Error,
     output_file::{Overwrite, exists},
     progress::Progress,
+    waiting,
 };
 
 /// Copy a data directory, whether or not a coordinator uses it.
@@ -42,8 +43,9 @@ Examples:
 
 /// Makes the copy.
 pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Result<(), Error> {
+    let what = format!("copying {} and looking through the copy", data_dir.display());
     let copied = args.overwrite.data_directory(data_dir, &args.to, |to| {
-        store::backup(data_dir, to).map_err(|error| refused(&error))
+        waiting::busy(&what, || store::backup(data_dir, to)).map_err(|error| refused(&error))
     });
     match copied? {
         Backup::Made(mut inspection) => {

@@ -45,7 +45,7 @@ impl Remote for PauseArgs {
                 connection.call(async |client| client.pause_experiment(request.clone()).await);
             present(call.await?.experiment)
         };
-        let outcome = each(&self.target, connection, pause).await?;
+        let outcome = each(&self.target, connection, progress, pause).await?;
         let is_any_paused = !outcome.changed.is_empty();
         let printed = print(&self.target, outcome, text::state_line, progress);
         if is_any_paused && !progress.is_json() {
@@ -77,7 +77,7 @@ impl Remote for ResumeArgs {
             let call = connection.call(async |client| client.resume_experiment(request).await);
             present(call.await?.experiment)
         };
-        let outcome = each(&self.target, connection, resume).await?;
+        let outcome = each(&self.target, connection, progress, resume).await?;
         follow(&self.target, outcome, connection, progress).await
     }
 }
@@ -107,7 +107,7 @@ impl Remote for PriorityArgs {
             let call = connection.call(async |client| client.set_priority(request).await);
             present(call.await?.experiment)
         };
-        let outcome = each(&target, connection, set).await?;
+        let outcome = each(&target, connection, progress, set).await?;
         let line = |it: &Experiment| format!("{}: priority {}", text::title(it), it.priority);
         print(&target, outcome, line, progress)
     }
@@ -131,7 +131,7 @@ impl Remote for CancelArgs {
             let call = connection.call(async |client| client.cancel_experiment(request).await);
             present(call.await?.experiment)
         };
-        let outcome = each(&self.target, connection, cancel).await?;
+        let outcome = each(&self.target, connection, progress, cancel).await?;
         print(&self.target, outcome, text::cancelled, progress)
     }
 }
@@ -140,11 +140,12 @@ impl Remote for CancelArgs {
 async fn each(
     target: &Target,
     connection: &Connection,
+    progress: &mut Progress,
     change: impl AsyncFn(u64) -> Result<Experiment, Error>,
 ) -> Result<Outcome<Experiment>, Error> {
     let why_none = "all experiments of group `NAME` have ended";
     let members = members(target, connection, |state| !has_ended(state), why_none).await?;
-    Ok(change_each(&members, change).await)
+    Ok(change_each(&members, progress, change).await)
 }
 
 /// Prints what goes on; follows it to its end if this process computes it.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use swarm_telemetry::escape;
 
 use super::backup::refused;
-use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text};
+use crate::{error::Error, json, output_file::Overwrite, progress::Progress, text, waiting};
 
 /// Check the database of a data directory, or keep what is sound in a damaged one.
 ///
@@ -70,8 +70,9 @@ struct RecoveredDocument<'a> {
 /// Looks at a data directory, or makes a new one of it.
 pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Result<(), Error> {
     if let Some(to) = &args.recover {
+        let what = format!("copying what is sound in {}", data_dir.display());
         let recovery = args.overwrite.data_directory(data_dir, to, |to| {
-            store::recover(data_dir, to).map_err(|error| refused(&error))
+            waiting::busy(&what, || store::recover(data_dir, to)).map_err(|error| refused(&error))
         })?;
         return progress.print(&if progress.is_json() {
             json::document(&recovery_document(&recovery, to))
@@ -79,7 +80,9 @@ pub fn doctor(data_dir: &Path, args: &DoctorArgs, progress: &mut Progress) -> Re
             recovery_text(&recovery, to)
         });
     }
-    let inspection = store::inspect(data_dir).map_err(|error| Error::from_store(&error))?;
+    let what = format!("looking through all that is in {}", data_dir.display());
+    let inspection = waiting::busy(&what, || store::inspect(data_dir))
+        .map_err(|error| Error::from_store(&error))?;
     print_inspection(&inspection, progress)?;
     match inspection.findings.len() {
         0 => Ok(()),

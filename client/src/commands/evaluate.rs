@@ -7,12 +7,12 @@ mod measured;
 mod statistics;
 mod summary;
 
-use std::{pin::pin, time::Duration};
+use std::pin::pin;
 
-use swarm_proto::v1::{EvaluateRequest, ListWorkersRequest};
+use swarm_proto::v1::EvaluateRequest;
 use tokio::{
     task::JoinSet,
-    time::{Instant, sleep, timeout},
+    time::{Instant, sleep},
 };
 use tokio_util::sync::CancellationToken;
 
@@ -25,7 +25,7 @@ use crate::{
     progress::{Part, Progress},
     settings::Settings,
     table::{self, Column, Table},
-    text, waiting,
+    waiting,
 };
 
 pub use self::args::EvaluateArgs;
@@ -45,8 +45,6 @@ use super::{
 
 /// Most conditions that are evaluated at the same time.
 const CALLS_MAX: usize = 8;
-/// How long the coordinator has to say what an evaluation waits for.
-const ANSWER_TIME: Duration = Duration::from_secs(1);
 /// What works without a coordinator.
 const HERE: &str = "with --local this command evaluates in its own process";
 
@@ -188,27 +186,9 @@ fn or_here(error: Error) -> Error {
 
 /// What an evaluation waits for.
 async fn waits_for(connection: &Connection, is_local: bool) -> String {
-    if is_local {
-        return "computing".to_owned();
-    }
-    let address = connection.address();
-    let impatient = connection.with_patience(Duration::ZERO);
-    let request = ListWorkersRequest {};
-    let listing = impatient.call_fleet(async |client| client.list_workers(request).await);
-    let listing = timeout(ANSWER_TIME, listing).await;
-    match listing.map(|answer| answer.map(|it| it.workers.len() as u64)) {
-        Ok(Ok(0)) => format!(
-            "waiting for a worker: the coordinator at {address} has none; start one with \
-             `worker --coordinator {address}`; {HERE}"
-        ),
-        Ok(Ok(n)) => {
-            let workers = text::counted(n, "worker");
-            format!("waiting for {workers} of the coordinator at {address}")
-        }
-        Ok(Err(error)) => format!("waiting: {error}; {HERE}"),
-        Err(_) => {
-            format!("waiting: the coordinator at {address} does not answer; {HERE}")
-        }
+    match is_local {
+        true => "computing".to_owned(),
+        false => format!("waiting for {}", waiting::fleet(connection, HERE).await),
     }
 }
 

@@ -58,7 +58,7 @@ impl Remote for DeleteArgs {
             let response = call.await?;
             Ok((present(response.experiment)?, response.freed_bytes))
         };
-        let deleted = change_each(&members, delete).await;
+        let deleted = change_each(&members, progress, delete).await;
         print_with(&self.target, deleted, progress, |bytes| {
             format!("deleted, {} of the database are free", mib(bytes))
         })
@@ -95,7 +95,7 @@ impl Remote for PruneArgs {
             let response = call.await?;
             Ok((present(response.experiment)?, response.freed_bytes))
         };
-        let pruned = change_each(&members, prune).await;
+        let pruned = change_each(&members, progress, prune).await;
         print_with(&self.target, pruned, progress, |bytes| {
             format!("{} of the database are free", mib(bytes))
         })
@@ -129,7 +129,7 @@ impl Remote for ArchiveArgs {
             Ok((present(response.experiment)?, response.log_bytes))
         };
         let members = members(&target, connection, has_ended, NONE_HAS_ENDED).await?;
-        let archived = change_each(&members, archive).await;
+        let archived = change_each(&members, progress, archive).await;
         print_with(&target, archived, progress, |bytes| match restore {
             true => "listed again".to_owned(),
             false => format!("archived; its fitness log takes {}, see swarmctl prune", mib(bytes)),
@@ -172,7 +172,7 @@ impl Remote for LabelArgs {
             present(call.await?.experiment)
         };
         let members = members(&self.target, connection, |_| true, NONE_HAS_ENDED).await?;
-        let changed = change_each(&members, label).await;
+        let changed = change_each(&members, progress, label).await;
         let line = |it: &Experiment| match text::labels(it) {
             labels if labels.is_empty() => format!("{}: no labels", text::title(it)),
             labels => format!("{}: {labels}", text::title(it)),

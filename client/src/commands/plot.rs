@@ -50,7 +50,11 @@ pub async fn plot(
             Source::File(path) => runs.push(Run::read(path)?),
             Source::Coordinator(subject) => {
                 let connection = connection.as_ref().expect("connected if it is asked");
-                for experiment in connection.subject(subject).await? {
+                let experiments = connection.subject(subject).await?;
+                if runs.len() + experiments.len() > CURVES_MAX {
+                    return Err(too_many());
+                }
+                for experiment in experiments {
                     runs.push(Run::fetch(connection, experiment).await?);
                 }
             }

@@ -44,7 +44,7 @@ impl Remote for ExtendArgs {
         let is_completed = |state| state == ExperimentState::Completed;
         let why_none = "no experiment of group `NAME` has completed";
         let members = members(&target, connection, is_completed, why_none).await?;
-        let outcome = change_each(&members, extend).await;
+        let outcome = change_each(&members, progress, extend).await;
         follow(&target, outcome, connection, progress).await
     }
 }
@@ -73,7 +73,7 @@ impl Remote for RetryArgs {
         let has_failed = |state| state == ExperimentState::Failed;
         let why_none = "no experiment of group `NAME` has failed";
         let members = members(&self.target, connection, has_failed, why_none).await?;
-        let outcome = change_each(&members, retry).await;
+        let outcome = change_each(&members, progress, retry).await;
         follow(&self.target, outcome, connection, progress).await
     }
 }

@@ -121,8 +121,8 @@ pub async fn replay(
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
             let n = judged.trials;
-            let what = format!("the {n} trials by which it was judged; --trial N plays one alone");
-            let all = waiting::computing(&what, || {
+            let what = format!("computing the {n} trials by which it was judged; --trial N plays one alone");
+            let all = waiting::busy(&what, || {
                 Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
             });
             let all = all.map_err(|error| Error::Input(format!("{name}: {error}")))?;
@@ -140,7 +140,7 @@ pub async fn replay(
         }
         _ => episode,
     };
-    let bytes = waiting::computing("the episode", || match format {
+    let bytes = waiting::busy("computing the episode", || match format {
         Format::Html => html(&episode, trials).map(String::into_bytes),
         Format::Png => png(&episode, args.at),
     })?;

@@ -45,7 +45,7 @@ pub async fn simulate(
         None => None,
     };
     let trials =
-        waiting::computing("the trials; --trials has fewer, --steps shorter ones", || {
+        waiting::busy("computing the trials; --trials has fewer, --steps shorter ones", || {
             let mut trials = Vec::new();
             for trial in 0..compiled.config.algorithm.num_evaluations {
                 let observe: &mut dyn FnMut(&_) = match &mut trace {

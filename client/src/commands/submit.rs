@@ -114,11 +114,14 @@ pub async fn submit_all(
     runs: &[SweepRun],
     manner: Manner,
     connection: &Connection,
-    progress: &Progress,
+    progress: &mut Progress,
 ) -> Result<Vec<Experiment>, Error> {
     let mut submitted = Vec::new();
     let mut last_warnings = None;
     for run in runs {
+        if runs.len() > 1 {
+            progress.step(submitted.len() as u64, runs.len() as u64, "runs are submitted");
+        }
         let Manner { priority, reuse } = manner;
         let request = SubmitExperimentRequest {
             priority,
@@ -147,6 +150,7 @@ pub async fn submit_all(
         }
         submitted.push(experiment);
     }
+    progress.clear();
     let remark = reordered::remark(connection, &submitted).await;
     remark.iter().for_each(|remark| progress.remark(remark));
     Ok(submitted)

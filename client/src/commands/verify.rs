@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::export;
 use crate::{
     args::IsaArgs, error::Error, json, progress::Progress, resimulation::Resimulation,
-    settings::Settings,
+    settings::Settings, waiting,
 };
 
 /// Check a bundle without trusting whoever made it.
@@ -74,7 +74,8 @@ pub async fn verify(
 ) -> Result<(), Error> {
     let bytes = export::read(&args.file)?;
     let name = args.file.display();
-    let bundle = Bundle::read(&bytes).map_err(|error| Error::Input(format!("{name}: {error}")))?;
+    let bundle = waiting::busy(&format!("reading {name}"), || Bundle::read(&bytes))
+        .map_err(|error| Error::Input(format!("{name}: {error}")))?;
     progress.expiring(&settings);
     let resimulation = Resimulation::open(settings, &bundle.config_json, args.workers, args.isa)?;
     let flawed = |flaw: Flaw| Error::Flawed(format!("{name}: {flaw}"));

@@ -122,9 +122,12 @@ impl Samples {
         &mut self,
         connection: &Connection,
         subject: &Subject,
-        progress: &Progress,
+        progress: &mut Progress,
     ) -> Result<(), Error> {
-        for experiment in connection.subject(subject).await? {
+        let experiments = connection.subject(subject).await?;
+        let n_all = experiments.len() as u64;
+        for (n_done, experiment) in experiments.into_iter().enumerate() {
+            progress.step(n_done as u64, n_all, "histories are read");
             if experiment.state() != ExperimentState::Completed {
                 let line = text::state_line(&experiment);
                 progress.remark(&format!("left out: {line}"));
@@ -142,6 +145,7 @@ impl Samples {
             run.history = Some(history);
             run.judged = experiment.champion_fitness;
         }
+        progress.clear();
         self.check()
     }
 
