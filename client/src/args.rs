@@ -98,7 +98,7 @@ Exit codes:
   10   the experiment has not ended within wait --timeout
   11   the database is damaged
   12   the bundle is not what it says (verify)
-  71   the system gives it too few threads, memory for them, or file descriptors
+  71   the system gives it too few threads or file descriptors, or too little memory
   130  interrupted
   141  standard output was closed (watch, logs); the other commands go on without it";
 

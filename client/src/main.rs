@@ -37,31 +37,42 @@ mod tensorboard;
 mod text;
 mod waiting;
 
-use std::{
-    io::{self, Write as _},
-    process::ExitCode,
-};
+use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _};
 use clap_complete::CompleteEnv;
-use swarm_telemetry::{block_on, escape_lines, runtime};
+use swarm_telemetry::{block_on, report, runtime};
 
-use crate::{args::Args, progress::Progress, synonyms::with_suggestions};
+use crate::{args::Args, error::Error, progress::Progress, synonyms::with_suggestions};
 
 fn main() -> ExitCode {
     // Answers a shell that asks what a command line may become, and ends then.
     CompleteEnv::with_factory(Args::command).complete();
     let args = help::matches().and_then(|matches| Args::from_arg_matches(&matches));
-    let args = args.unwrap_or_else(|error| with_suggestions(error).exit());
+    let args = args.unwrap_or_else(|error| end(&with_suggestions(error)));
     let result = match runtime(0) {
         Ok(runtime) => {
             let progress = Progress::new(args.output).with_details(args.verbose);
-            block_on(runtime, commands::execute(args, progress))
+            let unwritten = progress.unwritten();
+            block_on(runtime, commands::execute(args, progress)).and_then(|()| unwritten.end())
         }
         Err(starved) => Err(starved.into()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    // If standard error is closed there is no place left to report to.
-    let _ = writeln!(io::stderr(), "{}", escape_lines(&error.report()));
+    report(&error.report());
     error.exit_code().into()
+}
+
+/// Ends with what the command line gets instead of a command: an error, or help.
+fn end(answer: &clap::Error) -> ! {
+    let code = match answer.print() {
+        Err(source) if !answer.use_stderr() => {
+            let error = Error::from_stdout(source);
+            report(&error.report());
+            error.exit_code().into()
+        }
+        // If standard error is closed, the exit code says enough.
+        _ => answer.exit_code(),
+    };
+    std::process::exit(code)
 }

@@ -233,7 +233,10 @@ pub fn exists(path: &Path) -> Error {
 
 /// The error that something cannot be written.
 pub fn unwritable(path: &Path, error: &io::Error) -> Error {
-    Error::Input(format!("cannot write {}: {error}", path.display()))
+    // The name of a file that is unfinished says nothing to anybody.
+    let is_plain = error.get_ref().is_none() || error.kind() == ErrorKind::Other;
+    let cause = if is_plain { error.to_string() } else { error.kind().to_string() };
+    Error::Input(format!("cannot write {}: {cause}", path.display()))
 }
 
 /// The directory that something is in.

@@ -4,7 +4,8 @@
 use std::{
     collections::{BTreeMap, VecDeque},
     io::{self, IsTerminal as _, Write},
-    time::Duration,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
 };
 
 use console::measure_text_width;
@@ -17,7 +18,6 @@ use crate::{
     args::OutputFormat,
     clock,
     commands::Finding,
-    clock,
     error::Error,
     json,
     place::Place,
@@ -32,9 +32,9 @@ const OPTIMISTIC: &str = ", optimistic";
 const ETA_WINDOW: usize = 20;
 /// A shorter rest is not worth a word where there is no bar.
 const ETA_MIN: Duration = Duration::from_secs(10);
-/// On narrower terminals there is no bar, and no name before it: only numbers.
 /// Where there is no bar, it is said so often how much of something long is done.
 const STEP_PAUSE: Duration = Duration::from_secs(10);
+/// On narrower terminals there is no bar, and no name before it: only numbers.
 const BAR_SCREEN_WIDTH: usize = 70;
 /// Names before the bar are cut to this width.
 const NAME_WIDTH_MAX: usize = 24;
@@ -45,6 +45,8 @@ const BAR_WIDTH: usize = 26;
 pub struct Progress {
     format: OutputFormat,
     stdout: Box<dyn Write + Send>,
+    /// Why it takes no more, if it does not.
+    unwritten: Unwritten,
     /// What happens when the reader of standard output goes.
     when_closed: WhenClosed,
     screen: Screen,
@@ -58,11 +60,11 @@ pub struct Progress {
     bar: ProgressBar,
     /// The experiments that are followed, by their numbers.
     followed: BTreeMap<u64, Followed>,
+    /// When it is said next how much is done, where there is no bar, and how much was.
+    next_word: Option<(Instant, u64)>,
 }
 
 /// A part of an answer for people. Colours are a table's alone: they are added when it is printed,
-    /// When it is said next how much is done, where there is no bar.
-    next_word: Option<Instant>,
 /// and its cells are escaped before.
 #[derive(Debug, Clone)]
 pub enum Part {
@@ -88,6 +90,17 @@ enum WhenClosed {
     HasGone,
     /// It ends: it does nothing but print, for as long as an experiment takes.
     End,
+}
+
+/// Why standard output did not take everything, if it did not.
+#[derive(Debug, Clone, Default)]
+pub struct Unwritten(Arc<Mutex<Option<Error>>>);
+
+impl Unwritten {
+    /// The error, of a command that has succeeded but for its output.
+    pub fn end(self) -> Result<(), Error> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
 }
 
 /// What is shown of an experiment that is followed.
@@ -123,6 +136,7 @@ impl Progress {
         Self {
             format,
             stdout,
+            unwritten: Unwritten::default(),
             when_closed: WhenClosed::GoOn,
             screen: Screen::default(),
             is_silent: false,
@@ -130,6 +144,7 @@ impl Progress {
             has_terminal: false,
             bar: ProgressBar::hidden(),
             followed: BTreeMap::new(),
+            next_word: None,
         }
     }
 
@@ -143,9 +158,13 @@ impl Progress {
         self.is_verbose
     }
 
+    /// What is asked at the end whether standard output has taken everything.
+    pub fn unwritten(&self) -> Unwritten {
+        self.unwritten.clone()
+    }
+
     /// Makes no remarks.
     pub fn silent(self) -> Self {
-            next_word: None,
         Self { is_silent: true, ..self }
     }
 
@@ -222,6 +241,12 @@ impl Progress {
                 self.remark("standard output is closed; the command goes on without it");
                 Ok(())
             }
+            // A full disk ends no computation; it is said at the end.
+            Err(error) if self.when_closed == WhenClosed::GoOn => {
+                self.when_closed = WhenClosed::HasGone;
+                *self.unwritten.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                Ok(())
+            }
             written => written,
         }
     }
@@ -291,6 +316,10 @@ impl Progress {
             _ => "{prefix} {bar:24} {pos}/{len}  {msg}",
         };
         let style = ProgressStyle::with_template(template).expect("the template is valid");
+        // One that was removed is shown again.
+        if self.bar.is_finished() {
+            self.bar.reset();
+        }
         self.bar.set_style(style);
         self.bar.set_length(length);
         self.bar.set_prefix(name);
@@ -319,8 +348,6 @@ impl Progress {
         }
         match self.format {
             OutputFormat::Json => {
-            // One that has been removed is shown again.
-            self.bar.reset();
                 self.print(&json::line(&json::GenerationLine::new(experiment_id, summary)))
             }
             _ if self.has_terminal => {
@@ -362,10 +389,26 @@ impl Progress {
 
     /// Shows how much of something long is done: in a bar, or in a line now and then.
     pub fn step(&mut self, n_done: u64, n_all: u64, what: &str) {
-        if self.has_terminal && !self.is_json() {
-            self.bar.set_position(n_done);
-            self.show_bar(String::new(), n_all, &escape(what));
+        if let Some(line) = self.word(clock::now(), n_done, n_all, what) {
+            return self.remark(&line);
         }
+        if self.has_terminal && !self.is_json() {
+            self.show_bar(String::new(), n_all, &escape(what));
+            self.bar.set_position(n_done);
+        }
+    }
+
+    /// What is said of a step, if there is no bar and it is time for a word.
+    fn word(&mut self, now: Instant, n_done: u64, n_all: u64, what: &str) -> Option<String> {
+        if self.has_terminal && !self.is_json() {
+            return None;
+        }
+        // Whoever has done less than before has begun something else.
+        let planned = self.next_word.filter(|&(_, n_before)| n_before <= n_done);
+        let next = planned.map_or(now + waiting::SILENCE_MAX, |(next, _)| next);
+        let is_due = now >= next;
+        self.next_word = Some((if is_due { now + STEP_PAUSE } else { next }, n_done));
+        is_due.then(|| format!("{n_done}/{n_all} {what}"))
     }
 
     /// A remark about an experiment that is followed.
@@ -383,14 +426,8 @@ impl Progress {
 
     /// Says what keeps an experiment from being computed; none: nothing any more.
     pub fn situation(&self, experiment_id: u64, finding: Option<&Finding>) {
-        if let Some(line) = self.word(clock::now(), n_done, n_all, what) {
-            return self.remark(&line);
-        }
         let what = match finding {
             Some(finding) => format!("waiting: {finding}"),
-            if self.bar.is_finished() {
-                self.bar.reset();
-            }
             None => "it is computed again".to_owned(),
         };
         let first_line = what.lines().next().unwrap_or_default();
@@ -400,18 +437,6 @@ impl Progress {
 
     /// Shows as many of these beside the bar as there is room for, the first ones.
     fn set_message(&self, parts: &[String]) {
-    /// What is said of a step, if there is no bar and it is time for a word.
-    fn word(&mut self, now: Instant, n_done: u64, n_all: u64, what: &str) -> Option<String> {
-        if self.has_terminal && !self.is_json() {
-            return None;
-        }
-        let is_first = n_done == 0 || self.next_word.is_none();
-        let next = self.next_word.filter(|_| !is_first).unwrap_or(now + waiting::SILENCE_MAX);
-        let is_due = now >= next;
-        self.next_word = Some(if is_due { now + STEP_PAUSE } else { next });
-        is_due.then(|| format!("{n_done}/{n_all} {what}"))
-    }
-
         self.bar.set_message(fitting(parts, self.message_room()));
     }
 

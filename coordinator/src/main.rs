@@ -3,6 +3,7 @@
 mod access_args;
 
 use std::{
+    io::{self, Write as _},
     net::SocketAddr,
     path::PathBuf,
     process::ExitCode,
@@ -15,7 +16,7 @@ use coordinator::{
     Coordinator, CoordinatorConfig, RunError, StartError, health_check, limits::MEMORY_BUDGET_MIB,
     referee,
 };
-use swarm_telemetry::{EXIT_STARVED, LogArgs, MetricsArgs, VERSION, block_on, runtime};
+use swarm_telemetry::{EXIT_STARVED, LogArgs, MetricsArgs, VERSION, block_on, report, runtime};
 use swarm_transport::listen_address;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing::{error, info};
@@ -98,7 +99,7 @@ Exit codes:
   2  bad input: address in use, or open to a network without tokens or TLS; token,
      certificate or data directory unusable; database damaged; wrong arguments
   3  another coordinator has taken over the data directory, and goes on there
-  71 the system gives it too few threads, memory for them, or file descriptors
+  71 the system gives it too few threads or file descriptors, or too little memory
 
 docs/security.md says how to create tokens and certificates.";
 
@@ -115,7 +116,7 @@ fn main() -> ExitCode {
         None => match runtime(0) {
             Ok(runtime) => block_on(runtime, run(&args)),
             Err(starved) => {
-                eprintln!("error: {starved}");
+                report(&format!("error: {starved}"));
                 ExitCode::from(EXIT_STARVED)
             }
         },
@@ -127,7 +128,7 @@ fn evaluate_items() -> ExitCode {
     match referee::serve_stdio() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            report(&format!("error: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -138,7 +139,7 @@ async fn run(args: &Args) -> ExitCode {
         return report_health(args).await;
     }
     if let Err(error) = args.log.init() {
-        eprintln!("error: {error}");
+        report(&format!("error: {error}"));
         return ExitCode::from(2);
     }
     match serve(args).await {
@@ -164,11 +165,12 @@ async fn report_health(args: &Args) -> ExitCode {
     };
     match health.await {
         Ok(()) => {
-            println!("healthy: the coordinator on {} serves", args.listen);
+            // The exit code says it, too, where nobody reads the line.
+            let _ = writeln!(io::stdout(), "healthy: the coordinator on {} serves", args.listen);
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("unhealthy: {error}");
+            report(&format!("unhealthy: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -3,6 +3,7 @@
 use std::{
     env, fs,
     future::ready,
+    io::{self, Write as _},
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
@@ -14,7 +15,7 @@ use clap::Parser;
 use sim_core::Isa;
 use swarm_telemetry::{
     EXIT_STARVED, Endpoint, LogArgs, MetricsArgs, VERSION, block_on, parse_positive_duration,
-    runtime,
+    report, runtime,
 };
 use swarm_transport::CredentialArgs;
 use tokio::{
@@ -94,7 +95,7 @@ Exit codes:
   2    bad arguments; token or certificate unusable; address of metrics in use
   7    the coordinator does not accept the token
   9    the server at the address is not a coordinator, or one of another version
-  71   the system gives it too few threads, memory for them, or file descriptors
+  71   the system gives it too few threads or file descriptors, or too little memory
   130  ended at once by a second signal";
 
 fn main() -> ExitCode {
@@ -106,7 +107,7 @@ fn main() -> ExitCode {
     match runtime(1) {
         Ok(runtime) => block_on(runtime, work(args)),
         Err(starved) => {
-            eprintln!("error: {starved}");
+            report(&format!("error: {starved}"));
             EXIT_STARVED.into()
         }
     }
@@ -114,7 +115,7 @@ fn main() -> ExitCode {
 
 async fn work(args: Args) -> ExitCode {
     if let Err(error) = args.log.init() {
-        eprintln!("error: {error}");
+        report(&format!("error: {error}"));
         return EXIT_INPUT.into();
     }
     let shutdown = CancellationToken::new();
@@ -211,11 +212,12 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
 fn report_health(session_file: &Path) -> ExitCode {
     match worker::health_check(session_file) {
         Ok(session) => {
-            println!("healthy: {session}");
+            // The exit code says it, too, where nobody reads the line.
+            let _ = writeln!(io::stdout(), "healthy: {session}");
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("unhealthy: {error}");
+            report(&format!("unhealthy: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -223,7 +225,7 @@ fn report_health(session_file: &Path) -> ExitCode {
 
 /// The first signal asks the worker to finish, items of scripts within [`FINISHING_TIME`]; the
 /// second ends the process.
-fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> std::io::Result<()> {
+fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {

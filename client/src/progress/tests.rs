@@ -35,12 +35,13 @@ impl Write for Captured {
     }
 }
 
-/// Standard output whose reader has gone, as with `| head`.
-struct Closed;
+/// Standard output that takes nothing: its reader has gone, as with `| head`, or the disk
+/// is full.
+struct Takes(io::ErrorKind);
 
-impl Write for Closed {
+impl Write for Takes {
     fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-        Err(io::ErrorKind::BrokenPipe.into())
+        Err(self.0.into())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -134,10 +135,43 @@ fn beside_the_bar_nothing_is_cut_in_the_middle() {
 
 #[test]
 fn a_closed_pipe_ends_the_output_and_not_the_work() {
-    let mut progress = Progress::to(OutputFormat::Table, Box::new(Closed));
+    let closed = || {
+        let stdout = Box::new(Takes(io::ErrorKind::BrokenPipe));
+        Progress::to(OutputFormat::Table, stdout)
+    };
+    let mut progress = closed();
     assert!(progress.print("x").is_ok());
     assert!(progress.print("y").is_ok());
-    let mut progress = Progress::to(OutputFormat::Table, Box::new(Closed));
+    assert!(progress.unwritten().end().is_ok());
+    let mut progress = closed();
     progress.end_with_reader();
     assert!(matches!(progress.print("x"), Err(Error::OutputClosed)));
+}
+
+#[test]
+fn a_full_disk_ends_the_output_and_not_the_work_and_is_said_at_the_end() {
+    let full = Box::new(Takes(io::ErrorKind::StorageFull));
+    let mut progress = Progress::to(OutputFormat::Table, full);
+    let unwritten = progress.unwritten();
+    assert!(progress.print("x").is_ok());
+    assert!(progress.print("y").is_ok());
+    let error = unwritten.end().unwrap_err();
+    assert_eq!(error.exit_code(), 1);
+    assert!(error.report().contains("standard output"), "{}", error.report());
+}
+
+#[test]
+fn without_a_terminal_long_work_says_now_and_then_how_much_is_done() {
+    let mut progress = Captured::default().progress(OutputFormat::Json);
+    let start = clock::now();
+    let mut words = |first: u64, seconds: u64| {
+        let word = |second| {
+            let now = start + Duration::from_secs(second);
+            Some((second, progress.word(now, second - first, 99, "experiments")?))
+        };
+        (first..first + seconds).filter_map(word).collect::<Vec<_>>()
+    };
+    let word = |second, n_done| (second, format!("{n_done}/99 experiments"));
+    assert_eq!(words(0, 25), [word(2, 2), word(12, 12), word(22, 22)]);
+    assert_eq!(words(50, 4), [word(52, 2)], "something else that is long");
 }

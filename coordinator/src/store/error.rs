@@ -144,8 +144,11 @@ pub enum StoreError {
         /// What the system says.
         source: io::Error,
     },
-    /// The disk is full, or cannot be read or written; try again later.
-    #[error("the database cannot be read or written: {0}; is the disk full, or read-only?")]
+    /// The disk is full, or cannot be read or written, or memory is short; try again later.
+    #[error(
+        "the database cannot be read or written: {0}; is the disk full, or read-only, or memory \
+         short?"
+    )]
     Unavailable(rusqlite::Error),
     /// The experiment has ended meanwhile.
     #[error("experiment {0} has ended")]
@@ -189,8 +192,13 @@ impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {
         use rusqlite::ErrorCode::{
             CannotOpen, DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase,
-            ReadOnly, SystemIoFailure,
+            OutOfMemory, ReadOnly, SystemIoFailure,
         };
+        let code = error.sqlite_error_code();
+        // Any statement may say so, whatever it says of its tables.
+        if code == Some(OutOfMemory) {
+            return Self::Unavailable(error);
+        }
         // Every query asks for the types of the schema, and for rows that must exist.
         if matches!(
             error,
@@ -212,7 +220,7 @@ impl From<rusqlite::Error> for StoreError {
         if let Some(what) = missing {
             return Self::Corrupt(format!("its tables are not those of its version: {what}"));
         }
-        match error.sqlite_error_code() {
+        match code {
             Some(DatabaseCorrupt | NotADatabase) => Self::Corrupt(error.to_string()),
             Some(
                 CannotOpen | DatabaseBusy | DatabaseLocked | DiskFull | ReadOnly | SystemIoFailure,

@@ -29,6 +29,18 @@ const LOCK_PAUSE: Duration = Duration::from_millis(20);
 /// Longest text in a lock file, bytes.
 const HOLDER_LEN_MAX: u64 = 512;
 
+/// Fails if there is no database there, or none that can be seen.
+pub fn must_exist(path: &Path) -> Result<()> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_file() => Ok(()),
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            let directory = path.parent().unwrap_or(path);
+            Err(StoreError::Directory { path: directory.to_owned(), source })
+        }
+        _ => Err(StoreError::NoDatabase { path: path.to_owned() }),
+    }
+}
+
 /// What keeps other coordinators out, for as long as it is kept.
 #[derive(Debug)]
 pub struct Locks {

@@ -95,10 +95,7 @@ pub fn is_in(directory: &Path) -> bool {
 
 /// Fails if there is no database in a directory.
 pub fn must_be_in(directory: &Path) -> Result<()> {
-    match is_in(directory) {
-        true => Ok(()),
-        false => Err(StoreError::NoDatabase { path: file::path_in(directory) }),
-    }
+    file::must_exist(&file::path_in(directory))
 }
 
 impl Store {

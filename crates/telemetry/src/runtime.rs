@@ -5,15 +5,18 @@
 //! the same, the program ends with one line.
 
 use std::{
-    fs,
-    io::{self, Write as _},
-    panic,
+    fs, io, panic,
     sync::{Arc, Barrier, RwLock},
     thread,
     time::Duration,
 };
 
 use tokio::runtime::{Builder, Runtime};
+
+use crate::{
+    allocator::{give_back, keep_little},
+    text::report,
+};
 
 /// Exit code of a program that the system gives too little to start or to go on: threads,
 /// memory for their stacks, file descriptors.
@@ -22,6 +25,14 @@ pub const EXIT_STARVED: u8 = 71;
 const BLOCKING_MAX: usize = 32;
 /// Those of them that always are there.
 const BLOCKING_KEPT: usize = 2;
+/// Pairs of file descriptors that a program needs at least, beside those with which it starts:
+/// for the database, signals, connections, and what it writes.
+const PIPES_MIN: usize = 12;
+/// Those for each processor, as `run` has a worker there, at most for [`PROCESSORS_MAX`].
+const PIPES_PER_PROCESSOR: usize = 2;
+const PROCESSORS_MAX: usize = 32;
+/// Bytes that it computes with at least, beside stacks of threads.
+const MEMORY_MIN: usize = 64 << 20;
 /// Time for threads that have ended to be gone, ms.
 const GONE_TIME_MS: usize = 1000;
 /// Longer than a program runs.
@@ -30,9 +41,9 @@ const FOR_EVER: Duration = Duration::from_secs(1 << 32);
 /// The system gives the program too little to start.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "the system gives this program too few threads or file descriptors to start ({0}); raise \
-     the limits of processes, memory or open files (ulimit -u, -v, -n; of a container, \
-     --pids-limit), or end other programs"
+    "the system gives this program too few threads or file descriptors, or too little memory, to \
+     start ({0}); raise the limits of processes, memory or open files (ulimit -u, -v, -n; of a \
+     container, --pids-limit), or end other programs"
 )]
 pub struct Starved(io::Error);
 
@@ -79,11 +90,16 @@ fn sizes(wanted: Sizes, granted: usize) -> Option<Sizes> {
 /// `n_others`: threads that the program starts beside it and needs. From here on a panic
 /// because of a thread that is refused is one line and [`EXIT_STARVED`].
 pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
+    keep_little();
     report_refused_threads();
     let n_cores = thread::available_parallelism().map_or(1, Into::into);
     let wanted = Sizes { workers: n_cores, blocking: BLOCKING_MAX };
+    find_files(PIPES_MIN + PIPES_PER_PROCESSOR * n_cores.min(PROCESSORS_MAX)).map_err(Starved)?;
+    // Threads are shared out from what is left beside it.
+    let memory = find_memory(MEMORY_MIN).map_err(Starved)?;
     let n_before = n_threads();
     let (n_granted, refusal) = granted(n_cores + BLOCKING_MAX + n_others);
+    drop(memory);
     if refusal.is_some() {
         wait_for_ended_threads(n_before);
     }
@@ -101,7 +117,21 @@ pub fn runtime(n_others: usize) -> Result<Runtime, Starved> {
     let runtime = builder.build().map_err(Starved)?;
     let n_kept = if sizes == wanted { BLOCKING_KEPT } else { sizes.blocking };
     keep(&runtime, n_kept);
+    runtime.spawn(give_back());
     Ok(runtime)
+}
+
+/// Fails unless so many pairs of file descriptors are to be had: in the middle of its work
+/// a program would say of the disk or of the network what is true of them.
+fn find_files(n_pipes: usize) -> io::Result<()> {
+    (0..n_pipes).map(|_| io::pipe()).collect::<io::Result<Vec<_>>>().map(drop)
+}
+
+/// Room for so many bytes, until it is dropped; they are not written to.
+fn find_memory(len: usize) -> io::Result<Vec<u8>> {
+    let mut room = Vec::new();
+    room.try_reserve_exact(len).map_err(|_| io::ErrorKind::OutOfMemory)?;
+    Ok(room)
 }
 
 /// Starts this many of the threads for what blocks, all of which wait for each other.
@@ -160,8 +190,7 @@ fn report_refused_threads() {
         }
         // The standard library quotes what the system says.
         let why = text.split('"').nth(1).or_else(|| text.rsplit(": ").next()).unwrap_or(text);
-        // If standard error is closed there is no place left to report to.
-        let _ = writeln!(io::stderr(), "error: {}", Starved(io::Error::other(why.to_owned())));
+        report(&format!("error: {}", Starved(io::Error::other(why.to_owned()))));
         std::process::exit(EXIT_STARVED.into());
     }));
 }
@@ -190,6 +219,13 @@ mod tests {
             let (workers, blocking) = of(granted).unwrap();
             assert!(blocking > 0 && workers + blocking <= granted, "{granted}");
         }
+    }
+
+    #[test]
+    fn what_is_there_is_found_and_what_is_not_is_refused() {
+        find_files(3).unwrap();
+        assert_eq!(find_memory(1000).unwrap().len(), 0);
+        assert_eq!(find_memory(usize::MAX).unwrap_err().kind(), io::ErrorKind::OutOfMemory);
     }
 
     #[test]

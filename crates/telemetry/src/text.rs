@@ -33,6 +33,11 @@ pub fn escape_lines(text: &str) -> Cow<'_, str> {
     escape_if(text, |c| !matches!(c, '\n' | '\t') && is_unprintable(c))
 }
 
+/// A line, or several, on standard error. If that takes none there is no place left to report to.
+pub fn report(text: &str) {
+    let _ = writeln!(io::stderr(), "{}", escape_lines(text));
+}
+
 fn escape_if(text: &str, is_unfit: impl Fn(char) -> bool) -> Cow<'_, str> {
     if !text.contains(&is_unfit) {
         return Cow::Borrowed(text);

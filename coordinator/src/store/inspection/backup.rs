@@ -26,9 +26,7 @@ pub enum Backup {
 /// uses that; of one moment, and looked through.
 pub fn backup(directory: &Path, to: &Path) -> Result<Backup> {
     let from = file::path_in(directory);
-    if !from.is_file() {
-        return Err(StoreError::NoDatabase { path: from });
-    }
+    file::must_exist(&from)?;
     let restore = format!(
         "restore an earlier backup, or keep what is sound: \
          `swarmctl doctor --data-dir {} --recover NEW`",

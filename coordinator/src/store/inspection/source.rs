@@ -28,9 +28,7 @@ pub struct Source {
 impl Source {
     /// Opens a database; a coordinator may use it meanwhile.
     pub fn open(path: &Path) -> Result<Self> {
-        if !path.is_file() {
-            return Err(StoreError::NoDatabase { path: path.to_owned() });
-        }
+        file::must_exist(path)?;
         let has_log = write_ahead_log::exists(path);
         let connection = file::open_read_only(path)?;
         let mut damage = structure(&connection);
