@@ -121,7 +121,9 @@ pub async fn replay(
     let episode = match judged {
         Some(judged) if args.trial.is_none() && args.generation.is_none() => {
             let n = judged.trials;
-            let what = format!("computing the {n} trials by which it was judged; --trial N plays one alone");
+            let what = format!(
+                "computing the {n} trials by which it was judged; --trial N plays one alone"
+            );
             let all = waiting::busy(&what, || {
                 Trials::of_judgement(episode.simulation, episode.genotype, &judged, &|| true)
             });
