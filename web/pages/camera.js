@@ -95,20 +95,25 @@ export class Camera {
    *  it that something of `radius` pixels is. They are few whatever the numbers are. */
   eachImage(x, y, radius, draw) {
     const { width, height } = this.episode;
-    const [halfX, halfY] = this.halves.map((half) => (half + radius) / this.scale);
-    const [columns, rows] = [images(x - this.x, halfX, width), images(y - this.y, halfY, height)];
-    for (const i of columns) {
-      for (const k of rows) draw(...this.toScreen(x + i * width, y + k * height));
+    const { scale } = this;
+    const [offX, offY] = [x - this.x, y - this.y];
+    const halfX = (Math.min(this.width, width * scale) / 2 + radius) / scale;
+    const halfY = (Math.min(this.height, height * scale) / 2 + radius) / scale;
+    const [nearX, nearY] = [offX - Math.round(offX / width) * width, offY - Math.round(offY / height) * height];
+    const [nX, nY] = [reached(halfX, width), reached(halfY, height)];
+    for (let i = -nX; i <= nX; i++) {
+      const awayX = nearX + i * width;
+      if (Math.abs(awayX) > halfX) continue;
+      for (let k = -nY; k <= nY; k++) {
+        const awayY = nearY + k * height;
+        if (Math.abs(awayY) <= halfY) draw(this.width / 2 + awayX * scale, this.height / 2 - awayY * scale);
+      }
     }
   }
 }
 
-/** The numbers of the images of a coordinate within `half` of the centre; `offset`: from there. */
-function images(offset, half, period) {
-  const nearest = -Math.round(offset / period);
-  const found = [];
-  for (let i = -IMAGES_MAX; i <= IMAGES_MAX; i++) {
-    if (Math.abs(offset + (nearest + i) * period) <= half) found.push(nearest + i);
-  }
-  return found;
+/** Images to each side of the nearest one that can be within so much. */
+function reached(half, period) {
+  const n = Math.ceil(half / period + 0.5);
+  return n < IMAGES_MAX ? n : IMAGES_MAX;
 }

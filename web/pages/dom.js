@@ -26,7 +26,7 @@ const themed = [];
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   for (const changed of themed) changed();
   // Only those that are shown: what was removed is not kept for this.
-  for (const node of document.querySelectorAll("canvas")) (node.repaint ?? node.redraw)?.();
+  for (const node of document.querySelectorAll("canvas")) node.redraw?.();
 });
 
 /** A canvas that fills its parent, in pixels of the device; draws whenever its size changes.

@@ -59,3 +59,10 @@ export function rgb(text) {
   const number = parseInt(text.replace("#", ""), 16);
   return [(number >> 16) & 255, (number >> 8) & 255, number & 255];
 }
+
+/** Makes a disc the path. */
+export function disc(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  return context;
+}

@@ -55,16 +55,18 @@ export class Episode {
     return this.columns[name].values.subarray(row * this.steps, (row + 1) * this.steps);
   }
 
-  /** Position and heading of a robot; a share of a step later if it is under way. */
+  /** Position and heading of a robot; a share of a step later if it is under way. Asked for every
+   *  robot in every frame. */
   pose(robot, step, share = 0) {
-    const pose = (k) => [this.at("x", robot, k), this.at("y", robot, k), this.at("heading", robot, k)];
-    const [x, y, heading] = pose(step);
+    const { x: xs, y: ys, heading: headings } = this.columns;
+    const at = robot * this.steps + step;
+    const [x, y, heading] = [xs.values[at] * xs.scale, ys.values[at] * ys.scale, headings.values[at] * headings.scale];
     if (share === 0 || step + 1 >= this.steps) return { x, y, heading };
-    const [nextX, nextY, nextHeading] = pose(step + 1);
-    const turn = shortest(nextHeading - heading, 2 * Math.PI);
-    const [dx, dy] = [shortest(nextX - x, this.width), shortest(nextY - y, this.height)];
+    const turn = shortest(headings.values[at + 1] * headings.scale - heading, 2 * Math.PI);
+    const dx = shortest(xs.values[at + 1] * xs.scale - x, this.width);
+    const dy = shortest(ys.values[at + 1] * ys.scale - y, this.height);
     // Who is placed elsewhere does not glide there.
-    const part = Math.hypot(dx, dy) > 50 ? 0 : share;
+    const part = Math.abs(dx) + Math.abs(dy) > 50 ? 0 : share;
     return { x: x + part * dx, y: y + part * dy, heading: heading + part * turn };
   }
 

@@ -99,7 +99,21 @@ export class Player {
       has("relays") ? item("relays", "relays") : null,
       has("carries") ? item("carries", "carries") : null,
       has("failed") ? item("failed", "failed") : null,
-      episode.has_targets ? item("target", "should shine") : null);
+      episode.has_targets ? item("target", "should shine") : null,
+      ...this.places("areas", "sees_areas"), ...this.places("lights", "sees_lights"));
+  }
+
+  /** What areas and lights there are, and which robots see them, unless all do. */
+  places(name, sees) {
+    const { robots } = this.episode;
+    const seeing = robots.filter((it) => it[sees]).map((it) => it.name);
+    const who = seeing.length === robots.length ? "" : seeing.length ? `, seen by ${seeing.join(", ")}` : ", seen by no robot";
+    const kinds = Map.groupBy(this.episode[name], (it) => `${it.name} ${it.color}`);
+    return [...kinds.values()].map((its) => {
+      const mark = element("i", { className: name });
+      mark.style.setProperty("--place", its[0].color);
+      return element("span", { className: "key place" }, mark, `${its[0].name}${its.length > 1 ? ` (${its.length})` : ""}${who}`);
+    });
   }
 
   help() {

@@ -6,31 +6,16 @@ import { palette, pixels, rgb } from "swarm/drawing.js";
 import { extremes } from "swarm/scales.js";
 
 /** A picture over all steps with a mark at the current one. `paint(context, width, height)`
- *  is called once per size and theme. */
+ *  is called once per size and theme: in every frame, only the mark moves. */
 export function track(view, seek, height, label, paint) {
-  let picture = null;
-  const node = canvas((context, width, tall) => {
-    const ratio = devicePixelRatio || 1;
-    if (!picture || picture.width !== Math.round(width * ratio) || picture.height !== Math.round(tall * ratio)) {
-      picture = document.createElement("canvas");
-      picture.width = Math.max(1, Math.round(width * ratio));
-      picture.height = Math.max(1, Math.round(tall * ratio));
-      const own = picture.getContext("2d");
-      own.scale(ratio, ratio);
-      paint(own, width, tall);
-    }
+  const picture = canvas((context, width, tall) => {
     context.clearRect(0, 0, width, tall);
-    context.drawImage(picture, 0, 0, width, tall);
-    const x = ((view.step + view.share + 0.5) / view.steps) * width;
-    context.fillStyle = palette().accent;
-    context.fillRect(x - 1, 0, 2, tall);
+    paint(context, width, tall);
   }, label);
-  node.className = "track";
+  const mark = element("i", { className: "mark" });
+  const node = element("div", { className: "track" }, picture, mark);
   node.style.height = `${height}px`;
-  node.repaint = () => {
-    picture = null;
-    node.redraw();
-  };
+  node.redraw = () => (mark.style.transform = `translateX(${(100 * (view.step + view.share + 0.5)) / view.steps}%)`);
   const go = (event) => {
     const box = node.getBoundingClientRect();
     seek(Math.floor(((event.clientX - box.left) / box.width) * view.steps));

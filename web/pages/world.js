@@ -2,14 +2,11 @@
 
 import { canvas } from "swarm/dom.js";
 import { Camera } from "swarm/camera.js";
-import { palette, symbolColor } from "swarm/drawing.js";
-import { shortest } from "swarm/episode.js";
+import { disc, palette } from "swarm/drawing.js";
+import { drawHearing } from "swarm/hearing.js";
+import { RobotPictures } from "swarm/robot-pictures.js";
+import { drawTrails } from "swarm/robot-trails.js";
 
-/** Steps of a robot's trail, and of a frame until it has faded. */
-const TRAIL = 60;
-const FADE = 4;
-/** Robots whose symbols are written beside the arrows, unless one is followed. */
-const LABELS_MAX = 60;
 /** Radius of a robot, cm, and the least one on the screen, pixels. */
 const RADIUS = 5.5;
 const RADIUS_MIN = 4;
@@ -20,6 +17,7 @@ export class World {
     this.episode = episode;
     this.view = view;
     this.camera = new Camera(episode);
+    this.robots = new RobotPictures();
     this.node = canvas((context, width, height) => this.draw(context, width, height), "the world");
     this.node.className = "world";
     this.listen(onRobot);
@@ -100,9 +98,11 @@ export class World {
     camera.resize(width, height);
     this.poses = Array.from({ length: episode.n_robots }, (_, robot) => episode.pose(robot, view.step, view.share));
     context.save();
-    context.fillStyle = colors.page;
-    context.fillRect(0, 0, width, height);
     const [halfX, halfY] = camera.halves;
+    if (2 * halfX < width || 2 * halfY < height) {
+      context.fillStyle = colors.page;
+      context.fillRect(0, 0, width, height);
+    }
     context.beginPath();
     context.rect(width / 2 - halfX, height / 2 - halfY, 2 * halfX, 2 * halfY);
     context.clip();
@@ -111,9 +111,9 @@ export class World {
     this.drawPlane(context);
     this.drawPlaces(context);
     if (view.reach || view.robot !== null) this.drawReach(context);
-    if (view.trails) this.drawTrails(context);
-    if (view.radio) this.drawFrames(context);
-    this.drawRobots(context);
+    if (view.trails) drawTrails(context, this);
+    if (view.radio) drawHearing(context, this);
+    this.robots.draw(context, this);
     context.restore();
     this.drawRuler(context);
   }
@@ -144,28 +144,37 @@ export class World {
     context.setLineDash([]);
   }
 
-  /** Ground areas and lights. */
+  /** Ground areas and lights. On a torus an image is nearest within half a world around it, and
+   *  there it ends: what is farther belongs to the next image. */
   drawPlaces(context) {
     const { camera, episode, view } = this;
-    episode.areas.forEach(({ range, color }, area) => {
-      const [x, y] = ["area_x", "area_y"].map((name) => episode.at(name, area, view.step));
-      camera.eachImage(x, y, range * camera.scale, (sx, sy) => {
-        context.globalAlpha = 0.25;
-        context.fillStyle = color;
-        disc(context, sx, sy, range * camera.scale).fill();
+    const [halfX, halfY] = [(episode.width / 2) * camera.scale, (episode.height / 2) * camera.scale];
+    const eachOf = (name, discs, fill) => discs.forEach(({ range, color }, i) => {
+      const [x, y] = ["x", "y"].map((axis) => episode.at(`${name}_${axis}`, i, view.step));
+      const radius = range * camera.scale;
+      const isCut = radius > Math.min(halfX, halfY);
+      camera.eachImage(x, y, radius, (sx, sy) => {
+        if (isCut) {
+          context.save();
+          context.beginPath();
+          context.rect(sx - halfX, sy - halfY, 2 * halfX, 2 * halfY);
+          context.clip();
+        }
+        fill(sx, sy, radius, color);
+        if (isCut) context.restore();
       });
     });
+    eachOf("area", episode.areas, (sx, sy, radius, color) => {
+      context.globalAlpha = 0.25;
+      context.fillStyle = color;
+      disc(context, sx, sy, radius).fill();
+    });
     context.globalAlpha = 1;
-    episode.lights.forEach(({ range, color }, light) => {
-      const [x, y] = ["light_x", "light_y"].map((name) => episode.at(name, light, view.step));
-      const radius = range * camera.scale;
-      camera.eachImage(x, y, radius, (sx, sy) => {
-        const glow = context.createRadialGradient(sx, sy, 0, sx, sy, radius);
-        context.fillStyle = glowColor(context, glow, color);
-        disc(context, sx, sy, radius).fill();
-        context.fillStyle = color;
-        disc(context, sx, sy, 5).fill();
-      });
+    eachOf("light", episode.lights, (sx, sy, radius, color) => {
+      context.fillStyle = glowColor(context, context.createRadialGradient(sx, sy, 0, sx, sy, radius), color);
+      disc(context, sx, sy, radius).fill();
+      context.fillStyle = color;
+      disc(context, sx, sy, 5).fill();
     });
   }
 
@@ -203,126 +212,8 @@ export class World {
     });
   }
 
-  drawTrails(context) {
-    const { camera, colors, episode, view } = this;
-    const first = Math.max(0, view.step - TRAIL);
-    // A wider line takes several times as long to draw.
-    context.lineWidth = 1;
-    context.strokeStyle = colors.trail;
-    for (let robot = 0; robot < episode.n_robots; robot++) {
-      if (!episode.moves[robot]) continue;
-      const { x, y } = this.poses[robot];
-      const way = this.wayBack(robot, first, x, y);
-      const length = way.reduce((most, [dx, dy]) => Math.max(most, Math.abs(dx), Math.abs(dy)), 0);
-      if (length < 1) continue;
-      context.globalAlpha = view.robot === null || view.robot === robot ? 1 : 0.3;
-      camera.eachImage(x, y, length * camera.scale, (sx, sy) => {
-        context.beginPath();
-        context.moveTo(sx, sy);
-        let isDrawn = true;
-        for (const [dx, dy, jumps] of way) {
-          isDrawn = !jumps;
-          context[isDrawn ? "lineTo" : "moveTo"](sx + dx * camera.scale, sy - dy * camera.scale);
-        }
-        context.stroke();
-      });
-    }
-    context.globalAlpha = 1;
-  }
-
-  /** Where a robot was before, relative to where it is, over the seam if it came over it. */
-  wayBack(robot, first, x, y) {
-    const { episode, view } = this;
-    const way = [];
-    let [lastX, lastY, dx, dy] = [x, y, 0, 0];
-    for (let step = view.step; step >= first; step--) {
-      const [px, py] = [episode.at("x", robot, step), episode.at("y", robot, step)];
-      const [wayX, wayY] = [shortest(px - lastX, episode.width), shortest(py - lastY, episode.height)];
-      [dx, dy] = [dx + wayX, dy + wayY];
-      way.push([dx, dy, Math.hypot(wayX, wayY) > 50]);
-      [lastX, lastY] = [px, py];
-    }
-    return way;
-  }
-
-  /** Frames of the last steps, the older the fainter. */
-  drawFrames(context) {
-    const { camera, colors, episode, view } = this;
-    const n = episode.n_symbols;
-    for (let age = Math.min(FADE - 1, view.step); age >= 0; age--) {
-      const step = view.step - age;
-      for (let robot = 0; robot < episode.n_robots; robot++) {
-        const emitter = episode.whole("emitter", robot, step);
-        if (emitter < 0) continue;
-        const isOurs = view.robot === null || robot === view.robot || emitter === view.robot;
-        context.globalAlpha = (isOurs ? 0.9 : 0.14) * (1 - (age + view.share) / FADE);
-        const symbol = episode.heardSymbol(robot, step);
-        context.strokeStyle = context.fillStyle = symbolColor(symbol, n, colors.isDark);
-        const from = this.poses[emitter];
-        const to = this.poses[robot];
-        const dx = shortest(to.x - from.x, episode.width) * camera.scale;
-        const dy = -shortest(to.y - from.y, episode.height) * camera.scale;
-        const hasLabel = age === 0 && view.numbers && isOurs && symbol !== null;
-        const label = hasLabel && (view.robot !== null || episode.n_robots <= LABELS_MAX) ? String(symbol) : "";
-        const length = Math.hypot(dx, dy);
-        const head = age === 0 ? 7 : 0;
-        camera.eachImage(from.x, from.y, length, (sx, sy) => arrow(context, sx, sy, dx, dy, this.radius, head, label));
-      }
-    }
-    context.globalAlpha = 1;
-  }
-
   get radius() {
     return Math.max(RADIUS_MIN, Math.min(RADIUS * this.camera.scale, 26));
-  }
-
-  drawRobots(context) {
-    const { camera, colors, episode, radius, view } = this;
-    for (let robot = 0; robot < episode.n_robots; robot++) {
-      const { x, y, heading } = this.poses[robot];
-      const led = episode.whole("led", robot, view.step);
-      const relays = episode.whole("relays", robot, view.step) > 0;
-      const target = episode.whole("target", robot, view.step);
-      const [ux, uy] = [Math.cos(heading), -Math.sin(heading)];
-      camera.eachImage(x, y, 3 * radius, (sx, sy) => {
-        if (led > 0) {
-          context.globalAlpha = 0.22;
-          context.fillStyle = colors.led(led);
-          disc(context, sx, sy, 1.9 * radius).fill();
-          context.globalAlpha = 1;
-        }
-        context.strokeStyle = colors.ink;
-        context.lineWidth = Math.max(1.5, radius / 4);
-        context.beginPath();
-        context.moveTo(sx, sy);
-        context.lineTo(sx + 1.75 * radius * ux, sy + 1.75 * radius * uy);
-        context.stroke();
-        const hasFailed = episode.whole("failed", robot, view.step) > 0;
-        context.globalAlpha = hasFailed ? 0.4 : 1;
-        context.fillStyle = colors.led(led);
-        disc(context, sx, sy, radius).fill();
-        context.globalAlpha = 1;
-        context.strokeStyle = relays ? colors.relay : colors["robot-edge"];
-        context.lineWidth = relays ? 2 : 1;
-        context.stroke();
-        if (episode.whole("carries", robot, view.step) > 0) {
-          context.fillStyle = colors.target;
-          disc(context, sx, sy, 0.55 * radius).fill();
-        }
-        if (hasFailed) cross(context, sx, sy, radius, colors.ink);
-        if (target > 0) ring(context, sx, sy, 1.55 * radius, colors.target, [3, 3]);
-        if (robot === view.robot) ring(context, sx, sy, 2.1 * radius, colors.accent, []);
-        if (view.numbers && radius >= 6) this.drawNumber(context, sx, sy, robot, led);
-      });
-    }
-  }
-
-  drawNumber(context, x, y, robot, led) {
-    context.fillStyle = led > 0 ? "#ffffff" : this.colors.ground;
-    context.font = `600 ${Math.round(this.radius * 1.05)}px system-ui, sans-serif`;
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.fillText(String(robot), x, y + 0.5);
   }
 
   /** A length to compare with. */
@@ -345,32 +236,6 @@ export class World {
   }
 }
 
-function disc(context, x, y, radius) {
-  context.beginPath();
-  context.arc(x, y, radius, 0, 2 * Math.PI);
-  return context;
-}
-
-function ring(context, x, y, radius, style, dash) {
-  context.strokeStyle = style;
-  context.lineWidth = 2;
-  context.setLineDash(dash);
-  disc(context, x, y, radius).stroke();
-  context.setLineDash([]);
-}
-
-/** Crosses out what is at a place. */
-function cross(context, x, y, radius, style) {
-  context.strokeStyle = style;
-  context.lineWidth = 2;
-  context.beginPath();
-  for (const slope of [-radius, radius]) {
-    context.moveTo(x - radius, y - slope);
-    context.lineTo(x + radius, y + slope);
-  }
-  context.stroke();
-}
-
 /** A glow that fades with the distance, in any colour that a file names. */
 function glowColor(context, glow, name) {
   context.fillStyle = name;
@@ -379,34 +244,4 @@ function glowColor(context, glow, name) {
   glow.addColorStop(0, transparent("66"));
   glow.addColorStop(1, transparent("08"));
   return glow;
-}
-
-/** An arrow that is slightly bent, so that both directions are seen. */
-function arrow(context, x, y, dx, dy, radius, head, label) {
-  const length = Math.hypot(dx, dy);
-  if (length < 2 * radius) return;
-  const [ux, uy] = [dx / length, dy / length];
-  const bend = Math.min(14, 0.12 * length);
-  const [startX, startY] = [x + ux * radius, y + uy * radius];
-  const [endX, endY] = [x + dx - ux * (radius + 3), y + dy - uy * (radius + 3)];
-  const [midX, midY] = [x + dx / 2 - uy * bend, y + dy / 2 + ux * bend];
-  // Those that fade are thin, which takes less time to draw.
-  context.lineWidth = head > 0 ? 1.6 : 1;
-  context.beginPath();
-  context.moveTo(startX, startY);
-  context.quadraticCurveTo(midX, midY, endX, endY);
-  if (head > 0) {
-    const angle = Math.atan2(endY - midY, endX - midX);
-    const barb = (side) => [endX - head * Math.cos(angle + side), endY - head * Math.sin(angle + side)];
-    context.moveTo(...barb(-0.45));
-    context.lineTo(endX, endY);
-    context.lineTo(...barb(0.45));
-  }
-  context.stroke();
-  if (label && length > 4 * radius) {
-    context.font = "600 11px system-ui, sans-serif";
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    context.fillText(label, (midX + x + dx / 2) / 2 - uy * 7, (midY + y + dy / 2) / 2 + ux * 7);
-  }
 }

@@ -2,8 +2,8 @@
 
     target/python/bin/python web/tests/frames.py target/debug [--profile]
 
-The argument is the folder with swarmctl. Trails, who hears whom and the reach of all radios are
-shown while 50 and 500 robots play. With --profile it also prints the
+The argument is the folder with swarmctl. Trails and who hears whom, and then the reach of all
+radios, too, are shown while 50 and 500 robots play. With --profile it also prints the
 functions that took most time. Without a graphics card, all is drawn by the processor. With
 SWARM_SCREENSHOTS=DIR step 60 is pictured there.
 """
@@ -51,16 +51,18 @@ class Frames(BrowserTest):
         subprocess.run([PROGRAMS / "swarmctl", *command, "--steps", str(STEPS), "--to", html], check=True, capture_output=True)
         return html
 
-    def play(self, n_robots, html):
+    def play(self, n_robots, html, has_reach):
         self.browser.get(f"{html.as_uri()}#step=60")
         self.wait_for_text(".episode", f"{n_robots} robots")
-        self.find("#show-reach").click()
         self.picture(f"frames-{n_robots}")
         self.browser.get("about:blank")
         self.browser.get(f"{html.as_uri()}#step=0")
-        self.find("#show-reach").click()
+        if has_reach:
+            self.find("#show-reach").click()
         # So slow that it does not end before it was measured.
         self.assertLess(SECONDS * 20, STEPS)
+        self.browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+        before = self.main_thread()
         if IS_PROFILED:
             self.browser.execute_cdp_cmd("Profiler.enable", {})
             self.browser.execute_cdp_cmd("Profiler.start", {})
@@ -68,15 +70,21 @@ class Frames(BrowserTest):
         elapsed = "(frames_drawn.length && frames_drawn.at(-1)[0] - frames_drawn[0][0])"
         self.wait(lambda: self.script(f"return {elapsed} > {1000 * SECONDS}"), "it does not play")
         frames = self.script("return frames_drawn")
+        thread = 1000 * (self.main_thread() - before) / len(frames)
         if IS_PROFILED:
             self.print_profile(self.browser.execute_cdp_cmd("Profiler.stop", {})["profile"])
         intervals = [after[0] - before[0] for before, after in zip(frames, frames[1:])]
         late = statistics.quantiles(intervals, n=20)[-1]
         drawing = statistics.mean(took for _, took in frames)
         print(
-            f"{n_robots:4} robots  {1000 / statistics.mean(intervals):5.1f} frames/s, 95 % of frames within "
-            f"{late:.1f} ms, scripts take {drawing:.1f} ms of a frame"
+            f"{n_robots:4} robots{', reach' if has_reach else ''}  {1000 / statistics.mean(intervals):5.1f} frames/s, 95 % of frames within "
+            f"{late:.1f} ms, scripts take {drawing:.1f} ms of a frame, the main thread {thread:.1f} ms of a processor"
         )
+
+    def main_thread(self):
+        """Seconds of a processor that it has used."""
+        metrics = self.browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+        return next(it["value"] for it in metrics if it["name"] == "TaskDuration")
 
     def print_profile(self, profile):
         """Functions by the time that they took themselves."""
@@ -94,7 +102,9 @@ class Frames(BrowserTest):
         self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNTER})
         with tempfile.TemporaryDirectory() as directory:
             for n_robots in N_ROBOTS:
-                self.play(n_robots, self.swarm(pathlib.Path(directory), n_robots))
+                html = self.swarm(pathlib.Path(directory), n_robots)
+                for has_reach in [False, True]:
+                    self.play(n_robots, html, has_reach)
 
 
 if __name__ == "__main__":

@@ -153,7 +153,9 @@ class BrowserTest(unittest.TestCase):
         )
 
     def text(self, selector):
-        return self.find(selector).text
+        """As it is seen, of an element that may be another one in a moment."""
+        self.find(selector)
+        return self.script(f"const it = document.querySelector({selector!r}); return it?.innerText ?? it?.textContent ?? ''")
 
     def wait_for_text(self, selector, part):
         self.wait(lambda: part in self.script(f"return document.querySelector({selector!r})?.textContent ?? ''"), f"{selector} never says {part!r}")

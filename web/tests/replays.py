@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 import subprocess
 import tempfile
 import unittest
@@ -87,6 +88,30 @@ class Replays(BrowserTest):
         known = json.loads(urllib.request.urlopen(self.fleet.pages + "/api/trials/1").read())
         self.wait_for_text(".episode", f"trial {known['median']} of its judgement")
         self.assertIn(f"judged {known['mean']:.4f}", self.text("#result"))
+
+    def test_lamps_and_areas_have_a_legend_and_end_where_the_next_image_is_nearer(self):
+        config = json.loads((CONFIG.parent / "light_follower_snes.json").read_text())
+        config["world"]["objects"]["light_red"]["params"]["range"] = 5000
+        with tempfile.TemporaryDirectory() as directory:
+            file, genotype, html = (pathlib.Path(directory) / name for name in ("far.json", "genes.json", "far.html"))
+            file.write_text(json.dumps(config))
+            n_genes = int(re.search(r"([0-9]+) genes", subprocess.run([PROGRAMS / "swarmctl", "validate", file], check=True, capture_output=True, text=True).stdout)[1])
+            genotype.write_text(json.dumps([0.5] * n_genes))
+            command = ["replay", "--config", file, "--genotype", genotype, "--steps", "50", "--to", html]
+            subprocess.run([PROGRAMS / "swarmctl", *command], check=True, capture_output=True)
+            self.browser.get(html.as_uri() + "#step=0")
+            self.wait_for_text(".legend .place", "light_red")
+            self.find(".camera").click()
+            # Where the glow of several images would add up, it is not brighter than beside the lamp.
+            shades = self.script("""
+                const it = document.querySelector('.world');
+                const { data } = it.getContext('2d').getImageData(0, 0, it.width, it.height);
+                const greens = [];
+                for (let i = 0; i < data.length; i += 4) if (data[i] > 200) greens.push(data[i + 1]);
+                // But for the lamp itself.
+                return greens.sort((a, b) => a - b)[Math.floor(greens.length / 100)];
+            """)
+            self.assertGreater(shades, 100, "images of a lamp add up")
 
     def test_the_form_has_todays_values_and_marks_what_is_changed(self):
         self.open("/replay/1#step=5")

@@ -1,0 +1,80 @@
+// Where robots were in the last steps, as thin lines behind them.
+
+/** Steps of a trail. */
+const TRAIL = 60;
+/** What is nearer than this to the point before is not drawn, pixels. */
+const NEAR = 2.5;
+/** Robots whose trails are one path: to stroke each of 500 takes longer than a frame may, and so
+ *  does one path of all. */
+const TOGETHER = 40;
+/** Who goes farther than this in a step was placed elsewhere, cm. */
+const JUMP = 50;
+
+/** Draws the trails of all robots; that of a robot which is followed stands out. */
+export function drawTrails(context, { camera, colors, episode, poses, view }) {
+  const first = Math.max(0, view.step - TRAIL);
+  // A wider line takes several times as long to draw.
+  context.lineWidth = 1;
+  context.strokeStyle = colors.trail;
+  let n_waiting = 0;
+  const stroke = (alpha) => {
+    context.globalAlpha = alpha;
+    if (n_waiting > 0) context.stroke();
+    n_waiting = 0;
+    context.beginPath();
+  };
+  const others = view.robot === null ? 1 : 0.3;
+  context.beginPath();
+  for (let robot = 0; robot < episode.n_robots; robot++) {
+    if (!episode.moves[robot] || robot === view.robot) continue;
+    addTrail(context, camera, episode, robot, poses[robot], view.step, first);
+    if (++n_waiting === TOGETHER) stroke(others);
+  }
+  stroke(others);
+  if (view.robot !== null && episode.moves[view.robot]) {
+    addTrail(context, camera, episode, view.robot, poses[view.robot], view.step, first);
+    n_waiting = 1;
+    stroke(1);
+  }
+  context.globalAlpha = 1;
+}
+
+/** Points of the trail that is worked out, relative to where the robot is, pixels; and whether a
+ *  line leads to each. */
+const way = new Float32Array(2 * (TRAIL + 2));
+const isLine = new Uint8Array(TRAIL + 2);
+
+/** Adds the way of a robot back to the step `first`, over the seam if it came over it. */
+function addTrail(context, camera, episode, robot, { x, y }, step, first) {
+  const { values: xs, scale: unit } = episode.columns.x;
+  const { values: ys } = episode.columns.y;
+  const { scale } = camera;
+  const { width, height } = episode;
+  const start = robot * episode.steps;
+  let [lastX, lastY, dx, dy, drawnX, drawnY, longest, n] = [x, y, 0, 0, 0, 0, 0, 0];
+  let isJump = false;
+  for (let k = step; k >= first; k--) {
+    const [px, py] = [xs[start + k] * unit, ys[start + k] * unit];
+    let [wayX, wayY] = [px - lastX, py - lastY];
+    if (wayX > width / 2 || wayX < -width / 2) wayX -= width * Math.round(wayX / width);
+    if (wayY > height / 2 || wayY < -height / 2) wayY -= height * Math.round(wayY / height);
+    isJump ||= Math.abs(wayX) + Math.abs(wayY) > JUMP;
+    dx += wayX * scale;
+    dy -= wayY * scale;
+    [lastX, lastY] = [px, py];
+    if (k > first && !isJump && Math.abs(dx - drawnX) + Math.abs(dy - drawnY) < NEAR) continue;
+    way[2 * n] = drawnX = dx;
+    way[2 * n + 1] = drawnY = dy;
+    isLine[n++] = isJump ? 0 : 1;
+    isJump = false;
+    longest = Math.max(longest, Math.abs(dx), Math.abs(dy));
+  }
+  if (longest < NEAR) return;
+  camera.eachImage(x, y, longest, (sx, sy) => {
+    context.moveTo(sx, sy);
+    for (let i = 0; i < n; i++) {
+      if (isLine[i]) context.lineTo(sx + way[2 * i], sy + way[2 * i + 1]);
+      else context.moveTo(sx + way[2 * i], sy + way[2 * i + 1]);
+    }
+  });
+}
