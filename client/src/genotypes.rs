@@ -37,7 +37,8 @@ impl Connection {
         from_individual: u32,
     ) -> Result<GetIndividualsResponse, Error> {
         let address = address.to_string();
-        let request = GetIndividualsRequest { address, from_individual, page_size: 0 };
+        let request =
+            GetIndividualsRequest { address, from_individual, ..GetIndividualsRequest::default() };
         self.call(async |client| client.get_individuals(request.clone()).await).await
     }
 

@@ -45,7 +45,7 @@ class Records(ABC):
 
     def _fitness(self, experiment: int, generations: Sequence[int]) -> list[Floats]:
         """``[P, T]``: of each of these generations."""
-        return [self._run(experiment).individuals(it).fitness for it in generations]
+        return [self._run(experiment)._individuals(it, fitness_only=True).fitness for it in generations]
 
     def experiments(self) -> pandas.DataFrame:
         """A row per experiment: number, name, state, generations, fitness of the champion."""
@@ -197,13 +197,18 @@ class RecordedRun:
 
     def individuals(self, generation: int) -> Individuals:
         """All individuals of a generation, with what evolution was told of them."""
-        generation = arguments.whole(generation, "generation")
+        return self._individuals(arguments.whole(generation, "generation"), fitness_only=False)
+
+    def _individuals(self, generation: int, *, fitness_only: bool) -> Individuals:
         genotypes: list[Any] = []
         fitness: list[Any] = []
         next_individual: int | None = 0
         while next_individual is not None:
             page = self._records._call(
-                "GetIndividuals", address=f"{self.id}@{generation}", from_individual=next_individual
+                "GetIndividuals",
+                address=f"{self.id}@{generation}",
+                from_individual=next_individual,
+                fitness_only=fitness_only,
             )
             genotypes.extend(it.genotype for it in page.individuals)
             fitness.extend(it.trial_fitness for it in page.individuals)

@@ -4,6 +4,7 @@ use std::{fs, path::Path};
 
 use harness::{CoordinatorProcess, Experiment, WorkerProcess, swarmctl, workspace_file};
 use serde_json::{Value, json};
+use swarm_proto::v1::{GetIndividualsRequest, experiment_service_client::ExperimentServiceClient};
 
 /// Two populations, as in cooperative coevolution.
 fn coevolution() -> Experiment {
@@ -141,4 +142,28 @@ fn prune(coordinator: &CoordinatorProcess, id: u64) {
     assert_eq!(history.as_array().unwrap().len(), 5);
     let data_dir = coordinator.data_dir().to_str().unwrap();
     swarmctl(["doctor", "--data-dir", data_dir]).expect_success();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn fitness_alone_comes_page_by_page_without_genes() {
+    let coordinator = CoordinatorProcess::start();
+    let _worker = WorkerProcess::start(&coordinator, "worker");
+    let id = coordinator.submit(&Experiment::tiny(2).path());
+    coordinator.watch(id).finish();
+    let mut client = ExperimentServiceClient::connect(coordinator.url()).await.unwrap();
+    let mut ask = async |fitness_only, from_individual, page_size| {
+        let address = format!("{id}@1");
+        let request = GetIndividualsRequest { address, from_individual, page_size, fitness_only };
+        client.get_individuals(request).await.unwrap().into_inner()
+    };
+    let whole = ask(false, 0, 0).await;
+    let page = ask(true, 3, 4).await;
+    assert_eq!(page.next_individual, Some(7));
+    assert_eq!(page.individuals.len(), 4);
+    for (alone, with_genes) in page.individuals.iter().zip(&whole.individuals[3..]) {
+        assert!(alone.genotype.is_empty() && !with_genes.genotype.is_empty());
+        assert_eq!(alone.trial_fitness, with_genes.trial_fitness);
+        assert_eq!((alone.individual, alone.fitness), (with_genes.individual, with_genes.fitness));
+    }
+    assert_eq!(ask(true, 0, 0).await.individuals.len(), whole.individuals.len());
 }

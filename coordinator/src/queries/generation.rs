@@ -44,24 +44,34 @@ impl StoredGeneration {
         Ok(Self { experiment, of, checkpoint, told })
     }
 
-    /// Goes through the generation again: work for a CPU. Genotypes and fitness have the
-    /// digest of the history, or there is an error.
-    pub fn replay(&self) -> Result<Replayed, QueryError> {
-        let Self { experiment, of, checkpoint, told } = self;
-        let other = |what: String| QueryError::OtherBits {
+    /// What evolution was told of it.
+    pub fn told(&self) -> Result<Told, QueryError> {
+        Told::from_bytes(&self.told).map_err(|error| self.other(error.to_string()))
+    }
+
+    fn other(&self, what: String) -> QueryError {
+        let Self { experiment, of, .. } = self;
+        QueryError::OtherBits {
             experiment: experiment.id,
             generation: of.generation,
             what,
             theirs: experiment.fingerprint.clone(),
-        };
-        let mut after = Evolution::restore(checkpoint).map_err(|error| other(error.to_string()))?;
-        let told = Told::from_bytes(told).map_err(|error| other(error.to_string()))?;
+        }
+    }
+
+    /// Goes through the generation again: work for a CPU. Genotypes and fitness have the
+    /// digest of the history, or there is an error.
+    pub fn replay(&self) -> Result<Replayed, QueryError> {
+        let Self { of, checkpoint, .. } = self;
+        let restored = Evolution::restore(checkpoint);
+        let mut after = restored.map_err(|error| self.other(error.to_string()))?;
+        let told = self.told()?;
         let generation = after.ask();
-        after.replay(&told).map_err(|error| other(error.to_string()))?;
+        after.replay(&told).map_err(|error| self.other(error.to_string()))?;
         let found = after.digest().to_string();
         if found != of.digest {
             let what = format!("they have the digest {found}, and the history {}", of.digest);
-            return Err(other(what));
+            return Err(self.other(what));
         }
         Ok(Replayed { generation, told, after })
     }

@@ -1,6 +1,6 @@
 //! Genotypes: champions, and whoever else has lived, computed again from the fitness log.
 
-use evolution::{ALGORITHMS, Champion, ChampionSource};
+use evolution::{ALGORITHMS, Champion, ChampionSource, Genotype};
 use experiment_file::ExperimentConfig;
 use sim_core::Simulation;
 
@@ -20,16 +20,22 @@ pub enum StoredIndividuals {
     OfGeneration(StoredGeneration, Wanted),
 }
 
+/// Which individuals of a whole generation.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Several {
+    /// The index of the first.
+    pub first: u32,
+    /// How many at most; 0: as many as possible.
+    pub len: u32,
+    /// Whether their genotypes stay empty.
+    pub fitness_only: bool,
+}
+
 /// Whom of a generation.
 #[derive(Debug, Clone, Copy)]
 pub enum Wanted {
-    /// Those from an index on.
-    Page {
-        /// The index.
-        first: u32,
-        /// How many at most.
-        len: u32,
-    },
+    /// Some of all.
+    Page(Several),
     /// The one of this index.
     Individual(u32),
     /// The mean of the distribution after it.
@@ -51,23 +57,16 @@ pub struct Individuals {
 }
 
 impl StoredIndividuals {
-    /// Reads what there is to know of those at an address. Of a whole generation: those from
-    /// index `first` on, `page_len` at most, 0 for as many as possible.
-    pub fn read(
-        store: &Store,
-        address: Address,
-        first: u32,
-        page_len: u32,
-    ) -> Result<Self, QueryError> {
+    /// Reads what there is to know of those at an address; of a whole generation, a page.
+    pub fn read(store: &Store, address: Address, page: Several) -> Result<Self, QueryError> {
         let id = address.experiment;
-        let page_len = if page_len == 0 { PAGE_LEN_MAX } else { page_len.min(PAGE_LEN_MAX) };
         let (generation, wanted) = match address.who {
             Who::Champion => {
                 let experiment = experiment(store, id)?;
                 let champion = store.champion(id)?.ok_or(QueryError::NoChampion(id))?;
                 return Ok(Self::Champion(experiment, champion));
             }
-            Who::Generation(generation) => (generation, Wanted::Page { first, len: page_len }),
+            Who::Generation(generation) => (generation, Wanted::Page(page)),
             Who::Individual(generation, individual) => (generation, Wanted::Individual(individual)),
             Who::Mean(generation) => (generation, Wanted::Mean),
         };
@@ -80,7 +79,7 @@ impl StoredIndividuals {
             Self::Champion(experiment, champion) => (experiment, vec![champion], None, true),
             Self::OfGeneration(stored, wanted) => {
                 let (individuals, next) = individuals(&stored, wanted)?;
-                let is_single = !matches!(wanted, Wanted::Page { .. });
+                let is_single = !matches!(wanted, Wanted::Page(_));
                 (stored.experiment, individuals, next, is_single)
             }
         };
@@ -101,12 +100,18 @@ fn individuals(
     wanted: Wanted,
 ) -> Result<(Vec<Champion>, Option<u32>), QueryError> {
     let StoredGeneration { experiment, of, .. } = stored;
-    let Replayed { generation, told, after } = stored.replay()?;
-    let n_individuals = generation.genotypes.len() as u32;
+    let (genotypes, told, after) = match wanted {
+        Wanted::Page(Several { fitness_only: true, .. }) => (None, stored.told()?, None),
+        _ => {
+            let Replayed { generation, told, after } = stored.replay()?;
+            (Some(generation.genotypes), told, Some(after))
+        }
+    };
+    let n_individuals = told.trial_fitness.len() as u32;
     let individual = |i: u32| Champion {
         generation: of.generation,
         source: ChampionSource::Individual(i),
-        genotype: generation.genotypes[i as usize].clone(),
+        genotype: genotypes.as_ref().map_or_else(Genotype::new, |all| all[i as usize].clone()),
         trial_fitness: told.trial_fitness[i as usize].clone(),
         held_out: None,
         judged: None,
@@ -120,16 +125,21 @@ fn individuals(
     Ok(match wanted {
         Wanted::Individual(i) if i >= n_individuals => return Err(no_individual(i)),
         Wanted::Individual(i) => (vec![individual(i)], None),
-        Wanted::Page { first, .. } if first >= n_individuals => return Err(no_individual(first)),
-        Wanted::Page { first, len } => {
-            let numbers_per_individual =
-                generation.genotypes[0].len() + told.trial_fitness[0].len();
+        Wanted::Page(Several { first, .. }) if first >= n_individuals => {
+            return Err(no_individual(first));
+        }
+        Wanted::Page(Several { first, len, .. }) => {
+            let n_genes = genotypes.as_ref().map_or(0, |all| all[0].len());
+            let numbers_per_individual = (n_genes + told.trial_fitness[0].len()).max(1);
             let fit = INDIVIDUALS_LEN_MAX / (numbers_per_individual * size_of::<f64>());
+            let len = if len == 0 { PAGE_LEN_MAX } else { len.min(PAGE_LEN_MAX) };
             let end = n_individuals.min(first.saturating_add(len.min(fit.max(1) as u32)));
             ((first..end).map(individual).collect(), (end < n_individuals).then_some(end))
         }
         Wanted::Mean => {
-            let genotype = after.mean().ok_or(QueryError::NoMean { experiment: experiment.id })?;
+            let genotype = after
+                .and_then(|after| after.mean())
+                .ok_or(QueryError::NoMean { experiment: experiment.id })?;
             let mean = Champion {
                 generation: of.generation,
                 source: ChampionSource::Mean,

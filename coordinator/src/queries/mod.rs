@@ -26,7 +26,7 @@ pub use dynamics::{DynamicsPage, StoredDynamics};
 pub use explanation::{incompatibility, latest_notices};
 pub use fitness::fitness;
 pub use generation::{Gap, StoredGeneration};
-pub use individuals::{Individuals, StoredIndividuals};
+pub use individuals::{Individuals, Several, StoredIndividuals};
 pub use lineage::{Lineage, StoredLineage};
 pub use pages::{Page, events, generations};
 pub use watch::{WatchError, watch};

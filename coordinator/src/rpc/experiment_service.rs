@@ -33,8 +33,8 @@ use crate::{
     ids::ExperimentId,
     priority::Priority,
     queries::{
-        self, Address, Individuals, QueryError, StoredDynamics, StoredIndividuals, StoredLineage,
-        Who,
+        self, Address, Individuals, QueryError, Several, StoredDynamics, StoredIndividuals,
+        StoredLineage, Who,
     },
     shared_store::SharedStore,
     submission::Submission,
@@ -65,14 +65,9 @@ impl Experiments {
     }
 
     /// Genotypes, computed again if need be.
-    async fn individuals(
-        &self,
-        address: Address,
-        first: u32,
-        page_len: u32,
-    ) -> Result<Individuals, Status> {
+    async fn individuals(&self, address: Address, page: Several) -> Result<Individuals, Status> {
         let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
-        let read = move |store: &_| StoredIndividuals::read(store, address, first, page_len);
+        let read = move |store: &_| StoredIndividuals::read(store, address, page);
         let stored = self.store.read(read).await?;
         let found = task::spawn_blocking(move || stored.reconstruct())
             .await
@@ -289,7 +284,7 @@ impl ExperimentService for Experiments {
     ) -> Result<Response<GetChampionResponse>, Status> {
         let id = ExperimentId(request.into_inner().experiment_id);
         let address = Address { experiment: id, who: Who::Champion };
-        let mut found = self.individuals(address, 0, 1).await?;
+        let mut found = self.individuals(address, Several::default()).await?;
         let champion = found.individuals.pop().ok_or(QueryError::NoChampion(id))?;
         let network_json = found.network_json.unwrap_or_default();
         Ok(Response::new(convert::individual(id.0, champion, network_json)))
@@ -299,9 +294,10 @@ impl ExperimentService for Experiments {
         &self,
         request: Request<GetIndividualsRequest>,
     ) -> Result<Response<GetIndividualsResponse>, Status> {
-        let GetIndividualsRequest { address, from_individual, page_size } = request.into_inner();
+        let GetIndividualsRequest { address, from_individual: first, page_size: len, fitness_only } =
+            request.into_inner();
         let address = convert::address(&address)?;
-        let found = self.individuals(address, from_individual, page_size).await?;
+        let found = self.individuals(address, Several { first, len, fitness_only }).await?;
         Ok(Response::new(convert::individuals(found)))
     }
 

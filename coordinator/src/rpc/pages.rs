@@ -21,7 +21,7 @@ use crate::{
     engine::{Fate, TimelineEntry},
     ids::ExperimentId,
     limits::RECONSTRUCTIONS_OF_PAGES_MAX,
-    queries::{self, QueryError, StoredDynamics, StoredIndividuals},
+    queries::{self, QueryError, Several, StoredDynamics, StoredIndividuals},
     shared_store::SharedStore,
     store::{Store, StoreError, Wanted},
 };
@@ -102,7 +102,7 @@ impl Archive for PagesArchive {
     async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status> {
         let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
         let address = convert::address(address)?;
-        let read = move |store: &Store| StoredIndividuals::read(store, address, 0, 1);
+        let read = move |store: &Store| StoredIndividuals::read(store, address, Several::default());
         let stored = self.store.read(read).await?;
         let found = task::spawn_blocking(move || stored.reconstruct())
             .await
