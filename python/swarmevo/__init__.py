@@ -17,6 +17,7 @@ from .errors import (
     EvolutionWarning,
     ExperimentError,
     FleetError,
+    FleetWarning,
     ForkError,
     InternalError,
     NotFound,
@@ -51,7 +52,7 @@ from .workers import Workers, workers
 __all__ = [
     "Actions", "Archive", "CMAES", "Champion", "Client", "Episodes", "Evolution", "EvolutionError",
     "EvolutionWarning", "Experiment", "ExperimentError",
-    "FINGERPRINT", "FleetError", "FleetRun", "ForkError", "GA", "Generation", "Individuals", "InternalError",
+    "FINGERPRINT", "FleetError", "FleetRun", "FleetWarning", "ForkError", "GA", "Generation", "Individuals", "InternalError",
     "Interrupted", "Judged", "LocalRun", "Measured", "Network", "NotFound", "OpenAIES", "Origin", "OtherExperimentError", "Problem", "RecordedRun", "RefusedArgument", "Replay", "SNES", "Selection",
     "SepCMAES", "SwarmError", "Trace", "TrialSet", "Workers", "XNES", "__version__", "algorithms", "connect", "evolve",
     "mirror", "open", "parallel_env", "workers",

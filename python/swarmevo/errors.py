@@ -53,6 +53,10 @@ class EvolutionError(SwarmError, ValueError):
     same for a hundred generations while chance has driven the distribution out of all bounds."""
 
 
+class FleetWarning(UserWarning):
+    """What a coordinator is asked for waits: it has no workers."""
+
+
 class EvolutionWarning(UserWarning):
     """Evolution learns nothing, or less than it could: what a coordinator has as notices of a run, and ``swarmctl``
     as warnings of a file."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 import uuid
+import warnings
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Sequence
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from . import _core, arguments, protocol
 from .champion import Champion, Genes
-from .errors import ExperimentError, FleetError, ForkError, refused
+from .errors import ExperimentError, FleetError, FleetWarning, ForkError, refused
 from .experiment import Experiment, as_experiment
 from .extras import needs
 from .generations import Generation, of_message
@@ -35,6 +36,8 @@ VALUES_MAX = 1 << 21
 """Genotypes times trials in one request."""
 DEADLINE_S = 30.0
 PAUSE_S = 1.0
+SILENCE_MAX_S = 2.0
+"""Nobody waits for workers for longer without a word."""
 TRANSIENT = ("UNAVAILABLE", "DEADLINE_EXCEEDED", "ABORTED")
 """Errors after which the same request may succeed; every request can be repeated."""
 ENDS = ("completed", "failed", "cancelled")
@@ -188,7 +191,7 @@ class Client(Records):
     ) -> Floats:
         """Fitness ``[P, T]`` of genotypes ``[P, d]`` (or ``[d]``: then ``[T]``), computed by the
         fleet: the bits of :meth:`Experiment.evaluate`, audited and repeated as a generation of
-        an experiment is. It waits for workers if there are none.
+        an experiment is. It waits for workers if there are none, which is a :class:`FleetWarning` after two seconds.
 
         ``generation``: whose trials, or a trial set, but for those of evaluations. ``trials``:
         their number; the file's if absent. ``priority``: share of the fleet, 1 to 1000.
@@ -249,7 +252,7 @@ class Client(Records):
 
                 def answer(i: int = i, message: Any = message) -> Any:
                     try:
-                        return waiting[i].result()
+                        return self._aloud(waiting[i])
                     except BaseException:
                         waiting[i].cancel()
                         waiting[i] = call.future(message, metadata=self._metadata)
@@ -261,6 +264,30 @@ class Client(Records):
             # Whoever stops waiting, stops the work.
             for future in waiting:
                 future.cancel()
+
+    def _aloud(self, future: Any) -> Any:
+        """What a call has come to; warns if it waits for workers."""
+        import grpc
+
+        try:
+            return future.result(timeout=SILENCE_MAX_S)
+        except grpc.FutureTimeoutError:
+            self._warn_without_workers(7)
+            return future.result()
+
+    def _warn_without_workers(self, stacklevel: int) -> None:
+        try:
+            has_workers = bool(self._request("FleetService", "ListWorkers").workers)
+        except FleetError:
+            # Whoever waits hears of that by itself.
+            return
+        if not has_workers:
+            warnings.warn(
+                f"waiting for a worker: the coordinator at {self.address} has none; start one with "
+                f"`worker --coordinator {self.address}`",
+                FleetWarning,
+                stacklevel=stacklevel,
+            )
 
     def _patiently(self, attempt: Callable[[], Any]) -> Any:
         give_up_at = time.monotonic() + self.patience
@@ -283,8 +310,11 @@ class FleetRun(RecordedRun):
     _records: Client
 
     def watch(self) -> Iterator[Generation]:
-        """All generations, each once, those that are done first, until the experiment has ended; through restarts of the coordinator."""
+        """All generations, each once, those that are done first, until the experiment has ended; through restarts of
+        the coordinator. That there are no workers is a :class:`FleetWarning`."""
         client = self._records
+        if self.state not in ENDS:
+            client._warn_without_workers(3)
         call, request_class = client._call_of("ExperimentService", "WatchExperiment", "unary_stream")
         request = request_class(experiment_id=self.id, from_sequence=1)
         is_over = False
