@@ -1,8 +1,15 @@
 //! Experiments as files: exported here, verified and imported elsewhere.
 
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs,
+    io::{BufRead as _, BufReader},
+    path::Path,
+    process::{Command, Stdio},
+};
 
-use harness::{CoordinatorProcess, Experiment, Outcome, WorkerProcess, python_with, swarmctl};
+use harness::{
+    CoordinatorProcess, Experiment, Outcome, WorkerProcess, binary, python_with, swarmctl,
+};
 use serde_json::{Value, json};
 
 fn ga() -> Experiment {
@@ -218,4 +225,27 @@ fn a_bundle_is_an_ro_crate_to_an_independent_reader() {
         (&found["instrument"], &found["object"]),
         (&json!("swarmevo"), &json!("experiment.json"))
     );
+}
+
+#[test]
+fn verify_says_that_there_are_no_workers_and_goes_on_with_the_first() {
+    let coordinator = CoordinatorProcess::start();
+    let worker = WorkerProcess::start(&coordinator, "first");
+    let id = coordinator.submit(&ga().path());
+    coordinator.watch(id).finish();
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("run.zip");
+    export(&coordinator, id, &file);
+    drop(worker);
+
+    let mut command = Command::new(binary("swarmctl"));
+    command.args(["--coordinator", &coordinator.url(), "verify"]).arg(&file);
+    let mut verifying =
+        command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut lines = BufReader::new(verifying.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let said = lines.find(|line| line.starts_with("waiting for a worker:"));
+    assert!(said.is_some_and(|line| line.contains("without --coordinator")));
+    let _worker = WorkerProcess::start(&coordinator, "second");
+    let rest: Vec<String> = lines.collect();
+    assert!(verifying.wait().unwrap().success(), "{rest:?}");
 }
