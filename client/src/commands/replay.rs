@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use experiment_file::limits;
-use sim_core::TrialSet;
+use sim_core::{StepRecord, TrialSet};
 use swarm_proto::v1::JudgedFitness;
 use swarm_web::{Episode, Replay, ReplayError, Trials, replay_file};
 
-use self::picture::Moments;
+use self::picture::PictureArgs;
 use super::simulate::genotype::Genotype;
 use crate::{
     address::NamedAddress,
@@ -67,11 +67,9 @@ pub struct ReplayArgs {
     steps: StepsArg,
     #[command(flatten)]
     set: SetArg,
-    /// Step that a .png shows; FIRST..LAST, both included, makes an animated one [default: the
-    /// last step]
-    #[arg(long, value_name = "STEP|FIRST..LAST", requires = "to")]
-    at: Option<Moments>,
-    /// File to write; its name ends in .html, or in .png for a picture of the world
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// File to write; its name ends in .html, or in .png or .svg for a picture of the world
     /// [default: replay-ADDRESS.html, replay.html]
     #[arg(long, value_name = "FILE")]
     to: Option<PathBuf>,
@@ -84,7 +82,8 @@ Examples:
   swarmctl replay 3
   swarmctl replay 3@0/17 --data-dir swarm-data --to early.html
   swarmctl replay 3 --set world.objects.robot.num_instances=20 --steps 500
-  swarmctl replay 3 --to swarm.png --at 120
+  swarmctl replay 3 --to swarm.png --at 120 --size 1600 --dpi 300
+  swarmctl replay 3 --to swarm.svg --at 120
   swarmctl replay 3 --to swarm.png --at 0..200
   swarmctl replay --config experiment.json --genotype champion.json";
 
@@ -144,7 +143,8 @@ pub async fn replay(
     };
     let bytes = waiting::busy("computing the episode", || match format {
         Format::Html => html(&episode, trials).map(String::into_bytes),
-        Format::Png => png(&episode, args.at),
+        Format::Png => picture::png(&compiled.config, &steps(&episode)?, &args.picture),
+        Format::Svg => picture::svg(&compiled.config, &steps(&episode)?, &args.picture),
     })?;
     args.overwrite.write(&path, &bytes)?;
     progress.print(&path.display().to_string())
@@ -183,6 +183,7 @@ fn judged_trial(trials: &Trials, n: u32, wanted: Option<u32>) -> Result<(u32, St
 enum Format {
     Html,
     Png,
+    Svg,
 }
 
 fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> {
@@ -196,13 +197,14 @@ fn html(episode: &Episode<'_>, trials: Option<Trials>) -> Result<String, Error> 
     }))
 }
 
-fn png(episode: &Episode<'_>, moments: Option<Moments>) -> Result<Vec<u8>, Error> {
+/// All steps of an episode.
+fn steps(episode: &Episode<'_>) -> Result<Vec<StepRecord>, Error> {
     let mut steps = Vec::new();
-    let Episode { config, simulation, genotype, trial_set, trial, name } = *episode;
+    let Episode { simulation, genotype, trial_set, trial, name, .. } = *episode;
     simulation
         .simulate(genotype, trial_set, trial, &mut |step| steps.push(step.clone()))
         .map_err(|error| Error::Input(format!("{name}: {error}")))?;
-    picture::png(config, &steps, moments)
+    Ok(steps)
 }
 
 impl ReplayArgs {
@@ -245,13 +247,19 @@ impl ReplayArgs {
         let format = match Path::extension(&path).and_then(|extension| extension.to_str()) {
             Some("html") => Format::Html,
             Some("png") => Format::Png,
+            Some("svg") => Format::Svg,
             _ => {
                 let path = path.display();
-                return Err(Error::Input(format!("{path}: the name must end in .html or .png")));
+                return Err(Error::Input(format!(
+                    "{path}: the name must end in .html, .png or .svg"
+                )));
             }
         };
-        if format == Format::Html && self.at.is_some() {
-            return Err(Error::Input("--at is for .png; a .html has all steps".into()));
+        if format == Format::Html
+            && let Some(option) = self.picture.given()
+        {
+            let why = format!("{option} is for .png and .svg; a .html has all steps");
+            return Err(Error::Input(why));
         }
         Ok((path, format))
     }

@@ -5,7 +5,7 @@ use std::fs;
 use clap::Parser;
 use serde_json::{Value, json};
 
-use super::*;
+use super::{picture::Moments, *};
 use crate::{
     args::{Args, OutputFormat},
     commands::{Command, one_world::output},
@@ -61,6 +61,37 @@ async fn a_png_is_one_step_or_an_animation_of_several() {
 }
 
 #[tokio::test]
+async fn an_animation_of_a_hundred_steps_is_small() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("swarm.png");
+    let options = ["--to", path.to_str().unwrap(), "--at", "0..99"];
+    run(directory.path(), &options).await.unwrap();
+    let len = fs::metadata(&path).unwrap().len();
+    assert!(len < 1_000_000, "{len} bytes");
+}
+
+#[tokio::test]
+async fn a_picture_has_the_size_and_density_that_are_wanted() {
+    let directory = tempfile::tempdir().unwrap();
+    let [png, svg] = ["swarm.png", "swarm.svg"].map(|name| directory.path().join(name));
+    let options = ["--at", "60", "--size", "300", "--dpi", "600", "--to"];
+    run(directory.path(), &[&options[..], &[png.to_str().unwrap()]].concat()).await.unwrap();
+    let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(&png).unwrap()));
+    let reader = decoder.read_info().unwrap();
+    let info = reader.info();
+    assert_eq!((info.width, info.height), (300, 300));
+    assert_eq!(info.pixel_dims.unwrap().xppu, 23_622);
+    run(directory.path(), &[&options[..], &[svg.to_str().unwrap()]].concat()).await.unwrap();
+    let text = fs::read_to_string(&svg).unwrap();
+    assert!(text.contains(r#"width="300" height="300" viewBox="0 0 900 900""#), "{text}");
+    assert!(text.contains("step 60") && text.contains(" cm"), "no caption or no scale bar");
+    let error = run(directory.path(), &["--size", "300", "--to", "swarm.html"]).await.unwrap_err();
+    assert_eq!(error.to_string(), "--size is for .png and .svg; a .html has all steps");
+    let error = run(directory.path(), &["--at", "3..9", "--to", "many.svg"]).await.unwrap_err();
+    assert_eq!(error.to_string(), "an .svg shows one step; a .png may be animated");
+}
+
+#[tokio::test]
 async fn a_png_shows_ground_areas_in_their_colour() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("swarm.png");
@@ -97,7 +128,7 @@ async fn what_cannot_be_played_leaves_no_file() {
     let path = directory.path().join("swarm.html");
     let to = path.to_str().unwrap();
     for (options, expected) in [
-        (["--to", "swarm.txt"], "swarm.txt: the name must end in .html or .png"),
+        (["--to", "swarm.txt"], "swarm.txt: the name must end in .html, .png or .svg"),
         (["--set", "world.objects.robot.num_instances=0"], "is not a valid experiment file"),
         (["--set", "nonsense"], "--set "),
     ] {

@@ -1,0 +1,285 @@
+//! A step as a drawing, on pixels or as SVG. Lengths are points, of which a canvas has [`POINTS`]
+//! along each side, and several pixels each: so it is as smooth as the pixels are fine.
+
+use std::{f64::consts::PI, iter};
+
+use experiment_file::{ExperimentConfig, ObjectConfig};
+use plotters::{
+    coord::Shift,
+    drawing::DrawingAreaErrorKind,
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+use sim_core::{Mode, RobotRecord, StepRecord};
+
+use super::camera::Camera;
+use crate::figure::{FONT, embed_font};
+
+/// Side of a canvas, points.
+const POINTS: f64 = 800.0;
+/// Radius of a robot, cm, and the least and the greatest that is drawn, points.
+const RADIUS: f64 = 5.5;
+const RADII: (f64, f64) = (5.0, 20.0);
+/// Rings of a glow, from its reach inwards: share of the reach, and opacity.
+const GLOW: [(f64, f64); 5] = [(1.0, 0.05), (0.8, 0.06), (0.6, 0.08), (0.4, 0.1), (0.2, 0.14)];
+/// Length of an arrow's head, points, and half its angle.
+const HEAD: (f64, f64) = (9.0, 0.45);
+/// Lengths that a scale bar may have, cm; it is the longest of them that fits a quarter of the side.
+const BARS: [f64; 10] = [5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0];
+
+const GROUND: RGBColor = RGBColor(251, 252, 254);
+const GRID: RGBColor = RGBColor(230, 233, 240);
+const INK: RGBColor = RGBColor(28, 35, 51);
+const WAY: RGBColor = RGBColor(179, 192, 220);
+const FRAME: RGBColor = RGBColor(36, 86, 201);
+const OFF: RGBColor = RGBColor(91, 107, 140);
+const ON: RGBColor = RGBColor(215, 38, 61);
+const RELAY: RGBColor = RGBColor(199, 119, 0);
+const TARGET: RGBColor = RGBColor(24, 121, 78);
+const LIGHT: RGBColor = RGBColor(245, 179, 1);
+
+type Area<B> = DrawingArea<B, Shift>;
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+type Place = (i32, i32);
+
+/// What is the same in all steps: how far areas and lights reach, cm, and their colours.
+pub struct Discs {
+    areas: Vec<(f64, RGBColor)>,
+    lights: Vec<(f64, RGBColor)>,
+}
+
+impl Discs {
+    /// In the order of the records.
+    pub fn new(config: &ExperimentConfig) -> Self {
+        let mut discs = Self { areas: Vec::new(), lights: Vec::new() };
+        for object in config.world.objects.values() {
+            let (all, disc, n) = match object {
+                ObjectConfig::GroundArea(it) => {
+                    let disc = (it.params.range, color_named(&it.params.color));
+                    (&mut discs.areas, disc, it.num_instances)
+                }
+                ObjectConfig::LightSource(it) => {
+                    let disc = (it.params.range, color_named(&it.params.color));
+                    (&mut discs.lights, disc, it.num_instances)
+                }
+                _ => continue,
+            };
+            all.extend(iter::repeat_n(disc, n as usize));
+        }
+        discs
+    }
+}
+
+/// The colour of a word; grey for those that only the task knows.
+fn color_named(name: &str) -> RGBColor {
+    match name {
+        "black" => RGBColor(0, 0, 0),
+        "white" => RGBColor(200, 206, 216), // against a ground that is white
+        "red" => ON,
+        "green" => TARGET,
+        "blue" => FRAME,
+        "yellow" => LIGHT,
+        _ => OFF,
+    }
+}
+
+/// Draws the last of some steps, and the ways that lead to it. `side`: of the canvas, pixels.
+pub fn draw<B: DrawingBackend>(
+    area: &Area<B>,
+    side: u32,
+    camera: &Camera,
+    discs: &Discs,
+    way: &[StepRecord],
+) -> Drawn<B> {
+    let Some(now) = way.last() else { return Ok(()) };
+    embed_font();
+    let pen = Pen { area, camera, side, unit: f64::from(side) / POINTS };
+    area.fill(&GROUND)?;
+    pen.places(discs, now)?;
+    pen.grid()?;
+    pen.trails(way)?;
+    pen.hearing(now)?;
+    for robot in &now.robots {
+        pen.robot(robot)?;
+    }
+    pen.scale_bar()?;
+    let style = pen.text(22.0).pos(Pos::new(HPos::Right, VPos::Bottom));
+    let corner = side as i32 - pen.px(14.0);
+    area.draw(&Text::new(format!("step {}", now.step), (corner, corner), style))?;
+    area.present()
+}
+
+/// Draws on a canvas what a camera sees.
+struct Pen<'a, B: DrawingBackend> {
+    area: &'a Area<B>,
+    camera: &'a Camera,
+    side: u32,
+    /// Pixels of a point.
+    unit: f64,
+}
+
+impl<B: DrawingBackend> Pen<'_, B> {
+    fn px(&self, points: f64) -> i32 {
+        (points * self.unit).round() as i32
+    }
+
+    fn stroke(&self, color: impl Into<RGBAColor>, points: f64) -> ShapeStyle {
+        ShapeStyle::from(color.into()).stroke_width(self.px(points).max(1) as u32)
+    }
+
+    fn text(&self, points: f64) -> TextStyle<'static> {
+        (FONT, points * self.unit).into_font().color(&INK)
+    }
+
+    fn disc(&self, at: Place, radius: i32, color: RGBAColor) -> Drawn<B> {
+        self.area.draw(&Circle::new(at, radius, color.filled()))
+    }
+
+    fn line(&self, ends: &[Place], style: ShapeStyle) -> Drawn<B> {
+        self.area.draw(&PathElement::new(ends.to_vec(), style))
+    }
+
+    /// Whether a line stays on this side of the edge.
+    fn is_near(&self, from: Place, to: Place) -> bool {
+        let seen = 0..=self.side as i32;
+        let is_seen = |at: Place| seen.contains(&at.0) && seen.contains(&at.1);
+        is_seen(from)
+            && is_seen(to)
+            && (from.0 - to.0).abs().max((from.1 - to.1).abs()) < self.side as i32 / 2
+    }
+
+    fn places(&self, discs: &Discs, now: &StepRecord) -> Drawn<B> {
+        let pixels = |cm: f64| (cm * self.camera.scale).round() as i32;
+        for ((reach, color), center) in discs.areas.iter().zip(&now.areas) {
+            self.disc(self.camera.place(*center), pixels(*reach), color.mix(0.25))?;
+        }
+        for ((reach, color), center) in discs.lights.iter().zip(&now.lights) {
+            let at = self.camera.place(*center);
+            for (share, opacity) in GLOW {
+                self.disc(at, pixels(share * reach), color.mix(opacity))?;
+            }
+            self.disc(at, self.px(6.0), color.mix(1.0))?;
+        }
+        Ok(())
+    }
+
+    /// A line per metre.
+    fn grid(&self) -> Drawn<B> {
+        let (side, scale) = (self.side as i32, self.camera.scale);
+        let half = f64::from(self.side) / 2.0;
+        let lines = |middle: f64| {
+            let across = f64::from(self.side) / scale;
+            let first = ((middle - across / 2.0) / 100.0).ceil();
+            (0..=(across / 100.0) as u32).map(move |i| (first + f64::from(i)) * 100.0 - middle)
+        };
+        let style = self.stroke(GRID, 1.0);
+        for x in lines(self.camera.middle.x).map(|way| (half + way * scale) as i32) {
+            self.line(&[(x, 0), (x, side)], style)?;
+        }
+        for y in lines(self.camera.middle.y).map(|way| (half - way * scale) as i32) {
+            self.line(&[(0, y), (side, y)], style)?;
+        }
+        Ok(())
+    }
+
+    /// The ways of all robots, in pieces between which they went over the edge.
+    fn trails(&self, way: &[StepRecord]) -> Drawn<B> {
+        let n_robots = way.last().map_or(0, |now| now.robots.len());
+        let style = self.stroke(WAY, 1.5);
+        for robot in 0..n_robots {
+            let places: Vec<Place> =
+                way.iter().map(|step| self.camera.place(step.robots[robot].position)).collect();
+            for piece in places.chunk_by(|from, to| self.is_near(*from, *to)) {
+                if piece.len() > 1 {
+                    self.line(piece, style)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Arrows from those who were heard to those who heard them.
+    fn hearing(&self, now: &StepRecord) -> Drawn<B> {
+        let style = self.stroke(FRAME.mix(0.55), 1.6);
+        for robot in &now.robots {
+            let Some(frame) = robot.received else { continue };
+            let from = self.camera.place(now.robots[frame.emitter].position);
+            let to = self.camera.place(robot.position);
+            let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
+            let length = libm::hypot(dx, dy);
+            let edge = self.radius() + self.px(2.0);
+            if !self.is_near(from, to) || length < f64::from(3 * edge) {
+                continue;
+            }
+            let share = 1.0 - f64::from(edge) / length;
+            let tip = (from.0 + (dx * share) as i32, from.1 + (dy * share) as i32);
+            self.line(&[from, tip], style)?;
+            let (size, angle) = HEAD;
+            let back = libm::atan2(dy, dx) + PI;
+            let barb = |side: f64| {
+                let (sin, cos) = libm::sincos(back + side * angle);
+                let length = size * self.unit;
+                (tip.0 + (length * cos).round() as i32, tip.1 + (length * sin).round() as i32)
+            };
+            let head = vec![barb(1.0), tip, barb(-1.0)];
+            self.area.draw(&Polygon::new(head, FRAME.mix(0.8).filled()))?;
+        }
+        Ok(())
+    }
+
+    /// Pixels.
+    fn radius(&self) -> i32 {
+        let (least, most) = RADII;
+        (RADIUS * self.camera.scale).clamp(least * self.unit, most * self.unit).round() as i32
+    }
+
+    fn robot(&self, robot: &RobotRecord) -> Drawn<B> {
+        let (x, y) = self.camera.place(robot.position);
+        let radius = self.radius();
+        let times = |factor: f64| (factor * f64::from(radius)).round() as i32;
+        let ring = |factor: f64, color: RGBColor| {
+            self.area.draw(&Circle::new((x, y), times(factor), self.stroke(color, 2.0)))
+        };
+        let color = if robot.led > 0 { ON } else { OFF };
+        if robot.led > 0 {
+            self.disc((x, y), times(1.9), ON.mix(0.22))?;
+        }
+        if robot.target == Some(true) {
+            ring(1.6, TARGET)?;
+        }
+        let (sin, cos) = libm::sincos(robot.heading % (2.0 * PI));
+        let nose = (x + times(1.8 * cos), y - times(1.8 * sin));
+        self.line(&[(x, y), nose], self.stroke(INK, 2.6))?;
+        self.disc((x, y), radius, color.mix(if robot.failed { 0.4 } else { 1.0 }))?;
+        if robot.failed {
+            // Crossed out.
+            for slope in [-radius, radius] {
+                let ends = [(x - radius, y - slope), (x + radius, y + slope)];
+                self.line(&ends, self.stroke(INK, 2.0))?;
+            }
+        }
+        if robot.carries {
+            self.disc((x, y), times(0.5), TARGET.mix(1.0))?;
+        }
+        if robot.mode == Mode::Relay {
+            ring(1.0, RELAY)?;
+        }
+        Ok(())
+    }
+
+    /// A length to compare with.
+    fn scale_bar(&self) -> Drawn<B> {
+        let room = f64::from(self.side) / 4.0;
+        let fits = |cm: &&f64| **cm * self.camera.scale <= room;
+        let cm = BARS.iter().rev().find(fits).copied().unwrap_or(BARS[0]);
+        let (left, bottom) = (self.px(14.0), self.side as i32 - self.px(14.0));
+        let right = left + (cm * self.camera.scale).round() as i32;
+        let tick = self.px(6.0);
+        let bar = [(left, bottom - tick), (left, bottom), (right, bottom), (right, bottom - tick)];
+        self.line(&bar, self.stroke(INK, 2.0))?;
+        let name = if cm < 100.0 { format!("{cm} cm") } else { format!("{} m", cm / 100.0) };
+        let style = self.text(18.0).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let at = (left + self.px(6.0), bottom - self.px(4.0));
+        self.area.draw(&Text::new(name, at, style))
+    }
+}
