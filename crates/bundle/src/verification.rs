@@ -222,7 +222,10 @@ impl<'a> Verification<'a> {
         let GenerationRow { statistics, .. } = row;
         let [found, stated] = [summary.statistics, *statistics]
             // Databases do not keep the sign of zero.
-            .map(|it| [it.best, it.mean, it.min, it.standard_deviation].map(|it| it.get() + 0.0));
+            .map(|statistics| {
+                [statistics.best, statistics.mean, statistics.min, statistics.standard_deviation]
+                    .map(|number| number.get() + 0.0)
+            });
         let found = [0, 1, 2, 3].map(|i| as_stated(found[i], stated[i]));
         if !same_bits(&found, &stated) || row.episodes != n_episodes {
             return Err(Claim::History.flaw(at(&format!(
