@@ -30,12 +30,12 @@ impl Evolution {
             let squares = before.iter().zip(&after).map(|(a, b)| (a - b) * (a - b));
             squares.sum::<f64>().sqrt()
         });
-        let of_each = self.populations.iter().map(|it| it.deviations());
+        let of_each = self.populations.iter().map(|population| population.deviations());
         let deviations: Option<Vec<Vec<f64>>> = of_each.collect();
         Ok(Dynamics {
             digest,
             mean_step,
-            deviations: deviations.map(|it| quantiles(it.concat())),
+            deviations: deviations.map(|deviations| quantiles(deviations.concat())),
             rank_correlation: rank_correlation(&told.trial_fitness),
         })
     }
@@ -55,8 +55,10 @@ fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
 /// `trial_fitness[i][t]`: of individual i in trial t. Individuals whose fitness is not finite in
 /// every trial are left out.
 fn rank_correlation(trial_fitness: &[Vec<f64>]) -> Option<f64> {
-    let finite: Vec<&Vec<f64>> =
-        trial_fitness.iter().filter(|trials| trials.iter().all(|it| it.is_finite())).collect();
+    let finite: Vec<&Vec<f64>> = trial_fitness
+        .iter()
+        .filter(|trials| trials.iter().all(|fitness| fitness.is_finite()))
+        .collect();
     let n_trials = finite.first()?.len();
     let deviations: Vec<Vec<f64>> = (0..n_trials)
         .filter_map(|trial| deviations_of_ranks(finite.iter().map(|of| of[trial]).collect()))
@@ -83,8 +85,8 @@ fn deviations_of_ranks(values: Vec<f64>) -> Option<Vec<f64>> {
     };
     let middle = (values.len() as f64 - 1.0) / 2.0;
     let deviations: Vec<f64> = values.iter().map(|&value| rank(value) - middle).collect();
-    let length = deviations.iter().map(|it| it * it).sum::<f64>().sqrt();
-    (length > 0.0).then(|| deviations.into_iter().map(|it| it / length).collect())
+    let length = deviations.iter().map(|deviation| deviation * deviation).sum::<f64>().sqrt();
+    (length > 0.0).then(|| deviations.into_iter().map(|deviation| deviation / length).collect())
 }
 
 #[cfg(test)]

@@ -229,7 +229,9 @@ impl Evolution {
     /// Whether another one has the same seed, as many individuals, and populations with the
     /// same numbers of genes.
     pub fn has_shape_of(&self, other: &Self) -> bool {
-        let n_genes = |it: &Self| it.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>();
+        let n_genes = |evolution: &Self| {
+            evolution.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>()
+        };
         (self.seed, self.population_size) == (other.seed, other.population_size)
             && n_genes(self) == n_genes(other)
     }

@@ -87,7 +87,9 @@ pub(crate) mod tests {
     pub(crate) fn any_finite() -> impl Strategy<Value = f64> {
         let extreme = [0.0, -0.0, f64::MAX, f64::MIN, 5e-324, -5e-324, 1e308, 1.0, f64::EPSILON];
         prop_oneof![
-            2 => any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |it| it.is_finite()),
+            2 => any::<u64>()
+                .prop_map(f64::from_bits)
+                .prop_filter("finite", |number| number.is_finite()),
             1 => prop::sample::select(extreme.to_vec()),
             1 => (0u64..50).prop_map(f64::from_bits),
         ]

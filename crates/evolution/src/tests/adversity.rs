@@ -59,8 +59,10 @@ fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
                     "{} {what} {generation}",
                     algorithm.name
                 );
-                let told: Vec<Vec<f64>> =
-                    fitness(generation, &asked.genotypes).into_iter().map(|it| vec![it]).collect();
+                let told: Vec<Vec<f64>> = fitness(generation, &asked.genotypes)
+                    .into_iter()
+                    .map(|fitness| vec![fitness])
+                    .collect();
                 evolution.tell(asked, &told).unwrap();
             }
             let mean = evolution.mean().unwrap_or_default();
@@ -70,7 +72,9 @@ fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
                 algorithm.name
             );
             assert!(
-                evolution.widest().is_none_or(|it| it.is_finite() && it >= 0.0),
+                evolution
+                    .widest()
+                    .is_none_or(|deviation| deviation.is_finite() && deviation >= 0.0),
                 "{} {what}: {:?}",
                 algorithm.name,
                 evolution.widest()
@@ -89,8 +93,10 @@ fn remarks(
     for generation in 0..n_generations {
         let before = evolution.widest();
         let asked = evolution.ask();
-        let told: Vec<Vec<f64>> =
-            fitness(generation, &asked.genotypes).into_iter().map(|it| vec![it]).collect();
+        let told: Vec<Vec<f64>> = fitness(generation, &asked.genotypes)
+            .into_iter()
+            .map(|fitness| vec![fitness])
+            .collect();
         let summary = evolution.tell(asked, &told).unwrap();
         remarks.extend(evolution.remarks(before, &summary, generation + 1 == n_generations));
         if let Some(drifted) = evolution.drifted(&summary) {
@@ -128,7 +134,7 @@ fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
     let (remarks, drifted) = remarks(&mut of("xNES", 6), N_GENERATIONS, flat);
     let drifted = drifted.expect("the deviations of xNES grow without bound");
     assert!(drifted.n_generations >= 100 && drifted.deviation > 1e6, "{drifted}");
-    assert!(remarks.iter().any(|it| it.contains("it is drawn at random")), "{remarks:?}");
+    assert!(remarks.iter().any(|remark| remark.contains("it is drawn at random")), "{remarks:?}");
     // The same deviations with fitness that tells individuals apart are no reason to end it.
     let mut wide = of("xNES", 6);
     for generation in 0..drifted.n_generations {
@@ -146,7 +152,8 @@ fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
 #[test]
 fn a_distribution_that_shrinks_to_a_point_is_said_once() {
     let (remarks, _) = remarks(&mut of("SNES", 12), 3000, sphere);
-    let narrow = remarks.iter().filter(|it| it.contains("all individuals are alike")).count();
+    let narrow =
+        remarks.iter().filter(|remark| remark.contains("all individuals are alike")).count();
     assert_eq!(narrow, 1, "{remarks:?}");
 }
 
@@ -182,6 +189,9 @@ fn a_file_with_a_single_individual_is_taken_with_a_warning() {
         .replace(r#""population_size": 32"#, r#""population_size": 1"#);
     let (config, warnings) = ExperimentConfig::from_json(&file, "", ALGORITHMS).unwrap();
     assert_eq!(config.algorithm.population_size, 1);
-    let found: Vec<String> = warnings.iter().map(|it| format!("{it}")).collect();
-    assert!(found.iter().any(|it| it.contains("population_size: with a single")), "{found:?}");
+    let found: Vec<String> = warnings.iter().map(|warning| format!("{warning}")).collect();
+    assert!(
+        found.iter().any(|warning| warning.contains("population_size: with a single")),
+        "{found:?}"
+    );
 }

@@ -53,7 +53,8 @@ fn champion_of_a_run(seed: u64) -> Champion {
 fn champions_are_worth_what_their_judgement_says() {
     let champions: Vec<Champion> = (0..200).map(champion_of_a_run).collect();
     let errors = |of: fn(&Champion) -> f64| -> (f64, f64) {
-        let errors: Vec<f64> = champions.iter().map(|it| of(it) - worth(&it.genotype)).collect();
+        let errors: Vec<f64> =
+            champions.iter().map(|champion| of(champion) - worth(&champion.genotype)).collect();
         let HeldOut { mean, ci95, .. } = HeldOut::of(&errors, 0).unwrap();
         (mean.get(), ci95.get())
     };

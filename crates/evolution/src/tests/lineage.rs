@@ -37,7 +37,9 @@ fn genes_are_from_the_parents_that_are_named() {
             let lineage = pedigree.trace(individual);
             assert_eq!((lineage[0].generation, lineage[0].individual), (5, individual));
             assert_eq!(lineage[0].n_surviving, D);
-            assert!(lineage.iter().all(|it| it.individual != 4 || it.generation == 5));
+            assert!(
+                lineage.iter().all(|ancestor| ancestor.individual != 4 || ancestor.generation == 5)
+            );
             for ancestor in &lineage {
                 let genes = &genotypes[ancestor.generation as usize][ancestor.individual as usize];
                 let birth = ancestor.birth.as_ref().unwrap();
@@ -56,8 +58,8 @@ fn genes_are_from_the_parents_that_are_named() {
                 assert!(n_same >= ancestor.n_surviving, "{crossover}: {ancestor:?}");
             }
             for generation in 0..5 {
-                let of = lineage.iter().filter(|it| it.generation == generation);
-                assert!(of.map(|it| it.n_surviving).sum::<usize>() <= D);
+                let of = lineage.iter().filter(|ancestor| ancestor.generation == generation);
+                assert!(of.map(|ancestor| ancestor.n_surviving).sum::<usize>() <= D);
             }
         }
     }
@@ -79,6 +81,6 @@ fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
         evolution.replay(&told).unwrap();
     }
     let lineage = later.trace(8);
-    assert!(lineage.iter().all(|it| it.birth.is_some() == (it.generation == 2)));
+    assert!(lineage.iter().all(|ancestor| ancestor.birth.is_some() == (ancestor.generation == 2)));
     assert!(Setup::new("SNES", D).start().unwrap().births().is_none());
 }

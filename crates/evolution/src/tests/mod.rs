@@ -170,7 +170,7 @@ fn fitness_that_is_not_finite_ranks_last_and_is_counted() {
     let fitness = [vec![f64::NAN, 9.0], vec![1.0, 1.0], vec![f64::INFINITY, 0.0], vec![2.0, 4.0]];
     let record = evolution.tell(generation, &fitness).unwrap();
     assert_eq!(record.n_non_finite, 2);
-    let [best, mean, min] = [3.0, 2.0, 1.0].map(|it| Real::new(it).unwrap());
+    let [best, mean, min] = [3.0, 2.0, 1.0].map(|value| Real::new(value).unwrap());
     let expected = Statistics { best, mean, min, standard_deviation: min };
     assert_eq!(record.statistics, expected);
     assert_eq!(evolution.champion().unwrap().source, ChampionSource::Individual(3));
@@ -326,7 +326,7 @@ fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
     let bytes = |mean: f64, ci95: f64| [mean.to_le_bytes(), ci95.to_le_bytes()].concat();
     let replaced = |old: &[u8], new: &[u8]| {
         let mut keyframe = evolution.keyframe();
-        let places = keyframe.windows(old.len()).enumerate().filter(|(_, it)| *it == old);
+        let places = keyframe.windows(old.len()).enumerate().filter(|(_, window)| *window == old);
         let places: Vec<usize> = places.map(|(at, _)| at).collect();
         for &at in &places {
             keyframe[at..at + old.len()].copy_from_slice(new);
