@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn threads_are_shared_out_and_one_is_enough() {
         let wanted = Sizes { workers: 8, blocking: 32 };
-        let of = |granted| sizes(wanted, granted).map(|it| (it.workers, it.blocking));
+        let of = |granted| sizes(wanted, granted).map(|sizes| (sizes.workers, sizes.blocking));
         assert_eq!(of(0), None);
         assert_eq!(of(1), Some((0, 1)));
         assert_eq!(of(2), Some((0, 2)));
@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn as_many_threads_are_counted_as_there_are() {
         let (n_granted, refusal) = granted(5);
-        assert_eq!((n_granted, refusal.map(|it| it.to_string())), (5, None));
+        assert_eq!((n_granted, refusal.map(|refusal| refusal.to_string())), (5, None));
     }
 
     #[test]
