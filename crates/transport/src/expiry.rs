@@ -44,7 +44,7 @@ impl Expiries {
     /// Those that have expired at a time, or will have soon.
     pub fn near(&self, now: SystemTime) -> impl Iterator<Item = &Expiry> {
         let soon = seconds(now + NOTICE);
-        self.0.iter().filter(move |it| it.at < soon)
+        self.0.iter().filter(move |expiry| expiry.at < soon)
     }
 
     /// Logs those that will expire soon, now and every day.
@@ -125,7 +125,7 @@ mod tests {
     }
 
     fn texts(expiries: &Expiries) -> Vec<String> {
-        expiries.near(at(NOW)).map(|it| it.text(at(NOW))).collect()
+        expiries.near(at(NOW)).map(|expiry| expiry.text(at(NOW))).collect()
     }
 
     #[test]
