@@ -147,26 +147,34 @@ fn report(task: &str, n_runs: u64, run: impl Fn(u64) -> Figures + Sync) {
     let of = |value: fn(&Figures) -> f64| -> Vec<f64> {
         runs.iter().map(|(_, figures)| value(figures)).collect()
     };
-    let covered = of(|it| f64::from((it.interval[0]..=it.interval[1]).contains(&it.fresh)));
-    let normal = of(|it| f64::from((it.judged - it.fresh).abs() <= it.normal));
-    let below = of(|it| f64::from(it.fresh < it.interval[0]));
+    let covered = of(|figures| {
+        f64::from((figures.interval[0]..=figures.interval[1]).contains(&figures.fresh))
+    });
+    let normal = of(|figures| f64::from((figures.judged - figures.fresh).abs() <= figures.normal));
+    let below = of(|figures| f64::from(figures.fresh < figures.interval[0]));
     println!(
         "{task}: {n_runs} runs, {} fresh trials each",
         N_FRESH_SETS * u64::from(N_FRESH_TRIALS)
     );
-    println!("  fitness on fresh trials        {}", with_error(&of(|it| it.fresh)));
-    println!("  error of the judgement         {}", with_error(&of(|it| it.judged - it.fresh)));
-    println!("  error of the selecting mean    {}", with_error(&of(|it| it.selection - it.fresh)));
+    println!("  fitness on fresh trials        {}", with_error(&of(|figures| figures.fresh)));
+    println!(
+        "  error of the judgement         {}",
+        with_error(&of(|figures| figures.judged - figures.fresh))
+    );
+    println!(
+        "  error of the selecting mean    {}",
+        with_error(&of(|figures| figures.selection - figures.fresh))
+    );
     println!(
         "  width of the 95 % interval     {:.4}",
-        mean(&of(|it| it.interval[1] - it.interval[0]))
+        mean(&of(|figures| figures.interval[1] - figures.interval[0]))
     );
     println!("  intervals that cover           {:.1} %", 100.0 * mean(&covered));
     println!("  ... mean +- 1.96 s / sqrt(n)   {:.1} %", 100.0 * mean(&normal));
     println!("  ... that lie too high          {:.1} %", 100.0 * mean(&below));
     println!(
         "  held-out trials per run        {:.0}",
-        mean(&of(|it| it.n_selection_trials as f64))
+        mean(&of(|figures| figures.n_selection_trials as f64))
     );
 }
 

@@ -404,7 +404,8 @@ mod tests {
         /// Robots of a kind, and what one of them hears.
         fn of(&self, robot: usize) -> (&Listeners, &[Heard]) {
             let kinds = self.hearing.listeners().iter();
-            let mut robots = kinds.flat_map(|kind| kind.iter().map(move |it| (kind, it)));
+            let mut robots =
+                kinds.flat_map(|kind| kind.iter().map(move |listening| (kind, listening)));
             let found = robots.find(|(_, (listener, _))| *listener == robot);
             found.map(|(kind, (_, heard))| (kind, heard)).expect("it listens")
         }
@@ -485,7 +486,8 @@ mod tests {
         let listener = Antenna { emits_within: None, ..ANTENNA };
         let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0), (510.0, 500.0, 0.0)];
         let scene = scene(&[beacon, ANTENNA, listener], &robots);
-        let n_listeners: usize = scene.hearing.listeners().iter().map(|it| it.iter().count()).sum();
+        let n_listeners: usize =
+            scene.hearing.listeners().iter().map(|kind| kind.iter().count()).sum();
         assert_eq!(n_listeners, 2);
         assert_eq!(scene.emitters(1)[2], Some(0));
         assert_eq!(scene.emitters(2), [Some(1), None, Some(0), None]);

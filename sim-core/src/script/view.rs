@@ -118,10 +118,9 @@ impl<'a> View<'a> {
 
     fn state(&mut self, object: Object, meter: &Rc<Meter>) -> Answer {
         let kept = self.kept()?;
-        match kept
-            .states
-            .binary_search_by_key(&(object.kind, object.index), |(it, _)| (it.kind, it.index))
-        {
+        match kept.states.binary_search_by_key(&(object.kind, object.index), |(object, _)| {
+            (object.kind, object.index)
+        }) {
             Ok(place) => Ok(kept.states[place].1.clone()),
             Err(place) => {
                 let state = Value::dict(meter)?;

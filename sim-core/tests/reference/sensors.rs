@@ -121,8 +121,12 @@ pub fn distance(
 /// the first; zeros where there are none.
 pub fn neighborhood(n: usize, own_idx: usize, robots: &[Robot<'_>], torus: Torus) -> Vec<f64> {
     let own = &robots[own_idx];
-    let mut others: Vec<&Robot<'_>> =
-        robots.iter().enumerate().filter(|(idx, _)| *idx != own_idx).map(|(_, it)| it).collect();
+    let mut others: Vec<&Robot<'_>> = robots
+        .iter()
+        .enumerate()
+        .filter(|(idx, _)| *idx != own_idx)
+        .map(|(_, robot)| robot)
+        .collect();
     // Stable: ties keep their order.
     others.sort_by(|a, b| {
         let [a, b] = [a, b].map(|robot| torus.distance(own.position, robot.position));
