@@ -59,10 +59,13 @@ impl Situation {
             has_workers: activity.n_workers > 0,
             has_workers_available: activity.n_workers_available > 0,
             has_workers_of_others: activity.n_workers_of_others > 0,
-            withheld: withheld.map(|it| (it.name.clone(), it.reason.clone())).collect(),
+            withheld: withheld.map(|worker| (worker.name.clone(), worker.reason.clone())).collect(),
             has_store_trouble: store_trouble.is_some(),
             is_short_of_memory: shortage.is_some(),
-            has_referee_trouble: activity.questions.iter().any(|it| it.trouble.is_some()),
+            has_referee_trouble: activity
+                .questions
+                .iter()
+                .any(|question| question.trouble.is_some()),
             stage: Stage::of(explanation),
         }
     }

@@ -207,7 +207,8 @@ fn learn(
     generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
 ) -> Result<UpdatedEvolution, EvolutionError> {
-    let learnt = evolution.learn(generation, &evaluated.values, |it| completion(config, it))?;
+    let learnt =
+        evolution.learn(generation, &evaluated.values, |summary| completion(config, summary))?;
     let Learnt { summary, notices: remarks, completed } = learnt;
     let generation = GenerationRecord {
         generation: summary.generation,

@@ -110,7 +110,7 @@ impl http_body::Body for Pieces {
     /// A refusal is in the headers of an answer: clients take no frame after them.
     fn is_end_stream(&self) -> bool {
         let shared = lock(&self.unread);
-        shared.as_ref().is_some_and(|it| it.rest.is_empty() && it.body.is_end_stream())
+        shared.as_ref().is_some_and(|unread| unread.rest.is_empty() && unread.body.is_end_stream())
     }
 }
 
@@ -120,12 +120,12 @@ async fn watch(unread: Weak<Shared>) {
         let due = {
             let Some(unread) = unread.upgrade() else { return };
             let mut shared = lock(&unread);
-            let Some(it) = &mut *shared else { return };
-            if it.rest.is_empty() {
-                it.is_watched = false;
+            let Some(answer) = &mut *shared else { return };
+            if answer.rest.is_empty() {
+                answer.is_watched = false;
                 return;
             }
-            let due = it.taken + WATCH_PATIENCE;
+            let due = answer.taken + WATCH_PATIENCE;
             if due <= Instant::now() {
                 *shared = None;
                 return;

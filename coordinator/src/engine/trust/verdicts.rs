@@ -114,8 +114,10 @@ impl Engine {
         let names: BTreeSet<&str> = reporters.iter().map(|party| &*party.name).collect();
         let ids: BTreeSet<WorkerId> = reporters.iter().map(|party| party.id).collect();
         let work = &self.jobs[&job];
-        let trusted =
-            self.workers.iter().filter(|(_, it)| it.quarantined.is_none() && it.takes(work));
+        let trusted = self
+            .workers
+            .iter()
+            .filter(|(_, worker)| worker.quarantined.is_none() && worker.takes(work));
         let (mut n_slots, mut n_reporting) = (0, 0);
         for (id, worker) in trusted {
             n_slots += worker.n_slots();

@@ -69,7 +69,8 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         }
         drop(database);
         let inspection = inspect(directory.path()).unwrap();
-        let is_found = inspection.findings.iter().any(|it| it.experiment == Some(RUNNING));
+        let is_found =
+            inspection.findings.iter().any(|finding| finding.experiment == Some(RUNNING));
         let coordinator = Store::open(directory.path()).map(|store| goes_on(&store, RUNNING));
         let goes_on_here = coordinator.unwrap_or(false);
         assert!(goes_on_here || is_found, "{sql}: only the coordinator says that it is damaged");
@@ -104,7 +105,8 @@ fn a_damaged_experiment_takes_no_other_ones_backup() {
     let Backup::Made(inspection) = backup(directory.path(), &to).unwrap() else {
         panic!("there is no copy")
     };
-    let damaged: Vec<_> = inspection.findings.iter().filter_map(|it| it.experiment).collect();
+    let damaged: Vec<_> =
+        inspection.findings.iter().filter_map(|finding| finding.experiment).collect();
     assert_eq!(damaged, [ExperimentId(1)]);
     let copy = Store::open(&to).unwrap();
     assert_eq!(copy.experiments(&Wanted::default()).unwrap().len(), 4);
