@@ -60,7 +60,8 @@ impl Subject {
             experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
         let individual = shared.archive.individual(address).await?;
         let found = shared.archive.experiment(experiment).await?;
-        let simulation = found.experiment.map(|it| it.simulation).unwrap_or_default();
+        let simulation =
+            found.experiment.map(|experiment| experiment.simulation).unwrap_or_default();
         if simulation != FINGERPRINT {
             let why =
                 format!("it was computed with \"{simulation}\", and this is \"{FINGERPRINT}\"");
