@@ -65,7 +65,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|it| it["claim"].as_str().unwrap())
+        .map(|proof| proof["claim"].as_str().unwrap())
         .collect();
     assert_eq!(claims, ["experiment", "chain", "history", "keyframes", "champion", "simulation"]);
     let of_fork = swarmctl(["verify", fork.to_str().unwrap()]).expect_success().json();
@@ -78,15 +78,18 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     assert_eq!(import(&file).expect_success().json(), imported, "it is there already");
     import(&fork).expect_success();
     for id in ["1", "2"] {
-        let history =
-            |it: &CoordinatorProcess| it.swarmctl(&["history", id]).expect_success().json();
+        let history = |coordinator: &CoordinatorProcess| {
+            coordinator.swarmctl(&["history", id]).expect_success().json()
+        };
         assert_eq!(history(&elsewhere), history(&here));
-        let champion =
-            |it: &CoordinatorProcess| it.swarmctl(&["individual", id]).expect_success().json();
+        let champion = |coordinator: &CoordinatorProcess| {
+            coordinator.swarmctl(&["individual", id]).expect_success().json()
+        };
         assert_eq!(champion(&elsewhere), champion(&here));
     }
-    let individual =
-        |it: &CoordinatorProcess| it.swarmctl(&["individual", "1@2/7"]).expect_success().json();
+    let individual = |coordinator: &CoordinatorProcess| {
+        coordinator.swarmctl(&["individual", "1@2/7"]).expect_success().json()
+    };
     assert_eq!(individual(&elsewhere), individual(&here));
     let again = directory.path().join("again.zip");
     export(&elsewhere, 1, &again);
@@ -180,10 +183,10 @@ fn tensorboard_reads_the_history() {
         .expect_success();
     let bundle = bundle::Bundle::read(&fs::read(bundle).unwrap()).unwrap();
     for (tag, value) in [
-        ("fitness/best", (|it| it.best.get()) as fn(&evolution::Statistics) -> f64),
-        ("fitness/mean", |it| it.mean.get()),
-        ("fitness/min", |it| it.min.get()),
-        ("fitness/standard_deviation", |it| it.standard_deviation.get()),
+        ("fitness/best", (|statistics| statistics.best.get()) as fn(&evolution::Statistics) -> f64),
+        ("fitness/mean", |statistics| statistics.mean.get()),
+        ("fitness/min", |statistics| statistics.min.get()),
+        ("fitness/standard_deviation", |statistics| statistics.standard_deviation.get()),
     ] {
         let scalars = found[tag].as_array().unwrap_or_else(|| panic!("{tag}: {found}"));
         assert_eq!(scalars.len(), 3, "{tag}");

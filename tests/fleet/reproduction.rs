@@ -325,8 +325,10 @@ fn algorithms_are_compared_on_the_same_budget() {
     command.args(["--algorithms", "GA", "openaiES"]);
     Outcome::of(&mut command).expect_success();
     let runs = path("results/algorithms/quickstart");
-    let mut files: Vec<String> =
-        fs::read_dir(runs).unwrap().map(|it| it.unwrap().path().to_str().unwrap().into()).collect();
+    let mut files: Vec<String> = fs::read_dir(runs)
+        .unwrap()
+        .map(|entry| entry.unwrap().path().to_str().unwrap().into())
+        .collect();
     files.sort();
     assert_eq!(files.len(), 8, "{files:?}");
     let args = ["compare".to_owned()].into_iter().chain(files);
