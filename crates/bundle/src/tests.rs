@@ -28,8 +28,9 @@ fn config() -> ExperimentConfig {
 
 fn simulated(simulation: &Simulation, batch: &Batch) -> Vec<Vec<f64>> {
     let n_trials = batch.trial_fitness[0].len() as u32;
-    let of = |genes: &Vec<f64>| simulation.evaluate(genes, batch.trial_set, 0..n_trials).unwrap();
-    batch.genotypes.iter().map(of).collect()
+    let fitness =
+        |genes: &Vec<f64>| simulation.evaluate(genes, batch.trial_set, 0..n_trials).unwrap();
+    batch.genotypes.iter().map(fitness).collect()
 }
 
 /// A run to its end; `change`: what is told instead of the fitness of a generation.
@@ -49,8 +50,8 @@ fn evolved(
     while evolution.n_generations() < algorithm.generations {
         let generation = evolution.n_generations();
         let evaluate = |set: sim_core::TrialSet, genotypes: &[Vec<f64>], n_trials| {
-            let of = |genes: &Vec<f64>| simulation.evaluate(genes, set, 0..n_trials).unwrap();
-            genotypes.iter().map(of).collect::<Vec<_>>()
+            let fitness = |genes: &Vec<f64>| simulation.evaluate(genes, set, 0..n_trials).unwrap();
+            genotypes.iter().map(fitness).collect::<Vec<_>>()
         };
         let asked = evolution.ask();
         let mut fitness = evaluate(generation.into(), &asked.genotypes, algorithm.num_evaluations);
