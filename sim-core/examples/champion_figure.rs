@@ -118,7 +118,7 @@ fn run(
     Figures {
         judged: judged.mean.get(),
         interval: [judged.low.get(), judged.high.get()],
-        normal: HeldOut::of(&fitness[0], 0).expect("fitness is finite").ci95.get(),
+        normal: HeldOut::from_values(&fitness[0], 0).expect("fitness is finite").ci95.get(),
         selection: champion.held_out.expect("it was compared").mean.get(),
         fresh: mean(&fresh),
         n_selection_trials,

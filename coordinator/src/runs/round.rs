@@ -220,7 +220,7 @@ fn learn(
         idle_share: evaluated.idle_share,
     };
     let notices = [evaluated.notices.clone(), remarks].concat();
-    let told = Told::of(evaluated.values.clone());
+    let told = Told::from_fitness(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 

@@ -152,7 +152,7 @@ mod tests {
 
         let latest = GenerationRecord {
             generation: 0,
-            statistics: Statistics::of(&[0.0]),
+            statistics: Statistics::from_fitness(&[0.0]),
             digest: sound.config_digest.clone(),
             duration_ms: 1,
             episodes: 1,

@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
         let digest = Digest::default();
-        let statistics = Statistics::of(&[1.0, 0.0]);
+        let statistics = Statistics::from_fitness(&[1.0, 0.0]);
         let row = GenerationRow {
             statistics,
             episodes: 1,

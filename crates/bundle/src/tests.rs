@@ -56,7 +56,7 @@ fn evolved(
         let asked = evolution.ask();
         let mut fitness = evaluate(generation.into(), &asked.genotypes, algorithm.num_evaluations);
         change(generation, &mut fitness);
-        let mut told = Told::of(fitness);
+        let mut told = Told::from_fitness(fitness);
         let summary = evolution.tell(asked, &told.trial_fitness).unwrap();
         if evolution.n_generations().is_multiple_of(algorithm.champion_every) {
             let mut round = evolution.reevaluation().unwrap();

@@ -43,7 +43,7 @@ pub struct Birth {
 
 impl Birth {
     /// Of an individual with these genes; `parent`: the genes of a rank.
-    pub(crate) fn of<'a>(
+    pub(crate) fn new<'a>(
         parents: Parents,
         genes: &[f64],
         parent: impl Fn(usize) -> &'a Genotype,

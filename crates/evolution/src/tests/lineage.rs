@@ -19,7 +19,8 @@ fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
     for _ in 0..n_generations {
         let asked = evolution.ask();
         let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
-        let mut told = Told::of(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
+        let mut told =
+            Told::from_fitness(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
         // Whoever's fitness is not finite is nobody's parent.
         told.trial_fitness[4][0] = f64::NAN;
         genotypes.push(asked.genotypes);
@@ -74,7 +75,7 @@ fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
     let mut later = Pedigree::starting_at(1);
     for generation in 0..3 {
         let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
-        let told = Told::of(evaluate(&evolution.ask().genotypes));
+        let told = Told::from_fitness(evaluate(&evolution.ask().genotypes));
         if generation > 0 {
             later.push(births, &told);
         }
