@@ -104,7 +104,7 @@ impl ParameterCoverage {
     }
 
     /// Whether a value is covered.
-    pub fn of(&mut self, parameter: Parameter) -> &mut bool {
+    pub fn flag_mut(&mut self, parameter: Parameter) -> &mut bool {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
             Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],

@@ -32,7 +32,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub fn of(object: Object) -> Self {
+    pub fn of_object(object: Object) -> Self {
         match object.kind {
             1 => Self::Robot,
             2 => Self::Light,
@@ -150,7 +150,7 @@ impl<'a> View<'a> {
 
     fn position(&self, object: Object) -> Result<Vec2, String> {
         let number = object.index as usize;
-        match Kind::of(object) {
+        match Kind::of_object(object) {
             Kind::World => Err("the world has no position; `world.center` has".into()),
             Kind::Robot => Ok(self.swarm.positions[number]),
             Kind::Light => Ok(self.lights[number]),
@@ -177,7 +177,7 @@ impl<'a> View<'a> {
 
     /// The lights or areas that a thing is one of.
     fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
-        let groups = match Kind::of(object) {
+        let groups = match Kind::of_object(object) {
             Kind::Light => &self.world.lights,
             _ => &self.world.areas,
         };
@@ -267,7 +267,7 @@ impl<'a> View<'a> {
     fn own_stream(&mut self, object: Object) -> Result<&mut Stream, String> {
         match &mut self.may {
             May::Act { robot, stream, .. } | May::Sense { robot, stream }
-                if Kind::of(object) == Kind::Robot && *robot == object.index as usize =>
+                if Kind::of_object(object) == Kind::Robot && *robot == object.index as usize =>
             {
                 Ok(stream)
             }
@@ -340,7 +340,7 @@ impl<'a> View<'a> {
         arguments: &[Value],
         meter: &Rc<Meter>,
     ) -> Answer {
-        let kind = Kind::of(object);
+        let kind = Kind::of_object(object);
         let itself = Value::Object(object);
         match (name, arguments) {
             (Named::Distance | Named::Way, [other]) => {
@@ -369,7 +369,7 @@ impl Host for View<'_> {
     }
 
     fn get(&mut self, object: Object, name: Name, meter: &Rc<Meter>) -> Answer {
-        let kind = Kind::of(object);
+        let kind = Kind::of_object(object);
         match (Named::numbered(name), kind) {
             (Named::State, _) => self.state(object, meter),
             (name, Kind::World) => self.of_world(name, meter),
@@ -401,7 +401,7 @@ impl Host for View<'_> {
         meter: &Rc<Meter>,
     ) -> Answer {
         let name = Named::numbered(name);
-        match Kind::of(object) {
+        match Kind::of_object(object) {
             Kind::World => self.call_world(name, arguments, meter),
             _ => self.call_thing(object, name, arguments, meter),
         }

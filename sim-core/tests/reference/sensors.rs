@@ -132,8 +132,8 @@ pub fn neighborhood(n: usize, own_idx: usize, robots: &[Robot<'_>], torus: Torus
         let [a, b] = [a, b].map(|robot| torus.distance(own.position, robot.position));
         a.total_cmp(&b)
     });
-    let of = |robot: &&Robot<'_>| [robot.position[0], robot.position[1], robot.heading];
-    let mut reading: Vec<f64> = others.iter().take(n).flat_map(of).collect();
+    let pose = |robot: &&Robot<'_>| [robot.position[0], robot.position[1], robot.heading];
+    let mut reading: Vec<f64> = others.iter().take(n).flat_map(pose).collect();
     reading.resize(3 * n, 0.0);
     reading
 }

@@ -125,7 +125,7 @@ impl Receptors {
             for (receptor, (incoming, (gain, reversal))) in
                 self.incoming.iter().zip(self.drives).enumerate()
             {
-                let synapses = incoming.of(neuron);
+                let synapses = incoming.synapses_of(neuron);
                 if synapses.is_empty() {
                     continue;
                 }
