@@ -80,8 +80,8 @@ fn measure(algorithm: &str, n_generations: u64) {
         if evolution.n_generations().is_multiple_of(champion_every) {
             let mut round = evolution.reevaluation().expect("there are candidates");
             while !round.is_over() {
-                let of = |genes: &Vec<f64>| (0..50).map(|trial| genes[trial]).collect();
-                round.learn(&round.genotypes().iter().map(of).collect::<Vec<_>>());
+                let trial_fitness = |genes: &Vec<f64>| (0..50).map(|trial| genes[trial]).collect();
+                round.learn(&round.genotypes().iter().map(trial_fitness).collect::<Vec<_>>());
             }
             evolution.set_champion(&round);
             told.blocks = round.blocks().to_vec();

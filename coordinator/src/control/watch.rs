@@ -50,7 +50,7 @@ enum Stage {
 }
 
 impl Situation {
-    fn of(explanation: &Explanation) -> Self {
+    fn from_explanation(explanation: &Explanation) -> Self {
         let Explanation { experiment, activity, shortage, store_trouble, .. } = explanation;
         let withheld = activity.withheld.iter();
         Self {
@@ -66,13 +66,13 @@ impl Situation {
                 .questions
                 .iter()
                 .any(|question| question.trouble.is_some()),
-            stage: Stage::of(explanation),
+            stage: Stage::from_explanation(explanation),
         }
     }
 }
 
 impl Stage {
-    fn of(Explanation { activity, .. }: &Explanation) -> Self {
+    fn from_explanation(Explanation { activity, .. }: &Explanation) -> Self {
         let Some(batch) = &activity.batch else { return Self::None };
         let is_long = batch.held.iter().any(|held| held.held_for >= LONG);
         match (batch.n_items_queued, batch.held.is_empty()) {
@@ -122,7 +122,7 @@ impl Control {
         let mut explanation = first;
         let mut known = None;
         loop {
-            let situation = Situation::of(&explanation);
+            let situation = Situation::from_explanation(&explanation);
             let has_ended = !situation.state.is_unfinished();
             if known.as_ref() != Some(&situation) {
                 if outbox.send_timeout(Ok(explanation), WATCH_PATIENCE).await.is_err() {

@@ -53,7 +53,7 @@ impl Default for Outflow {
 
 impl Outflow {
     /// The same answer in pieces, if there is room for it.
-    pub fn of(&self, body: Body) -> Body {
+    pub fn wrap(&self, body: Body) -> Body {
         let (rest, taken) = (Bytes::new(), Instant::now());
         let unread = Unread { body, rest, place: None, taken, is_watched: false };
         let unread = Arc::new(Mutex::new(Some(unread)));
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     fn answer(outflow: &Outflow, len: usize) -> Body {
-        outflow.of(Body::new(Full::new(Bytes::from(vec![7; len]))))
+        outflow.wrap(Body::new(Full::new(Bytes::from(vec![7; len]))))
     }
 
     async fn piece(body: &mut Body) -> Result<usize, Status> {
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn an_answer_without_a_message_has_no_frame() {
         use http_body::Body as _;
-        assert!(Outflow::default().of(Body::empty()).is_end_stream());
+        assert!(Outflow::default().wrap(Body::empty()).is_end_stream());
         assert!(!answer(&Outflow::default(), 1).is_end_stream());
     }
 

@@ -128,7 +128,7 @@ fn a_champion_whose_interval_older_versions_could_not_compute_is_read() {
         held_out: Some(HeldOut { mean: one, ci95: one, n_trials: 2, generation: 0 }),
         judged: Some(Judged { mean: one, low: one, high: one, n_trials: 2, generation: 0 }),
     };
-    let sealer = super::super::seals::Sealer::of(store.connection()).unwrap();
+    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
     for nan in [f64::NAN, -f64::NAN] {
         let transaction = store.connection().unchecked_transaction().unwrap();
         super::super::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
@@ -180,7 +180,7 @@ fn a_list_that_could_not_be_read_again_is_not_stored() {
         held_out: None,
         judged: None,
     };
-    let sealer = super::super::seals::Sealer::of(store.connection()).unwrap();
+    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
     let transaction = store.connection().unchecked_transaction().unwrap();
     let put = super::super::champions::put(&transaction, &sealer, RUNNING, &champion, None, "");
     assert!(put.unwrap_err().to_string().contains("not finite"));
