@@ -63,7 +63,7 @@ impl Evolution {
         let what = format!("an evolution of {population_size} genotypes of {n_genes} genes");
         memory::ensure(bytes, &what)?;
         let evolution = setup.start().map_err(refused)?;
-        Ok(Self::of(evolution))
+        Ok(Self::wrap(evolution))
     }
 
     /// From what `to_json` has given.
@@ -72,7 +72,7 @@ impl Evolution {
         let evolution = serde_json::from_str(text).map_err(|error| {
             PyValueError::new_err(format!("not the state of an evolution: {error}"))
         })?;
-        Ok(Self::of(evolution))
+        Ok(Self::wrap(evolution))
     }
 
     /// The state.
@@ -219,7 +219,7 @@ impl Evolution {
 
 impl Evolution {
     /// One that Python has as its own.
-    pub fn of(evolution: evolution::Evolution) -> Self {
+    pub fn wrap(evolution: evolution::Evolution) -> Self {
         Self(Shared::new(State { evolution, asked: None }))
     }
 
@@ -231,7 +231,7 @@ impl Evolution {
     /// As the coordinator's of the same file.
     pub fn of_experiment(config: &ExperimentConfig, simulation: &Simulation) -> Self {
         let segments = simulation.population_segments();
-        Self::of(evolution::Evolution::new(config, segments, FINGERPRINT))
+        Self::wrap(evolution::Evolution::new(config, segments, FINGERPRINT))
     }
 }
 

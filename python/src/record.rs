@@ -49,7 +49,7 @@ impl Record {
 
     /// Evolution after the latest generation.
     fn evolution(&self, py: Python<'_>) -> PyResult<Evolution> {
-        Ok(Evolution::of(self.ask(py, |run| run.evolution())?))
+        Ok(Evolution::wrap(self.ask(py, |run| run.evolution())?))
     }
 
     /// The champion so far.
