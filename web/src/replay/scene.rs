@@ -87,9 +87,9 @@ impl Scene {
         let n_inputs =
             |robots: &Robots| robots.stimuli.iter().map(|stimulus| stimulus.n as usize).sum();
         let message_len = config.robots().filter_map(|(_, robot)| message_len(robot)).max();
-        let discs = |of: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
+        let discs = |properties: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
             let objects = config.world.objects.iter();
-            let kinds = objects.filter_map(|(name, object)| Some((name, of(object)?)));
+            let kinds = objects.filter_map(|(name, object)| Some((name, properties(object)?)));
             let each = kinds.flat_map(|(name, (n, range, color))| {
                 (0..n).map(move |_| Disc { name: name.clone(), color: color.into(), range })
             });

@@ -57,7 +57,7 @@ impl LatestAnswer {
 pub struct Explanations(Mutex<BTreeMap<u64, Arc<LatestAnswer>>>);
 
 impl Explanations {
-    async fn of(&self, id: u64) -> Arc<LatestAnswer> {
+    async fn latest(&self, id: u64) -> Arc<LatestAnswer> {
         let mut known = self.0.lock().await;
         if known.len() >= EXPLANATIONS_MAX {
             known.clear();
@@ -97,7 +97,7 @@ pub async fn explain(
     Path(id): Path<u64>,
 ) -> Result<Response, Problem> {
     let control = control(&shared)?;
-    let latest = shared.explanations.of(id).await;
+    let latest = shared.explanations.latest(id).await;
     latest.get(async { Ok(explanation(control.explain(id).await?)) }).await
 }
 

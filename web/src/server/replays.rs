@@ -35,7 +35,7 @@ type Judgement = Arc<OnceCell<Trials>>;
 const JUDGEMENTS_MAX: usize = 64;
 
 impl Judgements {
-    async fn of(&self, experiment: u64, generation: u64) -> Judgement {
+    async fn of_generation(&self, experiment: u64, generation: u64) -> Judgement {
         let mut known = self.0.lock().await;
         if known.len() >= JUDGEMENTS_MAX {
             known.clear();
@@ -87,7 +87,7 @@ impl Subject {
         let Some(judged) = judged.filter(|judged| judged.trials > 0) else {
             return Ok(Trials::of_generation(*generation, trial_fitness.clone()));
         };
-        let known = shared.judgements.of(self.experiment, judged.generation).await;
+        let known = shared.judgements.of_generation(self.experiment, judged.generation).await;
         let subject = self.clone();
         let trials = known.get_or_try_init(|| {
             work(shared, move |keep_going| {
