@@ -176,7 +176,7 @@ fn tensorboard_reads_the_history() {
     swarmctl(args).expect_success();
     let run = logs.join("leader_selection_snes-1");
     let mut reader = Command::new(python);
-    let found = Outcome::of(reader.args(["-c", READ_EVENTS]).arg(run)).expect_success();
+    let found = Outcome::of_command(reader.args(["-c", READ_EVENTS]).arg(run)).expect_success();
     let found: Value = serde_json::from_str(&found.stdout).unwrap();
     let bundle = directory.path().join("run.zip");
     swarmctl(["export", "1", "--to", bundle.to_str().unwrap(), "--data-dir", data_dir])
@@ -211,7 +211,8 @@ fn a_bundle_is_an_ro_crate_to_an_independent_reader() {
     let file = directory.path().join("run.zip");
     let file = file.to_str().unwrap();
     swarmctl(["export", "1", "--to", file, "--data-dir", data_dir]).expect_success();
-    let found = Outcome::of(Command::new(python).args(["-c", READ_CRATE, file])).expect_success();
+    let found =
+        Outcome::of_command(Command::new(python).args(["-c", READ_CRATE, file])).expect_success();
     let found: Value = serde_json::from_str(&found.stdout).unwrap();
     assert_eq!(found["version"], "1.3");
     assert_eq!(found["root"]["name"], "leader_selection_snes, seed 7");
