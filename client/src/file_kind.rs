@@ -103,8 +103,9 @@ impl Kind {
             head.get(..start.len()).is_some_and(|head| head.eq_ignore_ascii_case(start))
         };
         let known = BEGINNINGS.iter().find(|(start, _)| begins(start));
-        let table = || TABLES.iter().find(|(start, _)| begins(start.as_bytes())).map(|it| it.1);
-        known.map(|it| it.1).or_else(table).or_else(|| Self::of_json(path))
+        let table =
+            || TABLES.iter().find(|(start, _)| begins(start.as_bytes())).map(|(_, kind)| *kind);
+        known.map(|(_, kind)| *kind).or_else(table).or_else(|| Self::of_json(path))
     }
 
     fn of_json(path: &Path) -> Option<Self> {
@@ -116,7 +117,7 @@ impl Kind {
             }
             Value::Object(file) => {
                 let has = |keys: &&[&str]| keys.iter().all(|key| file.contains_key(*key));
-                OBJECTS.iter().find(|(keys, _)| has(keys)).map(|it| it.1)
+                OBJECTS.iter().find(|(keys, _)| has(keys)).map(|(_, kind)| *kind)
             }
             _ => None,
         }
@@ -154,7 +155,7 @@ impl Kind {
             format!("take it with: {}", shell_command(words))
         };
         let directory = || {
-            let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
+            let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
             directory.unwrap_or(Path::new(".")).to_string_lossy().into_owned()
         };
         match self {

@@ -97,7 +97,9 @@ impl Summary {
                 name: condition.name.clone(),
                 config_digest: Digest::of_config(&condition.config, sim_core::FINGERPRINT)
                     .to_string(),
-                changes: changes.map(|it| (it.path.clone(), it.value.clone())).collect(),
+                changes: changes
+                    .map(|change| (change.path.clone(), change.value.clone()))
+                    .collect(),
                 robots: condition.n_robots(),
                 fitness: Estimate::of(&fitness, false).expect("there are trials"),
                 metrics: metrics(measured),

@@ -37,9 +37,9 @@ impl Origin {
     /// That of an experiment's genotypes; none if its coordinator does not say.
     pub fn of_experiment(experiment: &Experiment) -> Option<Self> {
         let Experiment { config_digest, name, seed, simulation, .. } = experiment.clone();
-        let simulation = Some(simulation).filter(|it| !it.is_empty());
+        let simulation = Some(simulation).filter(|simulation| !simulation.is_empty());
         let origin = Self { config_digest, name, seed: Some(Seed(seed)), simulation };
-        Some(origin).filter(|it| !it.config_digest.is_empty())
+        Some(origin).filter(|origin| !origin.config_digest.is_empty())
     }
 
     /// Refuses an experiment file, as it is and with the genotype's seed, that is another
