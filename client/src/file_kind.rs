@@ -80,7 +80,7 @@ const OBJECTS: [(&[&str], Kind); 9] = [
 
 impl Kind {
     /// What there is at a path; none if it is nothing of this program.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn of_path(path: &Path) -> Option<Self> {
         if is_stdin(path) {
             return None;
         }
@@ -189,7 +189,7 @@ impl Kind {
 /// Says that a file is of another kind than those that are expected; no error if it is one of
 /// them, or of no kind that is known. `expected`: "an experiment file".
 pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String> {
-    match Kind::of(path).filter(|kind| !kinds.contains(kind)) {
+    match Kind::of_path(path).filter(|kind| !kinds.contains(kind)) {
         None => Ok(()),
         Some(kind) => Err(format!(
             "it is {}, and {expected} is expected here; {}",
@@ -202,7 +202,7 @@ pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String>
 /// What a word of the command line is, if it names a file.
 pub fn of_word(word: &str) -> Option<String> {
     let path = Path::new(word);
-    let kind = Kind::of(path)?;
+    let kind = Kind::of_path(path)?;
     Some(format!("`{word}` is {}; {}", kind.name(), kind.next_step(path)))
 }
 
@@ -229,12 +229,12 @@ mod tests {
             ("", None),
         ] {
             fs::write(&path, content).unwrap();
-            assert_eq!(Kind::of(&path), kind, "{content}");
+            assert_eq!(Kind::of_path(&path), kind, "{content}");
         }
-        assert_eq!(Kind::of(&quickstart()), Some(Kind::Experiment));
-        assert_eq!(Kind::of(directory.path()), None);
-        assert_eq!(Kind::of("-".as_ref()), None);
-        assert_eq!(Kind::of("/dev/zero".as_ref()), None);
+        assert_eq!(Kind::of_path(&quickstart()), Some(Kind::Experiment));
+        assert_eq!(Kind::of_path(directory.path()), None);
+        assert_eq!(Kind::of_path("-".as_ref()), None);
+        assert_eq!(Kind::of_path("/dev/zero".as_ref()), None);
     }
 
     #[test]

@@ -113,7 +113,7 @@ async fn remote(
     if args.local {
         return Ok(None);
     }
-    match Place::of(settings).await? {
+    match Place::find(settings).await? {
         Place::Directory { .. } => {
             progress.remark("computing in this process, as with --local");
             Ok(None)

@@ -27,7 +27,7 @@ pub struct Origin {
 
 impl Origin {
     /// What a file with a genotype says of it; none if it says nothing, as a list of genes.
-    pub fn of(file: &Value) -> Result<Option<Self>, serde_json::Error> {
+    pub fn of_file(file: &Value) -> Result<Option<Self>, serde_json::Error> {
         match file.get("config_digest") {
             None | Some(Value::Null) => Ok(None),
             Some(_) => Self::deserialize(file).map(Some),
@@ -98,7 +98,7 @@ mod tests {
     }
 
     fn check(champion: &Value, file: &Path, changed: ChangedArg) -> Result<(), String> {
-        let origin = Origin::of(champion).unwrap().unwrap();
+        let origin = Origin::of_file(champion).unwrap().unwrap();
         let file = ExperimentFile::read(file).unwrap();
         origin.check("c.json", &file, changed).map_err(|error| error.to_string())
     }
@@ -134,8 +134,8 @@ mod tests {
     #[test]
     fn a_list_of_genes_says_nothing_of_its_experiment() {
         for genes in [json!([0.5]), json!({"genotype": [0.5]}), json!({"config_digest": null})] {
-            assert_eq!(Origin::of(&genes).unwrap(), None);
+            assert_eq!(Origin::of_file(&genes).unwrap(), None);
         }
-        assert!(Origin::of(&json!({"config_digest": 3})).is_err());
+        assert!(Origin::of_file(&json!({"config_digest": 3})).is_err());
     }
 }
