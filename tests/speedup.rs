@@ -29,7 +29,7 @@ fn main() {
 
     let mut rounds: Vec<(f64, f64)> = (0..N_ROUNDS as u64)
         .map(|seed| {
-            let file = Experiment::of(serde_json::from_str(&text).expect("valid JSON"));
+            let file = Experiment::from_value(serde_json::from_str(&text).expect("valid JSON"));
             let file = file.edit(|file| {
                 file["seed"] = json!(seed);
                 file["algorithm"]["generations"] = json!(N_TIMED_GENERATIONS + 1);

@@ -15,7 +15,7 @@ pub struct NamedAddress {
 
 impl NamedAddress {
     /// The address in the experiment of that number.
-    pub fn of(&self, experiment_id: u64) -> Address {
+    pub fn in_experiment(&self, experiment_id: u64) -> Address {
         Address { experiment: ExperimentId(experiment_id), who: self.who }
     }
 }
@@ -45,7 +45,7 @@ impl FromStr for NamedAddress {
 impl fmt::Display for NamedAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // The number is the first part.
-        let numbered = self.of(0).to_string();
+        let numbered = self.in_experiment(0).to_string();
         write!(f, "{}{}", self.experiment, &numbered[1..])
     }
 }

@@ -119,7 +119,9 @@ impl Change {
             let with = |changes: &Vec<Self>, change: &Self| {
                 changes.iter().chain([change]).cloned().collect()
             };
-            all.iter().flat_map(|it| axis.iter().map(move |change| with(it, change))).collect()
+            all.iter()
+                .flat_map(|changes| axis.iter().map(move |change| with(changes, change)))
+                .collect()
         }))
     }
 
@@ -149,7 +151,7 @@ impl Change {
         for (i, key) in keys[..keys.len() - 1].iter().enumerate() {
             let object = place.object()?;
             let Some(inner) = object.get(*key) else {
-                let known: Vec<String> = object.keys().map(|it| format!("`{it}`")).collect();
+                let known: Vec<String> = object.keys().map(|key| format!("`{key}`")).collect();
                 let path = keys[..=i].join(".");
                 return Some((path, format!("the file has none; it has {}", known.join(", "))));
             };

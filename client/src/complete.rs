@@ -33,21 +33,27 @@ pub fn experiments(word: &OsStr) -> Vec<CompletionCandidate> {
 /// The groups that there are.
 pub fn groups(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
-    let groups = all.iter().filter(|it| !it.group.is_empty()).map(|it| it.group.clone());
+    let groups = all
+        .iter()
+        .filter(|experiment| !experiment.group.is_empty())
+        .map(|experiment| experiment.group.clone());
     offered(word, described(groups.collect(), "group"))
 }
 
 /// The labels that experiments have.
 pub fn labels(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
-    let labels = all.iter().flat_map(|it| &it.labels).map(|(key, value)| format!("{key}={value}"));
+    let labels = all
+        .iter()
+        .flat_map(|experiment| &experiment.labels)
+        .map(|(key, value)| format!("{key}={value}"));
     offered(word, described(labels.collect(), "label"))
 }
 
 /// The keys of these.
 pub fn label_keys(word: &OsStr) -> Vec<CompletionCandidate> {
     let all = all_experiments();
-    let keys = all.iter().flat_map(|it| it.labels.keys().cloned());
+    let keys = all.iter().flat_map(|experiment| experiment.labels.keys().cloned());
     offered(word, described(keys.collect(), "label"))
 }
 
@@ -55,11 +61,17 @@ pub fn label_keys(word: &OsStr) -> Vec<CompletionCandidate> {
 pub fn quarantined(word: &OsStr) -> Vec<CompletionCandidate> {
     let workers = fetched(async |connection| {
         let request = ListWorkersRequest {};
-        Some(connection.call_fleet(async |it| it.list_workers(request).await).await.ok()?.workers)
+        Some(
+            connection
+                .call_fleet(async |client| client.list_workers(request).await)
+                .await
+                .ok()?
+                .workers,
+        )
     });
     let workers = workers.unwrap_or_default().into_iter();
-    let distrusted = workers.filter(|it| !it.distrusted.is_empty());
-    offered(word, distrusted.map(|it| (it.name, it.distrusted)).collect())
+    let distrusted = workers.filter(|worker| !worker.distrusted.is_empty());
+    offered(word, distrusted.map(|worker| (worker.name, worker.distrusted)).collect())
 }
 
 /// The same, and files.
@@ -126,13 +138,18 @@ fn offered(word: &OsStr, candidates: Vec<(String, String)>) -> Vec<CompletionCan
 fn candidates(all: &[Experiment]) -> Vec<(String, String)> {
     let mut candidates: Vec<(String, String)> = all
         .iter()
-        .map(|it| (it.id.to_string(), format!("{}, {}", it.name, state_name(it.state()))))
+        .map(|experiment| {
+            (
+                experiment.id.to_string(),
+                format!("{}, {}", experiment.name, state_name(experiment.state())),
+            )
+        })
         .collect();
     let mut names: BTreeMap<&str, (bool, usize)> = BTreeMap::new();
     for experiment in all {
         names.entry(&experiment.name).or_default().1 += 1;
     }
-    for experiment in all.iter().filter(|it| !it.group.is_empty()) {
+    for experiment in all.iter().filter(|experiment| !experiment.group.is_empty()) {
         names.entry(&experiment.group).or_default().0 = true;
     }
     for (name, (is_group, n)) in names {

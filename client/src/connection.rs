@@ -93,7 +93,7 @@ impl Connection {
         intent: Intent,
         progress: &Progress,
     ) -> Result<Self, Error> {
-        let place = Place::of(settings).await?;
+        let place = Place::find(settings).await?;
         progress.found(&place);
         Self::to(place, intent).await
     }

@@ -49,8 +49,9 @@ impl Consent {
         match self.next(experiments.len(), has_people) {
             Next::Do => Ok(true),
             Next::List => {
-                let lines =
-                    experiments.iter().map(|it| format!("would {what} {}", text::state_line(it)));
+                let lines = experiments
+                    .iter()
+                    .map(|experiment| format!("would {what} {}", text::state_line(experiment)));
                 let lines: Vec<String> =
                     lines.chain([format!("nothing was done to {n}")]).collect();
                 progress.print(&if progress.is_json() {

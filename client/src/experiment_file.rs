@@ -103,7 +103,7 @@ impl ExperimentFile {
         let read = |text: &str| ExperimentConfig::from_json(text, &self.default_name(), ALGORITHMS);
         read(&self.text)?;
         let mut file = Json::parse(&plain(&self.text));
-        let missing: Vec<_> = changes.iter().filter_map(|it| it.missing(&file)).collect();
+        let missing: Vec<_> = changes.iter().filter_map(|change| change.missing(&file)).collect();
         apply_all(changes, &mut file).map_err(|problems| ConfigError {
             problems: problems.into_iter().map(unlocated).collect(),
         })?;
@@ -251,7 +251,7 @@ pub mod tests {
                 let path = entry.unwrap().path();
                 if path.is_dir() {
                     folders.push(path);
-                } else if path.extension().is_some_and(|it| it == "json") {
+                } else if path.extension().is_some_and(|extension| extension == "json") {
                     let file = ExperimentFile::read(&path).unwrap();
                     let compiled = file.compile(&Overrides::default()).unwrap();
                     assert_eq!(compiled.warnings, [], "{}", path.display());

@@ -60,11 +60,12 @@ impl Connection {
         let wanted = ListExperimentsRequest { named: name.to_owned(), ..Default::default() };
         // A coordinator of an earlier version sends others, too.
         let (members, others): (Vec<Experiment>, Vec<Experiment>) =
-            self.list(wanted).await?.into_iter().partition(|it| it.group == name);
+            self.list(wanted).await?.into_iter().partition(|experiment| experiment.group == name);
         if !members.is_empty() {
             return Ok(members);
         }
-        let named: Vec<Experiment> = others.into_iter().filter(|it| it.name == name).collect();
+        let named: Vec<Experiment> =
+            others.into_iter().filter(|experiment| experiment.name == name).collect();
         match named.len() {
             0 => Err(unknown(name, &self.experiments().await?)),
             1 => Ok(named),
@@ -89,7 +90,8 @@ fn unknown(name: &str, all: &[Experiment]) -> Error {
 
 /// The error that a name stands for several experiments where one is meant.
 fn several(name: &str, experiments: &[Experiment]) -> Error {
-    let ids: Vec<String> = experiments.iter().take(10).map(|it| it.id.to_string()).collect();
+    let ids: Vec<String> =
+        experiments.iter().take(10).map(|experiment| experiment.id.to_string()).collect();
     let more = if experiments.len() > ids.len() { ", ..." } else { "" };
     let ids = ids.join(", ");
     Error::Input(format!("`{name}` is the name of several experiments: {ids}{more}; give a number"))

@@ -311,7 +311,10 @@ impl ExperimentService for FakeCoordinator {
         request: Request<PruneExperimentRequest>,
     ) -> Result<Response<PruneExperimentResponse>, Status> {
         let experiment = self.experiment(request.into_inner().experiment_id)?;
-        if experiment.as_ref().is_some_and(|it| it.state() == ExperimentState::Running) {
+        if experiment
+            .as_ref()
+            .is_some_and(|experiment| experiment.state() == ExperimentState::Running)
+        {
             return Err(Status::failed_precondition("experiment 3 has not ended"));
         }
         Ok(Response::new(PruneExperimentResponse { experiment, freed_bytes: 5 << 20 }))
@@ -323,7 +326,7 @@ impl ExperimentService for FakeCoordinator {
     ) -> Result<Response<ExtendExperimentResponse>, Status> {
         let ExtendExperimentRequest { experiment_id, generations } = request.into_inner();
         let mut experiment = self.experiment(experiment_id)?;
-        experiment.iter_mut().for_each(|it| it.generations = generations);
+        experiment.iter_mut().for_each(|experiment| experiment.generations = generations);
         Ok(Response::new(ExtendExperimentResponse { experiment }))
     }
 

@@ -58,12 +58,12 @@ pub enum Format {
 impl Format {
     /// Refuses a file with a bad name, and one that may not be written over.
     pub fn check(path: &Path, overwrite: Overwrite) -> Result<(), Error> {
-        Self::of(path)?;
+        Self::of_path(path)?;
         overwrite.check(path)
     }
 
     /// The format that the extension of a file's name selects.
-    pub fn of(path: &Path) -> Result<Self, Error> {
+    pub fn of_path(path: &Path) -> Result<Self, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
@@ -78,7 +78,7 @@ impl Format {
 impl Figure {
     /// Writes the figure in the format that the extension of the file's name selects.
     pub fn write(&self, path: &Path, overwrite: Overwrite) -> Result<(), Error> {
-        let bytes = match Format::of(path)? {
+        let bytes = match Format::of_path(path)? {
             Format::Svg => self.to_svg()?.into_bytes(),
             Format::Png => self.to_png()?,
         };

@@ -80,7 +80,7 @@ const OBJECTS: [(&[&str], Kind); 9] = [
 
 impl Kind {
     /// What there is at a path; none if it is nothing of this program.
-    pub fn of(path: &Path) -> Option<Self> {
+    pub fn of_path(path: &Path) -> Option<Self> {
         if is_stdin(path) {
             return None;
         }
@@ -103,8 +103,9 @@ impl Kind {
             head.get(..start.len()).is_some_and(|head| head.eq_ignore_ascii_case(start))
         };
         let known = BEGINNINGS.iter().find(|(start, _)| begins(start));
-        let table = || TABLES.iter().find(|(start, _)| begins(start.as_bytes())).map(|it| it.1);
-        known.map(|it| it.1).or_else(table).or_else(|| Self::of_json(path))
+        let table =
+            || TABLES.iter().find(|(start, _)| begins(start.as_bytes())).map(|(_, kind)| *kind);
+        known.map(|(_, kind)| *kind).or_else(table).or_else(|| Self::of_json(path))
     }
 
     fn of_json(path: &Path) -> Option<Self> {
@@ -116,7 +117,7 @@ impl Kind {
             }
             Value::Object(file) => {
                 let has = |keys: &&[&str]| keys.iter().all(|key| file.contains_key(*key));
-                OBJECTS.iter().find(|(keys, _)| has(keys)).map(|it| it.1)
+                OBJECTS.iter().find(|(keys, _)| has(keys)).map(|(_, kind)| *kind)
             }
             _ => None,
         }
@@ -154,7 +155,7 @@ impl Kind {
             format!("take it with: {}", shell_command(words))
         };
         let directory = || {
-            let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
+            let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
             directory.unwrap_or(Path::new(".")).to_string_lossy().into_owned()
         };
         match self {
@@ -188,7 +189,7 @@ impl Kind {
 /// Says that a file is of another kind than those that are expected; no error if it is one of
 /// them, or of no kind that is known. `expected`: "an experiment file".
 pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String> {
-    match Kind::of(path).filter(|kind| !kinds.contains(kind)) {
+    match Kind::of_path(path).filter(|kind| !kinds.contains(kind)) {
         None => Ok(()),
         Some(kind) => Err(format!(
             "it is {}, and {expected} is expected here; {}",
@@ -201,7 +202,7 @@ pub fn expect(path: &Path, kinds: &[Kind], expected: &str) -> Result<(), String>
 /// What a word of the command line is, if it names a file.
 pub fn of_word(word: &str) -> Option<String> {
     let path = Path::new(word);
-    let kind = Kind::of(path)?;
+    let kind = Kind::of_path(path)?;
     Some(format!("`{word}` is {}; {}", kind.name(), kind.next_step(path)))
 }
 
@@ -228,12 +229,12 @@ mod tests {
             ("", None),
         ] {
             fs::write(&path, content).unwrap();
-            assert_eq!(Kind::of(&path), kind, "{content}");
+            assert_eq!(Kind::of_path(&path), kind, "{content}");
         }
-        assert_eq!(Kind::of(&quickstart()), Some(Kind::Experiment));
-        assert_eq!(Kind::of(directory.path()), None);
-        assert_eq!(Kind::of("-".as_ref()), None);
-        assert_eq!(Kind::of("/dev/zero".as_ref()), None);
+        assert_eq!(Kind::of_path(&quickstart()), Some(Kind::Experiment));
+        assert_eq!(Kind::of_path(directory.path()), None);
+        assert_eq!(Kind::of_path("-".as_ref()), None);
+        assert_eq!(Kind::of_path("/dev/zero".as_ref()), None);
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Connection {
 
     /// An address whose experiment has its number.
     pub async fn resolve(&self, address: &NamedAddress) -> Result<Address, Error> {
-        Ok(address.of(match &address.experiment {
+        Ok(address.in_experiment(match &address.experiment {
             Subject::Experiment(id) => *id,
             subject => self.one(subject).await?.id,
         }))

@@ -124,7 +124,7 @@ fn grouped(definition: &Command, width: Option<usize>) -> String {
     };
     // One list, so that all groups have columns of one width.
     let names = GROUPS.iter().flat_map(|(_, names)| *names);
-    let entries = names.filter_map(entry).enumerate().map(|(i, it)| it.display_order(i));
+    let entries = names.filter_map(entry).enumerate().map(|(i, command)| command.display_order(i));
     let mut list = Command::new("list")
         .subcommands(entries)
         .disable_help_subcommand(true)

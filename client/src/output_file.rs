@@ -241,7 +241,7 @@ pub fn unwritable(path: &Path, error: &io::Error) -> Error {
 
 /// The directory that something is in.
 fn parent(path: &Path) -> &Path {
-    path.parent().filter(|it| !it.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    path.parent().filter(|directory| !directory.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// A file beside its place, with the permissions of the one that it replaces, or of any new one.

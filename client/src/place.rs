@@ -69,7 +69,7 @@ impl Place {
     /// The place that the command line names, else the environment, else the settings file; else
     /// the coordinator at the default address if something listens there, else the default data
     /// directory if it is there.
-    pub async fn of(settings: Settings) -> Result<Self, Error> {
+    pub async fn find(settings: Settings) -> Result<Self, Error> {
         match Self::named(settings)? {
             Self::Coordinator(settings) if settings.coordinator.is_none() => {
                 if store::is_in(Path::new(DEFAULT_DATA_DIR)) && !is_answered().await {

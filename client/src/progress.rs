@@ -296,14 +296,15 @@ impl Progress {
             has_ended: false,
             durations_ms: VecDeque::new(),
         };
-        self.followed = experiments.iter().map(|it| (it.id, followed(it))).collect();
+        self.followed =
+            experiments.iter().map(|experiment| (experiment.id, followed(experiment))).collect();
         if self.has_terminal && !self.is_json() {
             let name = experiments.first().map_or("", |first| match experiments.len() {
                 1 => &first.name,
                 _ => &first.group,
             });
             let name = text::cut(&escape(name), NAME_WIDTH_MAX);
-            let length = experiments.iter().map(|it| it.generations).sum();
+            let length = experiments.iter().map(|experiment| experiment.generations).sum();
             self.show_bar(name, length, "waiting for the first generation");
         }
     }
@@ -358,7 +359,7 @@ impl Progress {
                 let parts = if is_alone {
                     [eta, fitness, String::new(), String::new()]
                 } else {
-                    let n_ended = self.followed.values().filter(|it| it.has_ended).count();
+                    let n_ended = self.followed.values().filter(|run| run.has_ended).count();
                     let ended = format!("{n_ended} of {} runs ended", self.followed.len());
                     [eta, ended, label, fitness]
                 };

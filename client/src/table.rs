@@ -174,7 +174,7 @@ impl Table {
             }
             let rank = |&(_, &i): &(usize, &usize)| self.columns[i].drop_rank;
             let Some((place, _)) =
-                shown.iter().enumerate().filter(|it| rank(it) > 0).max_by_key(rank)
+                shown.iter().enumerate().filter(|column| rank(column) > 0).max_by_key(rank)
             else {
                 return;
             };

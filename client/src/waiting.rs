@@ -76,7 +76,10 @@ pub async fn fleet(connection: &Connection, otherwise: &str) -> String {
     let impatient = connection.with_patience(Duration::ZERO);
     let request = ListWorkersRequest {};
     let listing = impatient.call_fleet(async |client| client.list_workers(request).await);
-    match timeout(ANSWER_TIME, listing).await.map(|answer| answer.map(|it| it.workers.len())) {
+    match timeout(ANSWER_TIME, listing)
+        .await
+        .map(|answer| answer.map(|response| response.workers.len()))
+    {
         Ok(Ok(0)) => format!(
             "a worker: the coordinator at {address} has none; start one with \
              `worker --coordinator {address}`; {otherwise}"

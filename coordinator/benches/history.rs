@@ -75,13 +75,13 @@ fn measure(algorithm: &str, n_generations: u64) {
             let at = |trial: usize| genes[trial] - (genes[trial + 9] - 0.3).abs();
             (0..n_trials).map(at).collect()
         };
-        let mut told = Told::of(asked.genotypes.iter().map(fitness).collect());
+        let mut told = Told::from_fitness(asked.genotypes.iter().map(fitness).collect());
         let summary = evolution.tell(asked, &told.trial_fitness).expect("all fitness is finite");
         if evolution.n_generations().is_multiple_of(champion_every) {
             let mut round = evolution.reevaluation().expect("there are candidates");
             while !round.is_over() {
-                let of = |genes: &Vec<f64>| (0..50).map(|trial| genes[trial]).collect();
-                round.learn(&round.genotypes().iter().map(of).collect::<Vec<_>>());
+                let trial_fitness = |genes: &Vec<f64>| (0..50).map(|trial| genes[trial]).collect();
+                round.learn(&round.genotypes().iter().map(trial_fitness).collect::<Vec<_>>());
             }
             evolution.set_champion(&round);
             told.blocks = round.blocks().to_vec();

@@ -86,7 +86,7 @@ fn put(store: &mut Store, new: &NewExperiment, i: usize) {
     for generation in 0..n_generations {
         let record = GenerationRecord {
             generation,
-            statistics: Statistics::of(&[0.1, 0.2]),
+            statistics: Statistics::from_fitness(&[0.1, 0.2]),
             digest: Digest::of_config(&new.config, "").to_string(),
             duration_ms: 1,
             episodes: 500,

@@ -78,7 +78,7 @@ impl AccessArgs {
 
     /// When the certificates in these files expire.
     pub fn expiries(&self) -> Expiries {
-        Expiries::of(self.tls_cert.as_deref(), self.tls_client_ca.as_deref())
+        Expiries::from_files(self.tls_cert.as_deref(), self.tls_client_ca.as_deref())
     }
 
     /// Reads the files of TLS.

@@ -131,7 +131,7 @@ impl LocalRun {
         let means: Vec<f64> = told.trial_fitness.iter().map(|trials| mean(trials)).collect();
         let generation = GenerationRecord {
             generation: evolution.n_generations().saturating_sub(1),
-            statistics: Statistics::of(&means),
+            statistics: Statistics::from_fitness(&means),
             digest: evolution.digest().to_string(),
             duration_ms: duration.as_millis() as u64,
             episodes: told.trial_fitness.iter().map(|trials| trials.len() as u64).sum(),
@@ -199,7 +199,7 @@ mod tests {
             let is_last = evolution.n_generations() == n_generations;
             let judgement = if is_last { vec![0.5, 0.25] } else { Vec::new() };
             let end = End { judgement, ..End::default() };
-            let told = Told { end, ..Told::of(fitness) };
+            let told = Told { end, ..Told::from_fitness(fitness) };
             let completed = is_last.then_some("");
             let duration = Duration::from_millis(5);
             run.commit(&Done {

@@ -83,8 +83,11 @@ fn comments() -> Vec<(String, String)> {
     let mut comments = Vec::new();
     for file in &set.file {
         let info = file.source_code_info.as_ref().unwrap();
-        let above: BTreeMap<&[i32], &str> =
-            info.location.iter().map(|it| (&*it.path, it.leading_comments())).collect();
+        let above: BTreeMap<&[i32], &str> = info
+            .location
+            .iter()
+            .map(|location| (&*location.path, location.leading_comments()))
+            .collect();
         let comment_of = |path: &[i32]| above.get(path).copied().unwrap_or_default().to_owned();
         comments.extend(elements(file).into_iter().map(|(name, path)| (name, comment_of(&path))));
     }

@@ -42,9 +42,9 @@ fn facts(set: &FileDescriptorSet) -> BTreeSet<String> {
     let mut facts = BTreeSet::new();
     for file in &set.file {
         let package = file.package();
-        file.message_type.iter().for_each(|it| add_message(&mut facts, package, it));
-        file.enum_type.iter().for_each(|it| add_enum(&mut facts, package, it));
-        file.service.iter().for_each(|it| add_service(&mut facts, package, it));
+        file.message_type.iter().for_each(|message| add_message(&mut facts, package, message));
+        file.enum_type.iter().for_each(|enumeration| add_enum(&mut facts, package, enumeration));
+        file.service.iter().for_each(|service| add_service(&mut facts, package, service));
     }
     facts
 }
@@ -68,8 +68,8 @@ fn add_message(facts: &mut BTreeSet<String>, scope: &str, message: &DescriptorPr
             field.json_name(),
         ));
     }
-    message.nested_type.iter().for_each(|it| add_message(facts, &scope, it));
-    message.enum_type.iter().for_each(|it| add_enum(facts, &scope, it));
+    message.nested_type.iter().for_each(|nested| add_message(facts, &scope, nested));
+    message.enum_type.iter().for_each(|enumeration| add_enum(facts, &scope, enumeration));
 }
 
 fn add_enum(facts: &mut BTreeSet<String>, scope: &str, enumeration: &EnumDescriptorProto) {
@@ -103,9 +103,9 @@ const HANDSHAKE: [&str; 5] = [
 /// The version that a `worker.proto` describes; none before it said so.
 fn worker_version(set: &FileDescriptorSet) -> Option<i32> {
     let mut enums = set.file.iter().flat_map(|file| &file.enum_type);
-    let version = enums.find(|it| it.name() == "ProtocolVersion")?;
+    let version = enums.find(|enumeration| enumeration.name() == "ProtocolVersion")?;
     let mut values = version.value.iter();
-    Some(values.find(|it| it.name() == "PROTOCOL_VERSION_CURRENT")?.number())
+    Some(values.find(|value| value.name() == "PROTOCOL_VERSION_CURRENT")?.number())
 }
 
 /// The files of a set with this name, or without it.
@@ -117,11 +117,12 @@ fn files(set: &FileDescriptorSet, is_in: impl Fn(&str) -> bool) -> FileDescripto
 /// What the first promises and the second does not keep.
 fn broken(promised: &FileDescriptorSet, present: &FileDescriptorSet) -> Vec<String> {
     let is_workers = |name: &str| name.ends_with("/worker.proto");
-    let facts_of = |set| (facts(&files(set, |it| !is_workers(it))), facts(&files(set, is_workers)));
+    let facts_of =
+        |set| (facts(&files(set, |name| !is_workers(name))), facts(&files(set, is_workers)));
     let (promised_to_clients, mut promised_to_workers) = facts_of(promised);
     let (for_clients, for_workers) = facts_of(present);
     if worker_version(present) > worker_version(promised) {
-        promised_to_workers.retain(|fact| HANDSHAKE.iter().any(|it| fact.starts_with(it)));
+        promised_to_workers.retain(|fact| HANDSHAKE.iter().any(|prefix| fact.starts_with(prefix)));
     }
     let lost_by_clients = promised_to_clients.difference(&for_clients);
     lost_by_clients.chain(promised_to_workers.difference(&for_workers)).cloned().collect()
@@ -189,7 +190,8 @@ fn every_kind_of_breaking_change_is_found_by_name() {
             message(set, "ListWorkersResponse").field[0].type_name = Some(".swarm.v1.Event".into());
         }),
         ("field swarm.v1.Event.notice", |set| {
-            let field = message(set, "Event").field.iter_mut().find(|it| it.name() == "notice");
+            let field =
+                message(set, "Event").field.iter_mut().find(|field| field.name() == "notice");
             field.unwrap().oneof_index = None;
         }),
         ("enum swarm.v1.ExperimentState", |set| states(set).name = Some("State".into())),
@@ -233,8 +235,8 @@ fn additions_break_nothing() {
 
 fn raise_worker_version(set: &mut FileDescriptorSet) {
     let mut enums = set.file.iter_mut().flat_map(|file| &mut file.enum_type);
-    let version = enums.find(|it| it.name() == "ProtocolVersion").unwrap();
-    let current = version.value.iter_mut().find(|it| it.name() == "PROTOCOL_VERSION_CURRENT");
+    let version = enums.find(|enumeration| enumeration.name() == "ProtocolVersion").unwrap();
+    let current = version.value.iter_mut().find(|value| value.name() == "PROTOCOL_VERSION_CURRENT");
     *current.unwrap().number.as_mut().unwrap() += 1;
 }
 

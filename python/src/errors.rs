@@ -18,7 +18,8 @@ fn exception<'py>(py: Python<'py>, name: &str, args: impl PyCallArgs<'py>) -> Py
 /// An experiment with problems: `ExperimentError`.
 pub fn config_error(py: Python<'_>, error: &ConfigError) -> PyErr {
     let problems = error.problems.iter();
-    let problems = problems.map(|it| (it.path.as_str(), it.line, it.message.as_str()));
+    let problems =
+        problems.map(|problem| (problem.path.as_str(), problem.line, problem.message.as_str()));
     exception(py, "ExperimentError", (problems.collect::<Vec<_>>(),))
 }
 

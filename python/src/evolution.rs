@@ -63,7 +63,7 @@ impl Evolution {
         let what = format!("an evolution of {population_size} genotypes of {n_genes} genes");
         memory::ensure(bytes, &what)?;
         let evolution = setup.start().map_err(refused)?;
-        Ok(Self::of(evolution))
+        Ok(Self::wrap(evolution))
     }
 
     /// From what `to_json` has given.
@@ -72,7 +72,7 @@ impl Evolution {
         let evolution = serde_json::from_str(text).map_err(|error| {
             PyValueError::new_err(format!("not the state of an evolution: {error}"))
         })?;
-        Ok(Self::of(evolution))
+        Ok(Self::wrap(evolution))
     }
 
     /// The state.
@@ -108,7 +108,8 @@ impl Evolution {
             let asked = state.asked.get_or_insert_with(|| state.evolution.ask());
             check_rows(&fitness, asked.genotypes.len()).map_err(NotTold::Rows)?;
             let mut after = state.evolution.clone();
-            let completion = |it: &_| experiment.and_then(|run| completion(run.config(), it));
+            let completion =
+                |summary: &_| experiment.and_then(|run| completion(run.config(), summary));
             let learnt = after.learn(asked.clone(), &fitness, completion);
             let learnt = learnt.map_err(NotTold::Evolution)?;
             *state = State { evolution: after, asked: None };
@@ -164,8 +165,8 @@ impl Evolution {
     /// Whether an individual has come since the last comparison of candidates.
     #[getter]
     fn has_challenger(&self, py: Python<'_>) -> PyResult<bool> {
-        let is_new = |it: &Champion| {
-            it.held_out.is_none() && matches!(it.source, ChampionSource::Individual(_))
+        let is_new = |champion: &Champion| {
+            champion.held_out.is_none() && matches!(champion.source, ChampionSource::Individual(_))
         };
         self.0.with(py, |state| {
             let candidates = state.evolution.reevaluation();
@@ -176,12 +177,12 @@ impl Evolution {
     /// The comparison of candidates for the champion; none before the first generation.
     fn reevaluation(&self, py: Python<'_>) -> PyResult<Option<Reevaluation>> {
         let reevaluation = self.0.with(py, |state| state.evolution.reevaluation())?;
-        Ok(reevaluation.map(|it| Reevaluation(Shared::new(it))))
+        Ok(reevaluation.map(|reevaluation| Reevaluation(Shared::new(reevaluation))))
     }
 
     /// Makes the winner of a comparison that is over the champion.
     fn set_champion(&self, py: Python<'_>, reevaluation: &Reevaluation) -> PyResult<()> {
-        let reevaluation = reevaluation.0.with(py, |it| it.clone())?;
+        let reevaluation = reevaluation.0.with(py, |reevaluation| reevaluation.clone())?;
         if !reevaluation.is_over() {
             return Err(PyValueError::new_err(
                 "the comparison is not over; tell it the next block",
@@ -193,7 +194,9 @@ impl Evolution {
     /// Judges the champion: its genotype and trials; none before the first generation.
     fn judgement<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
         let judgement = self.0.with(py, |state| state.evolution.judgement())?;
-        judgement.map(|it| asked_trials(py, &it.genotypes(), it.trial_set())).transpose()
+        judgement
+            .map(|judgement| asked_trials(py, &judgement.genotypes(), judgement.trial_set()))
+            .transpose()
     }
 
     /// The judged champion, and the last link of the digest chain of re-evaluations.
@@ -216,7 +219,7 @@ impl Evolution {
 
 impl Evolution {
     /// One that Python has as its own.
-    pub fn of(evolution: evolution::Evolution) -> Self {
+    pub fn wrap(evolution: evolution::Evolution) -> Self {
         Self(Shared::new(State { evolution, asked: None }))
     }
 
@@ -228,7 +231,7 @@ impl Evolution {
     /// As the coordinator's of the same file.
     pub fn of_experiment(config: &ExperimentConfig, simulation: &Simulation) -> Self {
         let segments = simulation.population_segments();
-        Self::of(evolution::Evolution::new(config, segments, FINGERPRINT))
+        Self::wrap(evolution::Evolution::new(config, segments, FINGERPRINT))
     }
 }
 
@@ -240,20 +243,21 @@ pub struct Reevaluation(Shared<evolution::Reevaluation>);
 impl Reevaluation {
     /// The genotypes and trials of the next block; none if the comparison is over.
     fn ask<'py>(&self, py: Python<'py>) -> PyResult<Option<AskedTrials<'py>>> {
-        let next =
-            self.0.with(py, |it| (!it.is_over()).then(|| (it.genotypes(), it.trial_set())))?;
+        let next = self.0.with(py, |reevaluation| {
+            (!reevaluation.is_over()).then(|| (reevaluation.genotypes(), reevaluation.trial_set()))
+        })?;
         next.map(|(genotypes, trials)| asked_trials(py, &genotypes, trials)).transpose()
     }
 
     /// Takes the fitness of a block in.
     fn tell(&self, py: Python<'_>, fitness: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
         let fitness = rows(&fitness);
-        let told = self.0.with(py, |it| {
-            if it.is_over() {
+        let told = self.0.with(py, |reevaluation| {
+            if reevaluation.is_over() {
                 return Err("the comparison is over".to_owned());
             }
-            check_rows(&fitness, it.genotypes().len())?;
-            it.learn(&fitness);
+            check_rows(&fitness, reevaluation.genotypes().len())?;
+            reevaluation.learn(&fitness);
             Ok(())
         })?;
         told.map_err(PyValueError::new_err)
@@ -299,10 +303,15 @@ pub fn champion_dict<'py>(py: Python<'py>, champion: &Champion) -> PyResult<Boun
     dict.set_item("individual", individual)?;
     dict.set_item("genotype", PyArray1::from_slice(py, genotype))?;
     dict.set_item("trial_fitness", PyArray1::from_slice(py, trial_fitness))?;
-    dict.set_item("selection", held_out.map(|it| (it.mean.get(), it.n_trials)))?;
+    dict.set_item(
+        "selection",
+        held_out.map(|selection| (selection.mean.get(), selection.n_trials)),
+    )?;
     dict.set_item(
         "judged",
-        judged.map(|it| (it.mean.get(), it.low.get(), it.high.get(), it.n_trials)),
+        judged.map(|judgement| {
+            (judgement.mean.get(), judgement.low.get(), judgement.high.get(), judgement.n_trials)
+        }),
     )?;
     Ok(dict)
 }
@@ -319,8 +328,9 @@ fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<Algorithm
     let parameters = described.map_or(&[][..], |described| described.parameters);
     for (key, value) in given {
         let key: String = key.extract()?;
-        let is_whole = parameters.iter().any(|it| {
-            it.key == key && matches!(it.domain, Domain::Whole(..) | Domain::BelowPopulationSize)
+        let is_whole = parameters.iter().any(|parameter| {
+            parameter.key == key
+                && matches!(parameter.domain, Domain::Whole(..) | Domain::BelowPopulationSize)
         });
         let value = if is_whole && let Ok(whole) = value.extract::<u32>() {
             ParameterValue::Whole(whole)
@@ -344,13 +354,22 @@ pub fn advice(algorithm: &str, population_size: u32) -> Option<String> {
 /// meaning.
 #[pyfunction]
 pub fn algorithms() -> Vec<(&'static str, &'static str, Vec<[String; 4]>)> {
-    let parameter = |it: &Parameter| {
-        let default = match it.default {
+    let parameter = |parameter: &Parameter| {
+        let default = match parameter.default {
             DefaultValue::Formula(formula) => formula.to_owned(),
             value => value.value().map_or_else(String::new, |value| value.to_string()),
         };
-        [it.key.to_owned(), it.domain.to_string(), default, it.meaning.to_owned()]
+        [
+            parameter.key.to_owned(),
+            parameter.domain.to_string(),
+            default,
+            parameter.meaning.to_owned(),
+        ]
     };
     let described = ALGORITHMS.iter();
-    described.map(|it| (it.name, it.title, it.parameters.iter().map(parameter).collect())).collect()
+    described
+        .map(|algorithm| {
+            (algorithm.name, algorithm.title, algorithm.parameters.iter().map(parameter).collect())
+        })
+        .collect()
 }

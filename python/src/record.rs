@@ -49,7 +49,7 @@ impl Record {
 
     /// Evolution after the latest generation.
     fn evolution(&self, py: Python<'_>) -> PyResult<Evolution> {
-        Ok(Evolution::of(self.ask(py, |run| run.evolution())?))
+        Ok(Evolution::wrap(self.ask(py, |run| run.evolution())?))
     }
 
     /// The champion so far.
@@ -62,11 +62,11 @@ impl Record {
     #[expect(clippy::type_complexity, reason = "a row")]
     fn history(&self, py: Python<'_>) -> PyResult<Vec<(u64, f64, f64, f64, f64, String, u64)>> {
         let history = self.ask(py, |run| Ok(run.history()?))?;
-        let rows = history.into_iter().map(|it| {
-            let of = it.statistics;
+        let rows = history.into_iter().map(|record| {
+            let of = record.statistics;
             let numbers = [of.best, of.mean, of.min, of.standard_deviation];
             let [best, mean, min, deviation] = numbers.map(f64::from);
-            (it.generation, best, mean, min, deviation, it.digest, it.duration_ms)
+            (record.generation, best, mean, min, deviation, record.digest, record.duration_ms)
         });
         Ok(rows.collect())
     }
@@ -89,7 +89,7 @@ impl Record {
         completed: Option<String>,
     ) -> PyResult<()> {
         let all = |blocks: &Blocks<'_>| blocks.iter().map(rows).collect::<Vec<_>>();
-        let judgement = judgement.map_or_else(Vec::new, |it| rows(&it).concat());
+        let judgement = judgement.map_or_else(Vec::new, |judgement| rows(&judgement).concat());
         let end = End { blocks: all(&end_blocks), judgement };
         let told = Told { trial_fitness: rows(&fitness), blocks: all(&blocks), end };
         let duration = Duration::try_from_secs_f64(seconds);

@@ -109,7 +109,7 @@ impl Episodes {
         };
         let fitness = self.ask(py, move |stage| stage.stepper.step(&actions))?;
         let fitness = fitness.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        let fitness = fitness.into_iter().map(|it| it.unwrap_or(f64::NAN));
+        let fitness = fitness.into_iter().map(|fitness| fitness.unwrap_or(f64::NAN));
         Ok(fitness.collect::<Vec<_>>().into_pyarray(py))
     }
 

@@ -243,7 +243,9 @@ fn sizes(isa: Isa) {
         });
         let mut measurements =
             swarms.each_mut().map(|swarm| move || swarm.seconds_per_robot_step());
-        let times = medians(measurements.each_mut().map(|it| it as &mut dyn FnMut() -> f64));
+        let times = medians(
+            measurements.each_mut().map(|measurement| measurement as &mut dyn FnMut() -> f64),
+        );
         println!("{:25} {}", config.name, times.map(|time| format!("{:8.3}", time * 1e6)).concat());
         println!("{:25} {}", "", times.map(|time| format!("{:7.2}x", time / times[0])).concat());
     }

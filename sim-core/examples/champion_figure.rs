@@ -118,7 +118,7 @@ fn run(
     Figures {
         judged: judged.mean.get(),
         interval: [judged.low.get(), judged.high.get()],
-        normal: HeldOut::of(&fitness[0], 0).expect("fitness is finite").ci95.get(),
+        normal: HeldOut::from_values(&fitness[0], 0).expect("fitness is finite").ci95.get(),
         selection: champion.held_out.expect("it was compared").mean.get(),
         fresh: mean(&fresh),
         n_selection_trials,
@@ -144,29 +144,38 @@ fn report(task: &str, n_runs: u64, run: impl Fn(u64) -> Figures + Sync) {
         threads.into_iter().flat_map(|thread| thread.join().expect("runs end")).collect()
     });
     runs.sort_by_key(|(seed, _)| *seed);
-    let of = |value: fn(&Figures) -> f64| -> Vec<f64> {
+    let per_run = |value: fn(&Figures) -> f64| -> Vec<f64> {
         runs.iter().map(|(_, figures)| value(figures)).collect()
     };
-    let covered = of(|it| f64::from((it.interval[0]..=it.interval[1]).contains(&it.fresh)));
-    let normal = of(|it| f64::from((it.judged - it.fresh).abs() <= it.normal));
-    let below = of(|it| f64::from(it.fresh < it.interval[0]));
+    let covered = per_run(|figures| {
+        f64::from((figures.interval[0]..=figures.interval[1]).contains(&figures.fresh))
+    });
+    let normal =
+        per_run(|figures| f64::from((figures.judged - figures.fresh).abs() <= figures.normal));
+    let below = per_run(|figures| f64::from(figures.fresh < figures.interval[0]));
     println!(
         "{task}: {n_runs} runs, {} fresh trials each",
         N_FRESH_SETS * u64::from(N_FRESH_TRIALS)
     );
-    println!("  fitness on fresh trials        {}", with_error(&of(|it| it.fresh)));
-    println!("  error of the judgement         {}", with_error(&of(|it| it.judged - it.fresh)));
-    println!("  error of the selecting mean    {}", with_error(&of(|it| it.selection - it.fresh)));
+    println!("  fitness on fresh trials        {}", with_error(&per_run(|figures| figures.fresh)));
+    println!(
+        "  error of the judgement         {}",
+        with_error(&per_run(|figures| figures.judged - figures.fresh))
+    );
+    println!(
+        "  error of the selecting mean    {}",
+        with_error(&per_run(|figures| figures.selection - figures.fresh))
+    );
     println!(
         "  width of the 95 % interval     {:.4}",
-        mean(&of(|it| it.interval[1] - it.interval[0]))
+        mean(&per_run(|figures| figures.interval[1] - figures.interval[0]))
     );
     println!("  intervals that cover           {:.1} %", 100.0 * mean(&covered));
     println!("  ... mean +- 1.96 s / sqrt(n)   {:.1} %", 100.0 * mean(&normal));
     println!("  ... that lie too high          {:.1} %", 100.0 * mean(&below));
     println!(
         "  held-out trials per run        {:.0}",
-        mean(&of(|it| it.n_selection_trials as f64))
+        mean(&per_run(|figures| figures.n_selection_trials as f64))
     );
 }
 

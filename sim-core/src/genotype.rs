@@ -86,7 +86,7 @@ impl Codec {
                 let span = high - low;
                 let (parameters, scale) = select(query, &config.topology, network);
                 for parameter in parameters {
-                    *coverage.of(parameter) = true;
+                    *coverage.flag_mut(parameter) = true;
                     genes.push(Gene { parameter, low, span, scale });
                 }
             }

@@ -89,7 +89,7 @@ impl Neighbours {
     }
 
     /// The neighbours of a robot.
-    pub fn of(&self, robot: usize) -> impl Iterator<Item = Neighbour> {
+    pub fn of_robot(&self, robot: usize) -> impl Iterator<Item = Neighbour> {
         self.places(robot).map(|place| self.get(place))
     }
 
@@ -405,20 +405,24 @@ mod tests {
     fn neighbours_see_each_other_across_the_seam() {
         let positions = [Vec2::new(990.0, 10.0), Vec2::new(20.0, 570.0), Vec2::new(500.0, 300.0)];
         let neighbours = neighbours(&positions, 50.0);
-        let [seen] = neighbours.of(0).collect::<Vec<_>>()[..] else { panic!("one neighbour") };
+        let [seen] = neighbours.of_robot(0).collect::<Vec<_>>()[..] else {
+            panic!("one neighbour")
+        };
         assert_eq!((seen.robot, seen.rho), (1, 50.0));
         assert!((seen.bearing - wrap_angle(libm::atan2(-40.0, 30.0))).abs() < 1e-15);
-        let [back] = neighbours.of(1).collect::<Vec<_>>()[..] else { panic!("one neighbour") };
+        let [back] = neighbours.of_robot(1).collect::<Vec<_>>()[..] else {
+            panic!("one neighbour")
+        };
         assert!((back.bearing - libm::atan2(40.0, -30.0)).abs() < 1e-15);
         assert!((back.reverse_bearing() - seen.bearing).abs() < 1e-15);
-        assert_eq!(neighbours.of(2).count(), 0);
+        assert_eq!(neighbours.of_robot(2).count(), 0);
     }
 
     #[test]
     fn robots_at_one_point_see_each_other_at_0() {
         let neighbours = neighbours(&[Vec2::new(1.0, 1.0); 2], 50.0);
         let at = |robot| Neighbour { robot, rho: 0.0, bearing: 0.0 };
-        assert!(neighbours.of(0).eq([at(1)]) && neighbours.of(1).eq([at(0)]));
+        assert!(neighbours.of_robot(0).eq([at(1)]) && neighbours.of_robot(1).eq([at(0)]));
         assert_eq!(at(1).reverse_bearing(), 0.0);
     }
 
@@ -431,7 +435,7 @@ mod tests {
             let positions: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
             let neighbours = neighbours(&positions, reach);
             for (robot, &position) in positions.iter().enumerate() {
-                let mut found: Vec<usize> = neighbours.of(robot).map(|n| n.robot).collect();
+                let mut found: Vec<usize> = neighbours.of_robot(robot).map(|n| n.robot).collect();
                 found.sort_unstable();
                 let others = (0..positions.len()).filter(|&other| {
                     other != robot && TORUS.distance(position, positions[other]) <= reach

@@ -102,10 +102,20 @@ impl Senses {
                 fill(row, received.map(|received| received.map_or(0.0, Received::signal)));
             }
             SensorQuery::ReceiverReceivingDirection => {
-                fill(row, received.map(|it| component(it.map(|it| it.receiving_direction), value)));
+                fill(
+                    row,
+                    received.map(|received| {
+                        component(received.map(|frame| frame.receiving_direction), value)
+                    }),
+                );
             }
             SensorQuery::ReceiverSendingDirection => {
-                fill(row, received.map(|it| component(it.map(|it| it.sending_direction), value)));
+                fill(
+                    row,
+                    received.map(|received| {
+                        component(received.map(|frame| frame.sending_direction), value)
+                    }),
+                );
             }
             SensorQuery::ReceiverState => {
                 let modes = swarm.modes[robots].iter();
@@ -113,7 +123,8 @@ impl Senses {
             }
             query => {
                 let mut sensors = self.sensors.iter();
-                let gives = |it: &&SensorState| it.query == query && value < it.reading_len;
+                let gives =
+                    |sensor: &&SensorState| sensor.query == query && value < sensor.reading_len;
                 if let Some(sensor) = sensors.find(gives) {
                     let readings = sensor.readings.chunks_exact(sensor.reading_len);
                     fill(row, readings.map(|reading| reading[value]));
@@ -140,9 +151,11 @@ impl Senses {
             }
             SensorQuery::ReceiverSignal => vec![received.map_or(0.0, Received::signal)],
             SensorQuery::ReceiverReceivingDirection => {
-                pair(received.map(|it| it.receiving_direction))
+                pair(received.map(|frame| frame.receiving_direction))
             }
-            SensorQuery::ReceiverSendingDirection => pair(received.map(|it| it.sending_direction)),
+            SensorQuery::ReceiverSendingDirection => {
+                pair(received.map(|frame| frame.sending_direction))
+            }
             SensorQuery::ReceiverState => {
                 vec![f64::from(swarm.modes[robot] == Mode::Send)]
             }

@@ -238,7 +238,10 @@ impl<'a> Stepper<'a> {
     /// actions said, but for the first steps and for perturbations.
     pub fn sent(&self) -> Vec<bool> {
         let agents = self.agents();
-        self.trials.iter().flat_map(|trial| agents.iter().map(|&it| trial.has_sent(it))).collect()
+        self.trials
+            .iter()
+            .flat_map(|trial| agents.iter().map(|&agent| trial.has_sent(agent)))
+            .collect()
     }
 
     /// The network of a genotype, at rest, for as many trials.

@@ -103,7 +103,7 @@ fn without_reevaluation(algorithm: &mut Value) {
 fn shipped(name: &str) -> Experiment {
     let path = workspace_file(&format!("configs/{name}.json"));
     let text = fs::read_to_string(path).expect("shipped with the project");
-    Experiment::of(serde_json::from_str(&text).expect("valid JSON"))
+    Experiment::from_value(serde_json::from_str(&text).expect("valid JSON"))
 }
 
 /// An experiment that a fleet has computed, per generation.

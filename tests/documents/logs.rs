@@ -122,7 +122,8 @@ fn the_page_on_logs_has_every_line_with_its_fields_and_no_other() {
         ("Worker", &["worker/src"]),
         ("Both", &["crates/telemetry/src", "crates/transport/src"]),
     ] {
-        let said: BTreeSet<Line> = directories.iter().flat_map(|it| lines_of(it)).collect();
+        let said: BTreeSet<Line> =
+            directories.iter().flat_map(|directory| lines_of(directory)).collect();
         let documented = documented(&page, heading);
         assert!(said.len() > 2, "{said:#?}");
         let missing: Vec<&Line> = said.difference(&documented).collect();

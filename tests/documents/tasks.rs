@@ -9,7 +9,8 @@ fn every_name_that_scripts_see_is_in_the_reference() {
     let names = fs::read_to_string(workspace_file("sim-core/src/script/names.rs")).unwrap();
     let reference = fs::read_to_string(workspace_file("docs/tasks.md")).unwrap();
     let rows = names.lines().filter_map(|line| line.trim().strip_prefix('"'));
-    let names: Vec<&str> = rows.filter_map(|row| row.split_once("\" = ")).map(|it| it.0).collect();
+    let names: Vec<&str> =
+        rows.filter_map(|row| row.split_once("\" = ")).map(|(name, _)| name).collect();
     assert!(names.len() > 30, "{names:?}");
     // In code, alone or as a part: `robot.distance(other)`.
     let code: Vec<&str> = reference.split('`').skip(1).step_by(2).collect();

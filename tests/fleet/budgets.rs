@@ -20,7 +20,7 @@ fn large(population_size: u64) -> Experiment {
     value["algorithm"]["population_size"] = json!(population_size);
     value["algorithm"]["num_evaluations"] = json!(1);
     value["algorithm"]["evaluation_steps"] = json!(1);
-    Experiment::of(value)
+    Experiment::from_value(value)
 }
 
 async fn submit(

@@ -65,7 +65,7 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|it| it["claim"].as_str().unwrap())
+        .map(|proof| proof["claim"].as_str().unwrap())
         .collect();
     assert_eq!(claims, ["experiment", "chain", "history", "keyframes", "champion", "simulation"]);
     let of_fork = swarmctl(["verify", fork.to_str().unwrap()]).expect_success().json();
@@ -78,15 +78,18 @@ fn an_exported_experiment_is_proven_anywhere_and_goes_on_elsewhere() {
     assert_eq!(import(&file).expect_success().json(), imported, "it is there already");
     import(&fork).expect_success();
     for id in ["1", "2"] {
-        let history =
-            |it: &CoordinatorProcess| it.swarmctl(&["history", id]).expect_success().json();
+        let history = |coordinator: &CoordinatorProcess| {
+            coordinator.swarmctl(&["history", id]).expect_success().json()
+        };
         assert_eq!(history(&elsewhere), history(&here));
-        let champion =
-            |it: &CoordinatorProcess| it.swarmctl(&["individual", id]).expect_success().json();
+        let champion = |coordinator: &CoordinatorProcess| {
+            coordinator.swarmctl(&["individual", id]).expect_success().json()
+        };
         assert_eq!(champion(&elsewhere), champion(&here));
     }
-    let individual =
-        |it: &CoordinatorProcess| it.swarmctl(&["individual", "1@2/7"]).expect_success().json();
+    let individual = |coordinator: &CoordinatorProcess| {
+        coordinator.swarmctl(&["individual", "1@2/7"]).expect_success().json()
+    };
     assert_eq!(individual(&elsewhere), individual(&here));
     let again = directory.path().join("again.zip");
     export(&elsewhere, 1, &again);
@@ -173,17 +176,17 @@ fn tensorboard_reads_the_history() {
     swarmctl(args).expect_success();
     let run = logs.join("leader_selection_snes-1");
     let mut reader = Command::new(python);
-    let found = Outcome::of(reader.args(["-c", READ_EVENTS]).arg(run)).expect_success();
+    let found = Outcome::of_command(reader.args(["-c", READ_EVENTS]).arg(run)).expect_success();
     let found: Value = serde_json::from_str(&found.stdout).unwrap();
     let bundle = directory.path().join("run.zip");
     swarmctl(["export", "1", "--to", bundle.to_str().unwrap(), "--data-dir", data_dir])
         .expect_success();
     let bundle = bundle::Bundle::read(&fs::read(bundle).unwrap()).unwrap();
     for (tag, value) in [
-        ("fitness/best", (|it| it.best.get()) as fn(&evolution::Statistics) -> f64),
-        ("fitness/mean", |it| it.mean.get()),
-        ("fitness/min", |it| it.min.get()),
-        ("fitness/standard_deviation", |it| it.standard_deviation.get()),
+        ("fitness/best", (|statistics| statistics.best.get()) as fn(&evolution::Statistics) -> f64),
+        ("fitness/mean", |statistics| statistics.mean.get()),
+        ("fitness/min", |statistics| statistics.min.get()),
+        ("fitness/standard_deviation", |statistics| statistics.standard_deviation.get()),
     ] {
         let scalars = found[tag].as_array().unwrap_or_else(|| panic!("{tag}: {found}"));
         assert_eq!(scalars.len(), 3, "{tag}");
@@ -208,7 +211,8 @@ fn a_bundle_is_an_ro_crate_to_an_independent_reader() {
     let file = directory.path().join("run.zip");
     let file = file.to_str().unwrap();
     swarmctl(["export", "1", "--to", file, "--data-dir", data_dir]).expect_success();
-    let found = Outcome::of(Command::new(python).args(["-c", READ_CRATE, file])).expect_success();
+    let found =
+        Outcome::of_command(Command::new(python).args(["-c", READ_CRATE, file])).expect_success();
     let found: Value = serde_json::from_str(&found.stdout).unwrap();
     assert_eq!(found["version"], "1.3");
     assert_eq!(found["root"]["name"], "leader_selection_snes, seed 7");

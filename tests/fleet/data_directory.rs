@@ -37,6 +37,6 @@ impl DataDirectory {
             .current_dir(self.path())
             .env_remove("SWARM_COORDINATOR")
             .envs(environment.iter().copied());
-        Outcome::of(&mut command)
+        Outcome::of_command(&mut command)
     }
 }

@@ -59,7 +59,7 @@ fn genotypes_that_workers_draw_and_that_they_are_sent_give_the_same_bits() {
         assert_eq!(line["digest"], *digest);
     }
     let said =
-        |message: &str| coordinator.process.lines().iter().any(|it| it["message"] == message);
+        |message: &str| coordinator.process.lines().iter().any(|line| line["message"] == message);
     assert!(said("batch evaluated"));
     assert!(!said("worker is faulty: it is given nothing until it is readmitted"));
 }

@@ -176,16 +176,16 @@ fn the_files_agree_with_each_other() {
         assert_eq!(condition["name"], name);
         for metric in ["leaders", "one_leader"] {
             let estimate = &condition["metrics"][metric];
-            let of = |column: usize| {
+            let mean_of = |column: usize| {
                 let rows = trials.iter().filter(|row| row[0] == name && row[2] == metric);
                 let values: Vec<f64> = rows.map(|row| row[column].parse().unwrap()).collect();
                 assert_eq!(values.len(), 12);
                 values.iter().sum::<f64>() / 12.0
             };
-            assert!((estimate["time_mean"]["mean"].as_f64().unwrap() - of(3)).abs() < 1e-9);
-            assert!((estimate["end"]["mean"].as_f64().unwrap() - of(4)).abs() < 1e-9);
+            assert!((estimate["time_mean"]["mean"].as_f64().unwrap() - mean_of(3)).abs() < 1e-9);
+            assert!((estimate["end"]["mean"].as_f64().unwrap() - mean_of(4)).abs() < 1e-9);
             let last = steps.iter().find(|row| row[..3] == [name, "299", metric]).unwrap();
-            assert!((last[7].parse::<f64>().unwrap() - of(4)).abs() < 1e-5);
+            assert!((last[7].parse::<f64>().unwrap() - mean_of(4)).abs() < 1e-5);
         }
     }
 }
@@ -327,7 +327,7 @@ async fn the_work_of_a_client_that_goes_away_is_dropped() {
 fn shown(coordinator: &CoordinatorProcess, command: &str) -> Outcome {
     let mut process = Command::new(binary("swarmctl"));
     process.args([command, "--coordinator", &coordinator.url()]);
-    Outcome::of(&mut process).expect_success()
+    Outcome::of_command(&mut process).expect_success()
 }
 
 #[test]

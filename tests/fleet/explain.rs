@@ -97,7 +97,7 @@ fn typed(coordinator: &CoordinatorProcess, step: &str) -> Command {
 
 /// Carries a step out.
 fn carry_out(coordinator: &CoordinatorProcess, step: &str) -> Outcome {
-    Outcome::of(&mut typed(coordinator, step)).expect_success()
+    Outcome::of_command(&mut typed(coordinator, step)).expect_success()
 }
 
 /// A worker that was started because a step says so.

@@ -32,7 +32,7 @@ fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
     coordinator.process.kill();
     coordinator.restart();
     let _workers = WorkerProcess::start_many(&coordinator, 2);
-    let ids = [&same, &smaller, &reseeded].map(|it| it["id"].as_u64().unwrap());
+    let ids = [&same, &smaller, &reseeded].map(|experiment| experiment["id"].as_u64().unwrap());
     let ends = ids.map(|id| coordinator.watch(id).finish());
 
     let expected = digests(&coordinator, parent);
@@ -49,7 +49,7 @@ fn a_fork_shares_the_past_of_its_parent_and_its_future_if_nothing_is_changed() {
     let genotypes = |address: &str| {
         let population = coordinator.swarmctl(&["individual", address]).expect_success().json();
         let individuals = population["individuals"].as_array().unwrap().clone();
-        individuals.iter().map(|it| it["genotype"].clone()).collect::<Vec<_>>()
+        individuals.iter().map(|individual| individual["genotype"].clone()).collect::<Vec<_>>()
     };
     let [_, smaller, reseeded] = ids;
     assert_eq!(genotypes(&format!("{smaller}@3")), genotypes("1@3"));

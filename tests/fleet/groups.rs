@@ -49,7 +49,7 @@ fn runs_of_a_group_share_the_fleet_and_have_the_bits_of_runs_alone() {
 
     let digests: Vec<&str> = runs[&submitted[0]["id"].as_u64().unwrap()]
         .iter()
-        .map(|it| it["digest"].as_str().unwrap())
+        .map(|generation| generation["digest"].as_str().unwrap())
         .collect();
     assert_eq!(digests, undisturbed(&experiment)[..4]);
 }

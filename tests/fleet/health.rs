@@ -7,7 +7,8 @@ use tempfile::tempdir;
 
 /// Its one line, if this is its exit code.
 fn line(program: &str, args: &[&str], code: i32) -> String {
-    let outcome = Outcome::of(Command::new(binary(program)).arg("--health-check").args(args));
+    let outcome =
+        Outcome::of_command(Command::new(binary(program)).arg("--health-check").args(args));
     assert_eq!(outcome.code, Some(code), "{outcome:#?}");
     let (said, silent) = match code {
         0 => (&outcome.stdout, &outcome.stderr),
@@ -58,7 +59,7 @@ fn a_worker_is_healthy_while_it_has_a_session() {
 fn a_session_file_that_cannot_be_written_is_bad_input() {
     let mut worker = Command::new(binary("worker"));
     worker.args(["--coordinator", "http://127.0.0.1:1", "--session-file", "/nonexistent/session"]);
-    let outcome = Outcome::of(&mut worker);
+    let outcome = Outcome::of_command(&mut worker);
     assert_eq!(outcome.code, Some(2), "{outcome:#?}");
     assert!(outcome.stderr.contains("/nonexistent/session"), "{}", outcome.stderr);
 }

@@ -13,7 +13,7 @@ fn a_lineage_names_parents_that_have_the_genes() {
         let params = json!({"crossover_operator": "uniform"});
         populations.values_mut().for_each(|population| population["params"] = params.clone());
     });
-    let ids = [&ga, &Experiment::tiny(1)].map(|it| coordinator.submit(&it.path()));
+    let ids = [&ga, &Experiment::tiny(1)].map(|experiment| coordinator.submit(&experiment.path()));
     for id in ids {
         coordinator.watch(id).finish();
     }
@@ -50,9 +50,11 @@ fn a_lineage_names_parents_that_have_the_genes() {
         let moved = moved.as_array().unwrap();
         assert_eq!(moved.len(), if has_distribution { 1 } else { 4 });
         for of in moved {
-            assert_eq!(of["mean_step"].as_f64().is_some_and(|it| it > 0.0), has_distribution);
+            assert_eq!(of["mean_step"].as_f64().is_some_and(|step| step > 0.0), has_distribution);
             assert_eq!(of["deviation_median"].as_f64().is_some(), has_distribution);
-            assert!(of["rank_correlation"].as_f64().is_none_or(|it| it.abs() <= 1.0));
+            assert!(
+                of["rank_correlation"].as_f64().is_none_or(|correlation| correlation.abs() <= 1.0)
+            );
         }
     }
     for (address, code, what) in [

@@ -23,13 +23,13 @@ fn worker(coordinator: &CoordinatorProcess) -> (WorkerProcess, String) {
 
 /// Scrapes until something holds that is about to; panics if that takes two minutes.
 fn scrape_until(address: &str, what: &str, holds: impl Fn(&Samples) -> bool) -> Samples {
-    let mut samples = Samples::of(address);
+    let mut samples = Samples::scrape(address);
     for _ in 0..12_000 {
         if holds(&samples) {
             return samples;
         }
         thread::sleep(Duration::from_millis(10));
-        samples = Samples::of(address);
+        samples = Samples::scrape(address);
     }
     panic!("never {what}: {}", samples.text);
 }
@@ -49,7 +49,7 @@ fn figures_agree_with_what_a_run_did() {
     coordinator.watch(id).finish();
     let gone = |samples: &Samples| samples.find("swarm_experiment_state", &[]).is_none();
     let samples = scrape_until(&address, "without the experiment", gone);
-    let ours = Samples::of(&worker_address);
+    let ours = Samples::scrape(&worker_address);
     for (samples, program) in [(&samples, "coordinator"), (&ours, "worker")] {
         check_with_promtool(samples);
         assert_eq!(samples.value(&format!("swarm_{program}_build_info"), &[]), 1.0);
@@ -91,7 +91,7 @@ fn figures_agree_with_what_a_run_did() {
 
     worker.process.kill();
     coordinator.process.wait_for("loss", |line| line["message"] == "worker lost");
-    let samples = Samples::of(&address);
+    let samples = Samples::scrape(&address);
     assert_eq!(samples.value("swarm_workers", &[("state", "available")]), 0.0);
     assert_eq!(samples.value("swarm_workers_joined_total", &[]), 1.0);
     assert_eq!(samples.value("swarm_workers_lost_total", &[]), 1.0);
@@ -111,7 +111,7 @@ fn an_experiment_can_be_seen_while_it_is_unfinished() {
     });
     assert_eq!(running.value("swarm_experiment_state", &[is_ours, ("state", "running")]), 1.0);
     check_with_promtool(&running);
-    check_with_promtool(&Samples::of(&worker_address));
+    check_with_promtool(&Samples::scrape(&worker_address));
 
     coordinator.swarmctl(&["pause", &text]).expect_success();
     // The last complete generation may be on its way to the disk.
@@ -199,7 +199,7 @@ fn an_address_in_use_is_one_clear_line_and_there_is_none_by_default() {
         if program == "coordinator" {
             command.args(["--listen", "127.0.0.1:0", "--data-dir"]).arg(directory.path());
         }
-        let outcome = Outcome::of(&mut command);
+        let outcome = Outcome::of_command(&mut command);
         assert_eq!(outcome.code, Some(2), "{outcome:#?}");
         assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
         assert!(outcome.stderr.contains(&taken), "{}", outcome.stderr);

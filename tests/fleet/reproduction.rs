@@ -232,7 +232,7 @@ fn the_script_of_the_report_prints_its_numbers() {
         skipped_for_want_of("python3", "apt-get install python3");
         return;
     }
-    let report = Outcome::of(&mut command).expect_success().stdout;
+    let report = Outcome::of_command(&mut command).expect_success().stdout;
     for row in [
         "| leader_selection_snes-0 | 1000 | 1.737 |",
         "| nominal | 1.47 | 1.23 |",
@@ -241,7 +241,7 @@ fn the_script_of_the_report_prints_its_numbers() {
     ] {
         assert!(report.contains(row), "{row}: {report}");
     }
-    Outcome::of(&mut Command::new(results("report.py"))).expect_success();
+    Outcome::of_command(&mut Command::new(results("report.py"))).expect_success();
 }
 
 /// A script with the programs in its path.
@@ -277,7 +277,7 @@ fn project_with(script: &str) -> TempDir {
 #[test]
 fn the_report_has_what_the_algorithms_came_to_on_each_task() {
     let Some(mut command) = python_script(results("compare.py")) else { return };
-    let table = Outcome::of(&mut command).expect_success().stdout;
+    let table = Outcome::of_command(&mut command).expect_success().stdout;
     let report = fs::read_to_string(workspace_file("docs/reproduction.md")).unwrap();
     assert!(table.contains("| D | "), "{table}");
     for row in table.lines() {
@@ -302,7 +302,7 @@ fn mechanisms_of_a_champion_of_each_file_are_told() {
         }
     }
     let args = [directory.path().as_os_str(), "--trials".as_ref(), "1".as_ref()];
-    let told = Outcome::of(command.args(args)).expect_success().stdout;
+    let told = Outcome::of_command(command.args(args)).expect_success().stdout;
     assert!(names.len() >= 10, "{names:?}");
     assert_eq!(told.matches("## ").count(), names.len(), "{told}");
 }
@@ -311,7 +311,7 @@ fn mechanisms_of_a_champion_of_each_file_are_told() {
 fn champions_are_compared_with_controllers_written_by_hand() {
     let Some(mut command) = python_script(results("by-hand.py")) else { return };
     command.args(["--trials", "3", "synchronisation"]);
-    let table = Outcome::of(&mut command).expect_success().stdout;
+    let table = Outcome::of_command(&mut command).expect_success().stdout;
     let row = table.lines().find(|line| line.starts_with("| synchronisation | ")).unwrap();
     assert_eq!(row.matches(" to ").count(), 2, "two means with intervals: {row}");
 }
@@ -323,10 +323,12 @@ fn algorithms_are_compared_on_the_same_budget() {
     let Some(mut command) = python_script(path("results/algorithms.py")) else { return };
     command.args(["quickstart", "--generations", "2", "--seeds", "0", "1"]);
     command.args(["--algorithms", "GA", "openaiES"]);
-    Outcome::of(&mut command).expect_success();
+    Outcome::of_command(&mut command).expect_success();
     let runs = path("results/algorithms/quickstart");
-    let mut files: Vec<String> =
-        fs::read_dir(runs).unwrap().map(|it| it.unwrap().path().to_str().unwrap().into()).collect();
+    let mut files: Vec<String> = fs::read_dir(runs)
+        .unwrap()
+        .map(|entry| entry.unwrap().path().to_str().unwrap().into())
+        .collect();
     files.sort();
     assert_eq!(files.len(), 8, "{files:?}");
     let args = ["compare".to_owned()].into_iter().chain(files);
@@ -342,7 +344,7 @@ fn a_run_that_is_added_twice_is_computed_once() {
         let mut command = script(path("results/add-run"));
         command.args(["quickstart", "7"]).arg(path("data"));
         command.args(["--generations", "2", "--workers", "1"]);
-        Outcome::of(&mut command).expect_success();
+        Outcome::of_command(&mut command).expect_success();
         let read = |name| fs::read_to_string(path(name)).unwrap();
         [read("results/histories/quickstart-7.csv"), read("results/champions/quickstart-7.json")]
     };

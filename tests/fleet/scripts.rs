@@ -229,6 +229,6 @@ fn an_expensive_start_is_tried_for_a_moment_and_accepted_with_a_warning() {
     assert!(validated.stdout.contains("its start takes long"), "{}", validated.stdout);
     let mut submit = Command::new(binary("swarmctl"));
     submit.args(["--coordinator", &coordinator.url(), "submit", path.to_str().unwrap()]);
-    let submitted = Outcome::of(&mut submit).expect_success();
+    let submitted = Outcome::of_command(&mut submit).expect_success();
     assert!(submitted.stderr.contains("its start takes long"), "{}", submitted.stderr);
 }

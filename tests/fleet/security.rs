@@ -91,7 +91,7 @@ impl Files {
     fn refused_coordinator(&self, options: &str) -> String {
         let mut command = Command::new(binary("coordinator"));
         command.args(self.options(options)).arg("--data-dir").arg(self.0.path().join("data"));
-        let outcome = Outcome::of(&mut command);
+        let outcome = Outcome::of_command(&mut command);
         assert_eq!(outcome.code, Some(2), "{outcome:#?}");
         assert_eq!(outcome.stderr.lines().count(), 1, "{}", outcome.stderr);
         outcome.stderr
@@ -173,7 +173,7 @@ fn bad_secrets_are_refused_by_the_name_of_their_file() {
 
     let mut command = Command::new(binary("coordinator"));
     command.args(["--listen", "127.0.0.1:0"]).env("SWARM_CLIENT_TOKEN", "");
-    let outcome = Outcome::of(&mut command);
+    let outcome = Outcome::of_command(&mut command);
     assert_eq!(outcome.code, Some(2), "{outcome:#?}");
     assert!(outcome.stderr.contains("SWARM_CLIENT_TOKEN is empty"), "{}", outcome.stderr);
 }
@@ -276,7 +276,7 @@ fn a_refused_token_is_one_line_and_an_exit_code() {
 
     let mut command = Command::new(binary("swarmctl"));
     command.args(["--coordinator", &url, "list"]).env("SWARM_CLIENT_TOKEN", CLIENT_TOKEN);
-    Outcome::of(&mut command).expect_success();
+    Outcome::of_command(&mut command).expect_success();
 
     for token in ["@client.token", "@wrong.token"] {
         let mut worker = files.worker(&url, &format!("--token-file {token}"));

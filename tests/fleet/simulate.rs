@@ -18,8 +18,8 @@ fn simulated(config: &Path, args: &[&str]) -> Value {
 }
 
 /// Bits of the fitness of each trial.
-fn fitness_bits(trials: &[Value], of: impl Fn(&Value) -> &Value) -> Vec<u64> {
-    trials.iter().map(|trial| of(trial).as_f64().unwrap().to_bits()).collect()
+fn fitness_bits(trials: &[Value], fitness: impl Fn(&Value) -> &Value) -> Vec<u64> {
+    trials.iter().map(|trial| fitness(trial).as_f64().unwrap().to_bits()).collect()
 }
 
 fn shipped() -> Vec<PathBuf> {

@@ -94,7 +94,7 @@ fn a_program_that_is_given_no_file_descriptors_says_so_and_ends() {
 fn shell(directory: &Path, line: &str) -> Output {
     let programs = ["swarmctl", "worker", "coordinator"].map(binary);
     let mut path: Vec<PathBuf> =
-        programs.iter().map(|it| it.parent().unwrap().to_owned()).collect();
+        programs.iter().map(|program| program.parent().unwrap().to_owned()).collect();
     path.extend(env::split_paths(&env::var_os("PATH").unwrap()));
     Command::new("timeout")
         .args(["--kill-after=5", "30", "sh", "-c", line])
@@ -123,7 +123,7 @@ fn run_line() -> (Experiment, String) {
 }
 
 fn champion_in(data_dir: &Path) -> bool {
-    let names = fs::read_dir(data_dir).unwrap().map(|it| it.unwrap().file_name());
+    let names = fs::read_dir(data_dir).unwrap().map(|entry| entry.unwrap().file_name());
     names.into_iter().any(|name| name.to_string_lossy().ends_with(".champion.json"))
 }
 
@@ -229,14 +229,14 @@ fn a_full_disk_leaves_no_half_of_a_file_and_keeps_what_was_there() {
         assert!(
             ["No space left", "no storage space", "disk is full"]
                 .iter()
-                .any(|it| said.contains(it)),
+                .any(|message| said.contains(message)),
             "{said}"
         );
         assert!(!said.contains(".unfinished"), "{said}");
     }
     assert_eq!(fs::read_to_string(disk.path().join("a.svg")).unwrap(), "old");
     let mut names: Vec<_> =
-        fs::read_dir(disk.path()).unwrap().map(|it| it.unwrap().file_name()).collect();
+        fs::read_dir(disk.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.svg", "ballast"]);
 }

@@ -35,7 +35,7 @@ impl Experiment {
         algorithm["num_evaluations"] = json!(3);
         algorithm["champion_trials"] = json!(3);
         algorithm["judgement_trials"] = json!(3);
-        Self::of(value)
+        Self::from_value(value)
     }
 
     /// A smaller one still: a generation takes some hundredths of a second.
@@ -49,7 +49,7 @@ impl Experiment {
     }
 
     /// Any content.
-    pub fn of(value: Value) -> Self {
+    pub fn from_value(value: Value) -> Self {
         let directory = tempfile::tempdir().expect("a temporary directory");
         let experiment = Self { directory, value };
         experiment.save();

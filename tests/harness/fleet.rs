@@ -136,7 +136,7 @@ impl CoordinatorProcess {
 pub fn run_coordinator(listen: &str, data_dir: &Path) -> Outcome {
     let mut command = Command::new(binary("coordinator"));
     command.args(["--listen", listen, "--data-dir"]).arg(data_dir);
-    Outcome::of(&mut command)
+    Outcome::of_command(&mut command)
 }
 
 fn spawn(

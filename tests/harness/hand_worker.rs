@@ -81,9 +81,9 @@ impl HandWorker {
         let response = response.ok_or_else(|| Status::unavailable("the stream has ended"))?;
         let mut message = response.message.expect("known kind");
         match &mut message {
-            work_response::Message::Distribution(it) => {
-                let read = Distribution::from_bytes(&it.distribution).expect("of this version");
-                self.distributions.insert(experiment_of(it.job), read);
+            work_response::Message::Distribution(sent) => {
+                let read = Distribution::from_bytes(&sent.distribution).expect("of this version");
+                self.distributions.insert(experiment_of(sent.job), read);
             }
             work_response::Message::Assignments(Assignments { job, assignments, .. }) => {
                 for assignment in assignments {

@@ -31,7 +31,7 @@ pub fn metrics_address(process: &LoggingProcess) -> String {
 
 impl Samples {
     /// Scrapes.
-    pub fn of(address: &str) -> Self {
+    pub fn scrape(address: &str) -> Self {
         let (status, text) = http_get(address, "/metrics");
         assert_eq!(status, 200, "{text}");
         let samples = text.lines().filter(|line| !line.starts_with('#')).map(parse).collect();

@@ -182,7 +182,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Runs a command to its end.
-    pub fn of(command: &mut Command) -> Self {
+    pub fn of_command(command: &mut Command) -> Self {
         let output = command.stdin(Stdio::null()).output().expect("the program starts");
         Self {
             code: output.status.code(),
@@ -213,7 +213,7 @@ impl Outcome {
 pub fn swarmctl<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>) -> Outcome {
     let mut command = Command::new(binary("swarmctl"));
     command.args(["--output", "json"]).args(args);
-    Outcome::of(&mut command)
+    Outcome::of_command(&mut command)
 }
 
 /// Starts `swarmctl --output json ARGS`.

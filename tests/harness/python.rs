@@ -71,7 +71,7 @@ impl PythonClient {
             .arg(option("--python_out=", self.generated.path()))
             .arg(option("--grpc_python_out=", self.generated.path()))
             .arg("swarm/v1/experiment.proto");
-        Outcome::of(&mut command).expect_success();
+        Outcome::of_command(&mut command).expect_success();
     }
 
     fn command(&self, args: &[&str]) -> Command {
@@ -86,7 +86,7 @@ impl PythonClient {
 
     /// Runs the example to its end.
     pub fn run(&self, args: &[&str]) -> Outcome {
-        Outcome::of(&mut self.command(args))
+        Outcome::of_command(&mut self.command(args))
     }
 
     /// Starts the example.

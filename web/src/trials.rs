@@ -74,13 +74,13 @@ mod tests {
 
     #[test]
     fn the_median_is_a_trial_and_the_lower_one_of_two() {
-        let of = |fitness: &[f64]| {
+        let worst_median_best = |fitness: &[f64]| {
             let trials = Trials::of_generation(3, fitness.to_vec());
             (trials.worst, trials.median, trials.best)
         };
-        assert_eq!(of(&[5.0, 1.0, 3.0]), (1, 2, 0));
-        assert_eq!(of(&[5.0, 1.0, 3.0, 2.0]), (1, 3, 0));
-        assert_eq!(of(&[7.0]), (0, 0, 0));
-        assert_eq!(of(&[]), (0, 0, 0));
+        assert_eq!(worst_median_best(&[5.0, 1.0, 3.0]), (1, 2, 0));
+        assert_eq!(worst_median_best(&[5.0, 1.0, 3.0, 2.0]), (1, 3, 0));
+        assert_eq!(worst_median_best(&[7.0]), (0, 0, 0));
+        assert_eq!(worst_median_best(&[]), (0, 0, 0));
     }
 }

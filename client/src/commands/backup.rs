@@ -53,8 +53,11 @@ pub fn backup(data_dir: &Path, args: &BackupArgs, progress: &mut Progress) -> Re
             inspection.path =
                 args.to.join(inspection.path.file_name().expect("a database has a name"));
             print_inspection(&inspection, progress)?;
-            let damaged: BTreeSet<u64> =
-                inspection.findings.iter().filter_map(|it| Some(it.experiment?.0)).collect();
+            let damaged: BTreeSet<u64> = inspection
+                .findings
+                .iter()
+                .filter_map(|finding| Some(finding.experiment?.0))
+                .collect();
             if damaged.is_empty() {
                 return Ok(());
             }

@@ -108,7 +108,9 @@ impl Remote for PriorityArgs {
             present(call.await?.experiment)
         };
         let outcome = each(&target, connection, progress, set).await?;
-        let line = |it: &Experiment| format!("{}: priority {}", text::title(it), it.priority);
+        let line = |experiment: &Experiment| {
+            format!("{}: priority {}", text::title(experiment), experiment.priority)
+        };
         print(&target, outcome, line, progress)
     }
 }
@@ -190,7 +192,7 @@ pub fn print_of<T>(
     }
     progress.print(&if progress.is_json() {
         let changed: Vec<Experiment> =
-            outcome.changed.iter().map(|it| experiment(it).clone()).collect();
+            outcome.changed.iter().map(|change| experiment(change).clone()).collect();
         json::experiments(&target.subject, &changed)
     } else {
         outcome.changed.iter().map(line).collect::<Vec<_>>().join("\n")

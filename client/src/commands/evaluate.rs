@@ -113,7 +113,7 @@ async fn remote(
     if args.local {
         return Ok(None);
     }
-    match Place::of(settings).await? {
+    match Place::find(settings).await? {
         Place::Directory { .. } => {
             progress.remark("computing in this process, as with --local");
             Ok(None)
@@ -236,7 +236,10 @@ async fn ask_all(
             progress.remark(&format!("{n_done}/{} {}", conditions.len(), condition.name));
         }
     }
-    Ok(measured.into_iter().map(|it| it.expect("every condition has been asked for")).collect())
+    Ok(measured
+        .into_iter()
+        .map(|measured| measured.expect("every condition has been asked for"))
+        .collect())
 }
 
 /// For people: means over trials and steps, with their confidence intervals.
@@ -247,7 +250,8 @@ fn table(summary: &Summary) -> Table {
     let mut table = Table::new(columns.chain(measures).collect::<Vec<_>>());
     for condition in &summary.conditions {
         let fitness = Some(&condition.fitness);
-        let metrics = names.iter().map(|name| condition.metrics.get(name).map(|it| &it.time_mean));
+        let metrics =
+            names.iter().map(|name| condition.metrics.get(name).map(|metric| &metric.time_mean));
         let cells = std::iter::once(fitness).chain(metrics);
         let cells = cells.map(|estimate| estimate.map_or("-".into(), ToString::to_string));
         table.push(std::iter::once(condition.name.clone()).chain(cells).collect::<Vec<_>>());

@@ -173,9 +173,9 @@ impl Remote for LabelArgs {
         };
         let members = members(&self.target, connection, |_| true, NONE_HAS_ENDED).await?;
         let changed = change_each(&members, progress, label).await;
-        let line = |it: &Experiment| match text::labels(it) {
-            labels if labels.is_empty() => format!("{}: no labels", text::title(it)),
-            labels => format!("{}: {labels}", text::title(it)),
+        let line = |experiment: &Experiment| match text::labels(experiment) {
+            labels if labels.is_empty() => format!("{}: no labels", text::title(experiment)),
+            labels => format!("{}: {labels}", text::title(experiment)),
         };
         print(&self.target, changed, line, progress)
     }
@@ -183,7 +183,7 @@ impl Remote for LabelArgs {
 
 /// A fork before the experiment that it shares generations with, which is kept until then.
 fn latest_first(mut members: Vec<Experiment>) -> Vec<Experiment> {
-    members.sort_by_key(|it| std::cmp::Reverse(it.id));
+    members.sort_by_key(|experiment| std::cmp::Reverse(experiment.id));
     members
 }
 
@@ -194,8 +194,10 @@ fn print_with(
     progress: &mut Progress,
     what: impl Fn(u64) -> String,
 ) -> Result<(), Error> {
-    let line = |(it, bytes): &(Experiment, u64)| format!("{}: {}", text::title(it), what(*bytes));
-    print_of(target, outcome, |(it, _)| it, line, progress)
+    let line = |(experiment, bytes): &(Experiment, u64)| {
+        format!("{}: {}", text::title(experiment), what(*bytes))
+    };
+    print_of(target, outcome, |(experiment, _)| experiment, line, progress)
 }
 
 fn mib(bytes: u64) -> String {

@@ -96,22 +96,22 @@ fn operator(ancestor: &Ancestor) -> Option<&'static str> {
 
 impl<'a> LineageDocument<'a> {
     fn new(address: Address, populations: &'a [PopulationLineage]) -> Self {
-        let ancestor = |it: &Ancestor| AncestorDocument {
-            generation: it.generation,
-            individual: it.individual,
-            fitness: Some(it.fitness).filter(|fitness| fitness.is_finite()),
-            operator: operator(it),
-            parents: it
+        let ancestor = |ancestor: &Ancestor| AncestorDocument {
+            generation: ancestor.generation,
+            individual: ancestor.individual,
+            fitness: Some(ancestor.fitness).filter(|fitness| fitness.is_finite()),
+            operator: operator(ancestor),
+            parents: ancestor
                 .parents
                 .iter()
                 .map(|of| ParentDocument { individual: of.individual, genes: of.genes })
                 .collect(),
-            new_genes: it.new_genes,
-            genes: it.genes,
+            new_genes: ancestor.new_genes,
+            genes: ancestor.genes,
         };
-        let population = |it: &'a PopulationLineage| PopulationDocument {
-            population: &it.population,
-            ancestors: it.ancestors.iter().map(ancestor).collect(),
+        let population = |population: &'a PopulationLineage| PopulationDocument {
+            population: &population.population,
+            ancestors: population.ancestors.iter().map(ancestor).collect(),
         };
         Self {
             address: address.to_string(),

@@ -91,7 +91,7 @@ impl Remote for ListArgs {
         let request = ListWorkersRequest {};
         let answer = connection.call_fleet(async |client| client.list_workers(request).await);
         let n_evaluations = answer.await.map_or(0, |answer| answer.evaluations.len());
-        text::evaluations(n_evaluations).iter().for_each(|it| progress.remark(it));
+        text::evaluations(n_evaluations).iter().for_each(|remark| progress.remark(remark));
         Ok(())
     }
 }
@@ -153,7 +153,10 @@ fn table(experiments: &[Experiment], now_ms: u64) -> Table {
             experiment.forked_from.as_ref().map_or("-".into(), origin_address),
             experiment.name.clone(),
             experiment.reason.clone(),
-            experiment.forked_from.as_ref().map_or_else(String::new, |it| it.changes.join("; ")),
+            experiment
+                .forked_from
+                .as_ref()
+                .map_or_else(String::new, |origin| origin.changes.join("; ")),
         ]);
     }
     table

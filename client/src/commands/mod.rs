@@ -227,7 +227,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
     };
     let interrupt = interrupt::token()?;
     let intent = command.intent();
-    let place = Place::of(settings).await?;
+    let place = Place::find(settings).await?;
     progress.found(&place);
     match place {
         Place::Directory { path, .. } if intent.computes() => {

@@ -80,7 +80,8 @@ const PARTS: [(&str, &str); 4] = [
 ];
 
 fn templates() -> Vec<PossibleValue> {
-    let value = |it: &'static Template| PossibleValue::new(it.name).help(it.about);
+    let value =
+        |template: &'static Template| PossibleValue::new(template.name).help(template.about);
     TEMPLATES.iter().map(value).collect()
 }
 
@@ -147,7 +148,7 @@ pub fn new(args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
 
 fn new_in(directory: &Path, args: &NewArgs, progress: &mut Progress) -> Result<(), Error> {
     let NewArgs { name, task, overwrite } = args;
-    let template = TEMPLATES.iter().find(|it| it.name == task);
+    let template = TEMPLATES.iter().find(|template| template.name == task);
     let template = template.expect("the command line takes no other");
     let config = format!("{name}.json");
     let mut files = vec![(config.clone(), template.config(name))];
@@ -214,7 +215,7 @@ mod tests {
         assert!(text.contains("completed after"), "{text}");
         let history = output("history 1 --output json", &at).await;
         let history: serde_json::Value = serde_json::from_str(&history).unwrap();
-        let mean = |it: &serde_json::Value| it["mean"].as_f64().unwrap();
+        let mean = |generation: &serde_json::Value| generation["mean"].as_f64().unwrap();
         history.as_array().unwrap().iter().map(mean).collect()
     }
 

@@ -302,7 +302,8 @@ async fn every_command_gives_the_same_in_a_directory_as_on_a_coordinator() {
 #[test]
 fn no_command_is_forgotten() {
     let definition = Args::command();
-    let names: BTreeSet<&str> = definition.get_subcommands().map(|it| it.get_name()).collect();
+    let names: BTreeSet<&str> =
+        definition.get_subcommands().map(|command| command.get_name()).collect();
     let lines = ASKED.iter().copied().chain(COMPUTED.iter().map(|(line, _)| *line));
     let tried: BTreeSet<&str> = lines.filter_map(|line| line.split(' ').next()).collect();
     let forgotten: Vec<_> =

@@ -16,11 +16,11 @@ pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option
     let first = submitted.first()?;
     // What has been submitted is so, even if nothing can be said of it.
     let mut earlier = connection.experiments().await.ok()?;
-    earlier.retain(|it| may_be_reordered(it, first));
+    earlier.retain(|experiment| may_be_reordered(experiment, first));
     if earlier.is_empty() {
         return None;
     }
-    earlier.sort_by_key(|it| Reverse(it.id));
+    earlier.sort_by_key(|experiment| Reverse(experiment.id));
     let file = without_order(&connection.stored(first.id).await.ok()?.1);
     for other in earlier.iter().take(COMPARED_MAX) {
         if without_order(&connection.stored(other.id).await.ok()?.1) == file {
@@ -73,10 +73,11 @@ mod tests {
         fn write(value: &Value) -> String {
             match value {
                 Value::Object(map) => {
-                    let entries = map.iter().map(|(key, it)| (json!(key).to_string(), write(it)));
+                    let entries =
+                        map.iter().map(|(key, value)| (json!(key).to_string(), write(value)));
                     let mut entries: Vec<_> = entries.collect();
                     entries.sort();
-                    let entries = entries.iter().rev().map(|(key, it)| format!("{key}:{it}"));
+                    let entries = entries.iter().rev().map(|(key, value)| format!("{key}:{value}"));
                     format!("{{{}}}", entries.collect::<Vec<_>>().join(","))
                 }
                 other => other.to_string(),
@@ -101,7 +102,7 @@ mod tests {
         let place = Place::Directory { path: data, is_found: false };
         let connection = Connection::to(place, Intent::Submit).await.unwrap();
         let mut experiments = connection.experiments().await.unwrap();
-        experiments.sort_by_key(|it| it.id);
+        experiments.sort_by_key(|experiment| experiment.id);
         let [first, longer, reordered] = &experiments[..] else { panic!("{experiments:?}") };
         for other in [first, longer] {
             assert_eq!(remark(&connection, std::slice::from_ref(other)).await, None);

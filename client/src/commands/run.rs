@@ -164,15 +164,17 @@ async fn existing(
         ..Default::default()
     };
     // A coordinator of an earlier version sends others, too.
-    let is_it = |it: &Experiment| {
-        it.state() == ExperimentState::Completed
-            && it.config_digest == digest
-            && it.generations == config.algorithm.generations
-            && it.forked_from.is_none()
+    let is_it = |experiment: &Experiment| {
+        experiment.state() == ExperimentState::Completed
+            && experiment.config_digest == digest
+            && experiment.generations == config.algorithm.generations
+            && experiment.forked_from.is_none()
     };
     let same = connection.list(wanted).await?.into_iter().filter(is_it);
-    let same = same.max_by_key(|it| (it.name == config.name, it.group.is_empty(), it.id));
-    Ok(same.map(|it| (it, config.name)))
+    let same = same.max_by_key(|experiment| {
+        (experiment.name == config.name, experiment.group.is_empty(), experiment.id)
+    });
+    Ok(same.map(|experiment| (experiment, config.name)))
 }
 
 /// Says what exists, and what else can be wanted; `name`: that of the file.

@@ -32,7 +32,7 @@ pub fn validate(args: &ValidateArgs, progress: &mut Progress) -> Result<(), Erro
     let ValidateArgs { files, strict } = args;
     let mut reports = Vec::new();
     for file in files {
-        let report = Report::of(file);
+        let report = Report::of_file(file);
         for problem in &report.problems {
             progress.remark(&format!("{}: {problem}", report.file));
         }
@@ -90,11 +90,11 @@ struct Summary {
 }
 
 impl Report {
-    fn of(path: &Path) -> Self {
+    fn of_file(path: &Path) -> Self {
         let file = path.to_string_lossy().into_owned();
         match ExperimentFile::read(path).and_then(|file| file.check(&Overrides::default())) {
             Ok(compiled) => {
-                let summary = Some(Summary::of(&compiled));
+                let summary = Some(Summary::from_compiled(&compiled));
                 Self { file, ok: true, problems: vec![], warnings: compiled.warnings, summary }
             }
             Err(ConfigError { problems }) => {
@@ -105,7 +105,7 @@ impl Report {
 }
 
 impl Summary {
-    fn of(compiled: &Compiled) -> Self {
+    fn from_compiled(compiled: &Compiled) -> Self {
         let Compiled { config, experiment, .. } = compiled;
         Self {
             name: config.name.clone(),

@@ -115,7 +115,8 @@ async fn compare_group(
     all: &[Followed],
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let has_completed = |it: &&Followed| it.experiment.state() == ExperimentState::Completed;
+    let has_completed =
+        |followed: &&Followed| followed.experiment.state() == ExperimentState::Completed;
     let group = all.first().map_or("", |first| &*first.experiment.group);
     let is_one = all.iter().all(|followed| followed.experiment.group == group);
     let n_completed = all.iter().filter(has_completed).count();

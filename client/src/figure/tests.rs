@@ -108,8 +108,8 @@ fn the_file_name_says_the_format() {
     let path = dir.path().join("a.svg");
     two_runs().write(&path, Overwrite::default()).unwrap();
     assert_eq!(fs::read_to_string(path).unwrap(), two_runs().to_svg().unwrap());
-    assert_eq!(Format::of("a.svg".as_ref()).unwrap(), Format::Svg);
-    assert_eq!(Format::of("b/a.png".as_ref()).unwrap(), Format::Png);
+    assert_eq!(Format::of_path("a.svg".as_ref()).unwrap(), Format::Svg);
+    assert_eq!(Format::of_path("b/a.png".as_ref()).unwrap(), Format::Png);
     for name in ["a.pdf", "svg", "missing/a.svg"] {
         let error = two_runs().write(&dir.path().join(name), Overwrite::default()).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{error}");

@@ -72,7 +72,7 @@ pub fn measure(file: &str) -> Alone {
             idle_share: 0.5,
         };
         let started = now();
-        let told = Told::of(trial_fitness).to_bytes();
+        let told = Told::from_fitness(trial_fitness).to_bytes();
         let is_due = evolution.is_keyframe_due(told.len());
         let keyframe = is_due.then(|| evolution.keyframe());
         let commit = GenerationCommit {

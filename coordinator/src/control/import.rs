@@ -46,7 +46,7 @@ fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
         Verification::begin(&bundle, Sample::Drawn(0)).map_err(|flaw| invalid(&flaw))?;
     let genotype_len = verification.simulation().genotype_len();
     let config = ExperimentConfig::from_canonical_json(&bundle.config_json)?;
-    let summary = Summary::of(&config, &bundle.config_json);
+    let summary = Summary::from_config(&config, &bundle.config_json);
     let needed = memory::estimate(&summary, genotype_len as u64);
     Shortage::check(needed, 0, memory_budget).map_err(ControlError::NoMemory)?;
     while verification.advance().map_err(|flaw| invalid(&flaw))?.is_some() {}

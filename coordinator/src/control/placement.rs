@@ -72,7 +72,7 @@ fn place_beside(
     }
     let config_json = new.config.to_canonical_json();
     let unfinished = store.experiments(&Wanted::unfinished())?;
-    let summary = Summary::of(&new.config, &config_json);
+    let summary = Summary::from_config(&new.config, &config_json);
     let shortage = shortage(&unfinished, &summary, new.genotype_len as u64, memory_budget);
     if resume_unfinished && let Some(placement) = resume(store, new, &config_json, shortage)? {
         return Ok(placement);

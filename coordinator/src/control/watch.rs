@@ -50,7 +50,7 @@ enum Stage {
 }
 
 impl Situation {
-    fn of(explanation: &Explanation) -> Self {
+    fn from_explanation(explanation: &Explanation) -> Self {
         let Explanation { experiment, activity, shortage, store_trouble, .. } = explanation;
         let withheld = activity.withheld.iter();
         Self {
@@ -59,17 +59,20 @@ impl Situation {
             has_workers: activity.n_workers > 0,
             has_workers_available: activity.n_workers_available > 0,
             has_workers_of_others: activity.n_workers_of_others > 0,
-            withheld: withheld.map(|it| (it.name.clone(), it.reason.clone())).collect(),
+            withheld: withheld.map(|worker| (worker.name.clone(), worker.reason.clone())).collect(),
             has_store_trouble: store_trouble.is_some(),
             is_short_of_memory: shortage.is_some(),
-            has_referee_trouble: activity.questions.iter().any(|it| it.trouble.is_some()),
-            stage: Stage::of(explanation),
+            has_referee_trouble: activity
+                .questions
+                .iter()
+                .any(|question| question.trouble.is_some()),
+            stage: Stage::from_explanation(explanation),
         }
     }
 }
 
 impl Stage {
-    fn of(Explanation { activity, .. }: &Explanation) -> Self {
+    fn from_explanation(Explanation { activity, .. }: &Explanation) -> Self {
         let Some(batch) = &activity.batch else { return Self::None };
         let is_long = batch.held.iter().any(|held| held.held_for >= LONG);
         match (batch.n_items_queued, batch.held.is_empty()) {
@@ -119,7 +122,7 @@ impl Control {
         let mut explanation = first;
         let mut known = None;
         loop {
-            let situation = Situation::of(&explanation);
+            let situation = Situation::from_explanation(&explanation);
             let has_ended = !situation.state.is_unfinished();
             if known.as_ref() != Some(&situation) {
                 if outbox.send_timeout(Ok(explanation), WATCH_PATIENCE).await.is_err() {

@@ -139,8 +139,8 @@ impl ToWorker {
             Self::Spec(_, spec) => spec.len(),
             Self::Distribution(_, distribution) => distribution.len(),
             Self::Assignments { assignments, .. } => {
-                let sent = assignments.iter().filter(|it| !it.is_drawn);
-                sent.map(|it| size_of_val(it.genotype.as_slice())).sum()
+                let sent = assignments.iter().filter(|assignment| !assignment.is_drawn);
+                sent.map(|assignment| size_of_val(assignment.genotype.as_slice())).sum()
             }
             Self::Welcome(_) | Self::Drop(_) | Self::End(_) | Self::Dropped(_) => 0,
         }

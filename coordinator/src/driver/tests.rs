@@ -73,10 +73,10 @@ impl Rig {
             let Ok(message) = self.inbox.try_recv() else { return answered };
             let ToWorker::Assignments { trial_set, assignments, .. } = message else { continue };
             answered = trial_set.generation();
-            let results = assignments.into_iter().map(|it| ItemResult {
-                id: it.id,
+            let results = assignments.into_iter().map(|assignment| ItemResult {
+                id: assignment.id,
                 output: sim_core::Output::Fitness,
-                outcome: Ok(it.trials.map(|_| it.genotype[0]).collect()),
+                outcome: Ok(assignment.trials.map(|_| assignment.genotype[0]).collect()),
                 compute_time: Duration::from_millis(1),
             });
             let spoke = WorkerMessage::Results(results.collect());

@@ -397,7 +397,8 @@ impl Engine {
     /// the distribution, or if that is shorter than the genotypes that it is expected to be
     /// given of the batch; else has them sent.
     fn choose_way(&mut self, id: WorkerId, job: JobId, assignments: &mut [Assignment]) {
-        let drawn: Vec<&mut Assignment> = assignments.iter_mut().filter(|it| it.is_drawn).collect();
+        let drawn: Vec<&mut Assignment> =
+            assignments.iter_mut().filter(|assignment| assignment.is_drawn).collect();
         let [first, ..] = &drawn[..] else { return };
         let batch = self.jobs[&job].batch.as_ref();
         let Some((batch, distribution)) =

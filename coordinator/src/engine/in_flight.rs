@@ -39,7 +39,8 @@ impl InFlight {
     /// Takes those of a job out.
     pub fn remove_of(&mut self, job: JobId) -> Vec<(AssignmentId, AssignedItem)> {
         let removed: Vec<_> = self.items.extract_if(.., |_, item| item.job == job).collect();
-        self.n_trials -= removed.iter().map(|(_, it)| it.item.trials.len()).sum::<usize>();
+        self.n_trials -=
+            removed.iter().map(|(_, assigned)| assigned.item.trials.len()).sum::<usize>();
         removed
     }
 }

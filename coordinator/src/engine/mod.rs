@@ -429,7 +429,7 @@ impl Engine {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
             if worker.known_jobs.remove(&id).is_some() {
                 self.load_index.remove(worker_id, worker);
-                let is_ours = |_: &AssignmentId, it: &mut AssignedItem| it.job == id;
+                let is_ours = |_: &AssignmentId, item: &mut AssignedItem| item.job == id;
                 let ours = worker.in_flight.remove_of(id);
                 let written_off = worker.written_off.extract_if(.., is_ours).collect::<Vec<_>>();
                 for (_, item) in ours.iter().chain(&written_off).cloned() {

@@ -244,7 +244,8 @@ impl Engine {
             // Of a fleet that is divided among experiments, auditors that have been seen may be
             // another's.
             let is_awaited = is_in_grace && workers.values().all(|worker| worker.takes(job));
-            let mut auditors = workers.values().filter(|it| it.may_audit() && it.takes(job));
+            let mut auditors =
+                workers.values().filter(|worker| worker.may_audit() && worker.takes(job));
             is_awaited || auditors.any(|worker| batch.audits.has_for(worker.name()))
         };
         if !batch.is_finished(has_auditor) {

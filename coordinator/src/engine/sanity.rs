@@ -13,7 +13,8 @@ impl Engine {
         let mut in_flight: BTreeMap<JobId, BTreeMap<_, _>> = BTreeMap::new();
         for (&id, worker) in &self.workers {
             load_index.add(id, worker);
-            let n_trials: usize = worker.in_flight.values().map(|it| it.item.trials.len()).sum();
+            let n_trials: usize =
+                worker.in_flight.values().map(|assigned| assigned.item.trials.len()).sum();
             assert_eq!(n_trials, worker.in_flight.n_trials());
             for (&assignment_id, assignment) in worker.in_flight.iter() {
                 assert!(worker.known_jobs.contains_key(&assignment.job));

@@ -98,7 +98,7 @@ impl Engine {
     /// A job's work in numbers; zeros if it has ended.
     pub fn job_stats(&self, id: JobId) -> JobStats {
         let Some(work) = self.jobs.get(&id) else { return JobStats::default() };
-        let count = |of: fn(&BatchInProgress) -> usize| work.batch.as_ref().map_or(0, of);
+        let count = |number: fn(&BatchInProgress) -> usize| work.batch.as_ref().map_or(0, number);
         JobStats {
             is_paused: work.is_paused,
             n_items_queued: if work.is_paused { 0 } else { count(BatchInProgress::n_waiting) },

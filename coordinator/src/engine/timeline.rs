@@ -117,9 +117,9 @@ impl Engine {
     /// The assignments of lately. Those that gave no result are remembered for longest.
     pub fn timeline(&self, now: Instant) -> Vec<TimelineEntry> {
         let Timeline { ended, broken } = &self.timeline;
-        let of_ended = |it: &Ended| {
-            let ended_for = now.saturating_duration_since(it.at);
-            entry(now, (it.worker, &it.name), &it.item, ended_for, it.busy, it.fate)
+        let of_ended = |ended: &Ended| {
+            let ended_for = now.saturating_duration_since(ended.at);
+            entry(now, (ended.worker, &ended.name), &ended.item, ended_for, ended.busy, ended.fate)
         };
         let mut unanswered: Vec<(WorkerId, &Worker, &AssignedItem)> = self
             .workers

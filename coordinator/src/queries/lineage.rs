@@ -95,7 +95,8 @@ impl StoredLineage {
                 return Err(other(format!("it has the digest {found}, and not {}", of.digest)));
             }
         }
-        let traced = names.into_iter().zip(pedigrees.iter().map(|it| it.trace(individual)));
+        let traced =
+            names.into_iter().zip(pedigrees.iter().map(|pedigree| pedigree.trace(individual)));
         let populations: Vec<(String, Vec<Ancestor>)> = traced.collect();
         if populations.iter().map(|(_, ancestors)| ancestors.len()).sum::<usize>() > ANCESTORS_MAX {
             return Err(too_deep());

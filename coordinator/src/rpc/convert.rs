@@ -161,8 +161,9 @@ pub fn evaluation(evaluation: EvaluationActivity) -> v1::RunningEvaluation {
 /// An experiment for clients.
 pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
     let summary = experiment.summary;
-    let (group, variant) =
-        experiment.membership.map_or_else(Default::default, |it| (it.group, it.variant));
+    let (group, variant) = experiment
+        .membership
+        .map_or_else(Default::default, |membership| (membership.group, membership.variant));
     v1::Experiment {
         id: experiment.id.0,
         name: experiment.name,
@@ -247,7 +248,7 @@ pub fn address(text: &str) -> Result<Address, Status> {
 pub fn individuals(found: Individuals) -> v1::GetIndividualsResponse {
     let Individuals { experiment, individuals, network_json, next } = found;
     let network_json = network_json.unwrap_or_default();
-    let individual = |it| individual(experiment.id.0, it, network_json.clone());
+    let individual = |champion| individual(experiment.id.0, champion, network_json.clone());
     v1::GetIndividualsResponse {
         individuals: individuals.into_iter().map(individual).collect(),
         next_individual: next,
@@ -259,7 +260,7 @@ pub fn dynamics((generations, next_generation): DynamicsPage) -> v1::ListDynamic
     let generation = |(generation, of): (u64, Dynamics)| v1::GenerationDynamics {
         generation,
         mean_step: of.mean_step,
-        deviations: of.deviations.map_or_else(Vec::new, |it| it.to_vec()),
+        deviations: of.deviations.map_or_else(Vec::new, |deviations| deviations.to_vec()),
         rank_correlation: of.rank_correlation,
     };
     let generations = generations.into_iter().map(generation).collect();
@@ -268,11 +269,11 @@ pub fn dynamics((generations, next_generation): DynamicsPage) -> v1::ListDynamic
 
 /// A lineage for clients.
 pub fn lineage(Lineage(populations): Lineage) -> v1::GetLineageResponse {
-    let ancestor = |it: Ancestor| v1::Ancestor {
-        generation: it.generation,
-        individual: it.individual,
-        fitness: it.fitness,
-        operator: match it.birth.as_ref().map(|birth| birth.operator) {
+    let ancestor = |ancestor: Ancestor| v1::Ancestor {
+        generation: ancestor.generation,
+        individual: ancestor.individual,
+        fitness: ancestor.fitness,
+        operator: match ancestor.birth.as_ref().map(|birth| birth.operator) {
             None => v1::BirthOperator::Unspecified,
             Some(Operator::First) => v1::BirthOperator::First,
             Some(Operator::Elite) => v1::BirthOperator::Elite,
@@ -280,9 +281,9 @@ pub fn lineage(Lineage(populations): Lineage) -> v1::GetLineageResponse {
             Some(Operator::Crossover) => v1::BirthOperator::Crossover,
         }
         .into(),
-        genes: it.n_surviving as u32,
-        new_genes: it.birth.as_ref().map_or(0, |birth| birth.n_new as u32),
-        parents: it
+        genes: ancestor.n_surviving as u32,
+        new_genes: ancestor.birth.as_ref().map_or(0, |birth| birth.n_new as u32),
+        parents: ancestor
             .birth
             .into_iter()
             .flat_map(|birth| birth.parents)

@@ -89,7 +89,7 @@ impl EvaluationService for Evaluations {
 
 /// The trials that a client names, or what is wrong with them.
 fn trial_set(trials: Option<EvolutionTrials>) -> Result<TrialSet, Status> {
-    match trials.and_then(|it| it.trials) {
+    match trials.and_then(|message| message.trials) {
         Some(Trials::Generation(generation)) => Ok(TrialSet::Generation(generation)),
         Some(Trials::Judgement(generation)) => Ok(TrialSet::Judgement(generation)),
         Some(Trials::Comparison(ComparisonTrials { generation, block })) => {

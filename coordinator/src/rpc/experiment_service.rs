@@ -105,7 +105,8 @@ impl ExperimentService for Experiments {
             labels: request.labels,
             parent: None,
         };
-        let fork_of = request.fork_of.map(|it| (ExperimentId(it.experiment_id), it.generation));
+        let fork_of =
+            request.fork_of.map(|point| (ExperimentId(point.experiment_id), point.generation));
         if fork_of.is_some() && request.resume_unfinished {
             return Err(Status::invalid_argument("a fork resumes nothing that is unfinished"));
         }

@@ -157,18 +157,18 @@ impl WebControl for Experiments {
 }
 
 /// An assignment for pages.
-fn assignment(it: TimelineEntry) -> Assignment {
+fn assignment(entry: TimelineEntry) -> Assignment {
     Assignment {
-        worker_id: it.worker.0,
-        batch: it.batch(),
-        worker_name: it.name.to_string(),
-        experiment: it.job.experiment().map(|id| id.0),
-        individual: it.individual,
-        trials: it.trials,
-        assigned_for: it.assigned_for,
-        ended_for: it.ended_for,
-        busy: it.busy,
-        fate: match it.fate {
+        worker_id: entry.worker.0,
+        batch: entry.batch(),
+        worker_name: entry.name.to_string(),
+        experiment: entry.job.experiment().map(|id| id.0),
+        individual: entry.individual,
+        trials: entry.trials,
+        assigned_for: entry.assigned_for,
+        ended_for: entry.ended_for,
+        busy: entry.busy,
+        fate: match entry.fate {
             Fate::Unanswered => swarm_web::Fate::Unanswered,
             Fate::Computed => swarm_web::Fate::Computed,
             Fate::TakenBack => swarm_web::Fate::TakenBack,

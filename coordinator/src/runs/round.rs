@@ -207,7 +207,8 @@ fn learn(
     generation: evolution::Generation,
     evaluated: &EvaluatedBatch,
 ) -> Result<UpdatedEvolution, EvolutionError> {
-    let learnt = evolution.learn(generation, &evaluated.values, |it| completion(config, it))?;
+    let learnt =
+        evolution.learn(generation, &evaluated.values, |summary| completion(config, summary))?;
     let Learnt { summary, notices: remarks, completed } = learnt;
     let generation = GenerationRecord {
         generation: summary.generation,
@@ -219,7 +220,7 @@ fn learn(
         idle_share: evaluated.idle_share,
     };
     let notices = [evaluated.notices.clone(), remarks].concat();
-    let told = Told::of(evaluated.values.clone());
+    let told = Told::from_fitness(evaluated.values.clone());
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 

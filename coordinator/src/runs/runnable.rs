@@ -41,7 +41,7 @@ impl Runnable {
         priority: Priority,
     ) -> Self {
         let spec: Arc<str> = config.to_canonical_json().into();
-        let memory = memory::estimate(&Summary::of(&config, &spec), genotype_len);
+        let memory = memory::estimate(&Summary::from_config(&config, &spec), genotype_len);
         Self { id, spec, config, memory, latest: None, priority, is_paused: false }
     }
 
@@ -114,7 +114,7 @@ mod tests {
         let record = ExperimentRecord {
             id: ExperimentId(1),
             name: new.config.name.clone(),
-            summary: Summary::of(&new.config, &config_json),
+            summary: Summary::from_config(&new.config, &config_json),
             config_digest: new.config_digest.to_string(),
             fingerprint: sim_core::FINGERPRINT.to_owned(),
             genotype_len: new.genotype_len as u64,
@@ -152,7 +152,7 @@ mod tests {
 
         let latest = GenerationRecord {
             generation: 0,
-            statistics: Statistics::of(&[0.0]),
+            statistics: Statistics::from_fitness(&[0.0]),
             digest: sound.config_digest.clone(),
             duration_ms: 1,
             episodes: 1,

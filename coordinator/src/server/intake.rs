@@ -52,7 +52,7 @@ impl Default for Intake {
 
 impl Intake {
     /// The same messages, for which there is room.
-    pub fn of(&self, body: Body) -> Body {
+    pub fn wrap(&self, body: Body) -> Body {
         Body::new(Arriving {
             body,
             room: Arc::clone(&self.0),
@@ -169,7 +169,7 @@ mod tests {
             sender.try_send(Bytes::copy_from_slice(frame)).unwrap();
         }
         let frames = ReceiverStream::new(frames).map(|bytes| Ok::<_, Status>(Frame::data(bytes)));
-        (intake.of(Body::new(StreamBody::new(frames))), sender)
+        (intake.wrap(Body::new(StreamBody::new(frames))), sender)
     }
 
     async fn read(body: &mut Body) -> usize {

@@ -53,7 +53,7 @@ impl Default for Outflow {
 
 impl Outflow {
     /// The same answer in pieces, if there is room for it.
-    pub fn of(&self, body: Body) -> Body {
+    pub fn wrap(&self, body: Body) -> Body {
         let (rest, taken) = (Bytes::new(), Instant::now());
         let unread = Unread { body, rest, place: None, taken, is_watched: false };
         let unread = Arc::new(Mutex::new(Some(unread)));
@@ -110,7 +110,7 @@ impl http_body::Body for Pieces {
     /// A refusal is in the headers of an answer: clients take no frame after them.
     fn is_end_stream(&self) -> bool {
         let shared = lock(&self.unread);
-        shared.as_ref().is_some_and(|it| it.rest.is_empty() && it.body.is_end_stream())
+        shared.as_ref().is_some_and(|unread| unread.rest.is_empty() && unread.body.is_end_stream())
     }
 }
 
@@ -120,12 +120,12 @@ async fn watch(unread: Weak<Shared>) {
         let due = {
             let Some(unread) = unread.upgrade() else { return };
             let mut shared = lock(&unread);
-            let Some(it) = &mut *shared else { return };
-            if it.rest.is_empty() {
-                it.is_watched = false;
+            let Some(answer) = &mut *shared else { return };
+            if answer.rest.is_empty() {
+                answer.is_watched = false;
                 return;
             }
-            let due = it.taken + WATCH_PATIENCE;
+            let due = answer.taken + WATCH_PATIENCE;
             if due <= Instant::now() {
                 *shared = None;
                 return;
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     fn answer(outflow: &Outflow, len: usize) -> Body {
-        outflow.of(Body::new(Full::new(Bytes::from(vec![7; len]))))
+        outflow.wrap(Body::new(Full::new(Bytes::from(vec![7; len]))))
     }
 
     async fn piece(body: &mut Body) -> Result<usize, Status> {
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn an_answer_without_a_message_has_no_frame() {
         use http_body::Body as _;
-        assert!(Outflow::default().of(Body::empty()).is_end_stream());
+        assert!(Outflow::default().wrap(Body::empty()).is_end_stream());
         assert!(!answer(&Outflow::default(), 1).is_end_stream());
     }
 

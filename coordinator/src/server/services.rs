@@ -95,10 +95,10 @@ impl Services {
             .layer(CallLayer(calls))
             .layer(CallLayer(gate))
             .layer(MapRequestLayer::new(move |request: Request<Body>| {
-                request.map(|body| intake.of(body))
+                request.map(|body| intake.wrap(body))
             }))
             .layer(MapResponseLayer::new(move |response: Response<Body>| {
-                response.map(|body| outflow.of(body))
+                response.map(|body| outflow.wrap(body))
             }))
             .add_service(health().await)
             .add_service(reflection_v1)

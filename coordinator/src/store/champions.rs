@@ -59,8 +59,9 @@ pub fn put(
 
 /// The ends of a champion's intervals.
 fn bounds(champion: &Champion) -> [f64; 3] {
-    let ci95 = champion.held_out.map_or(0.0, |it| it.ci95.get());
-    let (low, high) = champion.judged.map_or((0.0, 0.0), |it| (it.low.get(), it.high.get()));
+    let ci95 = champion.held_out.map_or(0.0, |held_out| held_out.ci95.get());
+    let (low, high) =
+        champion.judged.map_or((0.0, 0.0), |judged| (judged.low.get(), judged.high.get()));
     [ci95, low, high]
 }
 

@@ -126,7 +126,7 @@ impl Store {
             if version < schema::VERSION {
                 schema::read_as_latest(&connection, version)?;
             }
-            let sealer = Sealer::of(&connection)?;
+            let sealer = Sealer::from_database(&connection)?;
             Ok((connection, sealer))
         };
         let (connection, sealer) = open().map_err(|error| error.at(&path))?;
@@ -441,7 +441,7 @@ fn claim(connection: &Connection) -> rusqlite::Result<(Vec<u8>, Sealer)> {
     connection.execute("UPDATE identity SET owner = randomblob(16)", [])?;
     let owner = owner(connection)?;
     write_ahead_log::fold(connection)?;
-    Ok((owner, Sealer::of(connection)?))
+    Ok((owner, Sealer::from_database(connection)?))
 }
 
 /// The token of the coordinator that owns a database.

@@ -21,7 +21,7 @@ pub struct Sealer(Hasher);
 
 impl Sealer {
     /// The sealer of a database.
-    pub fn of(connection: &Connection) -> rusqlite::Result<Self> {
+    pub fn from_database(connection: &Connection) -> rusqlite::Result<Self> {
         connection.query_row("SELECT seal_key FROM identity", [], |row| {
             Ok(Self(Hasher::new_keyed(&row.get(0)?)))
         })
@@ -146,7 +146,7 @@ pub fn experiment_seal(
 
 /// Seals everything in a database that has no seals yet, as it is.
 pub fn seal_all(transaction: &Transaction<'_>) -> Result<()> {
-    let sealer = Sealer::of(transaction)?;
+    let sealer = Sealer::from_database(transaction)?;
     let mut statement = transaction.prepare("SELECT id FROM experiments")?;
     let ids = statement.query_map([], |row| row.get(0).map(ExperimentId))?;
     for id in ids {

@@ -60,7 +60,7 @@ impl Summary {
     }
 
     /// Of a file. `config_json`: the same in canonical form.
-    pub fn of(config: &ExperimentConfig, config_json: &str) -> Self {
+    pub fn from_config(config: &ExperimentConfig, config_json: &str) -> Self {
         let algorithm = &config.algorithm;
         Self {
             seed: config.seed,
@@ -92,7 +92,7 @@ mod tests {
             let new = submission.check(&|| true).unwrap().new;
             let (id, _) = store.create(&new, 0).unwrap();
             let stored = store.experiment(id).unwrap().unwrap();
-            assert_eq!(stored.summary, Summary::of(&new.config, &stored.config_json));
+            assert_eq!(stored.summary, Summary::from_config(&new.config, &stored.config_json));
             assert_eq!((stored.summary.seed, &stored.name), (seed, &new.config.name));
         }
     }

@@ -346,7 +346,7 @@ fn a_deleted_experiment_leaves_nothing_but_its_number() {
     assert!(is_new && again > kept, "numbers are not used again");
     drop(store);
     let findings = inspect(directory.path()).unwrap().findings;
-    assert!(findings.iter().all(|it| it.experiment != Some(id)), "{findings:?}");
+    assert!(findings.iter().all(|finding| finding.experiment != Some(id)), "{findings:?}");
 }
 
 #[test]

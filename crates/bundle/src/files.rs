@@ -131,12 +131,14 @@ pub fn champion_json(champion: &Champion) -> String {
         "generation": generation,
         "individual": individual,
         "trial_fitness": trial_fitness,
-        "selection": held_out.map(|it| serde_json::json!({
-            "mean": it.mean.get() + 0.0, "ci95": it.ci95, "trials": it.n_trials, "generation": it.generation,
+        "selection": held_out.map(|selection| serde_json::json!({
+            "mean": selection.mean.get() + 0.0, "ci95": selection.ci95,
+            "trials": selection.n_trials, "generation": selection.generation,
         })),
-        "judged": judged.map(|it| serde_json::json!({
-            "mean": it.mean.get() + 0.0, "low": it.low.get() + 0.0, "high": it.high.get() + 0.0,
-            "trials": it.n_trials, "generation": it.generation,
+        "judged": judged.map(|judgement| serde_json::json!({
+            "mean": judgement.mean.get() + 0.0,
+            "low": judgement.low.get() + 0.0, "high": judgement.high.get() + 0.0,
+            "trials": judgement.n_trials, "generation": judgement.generation,
         })),
         "genotype": genotype,
     });
@@ -314,7 +316,7 @@ mod tests {
     #[test]
     fn a_history_has_as_many_rows_as_generations_may_be_each_in_its_place() {
         let digest = Digest::default();
-        let statistics = Statistics::of(&[1.0, 0.0]);
+        let statistics = Statistics::from_fitness(&[1.0, 0.0]);
         let row = GenerationRow {
             statistics,
             episodes: 1,

@@ -28,8 +28,9 @@ fn config() -> ExperimentConfig {
 
 fn simulated(simulation: &Simulation, batch: &Batch) -> Vec<Vec<f64>> {
     let n_trials = batch.trial_fitness[0].len() as u32;
-    let of = |genes: &Vec<f64>| simulation.evaluate(genes, batch.trial_set, 0..n_trials).unwrap();
-    batch.genotypes.iter().map(of).collect()
+    let fitness =
+        |genes: &Vec<f64>| simulation.evaluate(genes, batch.trial_set, 0..n_trials).unwrap();
+    batch.genotypes.iter().map(fitness).collect()
 }
 
 /// A run to its end; `change`: what is told instead of the fitness of a generation.
@@ -49,13 +50,13 @@ fn evolved(
     while evolution.n_generations() < algorithm.generations {
         let generation = evolution.n_generations();
         let evaluate = |set: sim_core::TrialSet, genotypes: &[Vec<f64>], n_trials| {
-            let of = |genes: &Vec<f64>| simulation.evaluate(genes, set, 0..n_trials).unwrap();
-            genotypes.iter().map(of).collect::<Vec<_>>()
+            let fitness = |genes: &Vec<f64>| simulation.evaluate(genes, set, 0..n_trials).unwrap();
+            genotypes.iter().map(fitness).collect::<Vec<_>>()
         };
         let asked = evolution.ask();
         let mut fitness = evaluate(generation.into(), &asked.genotypes, algorithm.num_evaluations);
         change(generation, &mut fitness);
-        let mut told = Told::of(fitness);
+        let mut told = Told::from_fitness(fitness);
         let summary = evolution.tell(asked, &told.trial_fitness).unwrap();
         if evolution.n_generations().is_multiple_of(algorithm.champion_every) {
             let mut round = evolution.reevaluation().unwrap();

@@ -98,7 +98,7 @@ impl Claim {
 }
 
 impl Batch {
-    fn of(round: Round<'_>) -> Self {
+    fn from_round(round: Round<'_>) -> Self {
         let Round { trial_set, genotypes, trial_fitness } = round;
         Self { trial_set, genotypes, trial_fitness: trial_fitness.to_vec() }
     }
@@ -222,7 +222,10 @@ impl<'a> Verification<'a> {
         let GenerationRow { statistics, .. } = row;
         let [found, stated] = [summary.statistics, *statistics]
             // Databases do not keep the sign of zero.
-            .map(|it| [it.best, it.mean, it.min, it.standard_deviation].map(|it| it.get() + 0.0));
+            .map(|statistics| {
+                [statistics.best, statistics.mean, statistics.min, statistics.standard_deviation]
+                    .map(|number| number.get() + 0.0)
+            });
         let found = [0, 1, 2, 3].map(|i| as_stated(found[i], stated[i]));
         if !same_bits(&found, &stated) || row.episodes != n_episodes {
             return Err(Claim::History.flaw(at(&format!(
@@ -232,7 +235,7 @@ impl<'a> Verification<'a> {
         }
         let mut batches = Vec::new();
         if self.sample.contains(&generation) {
-            batches.extend(rounds.into_iter().map(Batch::of));
+            batches.extend(rounds.into_iter().map(Batch::from_round));
             let n_trials = self.n_trials as usize;
             if told.trial_fitness.iter().any(|trials| trials.len() != n_trials) {
                 return Err(Claim::Simulation.flaw(at(&format!("it has not {n_trials} trials"))));
@@ -266,7 +269,7 @@ impl<'a> Verification<'a> {
             return Err(Claim::Champion.flaw("the log leads to another one"));
         }
         self.champion = champion;
-        Ok(rounds.into_iter().map(Batch::of).collect())
+        Ok(rounds.into_iter().map(Batch::from_round).collect())
     }
 
     fn compare_keyframe(&mut self) -> Result<(), Flaw> {

@@ -75,7 +75,10 @@ fn run(setup: &Setup, function: Function, n_evaluations: u32) -> (f64, Option<f6
             generation.genotypes.iter().map(|genes| vec![-of_genes(genes)]).collect();
         evolution.tell(generation, &fitness).expect("fitness is finite");
     }
-    let best = evolution.champion().and_then(|it| it.fitness()).expect("there was a generation");
+    let best = evolution
+        .champion()
+        .and_then(|champion| champion.fitness())
+        .expect("there was a generation");
     (-best, evolution.mean().map(|genes| of_genes(&genes)))
 }
 
@@ -87,7 +90,8 @@ fn summary(mut values: Vec<f64>) -> String {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).map(|it| it.parse().expect("a whole number"));
+    let mut arguments =
+        std::env::args().skip(1).map(|argument| argument.parse().expect("a whole number"));
     let population_size: u32 = arguments.next().unwrap_or(20);
     let n_evaluations: u32 = arguments.next().unwrap_or(20_000);
     println!("{N_GENES} genes, {population_size} individuals, {n_evaluations} evaluations");
@@ -103,9 +107,9 @@ fn main() {
                 ..Setup::new(&algorithm, N_GENES)
             };
             let runs = SEEDS.map(|seed| run(&setup(seed), function, n_evaluations));
-            let mean: Option<Vec<f64>> = runs.iter().map(|it| it.1).collect();
+            let mean: Option<Vec<f64>> = runs.iter().map(|run| run.1).collect();
             let mean = mean.map_or_else(|| "-".to_owned(), summary);
-            let champion = summary(runs.iter().map(|it| it.0).collect());
+            let champion = summary(runs.iter().map(|run| run.0).collect());
             println!("| {algorithm}{} | {champion} | {mean} |", keys.concat());
         }
     }

@@ -91,7 +91,7 @@ const Z: f64 = 1.96;
 
 impl HeldOut {
     /// Of trials that belong to this generation; none if their mean is not finite.
-    pub fn of(values: &[f64], generation: u64) -> Option<Self> {
+    pub fn from_values(values: &[f64], generation: u64) -> Option<Self> {
         let mean = mean(values);
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         Self::from_squares(mean, squares, values.len() as u64, generation)
@@ -136,9 +136,10 @@ mod tests {
     #[test]
     fn trials_of_two_rounds_count_as_if_they_were_of_one() {
         let (first, later) = ([1.0, 2.0, 4.0], [8.0, 3.0]);
-        let of = |values: &[f64], generation| HeldOut::of(values, generation).unwrap();
-        let together = of(&first, 3).with(of(&later, 9)).unwrap();
-        let at_once = of(&[first.to_vec(), later.to_vec()].concat(), 9);
+        let held_out =
+            |values: &[f64], generation| HeldOut::from_values(values, generation).unwrap();
+        let together = held_out(&first, 3).with(held_out(&later, 9)).unwrap();
+        let at_once = held_out(&[first.to_vec(), later.to_vec()].concat(), 9);
         assert_eq!((together.n_trials, together.generation), (5, 9));
         assert!((together.mean.get() - at_once.mean.get()).abs() < 1e-15, "{together:?}");
         assert!((together.ci95.get() - at_once.ci95.get()).abs() < 1e-14, "{together:?}");
@@ -148,12 +149,15 @@ mod tests {
 
     #[test]
     fn candidates_are_close_if_chance_may_have_ordered_them() {
-        let of = |mean: f64, ci95: f64| {
+        let held_out = |mean: f64, ci95: f64| {
             let [mean, ci95] = [mean, ci95].map(|value| Real::new(value).unwrap());
             HeldOut { mean, ci95, n_trials: 50, generation: 0 }
         };
-        assert!(of(1.0, 0.3).is_close_to(&of(1.49, 0.4)));
-        assert!(!of(1.0, 0.3).is_close_to(&of(1.51, 0.4)));
-        assert!(!of(1.0, 0.0).is_close_to(&of(1.0, 0.0)), "more trials would show nothing new");
+        assert!(held_out(1.0, 0.3).is_close_to(&held_out(1.49, 0.4)));
+        assert!(!held_out(1.0, 0.3).is_close_to(&held_out(1.51, 0.4)));
+        assert!(
+            !held_out(1.0, 0.0).is_close_to(&held_out(1.0, 0.0)),
+            "more trials would show nothing new"
+        );
     }
 }

@@ -80,7 +80,10 @@ impl Evolution {
     /// Generations from a keyframe to the next.
     fn keyframe_interval(&self, entry_len: u64) -> u64 {
         let sum = |number: fn(&Algorithm, u64) -> u64| {
-            let of_each = self.populations.iter().map(|it| number(it, self.population_size as u64));
+            let of_each = self
+                .populations
+                .iter()
+                .map(|population| number(population, self.population_size as u64));
             of_each.sum::<u64>().max(1)
         };
         let for_time = (REPLAY_NS / sum(generation_ns)).clamp(1, GENERATIONS_MAX);

@@ -30,12 +30,12 @@ impl Evolution {
             let squares = before.iter().zip(&after).map(|(a, b)| (a - b) * (a - b));
             squares.sum::<f64>().sqrt()
         });
-        let of_each = self.populations.iter().map(|it| it.deviations());
+        let of_each = self.populations.iter().map(|population| population.deviations());
         let deviations: Option<Vec<Vec<f64>>> = of_each.collect();
         Ok(Dynamics {
             digest,
             mean_step,
-            deviations: deviations.map(|it| quantiles(it.concat())),
+            deviations: deviations.map(|deviations| quantiles(deviations.concat())),
             rank_correlation: rank_correlation(&told.trial_fitness),
         })
     }
@@ -55,8 +55,10 @@ fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
 /// `trial_fitness[i][t]`: of individual i in trial t. Individuals whose fitness is not finite in
 /// every trial are left out.
 fn rank_correlation(trial_fitness: &[Vec<f64>]) -> Option<f64> {
-    let finite: Vec<&Vec<f64>> =
-        trial_fitness.iter().filter(|trials| trials.iter().all(|it| it.is_finite())).collect();
+    let finite: Vec<&Vec<f64>> = trial_fitness
+        .iter()
+        .filter(|trials| trials.iter().all(|fitness| fitness.is_finite()))
+        .collect();
     let n_trials = finite.first()?.len();
     let deviations: Vec<Vec<f64>> = (0..n_trials)
         .filter_map(|trial| deviations_of_ranks(finite.iter().map(|of| of[trial]).collect()))
@@ -83,8 +85,8 @@ fn deviations_of_ranks(values: Vec<f64>) -> Option<Vec<f64>> {
     };
     let middle = (values.len() as f64 - 1.0) / 2.0;
     let deviations: Vec<f64> = values.iter().map(|&value| rank(value) - middle).collect();
-    let length = deviations.iter().map(|it| it * it).sum::<f64>().sqrt();
-    (length > 0.0).then(|| deviations.into_iter().map(|it| it / length).collect())
+    let length = deviations.iter().map(|deviation| deviation * deviation).sum::<f64>().sqrt();
+    (length > 0.0).then(|| deviations.into_iter().map(|deviation| deviation / length).collect())
 }
 
 #[cfg(test)]
@@ -94,16 +96,19 @@ mod tests {
 
     #[test]
     fn trials_that_rank_alike_correlate_and_opposite_ones_do_not() {
-        let of = |trials: [[f64; 4]; 2]| {
+        let correlation = |trials: [[f64; 4]; 2]| {
             let told: Vec<Vec<f64>> = (0..4).map(|i| vec![trials[0][i], trials[1][i]]).collect();
             rank_correlation(&told)
         };
         let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
-        assert!(near(of([[1.0, 2.0, 3.0, 4.0], [1.0, 8.0, 9.0, 70.0]]), 1.0));
-        assert!(near(of([[1.0, 2.0, 3.0, 4.0], [4.0, 3.0, 2.0, 1.0]]), -1.0));
+        assert!(near(correlation([[1.0, 2.0, 3.0, 4.0], [1.0, 8.0, 9.0, 70.0]]), 1.0));
+        assert!(near(correlation([[1.0, 2.0, 3.0, 4.0], [4.0, 3.0, 2.0, 1.0]]), -1.0));
         // Ranks 0, 1.5, 1.5, 3 and 0, 2, 1, 3: 4.5 / sqrt(4.5 * 5).
-        assert!(near(of([[1.0, 2.0, 2.0, 4.0], [1.0, 3.0, 2.0, 4.0]]), 0.948_683_298_050_513_8));
-        assert_eq!(of([[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 3.0, 4.0]]), None);
+        assert!(near(
+            correlation([[1.0, 2.0, 2.0, 4.0], [1.0, 3.0, 2.0, 4.0]]),
+            0.948_683_298_050_513_8
+        ));
+        assert_eq!(correlation([[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 3.0, 4.0]]), None);
         assert_eq!(rank_correlation(&[vec![1.0], vec![2.0]]), None);
         assert_eq!(rank_correlation(&[vec![f64::NAN, 1.0]]), None);
     }
@@ -122,8 +127,9 @@ mod tests {
             let mut same = evolution.clone();
             for _ in 0..3 {
                 let genotypes = evolution.ask().genotypes;
-                let told =
-                    Told::of(genotypes.iter().map(|genes| vec![genes[0], genes[1]]).collect());
+                let told = Told::from_fitness(
+                    genotypes.iter().map(|genes| vec![genes[0], genes[1]]).collect(),
+                );
                 let before = evolution.mean();
                 let found = evolution.dynamics(&told).unwrap();
                 same.replay(&told).unwrap();
@@ -147,7 +153,7 @@ mod tests {
             let genotypes = evolution.ask().genotypes;
             for (j, expected) in deviations.iter().enumerate() {
                 let genes: Vec<f64> = genotypes.iter().map(|genes| genes[j]).collect();
-                let found = crate::Statistics::of(&genes).standard_deviation.get();
+                let found = crate::Statistics::from_fitness(&genes).standard_deviation.get();
                 assert!((found / expected - 1.0).abs() < 0.06, "{name}: {found} {expected}");
             }
         }

@@ -186,11 +186,16 @@ impl Evolution {
             })
             .collect();
         let digest = Digest::of_config(config, simulation);
-        Self::of(config.seed, algorithm.population_size as usize, populations, digest)
+        Self::from_parts(config.seed, algorithm.population_size as usize, populations, digest)
     }
 
     /// The start of an evolution; `digest`: link -1 of the chain.
-    fn of(seed: u64, population_size: usize, populations: Vec<Algorithm>, digest: Digest) -> Self {
+    fn from_parts(
+        seed: u64,
+        population_size: usize,
+        populations: Vec<Algorithm>,
+        digest: Digest,
+    ) -> Self {
         Self {
             seed,
             population_size,
@@ -229,7 +234,9 @@ impl Evolution {
     /// Whether another one has the same seed, as many individuals, and populations with the
     /// same numbers of genes.
     pub fn has_shape_of(&self, other: &Self) -> bool {
-        let n_genes = |it: &Self| it.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>();
+        let n_genes = |evolution: &Self| {
+            evolution.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>()
+        };
         (self.seed, self.population_size) == (other.seed, other.population_size)
             && n_genes(self) == n_genes(other)
     }
@@ -299,7 +306,7 @@ impl Evolution {
         }
         self.digest = self.digest.next(index, &genotypes, trial_fitness);
         self.n_generations += 1;
-        let statistics = Statistics::of(&fitness);
+        let statistics = Statistics::from_fitness(&fitness);
         let n_non_finite = fitness.iter().filter(|value| !value.is_finite()).count();
         let is_flat = n_non_finite == 0 && statistics.best == statistics.min && fitness.len() > 1;
         self.n_flat = self.n_flat.next(is_flat);

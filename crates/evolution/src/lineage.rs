@@ -43,7 +43,7 @@ pub struct Birth {
 
 impl Birth {
     /// Of an individual with these genes; `parent`: the genes of a rank.
-    pub(crate) fn of<'a>(
+    pub(crate) fn new<'a>(
         parents: Parents,
         genes: &[f64],
         parent: impl Fn(usize) -> &'a Genotype,
@@ -144,7 +144,8 @@ impl Pedigree {
         let mut traced: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (place, (births, fitness)) in self.generations.iter().enumerate().rev() {
             if traced.is_empty() {
-                let n_genes = births.get(individual as usize).map_or(0, |it| it.sources.len());
+                let n_genes =
+                    births.get(individual as usize).map_or(0, |birth| birth.sources.len());
                 traced.insert(individual, (0..n_genes).collect());
             }
             let mut before: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
@@ -186,7 +187,8 @@ fn ranked(fitness: &[f64]) -> Vec<u32> {
 }
 
 fn parents_of(birth: &Birth, individual_of: &[u32]) -> Vec<(u32, usize)> {
-    let n_from = |source| birth.sources.iter().filter(|&&it| it == source).count();
+    let n_from =
+        |source| birth.sources.iter().filter(|&&gene_source| gene_source == source).count();
     let first = |rank: usize| (individual_of[rank], n_from(GeneSource::First));
     match birth.parents {
         Parents::None => Vec::new(),
@@ -202,6 +204,6 @@ fn birth_of(birth: &Birth, parents: Vec<(u32, usize)>) -> BirthOf {
         Parents::One(_) => Operator::Copy,
         Parents::Two(..) => Operator::Crossover,
     };
-    let n_new = birth.sources.iter().filter(|&&it| it == GeneSource::New).count();
+    let n_new = birth.sources.iter().filter(|&&source| source == GeneSource::New).count();
     BirthOf { operator, parents, n_new }
 }

@@ -72,7 +72,7 @@ impl Reevaluation {
         let genotypes = self.participants.iter().map(|&i| &self.candidates[i].genotype[..]);
         self.digest = self.digest.next_champion(self.of_generations, genotypes, trial_fitness);
         for (&i, values) in self.participants.iter().zip(trial_fitness) {
-            let block = HeldOut::of(values, self.generation);
+            let block = HeldOut::from_values(values, self.generation);
             let held_out = &mut self.candidates[i].held_out;
             // Without a finite mean it has lost: it has none, and meets no further block.
             *held_out = match *held_out {
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn whoever_has_met_more_trials_waits_for_the_others() {
-        let known = HeldOut::of(&[around(5.0), around(5.0)].concat(), 3);
+        let known = HeldOut::from_values(&[around(5.0), around(5.0)].concat(), 3);
         let mut round = reevaluation(&[known, None]);
         round.learn(&[around(5.0), around(5.5)]);
         for block in 1..BLOCKS_MAX {
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn one_lucky_block_does_not_beat_what_is_known_of_many() {
-        let known = HeldOut::of(&[around(5.0), around(5.0), around(5.0)].concat(), 3);
+        let known = HeldOut::from_values(&[around(5.0), around(5.0), around(5.0)].concat(), 3);
         let mut round = reevaluation(&[known, None]);
         round.learn(&[around(2.0), around(5.1)]);
         assert_eq!(participants(&round), [1.0], "4.25 and 5.1 are close");

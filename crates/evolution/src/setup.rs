@@ -55,7 +55,7 @@ impl Setup {
         let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes);
         let population = algorithm.expect("the algorithm is known");
         let size = self.population_size as usize;
-        Ok(Evolution::of(self.seed, size, vec![population], Digest::of_text(&self.text())))
+        Ok(Evolution::from_parts(self.seed, size, vec![population], Digest::of_text(&self.text())))
     }
 
     /// The same rules as the reader's of experiment files, from the same

@@ -98,7 +98,7 @@ impl Evolution {
 
     /// The largest of the genes' standard deviations in distributions; none without one.
     pub(crate) fn widest(&self) -> Option<f64> {
-        let of_each = self.populations.iter().filter_map(|it| it.deviations());
+        let of_each = self.populations.iter().filter_map(|population| population.deviations());
         of_each.flatten().reduce(f64::max)
     }
 
@@ -149,7 +149,7 @@ impl Evolution {
     /// Why a run should end that learns nothing; none if it may go on.
     pub(crate) fn drifted(&self, summary: &GenerationSummary) -> Option<Drifted> {
         let n_generations = summary.n_flat;
-        let deviation = self.widest().filter(|&it| it > DEVIATION_MAX)?;
+        let deviation = self.widest().filter(|&deviation| deviation > DEVIATION_MAX)?;
         let fitness = summary.statistics.best.get();
         (n_generations >= FLAT_MAX).then_some(Drifted { fitness, n_generations, deviation })
     }

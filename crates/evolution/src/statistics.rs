@@ -25,7 +25,7 @@ impl Statistics {
     /// # Panics
     ///
     /// If there is none.
-    pub fn of(fitness: &[f64]) -> Self {
+    pub fn from_fitness(fitness: &[f64]) -> Self {
         let finite: Vec<f64> = fitness.iter().copied().filter(|value| value.is_finite()).collect();
         let expected = "a generation without finite fitness fails before";
         let mean = finite_mean(&finite).expect(expected);
@@ -87,7 +87,9 @@ pub(crate) mod tests {
     pub(crate) fn any_finite() -> impl Strategy<Value = f64> {
         let extreme = [0.0, -0.0, f64::MAX, f64::MIN, 5e-324, -5e-324, 1e308, 1.0, f64::EPSILON];
         prop_oneof![
-            2 => any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |it| it.is_finite()),
+            2 => any::<u64>()
+                .prop_map(f64::from_bits)
+                .prop_filter("finite", |number| number.is_finite()),
             1 => prop::sample::select(extreme.to_vec()),
             1 => (0u64..50).prop_map(f64::from_bits),
         ]
@@ -105,7 +107,8 @@ pub(crate) mod tests {
         fn statistics_of_finite_values_are_finite_and_in_order(
             values in prop::collection::vec(any_finite(), 1..40),
         ) {
-            let Statistics { best, mean, min, standard_deviation } = Statistics::of(&values);
+            let Statistics { best, mean, min, standard_deviation } =
+                Statistics::from_fitness(&values);
             let slack = 4.0 * f64::EPSILON * best.get().abs().max(min.get().abs());
             prop_assert!(min.get() - slack <= mean.get() && mean.get() - slack <= best.get());
             prop_assert!(standard_deviation.get() >= 0.0);
@@ -115,7 +118,7 @@ pub(crate) mod tests {
         fn what_was_finite_without_scaling_keeps_every_bit(
             values in prop::collection::vec(any_finite(), 1..40),
         ) {
-            let Statistics { mean, standard_deviation, .. } = Statistics::of(&values);
+            let Statistics { mean, standard_deviation, .. } = Statistics::from_fitness(&values);
             let (plain_mean, plain_deviation) = plain(&values);
             if plain_mean.is_finite() {
                 prop_assert_eq!(mean.get().to_bits(), plain_mean.to_bits());
@@ -138,10 +141,10 @@ pub(crate) mod tests {
 
     #[test]
     fn sums_that_overflow_have_a_mean_and_a_deviation() {
-        let of = Statistics::of(&[1.5e308, 1.5e308, 0.5e308, 0.5e308]);
+        let of = Statistics::from_fitness(&[1.5e308, 1.5e308, 0.5e308, 0.5e308]);
         assert!((of.mean.get() / 1e308 - 1.0).abs() < 1e-15, "{of:?}");
         assert!((of.standard_deviation.get() / 0.5e308 - 1.0).abs() < 1e-15, "{of:?}");
-        let of = Statistics::of(&[f64::MAX, f64::MIN]);
+        let of = Statistics::from_fitness(&[f64::MAX, f64::MIN]);
         assert_eq!((of.mean.get(), of.standard_deviation.get()), (0.0, f64::MAX));
     }
 }

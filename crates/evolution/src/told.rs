@@ -43,7 +43,7 @@ pub struct End {
 
 impl Told {
     /// A generation after which there is no re-evaluation.
-    pub fn of(trial_fitness: Vec<Vec<f64>>) -> Self {
+    pub fn from_fitness(trial_fitness: Vec<Vec<f64>>) -> Self {
         Self { trial_fitness, ..Self::default() }
     }
 

@@ -110,7 +110,8 @@ pub(super) fn or_name_or_null(schema: &mut Schema) {
 /// Ground areas by the names that they have in the original simulator, with their colours.
 pub(super) fn food_areas_and_nests(schema: &mut Schema) {
     let Some(Value::Array(variants)) = schema.get_mut("oneOf") else { return };
-    let is_area = |it: &&Value| it.pointer("/properties/type/const") == Some(&json!("ground_area"));
+    let is_area =
+        |variant: &&Value| variant.pointer("/properties/type/const") == Some(&json!("ground_area"));
     let Some(area) = variants.iter().find(is_area).cloned() else { return };
     for (name, description) in [
         ("food_area", "A green ground area; `range` is 150 cm by default, `color` fixed."),

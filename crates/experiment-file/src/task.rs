@@ -42,7 +42,10 @@ pub fn script_path(text: &str) -> Option<(String, Range<usize>)> {
 
 fn property<'a>(value: &'a Value<'a>, name: &str) -> Option<&'a Value<'a>> {
     let properties = &value.as_object()?.properties;
-    properties.iter().find(|property| property.name.as_str() == name).map(|it| &it.value)
+    properties
+        .iter()
+        .find(|property| property.name.as_str() == name)
+        .map(|property| &property.value)
 }
 
 /// The text of a file with its script in the place of the path, in the same number of lines.

@@ -91,7 +91,7 @@ impl TopologyConfig {
     /// What synapses can start from in a stimulus: nodes of its encoder, or its values.
     pub fn n_sources(&self, stimulus: &str) -> u32 {
         let n = self.stimuli.get(stimulus).map_or(0, |stimulus| stimulus.n);
-        self.encoding.get(stimulus).map_or(n, |it| it.receptive_field.n_nodes(n))
+        self.encoding.get(stimulus).map_or(n, |encoding| encoding.receptive_field.n_nodes(n))
     }
 }
 

@@ -440,7 +440,7 @@ impl Machine<'_> {
     fn sorted(&mut self, mut keyed: Vec<(Value, Value)>, is_reverse: bool) -> Outcome<Value> {
         let n_rounds = keyed.len().max(1).ilog2() as usize;
         self.meter.work(keyed.len() * n_rounds)?;
-        let keys = Keys::of(&keyed)?;
+        let keys = Keys::from_keyed(&keyed)?;
         self.meter.read(2 * n_rounds * keys.n_bytes)?;
         keyed.sort_by(|(a, _), (b, _)| {
             let order = keys.order(a, b);
@@ -459,7 +459,7 @@ struct Keys {
 }
 
 impl Keys {
-    fn of(keyed: &[(Value, Value)]) -> Outcome<Self> {
+    fn from_keyed(keyed: &[(Value, Value)]) -> Outcome<Self> {
         let Some((first, _)) = keyed.first() else {
             return Ok(Self { are_texts: false, n_bytes: 0 });
         };

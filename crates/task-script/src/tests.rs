@@ -232,7 +232,7 @@ fn what_runs_away_ends() {
     ] {
         let error = run(&format!("def f(x):\n    {body}\n    return 1")).unwrap_err();
         let expected = ["does too much", "keeps too much", "nested so deep", "cannot be a key"];
-        assert!(expected.iter().any(|it| error.message.contains(it)), "{body}: {error}");
+        assert!(expected.iter().any(|message| error.message.contains(message)), "{body}: {error}");
     }
 }
 

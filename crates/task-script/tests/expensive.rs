@@ -188,7 +188,10 @@ fn expensive_scripts_end_within_their_budget() {
             next.send(text.clone()).unwrap();
             if let Err(error) = run(&text, LIMITS, Nowhere(Cell::new(u32::MAX))) {
                 let known = ["does too much", "keeps too much", "no such element"];
-                assert!(known.iter().any(|it| error.message.contains(it)), "{error}\n{text}");
+                assert!(
+                    known.iter().any(|message| error.message.contains(message)),
+                    "{error}\n{text}"
+                );
                 n_ended += 1;
             }
         }

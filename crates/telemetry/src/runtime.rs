@@ -207,16 +207,16 @@ mod tests {
     #[test]
     fn threads_are_shared_out_and_one_is_enough() {
         let wanted = Sizes { workers: 8, blocking: 32 };
-        let of = |granted| sizes(wanted, granted).map(|it| (it.workers, it.blocking));
-        assert_eq!(of(0), None);
-        assert_eq!(of(1), Some((0, 1)));
-        assert_eq!(of(2), Some((0, 2)));
-        assert_eq!(of(3), Some((1, 1)));
-        assert_eq!(of(39), Some((8, 19)));
-        assert_eq!(of(40), Some((8, 32)));
-        assert_eq!(of(4000), Some((8, 32)));
+        let shares = |granted| sizes(wanted, granted).map(|sizes| (sizes.workers, sizes.blocking));
+        assert_eq!(shares(0), None);
+        assert_eq!(shares(1), Some((0, 1)));
+        assert_eq!(shares(2), Some((0, 2)));
+        assert_eq!(shares(3), Some((1, 1)));
+        assert_eq!(shares(39), Some((8, 19)));
+        assert_eq!(shares(40), Some((8, 32)));
+        assert_eq!(shares(4000), Some((8, 32)));
         for granted in 1..40 {
-            let (workers, blocking) = of(granted).unwrap();
+            let (workers, blocking) = shares(granted).unwrap();
             assert!(blocking > 0 && workers + blocking <= granted, "{granted}");
         }
     }
@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn as_many_threads_are_counted_as_there_are() {
         let (n_granted, refusal) = granted(5);
-        assert_eq!((n_granted, refusal.map(|it| it.to_string())), (5, None));
+        assert_eq!((n_granted, refusal.map(|refusal| refusal.to_string())), (5, None));
     }
 
     #[test]

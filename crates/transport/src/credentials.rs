@@ -81,7 +81,7 @@ pub struct CredentialArgs {
 impl CredentialArgs {
     /// When the certificates in these files expire.
     pub fn expiries(&self) -> Expiries {
-        Expiries::of(self.tls_cert.as_deref(), self.tls_ca.as_deref())
+        Expiries::from_files(self.tls_cert.as_deref(), self.tls_ca.as_deref())
     }
 
     /// Reads all files. The token is in a file or in an environment variable.

@@ -34,7 +34,7 @@ impl Expiries {
     /// Of a certificate with those between it and its authority, all of which are needed; and of
     /// authorities, one of which is enough. A file that cannot be read is refused by whoever uses
     /// it, and is left out here.
-    pub fn of(chain: Option<&Path>, authorities: Option<&Path>) -> Self {
+    pub fn from_files(chain: Option<&Path>, authorities: Option<&Path>) -> Self {
         let chain = chain.and_then(|path| Some((path, ends(path).into_iter().min()?)));
         let authorities = authorities.and_then(|path| Some((path, ends(path).into_iter().max()?)));
         let found = chain.into_iter().chain(authorities);
@@ -44,7 +44,7 @@ impl Expiries {
     /// Those that have expired at a time, or will have soon.
     pub fn near(&self, now: SystemTime) -> impl Iterator<Item = &Expiry> {
         let soon = seconds(now + NOTICE);
-        self.0.iter().filter(move |it| it.at < soon)
+        self.0.iter().filter(move |expiry| expiry.at < soon)
     }
 
     /// Logs those that will expire soon, now and every day.
@@ -125,7 +125,7 @@ mod tests {
     }
 
     fn texts(expiries: &Expiries) -> Vec<String> {
-        expiries.near(at(NOW)).map(|it| it.text(at(NOW))).collect()
+        expiries.near(at(NOW)).map(|expiry| expiry.text(at(NOW))).collect()
     }
 
     #[test]
@@ -133,7 +133,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let said = |month, day| {
             let path = file(directory.path(), "own.pem", &[(month, day)]);
-            texts(&Expiries::of(Some(&path), None)).join("\n")
+            texts(&Expiries::from_files(Some(&path), None)).join("\n")
         };
         assert_eq!(said(3, 30), "");
         assert!(said(3, 29).contains("own.pem expires on 2026-03-29T00:00:00Z, in 13 days; "));
@@ -146,10 +146,10 @@ mod tests {
     fn a_chain_ends_with_its_first_and_authorities_with_their_last() {
         let directory = tempfile::tempdir().unwrap();
         let path = file(directory.path(), "both.pem", &[(3, 20), (9, 1)]);
-        assert_eq!(texts(&Expiries::of(Some(&path), None)).len(), 1);
-        assert_eq!(texts(&Expiries::of(None, Some(&path))), [""; 0]);
+        assert_eq!(texts(&Expiries::from_files(Some(&path), None)).len(), 1);
+        assert_eq!(texts(&Expiries::from_files(None, Some(&path))), [""; 0]);
         let path = file(directory.path(), "both.pem", &[(3, 20), (3, 21)]);
-        let text = &texts(&Expiries::of(None, Some(&path)))[0];
+        let text = &texts(&Expiries::from_files(None, Some(&path)))[0];
         assert!(text.contains("2026-03-21T"), "{text}");
     }
 
@@ -157,8 +157,8 @@ mod tests {
     fn what_is_no_certificate_says_nothing() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("none.pem");
-        assert_eq!(Expiries::of(Some(&path), Some(&path)), Expiries::default());
+        assert_eq!(Expiries::from_files(Some(&path), Some(&path)), Expiries::default());
         fs::write(&path, "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n").unwrap();
-        assert_eq!(Expiries::of(Some(&path), None), Expiries::default());
+        assert_eq!(Expiries::from_files(Some(&path), None), Expiries::default());
     }
 }

@@ -402,9 +402,10 @@ mod tests {
 
     impl Scene {
         /// Robots of a kind, and what one of them hears.
-        fn of(&self, robot: usize) -> (&Listeners, &[Heard]) {
+        fn heard_by(&self, robot: usize) -> (&Listeners, &[Heard]) {
             let kinds = self.hearing.listeners().iter();
-            let mut robots = kinds.flat_map(|kind| kind.iter().map(move |it| (kind, it)));
+            let mut robots =
+                kinds.flat_map(|kind| kind.iter().map(move |listening| (kind, listening)));
             let found = robots.find(|(_, (listener, _))| *listener == robot);
             found.map(|(kind, (_, heard))| (kind, heard)).expect("it listens")
         }
@@ -415,11 +416,11 @@ mod tests {
                 let robot = heard.robot as usize;
                 (robot < self.headings.len()).then_some(robot)
             };
-            self.of(robot).1.iter().map(emitter).collect()
+            self.heard_by(robot).1.iter().map(emitter).collect()
         }
 
         fn strength(&self, robot: usize, sector: usize) -> f64 {
-            let (kind, heard) = self.of(robot);
+            let (kind, heard) = self.heard_by(robot);
             let (neighbours, headings) = (&self.neighbours, &self.headings);
             libm::exp(kind.log_strength(robot, sector, heard[sector], neighbours, headings))
         }
@@ -434,7 +435,7 @@ mod tests {
         let phi = FRAC_PI_2 - libm::atan2(4.0, 3.0);
         assert!((scene.strength(0, 1) - libm::exp(-2.5 - phi)).abs() < 1e-15);
         // Seen from the other: 143.13 degrees to its left, nearest to 180.
-        let (kind, heard) = scene.of(0);
+        let (kind, heard) = scene.heard_by(0);
         let (neighbours, headings) = (&scene.neighbours, &scene.headings);
         let sending_direction =
             scene.hearing.sending_direction(kind, heard[1], neighbours, headings);
@@ -485,7 +486,8 @@ mod tests {
         let listener = Antenna { emits_within: None, ..ANTENNA };
         let robots = [(500.0, 500.0, 0.0), (550.0, 500.0, 0.0), (510.0, 500.0, 0.0)];
         let scene = scene(&[beacon, ANTENNA, listener], &robots);
-        let n_listeners: usize = scene.hearing.listeners().iter().map(|it| it.iter().count()).sum();
+        let n_listeners: usize =
+            scene.hearing.listeners().iter().map(|kind| kind.iter().count()).sum();
         assert_eq!(n_listeners, 2);
         assert_eq!(scene.emitters(1)[2], Some(0));
         assert_eq!(scene.emitters(2), [Some(1), None, Some(0), None]);

@@ -94,14 +94,17 @@ impl ParameterCoverage {
             weights: vec![false; network.synapses.len()],
             neurons: vec![vec![false; network.n_neurons()]; n_parameters],
             delays: vec![false; network.n_delays()],
-            encoders: network.encoders().map(|(_, it)| vec![false; it.n_weights]).collect(),
+            encoders: network
+                .encoders()
+                .map(|(_, encoder)| vec![false; encoder.n_weights])
+                .collect(),
             learning: vec![[false; 4]; network.groups.len()],
             decoders: network.outputs.iter().map(|output| vec![false; output.n_weights]).collect(),
         }
     }
 
     /// Whether a value is covered.
-    pub fn of(&mut self, parameter: Parameter) -> &mut bool {
+    pub fn flag_mut(&mut self, parameter: Parameter) -> &mut bool {
         match parameter {
             Parameter::Weight(synapse) => &mut self.weights[synapse],
             Parameter::Neuron { parameter, neuron } => &mut self.neurons[parameter][neuron],
@@ -135,7 +138,9 @@ impl ParameterCoverage {
         }
         if let Some(learning) = &network.learning {
             let groups = network.groups.iter().zip(&self.learning);
-            for ((name, _), _) in groups.filter(|((_, it), covered)| it.is_plastic && !covered[0]) {
+            for ((name, _), _) in
+                groups.filter(|((_, group), covered)| group.is_plastic && !covered[0])
+            {
                 let [a, b, c, d] = learning.coefficients();
                 lines.push(format!("learning:coefficients:{name} stay {a}, {b}, {c}, {d}"));
             }

@@ -47,13 +47,13 @@ pub(super) fn select(
             (parameters.collect(), GeneScale::Linear)
         }
         GenotypeQuery::Encoders(selector) => {
-            let stimuli = network.stimuli.iter().filter(|(_, it)| it.encoder.is_some());
+            let stimuli = network.stimuli.iter().filter(|(_, stimulus)| stimulus.encoder.is_some());
             let selected = stimuli.enumerate().filter(|(_, (name, _))| match selector {
                 StimulusSelector::All => true,
                 StimulusSelector::Named(selected) => selected == *name,
             });
             let parameters = selected.flat_map(|(encoder, (_, stimulus))| {
-                let n_weights = stimulus.encoder.as_ref().map_or(0, |it| it.n_weights);
+                let n_weights = stimulus.encoder.as_ref().map_or(0, |encoder| encoder.n_weights);
                 (0..n_weights).map(move |weight| Parameter::Encoder { encoder, weight })
             });
             (parameters.collect(), GeneScale::Linear)
@@ -87,9 +87,9 @@ fn axons_of(selector: &EnsembleSelector, network: &Network) -> Range<usize> {
     match selector {
         EnsembleSelector::All => 0..n_neurons + network.n_encoded(),
         EnsembleSelector::Named(name) => {
-            let encoder = network.stimuli.get(name).and_then(|it| it.encoder.as_ref());
+            let encoder = network.stimuli.get(name).and_then(|stimulus| stimulus.encoder.as_ref());
             match encoder {
-                Some(it) => n_neurons + it.nodes.start..n_neurons + it.nodes.end,
+                Some(encoder) => n_neurons + encoder.nodes.start..n_neurons + encoder.nodes.end,
                 None => neurons_of(selector, network),
             }
         }

@@ -83,7 +83,7 @@ pub(super) fn draw(
         let synapses = first..synapses.len();
         let (trainable, transmitter) = (group.trainable, group.transmitter);
         let is_plastic =
-            config.learning.as_ref().is_some_and(|it| it.synapses.contains(group_name));
+            config.learning.as_ref().is_some_and(|learning| learning.synapses.contains(group_name));
         let group = SynapseGroup { synapses, trainable, is_plastic, transmitter };
         groups.insert(group_name.clone(), group);
     }

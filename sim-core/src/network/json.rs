@@ -136,7 +136,8 @@ mod tests {
         assert_eq!(nodes(4), [&json!("PoissonRateCoding"), &json!(5), &json!(12)]);
         assert_eq!(stimuli[4]["first_input"], 6);
         let synapses = network["synapses"].as_array().unwrap();
-        let from = |key: &str| synapses.iter().filter_map(|it| it["pre"][key].as_u64()).max();
+        let from =
+            |key: &str| synapses.iter().filter_map(|synapse| synapse["pre"][key].as_u64()).max();
         assert_eq!((from("node"), from("input")), (Some(16), Some(3)));
         assert_eq!(network.get("learning"), None);
     }

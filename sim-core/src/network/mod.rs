@@ -163,7 +163,7 @@ impl Network {
     /// Encoders, in the order of their nodes, with the inputs that they encode.
     pub fn encoders(&self) -> impl Iterator<Item = (Range<usize>, &Encoder)> {
         let stimuli = self.stimuli.values();
-        stimuli.filter_map(|it| Some((it.inputs.clone(), it.encoder.as_ref()?)))
+        stimuli.filter_map(|stimulus| Some((stimulus.inputs.clone(), stimulus.encoder.as_ref()?)))
     }
 
     /// Nodes of all encoders.

@@ -140,7 +140,7 @@ fn switch(value: &Value, name: Named) -> Result<bool, String> {
 impl View<'_> {
     /// `object.name = value`.
     pub(super) fn change(&mut self, object: Object, name: Named, value: &Value) -> Change {
-        let (kind, number) = (Kind::of(object), object.index as usize);
+        let (kind, number) = (Kind::of_object(object), object.index as usize);
         match (&mut self.may, kind, name) {
             (
                 May::Act { robot, plan, .. },

@@ -264,11 +264,11 @@ impl<'a> ScriptRun<'a> {
                     task.program.problem(function, message)
                 }),
             });
-            let what = if Kind::of(*thing) == Kind::Light { "light" } else { "area" };
+            let what = if Kind::of_object(*thing) == Kind::Light { "light" } else { "area" };
             *target = moved.map_err(|error| about(error, &format!("{what} {}", thing.index)))?;
         }
         for Mover { thing, target, .. } in movers {
-            let things = match Kind::of(*thing) {
+            let things = match Kind::of_object(*thing) {
                 Kind::Light => &mut *view.lights,
                 _ => &mut *view.areas,
             };

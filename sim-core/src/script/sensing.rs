@@ -95,7 +95,7 @@ impl ScriptRun<'_> {
 
     /// Robots with a `script_sensor`, each with what it senses in this step.
     pub fn sensed(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        self.sensing.iter().map(|it| (it.robot, it.reading.as_slice()))
+        self.sensing.iter().map(|sensor| (sensor.robot, sensor.reading.as_slice()))
     }
 }
 

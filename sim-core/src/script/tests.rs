@@ -51,7 +51,8 @@ fn every_built_in_task_can_be_said_as_a_script_to_the_same_bits() {
         FitnessFunction::Grouping => (experiment_d(), script!("grouping")),
         FitnessFunction::Script => unreachable!("it is the one that is compared"),
     };
-    let built_in = FitnessFunction::ALL.iter().filter(|it| **it != FitnessFunction::Script);
+    let built_in =
+        FitnessFunction::ALL.iter().filter(|function| **function != FitnessFunction::Script);
     for &function in built_in {
         let (mut config, text) = shipped(function);
         config.algorithm.fitness_function = function;

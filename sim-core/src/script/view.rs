@@ -32,7 +32,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub fn of(object: Object) -> Self {
+    pub fn of_object(object: Object) -> Self {
         match object.kind {
             1 => Self::Robot,
             2 => Self::Light,
@@ -118,10 +118,9 @@ impl<'a> View<'a> {
 
     fn state(&mut self, object: Object, meter: &Rc<Meter>) -> Answer {
         let kept = self.kept()?;
-        match kept
-            .states
-            .binary_search_by_key(&(object.kind, object.index), |(it, _)| (it.kind, it.index))
-        {
+        match kept.states.binary_search_by_key(&(object.kind, object.index), |(object, _)| {
+            (object.kind, object.index)
+        }) {
             Ok(place) => Ok(kept.states[place].1.clone()),
             Err(place) => {
                 let state = Value::dict(meter)?;
@@ -151,7 +150,7 @@ impl<'a> View<'a> {
 
     fn position(&self, object: Object) -> Result<Vec2, String> {
         let number = object.index as usize;
-        match Kind::of(object) {
+        match Kind::of_object(object) {
             Kind::World => Err("the world has no position; `world.center` has".into()),
             Kind::Robot => Ok(self.swarm.positions[number]),
             Kind::Light => Ok(self.lights[number]),
@@ -178,7 +177,7 @@ impl<'a> View<'a> {
 
     /// The lights or areas that a thing is one of.
     fn objects(&self, object: Object) -> Result<&'a StaticObjects, String> {
-        let groups = match Kind::of(object) {
+        let groups = match Kind::of_object(object) {
             Kind::Light => &self.world.lights,
             _ => &self.world.areas,
         };
@@ -268,7 +267,7 @@ impl<'a> View<'a> {
     fn own_stream(&mut self, object: Object) -> Result<&mut Stream, String> {
         match &mut self.may {
             May::Act { robot, stream, .. } | May::Sense { robot, stream }
-                if Kind::of(object) == Kind::Robot && *robot == object.index as usize =>
+                if Kind::of_object(object) == Kind::Robot && *robot == object.index as usize =>
             {
                 Ok(stream)
             }
@@ -341,7 +340,7 @@ impl<'a> View<'a> {
         arguments: &[Value],
         meter: &Rc<Meter>,
     ) -> Answer {
-        let kind = Kind::of(object);
+        let kind = Kind::of_object(object);
         let itself = Value::Object(object);
         match (name, arguments) {
             (Named::Distance | Named::Way, [other]) => {
@@ -370,7 +369,7 @@ impl Host for View<'_> {
     }
 
     fn get(&mut self, object: Object, name: Name, meter: &Rc<Meter>) -> Answer {
-        let kind = Kind::of(object);
+        let kind = Kind::of_object(object);
         match (Named::numbered(name), kind) {
             (Named::State, _) => self.state(object, meter),
             (name, Kind::World) => self.of_world(name, meter),
@@ -402,7 +401,7 @@ impl Host for View<'_> {
         meter: &Rc<Meter>,
     ) -> Answer {
         let name = Named::numbered(name);
-        match Kind::of(object) {
+        match Kind::of_object(object) {
             Kind::World => self.call_world(name, arguments, meter),
             _ => self.call_thing(object, name, arguments, meter),
         }

@@ -44,7 +44,7 @@ impl Sensor for DistanceSensor {
 
     fn sense(&self, from: Viewpoint, surroundings: &Surroundings<'_>, reading: &mut [f64]) {
         reading.fill(0.0);
-        let neighbours = surroundings.neighbours.of(from.robot);
+        let neighbours = surroundings.neighbours.of_robot(from.robot);
         for neighbour in neighbours.filter(|neighbour| neighbour.rho <= self.range) {
             let bearing = wrap_angle(neighbour.bearing - from.heading);
             take_sectors(neighbour.rho, bearing, self.decay, self.aperture, reading, f64::max);

@@ -25,8 +25,9 @@ fn line(n: u32) -> ExperimentConfig {
 /// Has robots' networks get the sending direction instead of the receiving one.
 fn observe_sending_direction(config: &mut ExperimentConfig) {
     let mut stimuli = config.topology.stimuli.values_mut();
-    let direction =
-        stimuli.find(|it| it.sensor == SensorQuery::ReceiverReceivingDirection).unwrap();
+    let direction = stimuli
+        .find(|stimulus| stimulus.sensor == SensorQuery::ReceiverReceivingDirection)
+        .unwrap();
     direction.sensor = SensorQuery::ReceiverSendingDirection;
 }
 

@@ -282,7 +282,10 @@ pub fn decode_genes(config: &ExperimentConfig, genotype: &[f64]) -> Decoded {
     let mut weights: Vec<Option<f64>> = vec![None; synapses.len()];
     let (mut neurons, mut decoders, mut delays) = (Vec::new(), Vec::new(), Vec::new());
     let mut encoders = Vec::new();
-    let coefficients = topology.learning.as_ref().map_or([0.0; 4], |it| [it.a, it.b, it.c, it.d]);
+    let coefficients = topology
+        .learning
+        .as_ref()
+        .map_or([0.0; 4], |learning| [learning.a, learning.b, learning.c, learning.d]);
     let mut coefficients = vec![coefficients; topology.synapses.len()];
     for (x, BoundedGene { gene, min, max }) in genotype.iter().zip(&genes) {
         let value = x * (max - min) + min;

@@ -121,15 +121,19 @@ pub fn distance(
 /// the first; zeros where there are none.
 pub fn neighborhood(n: usize, own_idx: usize, robots: &[Robot<'_>], torus: Torus) -> Vec<f64> {
     let own = &robots[own_idx];
-    let mut others: Vec<&Robot<'_>> =
-        robots.iter().enumerate().filter(|(idx, _)| *idx != own_idx).map(|(_, it)| it).collect();
+    let mut others: Vec<&Robot<'_>> = robots
+        .iter()
+        .enumerate()
+        .filter(|(idx, _)| *idx != own_idx)
+        .map(|(_, robot)| robot)
+        .collect();
     // Stable: ties keep their order.
     others.sort_by(|a, b| {
         let [a, b] = [a, b].map(|robot| torus.distance(own.position, robot.position));
         a.total_cmp(&b)
     });
-    let of = |robot: &&Robot<'_>| [robot.position[0], robot.position[1], robot.heading];
-    let mut reading: Vec<f64> = others.iter().take(n).flat_map(of).collect();
+    let pose = |robot: &&Robot<'_>| [robot.position[0], robot.position[1], robot.heading];
+    let mut reading: Vec<f64> = others.iter().take(n).flat_map(pose).collect();
     reading.resize(3 * n, 0.0);
     reading
 }

@@ -87,8 +87,9 @@ impl SpikingNetwork {
         let Decoded { matrices, neurons, delays, encoders, decoders: covered, .. } =
             decode_genes(config, genotype);
         let of_ensembles = topology.ensembles.values();
-        let mut params: Vec<NamedMap<f64>> =
-            of_ensembles.flat_map(|it| vec![it.params.clone(); it.n as usize]).collect();
+        let mut params: Vec<NamedMap<f64>> = of_ensembles
+            .flat_map(|ensemble| vec![ensemble.params.clone(); ensemble.n as usize])
+            .collect();
         for (name, neuron, value) in neurons {
             params[neuron][name] = value;
         }
@@ -248,7 +249,8 @@ impl SpikingNetwork {
                 DecodingConfig::FirstToSpike {} => {
                     let first = &window.first[neurons.clone()];
                     let earliest = first.iter().min().expect("ensembles have neurons");
-                    vec![first.iter().position(|it| it == earliest).expect("it is there") as f64]
+                    vec![first.iter().position(|spike| spike == earliest).expect("it is there")
+                        as f64]
                 }
                 DecodingConfig::RankOrderDecoding { .. } => weights
                     .chunks(neurons.len())

@@ -155,11 +155,12 @@ fn a_run_in_one_process_ends_with_its_driver_and_goes_on_when_repeated() {
         .arg(experiment.path())
         .arg("--data-dir")
         .arg(data_dir.path());
-    let broken = Outcome::of(run.env("SWARM_FAILPOINT", "panic event 20"));
+    let broken = Outcome::of_command(run.env("SWARM_FAILPOINT", "panic event 20"));
     assert_eq!(broken.code, Some(1), "{broken:#?}");
     assert!(broken.stderr.contains("the driver ended"), "{}", broken.stderr);
 
-    let lines = Outcome::of(run.env_remove("SWARM_FAILPOINT")).expect_success().json_lines();
+    let lines =
+        Outcome::of_command(run.env_remove("SWARM_FAILPOINT")).expect_success().json_lines();
     let digests: Vec<&str> = lines.iter().filter_map(|line| line["digest"].as_str()).collect();
     assert_eq!(digests, TINY.undisturbed());
 }

@@ -97,7 +97,8 @@ impl Replay {
     ) -> Result<Self, ReplayError> {
         let Episode { simulation, genotype, trial_set, trial, .. } = *episode;
         let scene = Scene::new(episode);
-        let per_robot: usize = ROBOT_COLUMNS.iter().map(|it| (it.n_components)(&scene)).sum();
+        let per_robot: usize =
+            ROBOT_COLUMNS.iter().map(|column| (column.n_components)(&scene)).sum();
         let n_values = scene.steps as usize * scene.n_robots * per_robot;
         if n_values > VALUES_MAX {
             return Err(ReplayError::TooLong { n_values });

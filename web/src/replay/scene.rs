@@ -84,11 +84,12 @@ impl Scene {
         let config = episode.config;
         let robots: Vec<Robots> =
             config.robots().map(|(name, robot)| Robots::new(name, robot, config)).collect();
-        let n_inputs = |robots: &Robots| robots.stimuli.iter().map(|it| it.n as usize).sum();
+        let n_inputs =
+            |robots: &Robots| robots.stimuli.iter().map(|stimulus| stimulus.n as usize).sum();
         let message_len = config.robots().filter_map(|(_, robot)| message_len(robot)).max();
-        let discs = |of: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
+        let discs = |properties: fn(&ObjectConfig) -> Option<(u32, f64, &str)>| -> Vec<Disc> {
             let objects = config.world.objects.iter();
-            let kinds = objects.filter_map(|(name, object)| Some((name, of(object)?)));
+            let kinds = objects.filter_map(|(name, object)| Some((name, properties(object)?)));
             let each = kinds.flat_map(|(name, (n, range, color))| {
                 (0..n).map(move |_| Disc { name: name.clone(), color: color.into(), range })
             });
@@ -114,8 +115,10 @@ impl Scene {
             n_robots: robots.iter().map(|robots| robots.n).sum(),
             message_len: message_len.unwrap_or_default() as usize,
             n_inputs: robots.iter().map(n_inputs).max().unwrap_or_default(),
-            n_neurons: config.topology.ensembles.values().map(|it| it.n as usize).sum(),
-            ensembles: rows(config.topology.ensembles.iter().map(|(name, it)| (&**name, it.n))),
+            n_neurons: config.topology.ensembles.values().map(|ensemble| ensemble.n as usize).sum(),
+            ensembles: rows(
+                config.topology.ensembles.iter().map(|(name, ensemble)| (&**name, ensemble.n)),
+            ),
             robots,
             lights: discs(|object| match object {
                 ObjectConfig::LightSource(light) => {
@@ -146,9 +149,11 @@ impl Robots {
             emits_within: transmitter.map(|transmitter| transmitter.range),
             hears_within: receiver.map(|receiver| receiver.range),
             n_sectors: receiver.map_or(0, |receiver| receiver.n_sectors),
-            n_levels: transmitter.filter(|it| it.quantize).map(|it| it.n_levels()),
+            n_levels: transmitter
+                .filter(|transmitter| transmitter.quantize)
+                .map(|transmitter| transmitter.n_levels()),
             stimuli: if has_network {
-                rows(config.topology.stimuli.iter().map(|(name, it)| (&**name, it.n)))
+                rows(config.topology.stimuli.iter().map(|(name, stimulus)| (&**name, stimulus.n)))
             } else {
                 rows([("light_sensor", light)].into_iter())
             },
@@ -167,5 +172,7 @@ fn rows<'a>(named: impl Iterator<Item = (&'a str, u32)>) -> Vec<Rows> {
 fn message_len(robot: &RobotConfig) -> Option<u32> {
     let receiver = robot.sensors.wireless_receiver.as_ref();
     let transmitter = robot.actuators.wireless_transmitter.as_ref();
-    receiver.map(|it| it.msg_length).or(transmitter.map(|it| it.msg_length))
+    receiver
+        .map(|receiver| receiver.msg_length)
+        .or(transmitter.map(|transmitter| transmitter.msg_length))
 }

@@ -57,8 +57,10 @@ impl Access {
         let Some(expected) = &self.cookie else { return true };
         let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
         cookies.flat_map(|cookies| cookies.split(';')).any(|cookie| {
-            let value =
-                cookie.trim().strip_prefix(&*self.cookie_name).and_then(|it| it.strip_prefix('='));
+            let value = cookie
+                .trim()
+                .strip_prefix(&*self.cookie_name)
+                .and_then(|rest| rest.strip_prefix('='));
             value.is_some_and(|value| value.as_bytes().ct_eq(expected.as_bytes()).into())
         })
     }
@@ -125,7 +127,8 @@ async fn whole(request: Request) -> Result<Request, Problem> {
 
 /// Browsers say where a request that changes something comes from.
 fn is_same_origin(origin: Option<&str>, host: &str) -> bool {
-    let authority = origin.and_then(|origin| origin.split_once("://")).map(|(_, it)| it);
+    let authority =
+        origin.and_then(|origin| origin.split_once("://")).map(|(_, authority)| authority);
     authority == Some(host)
 }
 

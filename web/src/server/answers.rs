@@ -47,36 +47,38 @@ pub struct ExperimentAnswer {
 impl ExperimentAnswer {
     /// `has_coordinator`: whether one is there that could be computing it. Otherwise only the
     /// files are known, which call running whatever has not ended.
-    pub fn new(it: Experiment, has_coordinator: bool) -> Self {
+    pub fn new(experiment: Experiment, has_coordinator: bool) -> Self {
         Self {
-            state: match it.state() {
+            state: match experiment.state() {
                 ExperimentState::Running if !has_coordinator => "unfinished",
                 known => state(known),
             },
-            id: it.id,
-            name: it.name,
-            reason: it.reason,
-            generations_done: it.generations_done,
-            generations: it.generations,
-            seed: Seed(it.seed),
-            algorithm: it.algorithm,
-            population_size: it.population_size,
-            genotype_len: it.genotype_len,
-            submitted_at_ms: it.submitted_at_ms,
-            best: it.latest.as_ref().map(|latest| latest.best),
-            mean: it.latest.as_ref().map(|latest| latest.mean),
-            champion: it.champion_fitness,
-            selection: it.champion_selection_fitness,
-            priority: it.priority,
-            digest: it.digest,
-            simulation: it.simulation,
-            group: it.group,
-            variant: it.variant,
-            forked_from: it.forked_from.map(|it| format!("{}@{}", it.experiment_id, it.generation)),
-            last_sequence: it.last_sequence,
-            labels: it.labels,
-            archived: it.archived,
-            generation_ms: it.recent_generation_ms.map(f64::round),
+            id: experiment.id,
+            name: experiment.name,
+            reason: experiment.reason,
+            generations_done: experiment.generations_done,
+            generations: experiment.generations,
+            seed: Seed(experiment.seed),
+            algorithm: experiment.algorithm,
+            population_size: experiment.population_size,
+            genotype_len: experiment.genotype_len,
+            submitted_at_ms: experiment.submitted_at_ms,
+            best: experiment.latest.as_ref().map(|latest| latest.best),
+            mean: experiment.latest.as_ref().map(|latest| latest.mean),
+            champion: experiment.champion_fitness,
+            selection: experiment.champion_selection_fitness,
+            priority: experiment.priority,
+            digest: experiment.digest,
+            simulation: experiment.simulation,
+            group: experiment.group,
+            variant: experiment.variant,
+            forked_from: experiment
+                .forked_from
+                .map(|origin| format!("{}@{}", origin.experiment_id, origin.generation)),
+            last_sequence: experiment.last_sequence,
+            labels: experiment.labels,
+            archived: experiment.archived,
+            generation_ms: experiment.recent_generation_ms.map(f64::round),
         }
     }
 }
@@ -99,15 +101,15 @@ pub type GenerationRow = (u64, f64, f64, f64, f64, u64, u64, u64);
 
 /// A generation; none if the message is incomplete.
 pub fn generation_row(completed: &CompletedGeneration) -> Option<GenerationRow> {
-    let it = completed.summary.as_ref()?;
+    let summary = completed.summary.as_ref()?;
     Some((
-        it.generation,
-        it.best,
-        it.mean,
-        it.min,
-        it.standard_deviation,
-        it.duration_ms,
-        it.episodes,
+        summary.generation,
+        summary.best,
+        summary.mean,
+        summary.min,
+        summary.standard_deviation,
+        summary.duration_ms,
+        summary.episodes,
         completed.completed_at_ms,
     ))
 }
@@ -148,23 +150,23 @@ pub struct WorkerAnswer {
 }
 
 impl From<Worker> for WorkerAnswer {
-    fn from(it: Worker) -> Self {
-        let trouble = match (it.distrusted, it.waits, it.draining) {
+    fn from(worker: Worker) -> Self {
+        let trouble = match (worker.distrusted, worker.waits, worker.draining) {
             (why, _, _) if !why.is_empty() => format!("in quarantine: {why}"),
             (_, why, _) if !why.is_empty() => why,
             (_, _, true) => "finishes and leaves".to_owned(),
             _ => String::new(),
         };
         Self {
-            id: it.id,
-            name: it.name,
-            version: it.version,
-            slots: it.slots,
-            items: it.items_in_flight,
-            results_per_second: it.results_per_second,
-            idle_share: it.idle_share,
-            connected_at_ms: it.connected_at_ms,
-            last_heard_at_ms: it.last_heard_at_ms,
+            id: worker.id,
+            name: worker.name,
+            version: worker.version,
+            slots: worker.slots,
+            items: worker.items_in_flight,
+            results_per_second: worker.results_per_second,
+            idle_share: worker.idle_share,
+            connected_at_ms: worker.connected_at_ms,
+            last_heard_at_ms: worker.last_heard_at_ms,
             trouble,
         }
     }
@@ -177,21 +179,31 @@ pub fn timeline(assignments: Vec<Assignment>) -> Value {
     let mut workers: BTreeMap<(u64, String), usize> = BTreeMap::new();
     let mut batches: BTreeMap<(String, Option<u64>), usize> = BTreeMap::new();
     let mut rows = Vec::with_capacity(assignments.len());
-    for it in assignments {
+    for assignment in assignments {
         let n = workers.len();
-        let worker = *workers.entry((it.worker_id, it.worker_name)).or_insert(n);
+        let worker = *workers.entry((assignment.worker_id, assignment.worker_name)).or_insert(n);
         let n = batches.len();
-        let batch = *batches.entry((it.batch, it.experiment)).or_insert(n);
-        let [given, ended, busy] =
-            [it.assigned_for, it.ended_for, it.busy].map(|it| it.as_micros() as u64);
-        let (first, end) = (it.trials.start, it.trials.end);
-        rows.push(json!([worker, batch, it.individual, first, end, given, ended, busy, it.fate]));
+        let batch = *batches.entry((assignment.batch, assignment.experiment)).or_insert(n);
+        let [given, ended, busy] = [assignment.assigned_for, assignment.ended_for, assignment.busy]
+            .map(|duration| duration.as_micros() as u64);
+        let (first, end) = (assignment.trials.start, assignment.trials.end);
+        rows.push(json!([
+            worker,
+            batch,
+            assignment.individual,
+            first,
+            end,
+            given,
+            ended,
+            busy,
+            assignment.fate
+        ]));
     }
     json!({ "workers": by_place(workers), "batches": by_place(batches), "assignments": rows })
 }
 
 fn by_place<T: Ord>(places: BTreeMap<T, usize>) -> Vec<T> {
-    let mut all: Vec<(usize, T)> = places.into_iter().map(|(it, place)| (place, it)).collect();
+    let mut all: Vec<(usize, T)> = places.into_iter().map(|(item, place)| (place, item)).collect();
     all.sort_by_key(|(place, _)| *place);
-    all.into_iter().map(|(_, it)| it).collect()
+    all.into_iter().map(|(_, item)| item).collect()
 }

@@ -38,16 +38,20 @@ pub async fn one(
     let found = shared.archive.experiment(id).await?;
     let champion = shared.archive.individual(&id.to_string()).await.ok();
     let champion = champion.map(|champion| {
-        let judged = champion.judged.map(|it| json!([it.mean, it.low, it.high, it.trials]));
+        let judged = champion.judged.map(|judgement| {
+            json!([judgement.mean, judgement.low, judgement.high, judgement.trials])
+        });
         json!({
             "generation": champion.generation,
             "individual": champion.individual,
             "judged": judged,
-            "selection": champion.held_out.map(|it| it.mean),
+            "selection": champion.held_out.map(|selection| selection.mean),
         })
     });
     Ok(Json(json!({
-        "experiment": found.experiment.map(|it| ExperimentAnswer::new(it, shared.control.is_some())),
+        "experiment": found.experiment.map(|experiment| {
+            ExperimentAnswer::new(experiment, shared.control.is_some())
+        }),
         "config": serde_json::from_str::<Value>(&found.config_json).unwrap_or_default(),
         "champion": champion,
     })))
@@ -75,8 +79,14 @@ pub async fn dynamics(
 ) -> Result<Json<Value>, Problem> {
     let page = shared.archive.dynamics(id, from).await?;
     let rows = page.generations.iter();
-    let rows =
-        rows.map(|it| json!([it.generation, it.mean_step, it.deviations, it.rank_correlation]));
+    let rows = rows.map(|generation| {
+        json!([
+            generation.generation,
+            generation.mean_step,
+            generation.deviations,
+            generation.rank_correlation
+        ])
+    });
     Ok(Json(json!({ "generations": rows.collect::<Vec<_>>(), "next": page.next_generation })))
 }
 

@@ -57,7 +57,7 @@ impl LatestAnswer {
 pub struct Explanations(Mutex<BTreeMap<u64, Arc<LatestAnswer>>>);
 
 impl Explanations {
-    async fn of(&self, id: u64) -> Arc<LatestAnswer> {
+    async fn latest(&self, id: u64) -> Arc<LatestAnswer> {
         let mut known = self.0.lock().await;
         if known.len() >= EXPLANATIONS_MAX {
             known.clear();
@@ -97,19 +97,20 @@ pub async fn explain(
     Path(id): Path<u64>,
 ) -> Result<Response, Problem> {
     let control = control(&shared)?;
-    let latest = shared.explanations.of(id).await;
+    let latest = shared.explanations.latest(id).await;
     latest.get(async { Ok(explanation(control.explain(id).await?)) }).await
 }
 
-fn explanation(it: ExplainExperimentResponse) -> Value {
-    let troubles = [it.store_trouble, it.incompatible, it.shortage].into_iter();
+fn explanation(response: ExplainExperimentResponse) -> Value {
+    let troubles = [response.store_trouble, response.incompatible, response.shortage].into_iter();
     let troubles: Vec<String> = troubles.filter(|text| !text.is_empty()).collect();
     let held = |round: &Round| -> Vec<Value> {
         let held = round.held.iter();
-        held.map(|it| json!([it.worker_name, it.items, it.held_ms, it.silent_ms])).collect()
+        held.map(|items| json!([items.worker_name, items.items, items.held_ms, items.silent_ms]))
+            .collect()
     };
     json!({
-        "round": it.round.map(|round| json!({
+        "round": response.round.map(|round| json!({
             "generation": round.generation,
             "kind": match (round.held_out, round.judgement) {
                 (true, _) => "re-evaluation of candidates",
@@ -122,11 +123,14 @@ fn explanation(it: ExplainExperimentResponse) -> Value {
             "running_ms": round.running_ms,
             "held": held(&round),
         })),
-        "workers": it.workers,
-        "workers_available": it.workers_available,
-        "workers_of_others": it.workers_of_others,
-        "rivals": it.rivals,
-        "withheld": it.withheld.iter().map(|it| json!([it.worker_name, it.reason]))
+        "workers": response.workers,
+        "workers_available": response.workers_available,
+        "workers_of_others": response.workers_of_others,
+        "rivals": response.rivals,
+        "withheld": response
+            .withheld
+            .iter()
+            .map(|worker| json!([worker.worker_name, worker.reason]))
             .collect::<Vec<_>>(),
         // Why nothing goes on, if that is so.
         "troubles": troubles,

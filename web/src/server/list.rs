@@ -102,8 +102,8 @@ impl List {
             known.update(shared).await?;
             known.count = Some(count);
         }
-        let version = mark.strip_prefix(&*self.epoch).and_then(|it| it.strip_prefix('.'));
-        let version = version.and_then(|it| it.parse::<u64>().ok());
+        let version = mark.strip_prefix(&*self.epoch).and_then(|rest| rest.strip_prefix('.'));
+        let version = version.and_then(|number| number.parse::<u64>().ok());
         let is_newer = |row: &Row| version.is_none_or(|version| row.version > version);
         let newer = || known.rows.iter().filter(|(_, row)| is_newer(row));
         let gone = newer().filter(|(_, row)| row.text.is_none() && version.is_some());
@@ -121,7 +121,7 @@ impl Known {
         let experiments = shared.archive.experiments().await?;
         let version = self.version + 1;
         for (id, row) in &mut self.rows {
-            let is_there = experiments.binary_search_by_key(id, |it| it.id).is_ok();
+            let is_there = experiments.binary_search_by_key(id, |experiment| experiment.id).is_ok();
             if !is_there && row.text.take().is_some() {
                 row.version = version;
             }
@@ -165,8 +165,8 @@ async fn recent(shared: &Shared, id: u64, done: u64) -> Result<Vec<f32>, Problem
         page_size: RECENT as u32,
     };
     let page = shared.archive.generations(request).await?;
-    let summaries = page.generations.iter().filter_map(|it| it.summary.as_ref());
-    Ok(summaries.map(|it| it.best as f32).collect())
+    let summaries = page.generations.iter().filter_map(|generation| generation.summary.as_ref());
+    Ok(summaries.map(|summary| summary.best as f32).collect())
 }
 
 /// The version that a page has.

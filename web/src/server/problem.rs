@@ -68,7 +68,7 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Path<T>
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let path = axum::extract::Path::from_request_parts(parts, state).await;
-        path.map(|it| Self(it.0)).map_err(|why| {
+        path.map(|path| Self(path.0)).map_err(|why| {
             let path = parts.uri.path();
             Problem::bad(format!("{path}: an experiment has a number, such as 3 ({why})"))
         })
@@ -84,7 +84,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let query = axum::extract::Query::from_request_parts(parts, state).await;
-        query.map(|it| Self(it.0)).map_err(|why| Problem::bad(why.body_text()))
+        query.map(|query| Self(query.0)).map_err(|why| Problem::bad(why.body_text()))
     }
 }
 
@@ -97,6 +97,6 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         let body = axum::Json::from_request(request, state).await;
-        body.map(|it| Self(it.0)).map_err(|why| Problem::new(why.status(), why.body_text()))
+        body.map(|body| Self(body.0)).map_err(|why| Problem::new(why.status(), why.body_text()))
     }
 }

@@ -35,7 +35,7 @@ type Judgement = Arc<OnceCell<Trials>>;
 const JUDGEMENTS_MAX: usize = 64;
 
 impl Judgements {
-    async fn of(&self, experiment: u64, generation: u64) -> Judgement {
+    async fn of_generation(&self, experiment: u64, generation: u64) -> Judgement {
         let mut known = self.0.lock().await;
         if known.len() >= JUDGEMENTS_MAX {
             known.clear();
@@ -60,7 +60,8 @@ impl Subject {
             experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
         let individual = shared.archive.individual(address).await?;
         let found = shared.archive.experiment(experiment).await?;
-        let simulation = found.experiment.map(|it| it.simulation).unwrap_or_default();
+        let simulation =
+            found.experiment.map(|experiment| experiment.simulation).unwrap_or_default();
         if simulation != FINGERPRINT {
             let why =
                 format!("it was computed with \"{simulation}\", and this is \"{FINGERPRINT}\"");
@@ -86,7 +87,7 @@ impl Subject {
         let Some(judged) = judged.filter(|judged| judged.trials > 0) else {
             return Ok(Trials::of_generation(*generation, trial_fitness.clone()));
         };
-        let known = shared.judgements.of(self.experiment, judged.generation).await;
+        let known = shared.judgements.of_generation(self.experiment, judged.generation).await;
         let subject = self.clone();
         let trials = known.get_or_try_init(|| {
             work(shared, move |keep_going| {

@@ -218,7 +218,7 @@ fn span(interval: &Interval, digits: usize) -> String {
 /// Fewest and most generations of a run that are averaged if `last` are wanted; none without a
 /// history.
 fn averaged(samples: &[Sample], last: u64) -> Option<[u64; 2]> {
-    let lengths = samples.iter().flat_map(Sample::histories).map(|it| it.len() as u64);
+    let lengths = samples.iter().flat_map(Sample::histories).map(|history| history.len() as u64);
     let numbers: Vec<u64> = lengths.map(|length| length.min(last)).collect();
     Some([*numbers.iter().min()?, *numbers.iter().max()?])
 }

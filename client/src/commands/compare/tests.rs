@@ -69,7 +69,8 @@ async fn files_of_one_name_are_a_sample_and_each_quantity_has_its_numbers() {
     let text = run(NOWHERE, &paths, Some(6.0), OutputFormat::Json).await.unwrap();
     let report: Value = serde_json::from_str(&text).unwrap();
     let quantities: Vec<&Value> = report["quantities"].as_array().unwrap().iter().collect();
-    let names: Vec<&str> = quantities.iter().map(|it| it["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> =
+        quantities.iter().map(|quantity| quantity["name"].as_str().unwrap()).collect();
     let to_target = ["generations_to_target", "episodes_to_target"];
     assert_eq!(names[..3], ["judged", "mean", "best"]);
     assert_eq!(names[3..], to_target);

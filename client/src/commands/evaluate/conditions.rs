@@ -154,7 +154,7 @@ impl Nominal {
             match value {
                 Json::List(list) => {
                     let each = list.iter().enumerate();
-                    changes.extend(each.filter_map(|(i, it)| scaled(format!("{key}.{i}"), it)));
+                    changes.extend(each.filter_map(|(i, item)| scaled(format!("{key}.{i}"), item)));
                 }
                 one => changes.extend(scaled(key.clone(), one)),
             }
@@ -182,7 +182,7 @@ impl Nominal {
             .flatten()
             .filter_map(|(name, stimulus)| Some((name.as_str(), stimulus.get(["sensor"])?.text()?)))
             .collect();
-        let short = |sensor: &str| sensor.rsplit(':').next().is_some_and(|it| it == name);
+        let short = |sensor: &str| sensor.rsplit(':').next().is_some_and(|last| last == name);
         let sensor = sensors
             .iter()
             .find(|(stimulus, sensor)| *stimulus == name || *sensor == name || short(sensor))

@@ -45,7 +45,7 @@ impl Results {
                 for (metric, name) in measured.metrics.iter().enumerate() {
                     let values = measured.at_step(step, metric);
                     let (Some(mean), Some(quartiles)) =
-                        (mean(&values), Quartiles::of(values.clone()))
+                        (mean(&values), Quartiles::from_values(values.clone()))
                     else {
                         continue;
                     };

@@ -90,7 +90,7 @@ async fn once(
     let mut trials = Vec::new();
     while let Some(answer) = answers.message().await? {
         match answer.message {
-            Some(Message::Task(it)) => task = Some(it),
+            Some(Message::Task(sent)) => task = Some(sent),
             Some(Message::Trial(trial)) => trials.push(trial),
             None => {}
         }

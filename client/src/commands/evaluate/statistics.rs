@@ -21,7 +21,7 @@ pub struct Quartiles {
 
 impl Quartiles {
     /// None if there are no values.
-    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+    pub fn from_values(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let last = values.len().checked_sub(1)?;
         let quantile = |p: f64| {
@@ -57,8 +57,8 @@ pub struct Estimate {
 impl Estimate {
     /// None if there are no values, or one is not finite; `is_share`: whether they lie in
     /// [0, 1].
-    pub fn of(values: &[f64], is_share: bool) -> Option<Self> {
-        let quartiles = Quartiles::of(values.to_vec())?;
+    pub fn from_values(values: &[f64], is_share: bool) -> Option<Self> {
+        let quartiles = Quartiles::from_values(values.to_vec())?;
         let n = values.len() as f64;
         let finite_mean = finite_mean(values)?;
         let deviation = match values.len() - 1 {
@@ -106,33 +106,33 @@ mod tests {
     #[test]
     fn quartiles_interpolate_as_numpy_does() {
         // numpy.quantile([4, 1, 3, 2], [0.5, 0.25, 0.75])
-        let quartiles = Quartiles::of(vec![4.0, 1.0, 3.0, 2.0]).unwrap();
+        let quartiles = Quartiles::from_values(vec![4.0, 1.0, 3.0, 2.0]).unwrap();
         assert_eq!(quartiles, Quartiles { median: 2.5, q1: 1.75, q3: 3.25 });
-        let one = Quartiles::of(vec![7.0]).unwrap();
+        let one = Quartiles::from_values(vec![7.0]).unwrap();
         assert_eq!(one, Quartiles { median: 7.0, q1: 7.0, q3: 7.0 });
-        assert_eq!(Quartiles::of(vec![]), None);
+        assert_eq!(Quartiles::from_values(vec![]), None);
     }
 
     #[test]
     fn the_interval_of_a_proportion_is_that_of_equation_6_1() {
         // 40 of 50: 0.8 -+ 1.96 sqrt(0.8 * 0.2 / 50).
         let values: Vec<f64> = (0..50).map(|trial| f64::from(u8::from(trial < 40))).collect();
-        let [low, high] = Estimate::of(&values, true).unwrap().proportion_ci95.unwrap();
+        let [low, high] = Estimate::from_values(&values, true).unwrap().proportion_ci95.unwrap();
         assert!((low - 0.689_128).abs() < 1e-6 && (high - 0.910_872).abs() < 1e-6, "{low} {high}");
     }
 
     #[test]
     fn the_interval_of_a_mean_is_as_lopsided_as_the_values() {
-        let estimate = Estimate::of(&[1.0, 1.0, 1.0, 1.0, 1.0, 0.0], true).unwrap();
+        let estimate = Estimate::from_values(&[1.0, 1.0, 1.0, 1.0, 1.0, 0.0], true).unwrap();
         let [low, high] = estimate.ci95;
         assert!(0.0 < low && estimate.mean < high && high < 1.0, "{low} {high}");
         assert!(estimate.mean - low > 2.0 * (high - estimate.mean), "{low} {high}");
-        assert_eq!(Estimate::of(&[1.0, f64::NAN], false), None);
+        assert_eq!(Estimate::from_values(&[1.0, f64::NAN], false), None);
     }
 
     #[test]
     fn the_spread_is_that_of_a_sample() {
-        let estimate = Estimate::of(&[1.0, 2.0, 3.0, 4.0], false).unwrap();
+        let estimate = Estimate::from_values(&[1.0, 2.0, 3.0, 4.0], false).unwrap();
         assert_eq!((estimate.mean, estimate.min, estimate.max), (2.5, 1.0, 4.0));
         assert!((estimate.standard_deviation - 1.290_994).abs() < 1e-6);
         assert_eq!(estimate.proportion_ci95, None);
@@ -141,13 +141,13 @@ mod tests {
     #[test]
     fn a_sample_of_one_or_of_equals_has_no_spread() {
         for values in [&[0.1][..], &[0.1; 50]] {
-            let estimate = Estimate::of(values, true).unwrap();
+            let estimate = Estimate::from_values(values, true).unwrap();
             assert!(estimate.standard_deviation < 1e-15);
             assert!((estimate.ci95[0] - 0.1).abs() < 1e-15);
         }
-        let all = Estimate::of(&[1.0; 3], true).unwrap();
+        let all = Estimate::from_values(&[1.0; 3], true).unwrap();
         assert_eq!(all.proportion_ci95, Some([1.0, 1.0]));
-        assert_eq!(Estimate::of(&[], true), None);
+        assert_eq!(Estimate::from_values(&[], true), None);
     }
 
     #[test]
@@ -160,7 +160,7 @@ mod tests {
             [f64::MIN, 0.0, f64::MAX],
             [f64::MIN, f64::MAX, f64::MAX],
         ] {
-            let estimate = Estimate::of(&values, false).unwrap();
+            let estimate = Estimate::from_values(&values, false).unwrap();
             let json = serde_json::to_string(&estimate).unwrap();
             assert!(!json.contains("null"), "{json}");
             let [low, high] = estimate.ci95;

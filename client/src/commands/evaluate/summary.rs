@@ -97,9 +97,11 @@ impl Summary {
                 name: condition.name.clone(),
                 config_digest: Digest::of_config(&condition.config, sim_core::FINGERPRINT)
                     .to_string(),
-                changes: changes.map(|it| (it.path.clone(), it.value.clone())).collect(),
+                changes: changes
+                    .map(|change| (change.path.clone(), change.value.clone()))
+                    .collect(),
                 robots: condition.n_robots(),
-                fitness: Estimate::of(&fitness, false).expect("there are trials"),
+                fitness: Estimate::from_values(&fitness, false).expect("there are trials"),
                 metrics: metrics(measured),
             }
         });
@@ -127,8 +129,8 @@ fn metrics(measured: &Measured) -> IndexMap<String, MetricSummary> {
         let (unit, is_share) = unit(name);
         let summary = MetricSummary {
             unit,
-            time_mean: Estimate::of(&means, is_share)?,
-            end: Estimate::of(&ends, is_share),
+            time_mean: Estimate::from_values(&means, is_share)?,
+            end: Estimate::from_values(&ends, is_share),
         };
         Some((name.clone(), summary))
     };

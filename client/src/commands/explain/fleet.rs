@@ -108,7 +108,7 @@ pub async fn fleet(connection: &Connection, progress: &mut Progress) -> Result<(
             text::counted(slots, "slot"),
         ),
     }];
-    let lines = |it| evaluation_lines(it, workers.len(), connection.address());
+    let lines = |evaluation| evaluation_lines(evaluation, workers.len(), connection.address());
     sections.extend(evaluations.iter().map(lines));
     // With an experiment, what the workers are for is known: only then they may be too few.
     let mut of_fleet: Vec<String> = Vec::new();

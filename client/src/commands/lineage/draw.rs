@@ -17,8 +17,10 @@ pub fn trees(populations: &[PopulationLineage], experiment: u64) -> String {
         if populations.len() > 1 {
             lines.push(format!("population {population}"));
         }
-        let all: Ancestors<'_> =
-            ancestors.iter().map(|it| ((it.generation, it.individual), it)).collect();
+        let all: Ancestors<'_> = ancestors
+            .iter()
+            .map(|ancestor| ((ancestor.generation, ancestor.individual), ancestor))
+            .collect();
         let Some(root) = ancestors.first() else { continue };
         let mut tree = Tree { experiment, all, shown: BTreeSet::new(), lines: Vec::new() };
         tree.grow(root, String::new(), "", "");
@@ -47,7 +49,7 @@ impl Tree<'_> {
                 ", crossover of {}, {} new",
                 of.parents
                     .iter()
-                    .map(|it| format!("{} ({} genes)", it.individual, it.genes))
+                    .map(|parent| format!("{} ({} genes)", parent.individual, parent.genes))
                     .collect::<Vec<_>>()
                     .join(" and "),
                 of.new_genes
@@ -71,7 +73,9 @@ impl Tree<'_> {
         let parents: Vec<&Ancestor> = of
             .parents
             .iter()
-            .filter_map(|it| self.all.get(&(of.generation.checked_sub(1)?, it.individual)).copied())
+            .filter_map(|parent| {
+                self.all.get(&(of.generation.checked_sub(1)?, parent.individual)).copied()
+            })
             .collect();
         for (i, parent) in parents.iter().enumerate() {
             let (branch, under) = match i + 1 == parents.len() {
@@ -88,7 +92,7 @@ pub fn graph(populations: &[PopulationLineage]) -> String {
     let mut lines = vec!["digraph lineage {".to_owned(), "  node [shape=box];".to_owned()];
     for (p, PopulationLineage { population, ancestors }) in populations.iter().enumerate() {
         let known: BTreeSet<(u64, u32)> =
-            ancestors.iter().map(|it| (it.generation, it.individual)).collect();
+            ancestors.iter().map(|ancestor| (ancestor.generation, ancestor.individual)).collect();
         let label = match populations.len() {
             1 => String::new(),
             _ => format!("{}\\n", population.replace(['"', '\\'], "_")),

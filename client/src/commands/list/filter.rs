@@ -88,7 +88,7 @@ impl Sort {
             Self::Best => descending(best(a), best(b)),
             Self::Age => Reverse(a.submitted_at_ms).cmp(&Reverse(b.submitted_at_ms)),
             Self::Eta => {
-                let eta = |it| text::eta_ms(it).unwrap_or(u64::MAX);
+                let eta = |experiment| text::eta_ms(experiment).unwrap_or(u64::MAX);
                 eta(a).cmp(&eta(b))
             }
         }
@@ -137,7 +137,7 @@ mod tests {
     fn ids(filter: Filter) -> Vec<u64> {
         let mut experiments = experiments();
         filter.sort(&mut experiments);
-        experiments.iter().map(|it| it.id).collect()
+        experiments.iter().map(|experiment| experiment.id).collect()
     }
 
     #[test]

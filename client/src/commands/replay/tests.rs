@@ -158,9 +158,12 @@ async fn a_champion_plays_the_median_of_the_trials_that_judged_it() {
     let file = ExperimentFile::read(&quickstart()).unwrap();
     let simulation = file.compile(&Overrides::default()).unwrap().experiment;
     let fitness = simulation.evaluate(&genes, TrialSet::Judgement(1), 0..200).unwrap();
-    let n = |is_counted: &dyn Fn(f64) -> bool| fitness.iter().filter(|it| is_counted(**it)).count();
+    let n = |is_counted: &dyn Fn(f64) -> bool| {
+        fitness.iter().filter(|value| is_counted(**value)).count()
+    };
     // Of 200, the hundredth.
-    let is_median = |value: f64| n(&|it| it < value) < 100 && n(&|it| it <= value) >= 100;
+    let is_median =
+        |value: f64| n(&|other| other < value) < 100 && n(&|other| other <= value) >= 100;
     let medians: Vec<usize> = (0..200).filter(|&trial| is_median(fitness[trial])).collect();
     let files = async |option: String| {
         let path = directory.path().join("a.html");
@@ -174,6 +177,7 @@ async fn a_champion_plays_the_median_of_the_trials_that_judged_it() {
             equal.push((trial, files(format!(" --judged {trial}")).await == played));
         }
     }
-    let found: Vec<usize> = equal.iter().filter(|it| it.1).map(|it| it.0).collect();
+    let found: Vec<usize> =
+        equal.iter().filter(|(_, is_equal)| *is_equal).map(|(trial, _)| *trial).collect();
     assert!(matches!(found[..], [trial] if medians.contains(&trial)), "{found:?} {medians:?}");
 }

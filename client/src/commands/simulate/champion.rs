@@ -27,7 +27,7 @@ pub struct Origin {
 
 impl Origin {
     /// What a file with a genotype says of it; none if it says nothing, as a list of genes.
-    pub fn of(file: &Value) -> Result<Option<Self>, serde_json::Error> {
+    pub fn of_file(file: &Value) -> Result<Option<Self>, serde_json::Error> {
         match file.get("config_digest") {
             None | Some(Value::Null) => Ok(None),
             Some(_) => Self::deserialize(file).map(Some),
@@ -37,9 +37,9 @@ impl Origin {
     /// That of an experiment's genotypes; none if its coordinator does not say.
     pub fn of_experiment(experiment: &Experiment) -> Option<Self> {
         let Experiment { config_digest, name, seed, simulation, .. } = experiment.clone();
-        let simulation = Some(simulation).filter(|it| !it.is_empty());
+        let simulation = Some(simulation).filter(|simulation| !simulation.is_empty());
         let origin = Self { config_digest, name, seed: Some(Seed(seed)), simulation };
-        Some(origin).filter(|it| !it.config_digest.is_empty())
+        Some(origin).filter(|origin| !origin.config_digest.is_empty())
     }
 
     /// Refuses an experiment file, as it is and with the genotype's seed, that is another
@@ -98,7 +98,7 @@ mod tests {
     }
 
     fn check(champion: &Value, file: &Path, changed: ChangedArg) -> Result<(), String> {
-        let origin = Origin::of(champion).unwrap().unwrap();
+        let origin = Origin::of_file(champion).unwrap().unwrap();
         let file = ExperimentFile::read(file).unwrap();
         origin.check("c.json", &file, changed).map_err(|error| error.to_string())
     }
@@ -134,8 +134,8 @@ mod tests {
     #[test]
     fn a_list_of_genes_says_nothing_of_its_experiment() {
         for genes in [json!([0.5]), json!({"genotype": [0.5]}), json!({"config_digest": null})] {
-            assert_eq!(Origin::of(&genes).unwrap(), None);
+            assert_eq!(Origin::of_file(&genes).unwrap(), None);
         }
-        assert!(Origin::of(&json!({"config_digest": 3})).is_err());
+        assert!(Origin::of_file(&json!({"config_digest": 3})).is_err());
     }
 }

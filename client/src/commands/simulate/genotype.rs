@@ -90,7 +90,7 @@ fn read(path: &Path) -> Result<(Vec<f64>, Option<Origin>), String> {
         gene.as_f64().ok_or_else(|| format!("gene {index} is not a number"))
     };
     let genes: Vec<f64> = genes.iter().enumerate().map(gene).collect::<Result<_, _>>()?;
-    let origin = Origin::of(&value).map_err(|error| error.to_string())?;
+    let origin = Origin::of_file(&value).map_err(|error| error.to_string())?;
     Ok((genes, origin))
 }
 

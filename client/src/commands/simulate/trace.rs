@@ -164,7 +164,7 @@ impl<W: io::Write> Rows<W> {
             cells.extend((0..self.neurons.len()).map(voltage));
         }
         if self.has_frames {
-            cells.push(robot.received.map(|it| it.emitter.to_string()).unwrap_or_default());
+            cells.push(robot.received.map(|frame| frame.emitter.to_string()).unwrap_or_default());
             let message = robot.received_message.iter();
             let heard = |value: &f64| robot.received.map(|_| number(*value)).unwrap_or_default();
             cells.extend(message.map(heard));

@@ -106,7 +106,7 @@ impl Trust {
 
     /// The open questions about a job, for people.
     pub fn open_questions(&self, job: JobId) -> Vec<OpenQuestion> {
-        self.questions.of(job).map(|(_, question)| question.activity()).collect()
+        self.questions.about(job).map(|(_, question)| question.activity()).collect()
     }
 
     /// How many questions about a job have this doubt.

@@ -204,14 +204,14 @@ impl Questions {
     }
 
     /// Those about a job.
-    pub fn of(&self, job: JobId) -> impl Iterator<Item = (QuestionId, &Question)> {
+    pub fn about(&self, job: JobId) -> impl Iterator<Item = (QuestionId, &Question)> {
         let ours = self.open.iter().filter(move |(_, question)| question.job == job);
         ours.map(|(&id, question)| (id, question))
     }
 
     /// Number of those about a job that are asked for a reason.
     pub fn n_about(&self, job: JobId, is_reason: impl Fn(&Doubt) -> bool) -> usize {
-        self.of(job).filter(|(_, question)| is_reason(&question.doubt)).count()
+        self.about(job).filter(|(_, question)| is_reason(&question.doubt)).count()
     }
 
     /// Number of questions since the engine began.

@@ -98,7 +98,7 @@ impl Engine {
         reporter: &Party,
         message: &str,
     ) -> Option<String> {
-        let questions = self.trust.questions.of(job).map(|(_, question)| question);
+        let questions = self.trust.questions.about(job).map(|(_, question)| question);
         let others = questions.filter_map(|question| match &question.doubt {
             Doubt::Failure { reporter, message: same }
                 if question.trouble.is_some()
@@ -114,8 +114,10 @@ impl Engine {
         let names: BTreeSet<&str> = reporters.iter().map(|party| &*party.name).collect();
         let ids: BTreeSet<WorkerId> = reporters.iter().map(|party| party.id).collect();
         let work = &self.jobs[&job];
-        let trusted =
-            self.workers.iter().filter(|(_, it)| it.quarantined.is_none() && it.takes(work));
+        let trusted = self
+            .workers
+            .iter()
+            .filter(|(_, worker)| worker.quarantined.is_none() && worker.takes(work));
         let (mut n_slots, mut n_reporting) = (0, 0);
         for (id, worker) in trusted {
             n_slots += worker.n_slots();
@@ -131,7 +133,7 @@ impl Engine {
         job: JobId,
         is_moot: impl Fn(&Question) -> bool,
     ) {
-        let moot = self.trust.questions.of(job).filter(|(_, question)| is_moot(question));
+        let moot = self.trust.questions.about(job).filter(|(_, question)| is_moot(question));
         for id in moot.map(|(id, _)| id).collect::<Vec<QuestionId>>() {
             let Some(question) = self.trust.questions.take(id) else { continue };
             self.end_doubt(id, &question);

@@ -33,11 +33,12 @@ fn run(name: &str, generations: u64, fitness: fn(usize) -> f64) -> (Vec<String>,
 fn the_same_fitness_for_ten_generations_is_a_notice() {
     let (notices, error) = run("SNES", 12, |_| 0.25);
     assert_eq!(error, None);
-    let flat: Vec<&String> = notices.iter().filter(|it| it.contains("same fitness")).collect();
+    let flat: Vec<&String> =
+        notices.iter().filter(|notice| notice.contains("same fitness")).collect();
     assert!(flat[0].starts_with("generations 0 to 9: all 4 individuals"), "{notices:?}");
     assert!(flat[1].starts_with("generations 0 to 11: all 4 individuals"), "{notices:?}");
     let (notices, _) = run("SNES", 12, |i| i as f64);
-    assert!(!notices.iter().any(|it| it.contains("same fitness")), "{notices:?}");
+    assert!(!notices.iter().any(|notice| notice.contains("same fitness")), "{notices:?}");
 }
 
 #[test]
@@ -50,5 +51,5 @@ fn a_run_that_chance_drives_out_of_all_bounds_fails_with_the_reason() {
 #[test]
 fn trials_within_the_smallest_numbers_are_judged() {
     let (notices, _) = run("SNES", 2, |i| [0.0, 5e-324, 1e-323][i % 3]);
-    assert!(notices.iter().any(|it| it.starts_with("champion judged: ")), "{notices:?}");
+    assert!(notices.iter().any(|notice| notice.starts_with("champion judged: ")), "{notices:?}");
 }

@@ -163,7 +163,7 @@ pub fn copy(
     })?;
     each(from, "keyframes", "n_generations", "state", id, |n_generations, state, _| {
         if result.is_ok() && n_generations >= log.first {
-            let before = n_generations.checked_sub(1).and_then(|it| history.get(it as usize));
+            let before = n_generations.checked_sub(1).and_then(|index| history.get(index as usize));
             let seal = sealer.keyframe(id, before, state);
             result = fitness_log::put_keyframe(to, id, n_generations, state, seal);
         }

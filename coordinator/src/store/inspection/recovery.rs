@@ -68,7 +68,7 @@ fn write_all(source: &Source, path: &Path) -> Result<Vec<Recovered>> {
     let mut target = Connection::open(path)?;
     schema::migrate(&mut target)?;
     let transaction = target.transaction()?;
-    let sealer = Sealer::of(&transaction)?;
+    let sealer = Sealer::from_database(&transaction)?;
     let mut experiments = Vec::new();
     for id in source.experiments() {
         let mut inspected = Inspected::read(source, id);

@@ -58,7 +58,7 @@ impl Source {
                         .to_owned(),
                 );
             }
-            match Sealer::of(&connection) {
+            match Sealer::from_database(&connection) {
                 Ok(found) => sealer = Some(found),
                 Err(error) => damage.push(format!("the key of its seals is lost: {error}")),
             }

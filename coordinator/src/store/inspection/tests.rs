@@ -41,7 +41,10 @@ fn advance_to(is_keyframe: bool, store: &mut Store, id: ExperimentId, completed:
     let keyframe = is_keyframe.then(|| evolution.keyframe());
     let commit = GenerationCommit {
         generation: &record,
-        entry: Entry { told: &Told::of(fitness).to_bytes(), keyframe: keyframe.as_deref() },
+        entry: Entry {
+            told: &Told::from_fitness(fitness).to_bytes(),
+            keyframe: keyframe.as_deref(),
+        },
         champion: evolution.champion(),
         digest: &record.digest,
         notices: &[],

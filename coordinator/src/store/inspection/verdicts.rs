@@ -69,7 +69,8 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         }
         drop(database);
         let inspection = inspect(directory.path()).unwrap();
-        let is_found = inspection.findings.iter().any(|it| it.experiment == Some(RUNNING));
+        let is_found =
+            inspection.findings.iter().any(|finding| finding.experiment == Some(RUNNING));
         let coordinator = Store::open(directory.path()).map(|store| goes_on(&store, RUNNING));
         let goes_on_here = coordinator.unwrap_or(false);
         assert!(goes_on_here || is_found, "{sql}: only the coordinator says that it is damaged");
@@ -104,7 +105,8 @@ fn a_damaged_experiment_takes_no_other_ones_backup() {
     let Backup::Made(inspection) = backup(directory.path(), &to).unwrap() else {
         panic!("there is no copy")
     };
-    let damaged: Vec<_> = inspection.findings.iter().filter_map(|it| it.experiment).collect();
+    let damaged: Vec<_> =
+        inspection.findings.iter().filter_map(|finding| finding.experiment).collect();
     assert_eq!(damaged, [ExperimentId(1)]);
     let copy = Store::open(&to).unwrap();
     assert_eq!(copy.experiments(&Wanted::default()).unwrap().len(), 4);
@@ -126,7 +128,7 @@ fn a_champion_whose_interval_older_versions_could_not_compute_is_read() {
         held_out: Some(HeldOut { mean: one, ci95: one, n_trials: 2, generation: 0 }),
         judged: Some(Judged { mean: one, low: one, high: one, n_trials: 2, generation: 0 }),
     };
-    let sealer = super::super::seals::Sealer::of(store.connection()).unwrap();
+    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
     for nan in [f64::NAN, -f64::NAN] {
         let transaction = store.connection().unchecked_transaction().unwrap();
         super::super::champions::put(&transaction, &sealer, id, &champion, None, "").unwrap();
@@ -178,7 +180,7 @@ fn a_list_that_could_not_be_read_again_is_not_stored() {
         held_out: None,
         judged: None,
     };
-    let sealer = super::super::seals::Sealer::of(store.connection()).unwrap();
+    let sealer = super::super::seals::Sealer::from_database(store.connection()).unwrap();
     let transaction = store.connection().unchecked_transaction().unwrap();
     let put = super::super::champions::put(&transaction, &sealer, RUNNING, &champion, None, "");
     assert!(put.unwrap_err().to_string().contains("not finite"));

@@ -112,7 +112,7 @@ proptest! {
             pattern == "*" || pattern.ends_with('?') || pattern.ends_with(&number.to_string())
         };
         let taken: Vec<u64> =
-            (1..=3).filter(|&n| patterns.iter().any(|it| takes(it, n))).collect();
+            (1..=3).filter(|&n| patterns.iter().any(|pattern| takes(pattern, n))).collect();
         let workers: BTreeMap<WorkerId, &String> = (0..)
             .zip(&patterns)
             .map(|(i, pattern)| (fleet.join_for(pattern, 0.5 + f64::from(i) / 4.0), pattern))

@@ -9,8 +9,8 @@ use crate::simulated_fleet::{Conduct, FleetModel, SimulatedFleet};
 
 fn fates(fleet: &SimulatedFleet) -> BTreeMap<&'static str, usize> {
     let mut counts = BTreeMap::new();
-    for it in fleet.timeline() {
-        let name = match it.fate {
+    for entry in fleet.timeline() {
+        let name = match entry.fate {
             Fate::Unanswered => "unanswered",
             Fate::Computed => "computed",
             Fate::TakenBack => "taken back",
@@ -41,7 +41,7 @@ fn it_says_which_worker_computed_what_and_for_how_long() {
     }
     assert_eq!(computed, (0..4).map(|individual| (individual, 3)).collect());
     assert_eq!(timeline[0].batch(), "experiment 1, generation 7");
-    assert!(timeline.iter().all(|it| it.fate == Fate::Computed));
+    assert!(timeline.iter().all(|entry| entry.fate == Fate::Computed));
 }
 
 #[test]

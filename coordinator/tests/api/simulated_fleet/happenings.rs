@@ -153,7 +153,8 @@ impl SimulatedFleet {
             match command {
                 Command::SendAssignments { worker, ref assignments, .. } => {
                     self.n_items_sent += assignments.len();
-                    self.n_items_drawn += assignments.iter().filter(|it| it.is_drawn).count();
+                    self.n_items_drawn +=
+                        assignments.iter().filter(|assignment| assignment.is_drawn).count();
                     self.post(worker, command);
                 }
                 Command::SendDrop { worker, ref assignments } => {

@@ -61,7 +61,7 @@ impl Described for CmaEs {
 impl CmaEs {
     /// Eigenvectors of C and the square roots of its eigenvalues.
     fn root(&self) -> (Eigen, DVector<f64>) {
-        let eigen = Eigen::of(&self.covariance.to_dense());
+        let eigen = Eigen::new(&self.covariance.to_dense());
         let min = EIGENVALUE_RATIO_MIN * eigen.values.max();
         let deviations = eigen.values.map(|value| value.max(min).sqrt());
         (eigen, deviations)

@@ -79,7 +79,7 @@ impl Eigen {
     /// Absolute error of the eigenvalues: about 1e-15 of the largest. Should the
     /// iteration not converge, which is not known to happen, the result is the
     /// matrix's diagonal: worse, but deterministic, and no endless loop.
-    pub fn of(matrix: &DMatrix<f64>) -> Self {
+    pub fn new(matrix: &DMatrix<f64>) -> Self {
         Self::within(matrix, ITERATIONS_PER_ROW * matrix.nrows())
     }
 
@@ -129,7 +129,7 @@ mod tests {
 
     fn assert_decomposes(matrix: &DMatrix<f64>) {
         let n = matrix.nrows();
-        let eigen = Eigen::of(matrix);
+        let eigen = Eigen::new(matrix);
         let error = (recompose(&eigen) - matrix).amax();
         assert!(error <= 1e-13 * matrix.amax() * n as f64, "{error:e} {matrix}");
         let gram = eigen.vectors.transpose() * &eigen.vectors;
@@ -206,7 +206,7 @@ mod tests {
     fn the_bits_of_a_decomposition_are_fixed() {
         let a = random_factor(30, 30);
         let symmetric = &a + a.transpose();
-        let eigen = Eigen::of(&symmetric);
+        let eigen = Eigen::new(&symmetric);
         let ones = DVector::from_element(30, 1.0);
         let scales = eigen.values.map(libm::exp);
         let y = eigen.apply(&scales, &ones);

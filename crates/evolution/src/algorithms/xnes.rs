@@ -167,7 +167,7 @@ impl Strategy for Xnes {
 /// V diag(exp l) V^T. nalgebra's own exponential takes powers and logarithms of
 /// floats and multiplies matrices by kernels that differ between processors.
 fn times_exponential(a: &DMatrix<f64>, symmetric: &DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = Eigen::of(symmetric);
+    let eigen = Eigen::new(symmetric);
     let mut scaled = product(a, &eigen.vectors);
     for (mut column, value) in scaled.column_iter_mut().zip(&eigen.values) {
         column *= finite_exp(*value);

@@ -42,7 +42,7 @@ fn of_each(genotypes: &[Genotype], fitness: impl Fn(&Genotype) -> f64) -> Vec<f6
     genotypes.iter().map(fitness).collect()
 }
 
-fn of(name: &str, population_size: u32) -> Evolution {
+fn started(name: &str, population_size: u32) -> Evolution {
     Setup { population_size, ..Setup::new(name, 3) }.start().unwrap()
 }
 
@@ -50,7 +50,7 @@ fn of(name: &str, population_size: u32) -> Evolution {
 fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
     for algorithm in ALGORITHMS {
         for (what, fitness) in ADVERSARIES {
-            let mut evolution = of(algorithm.name, 5);
+            let mut evolution = started(algorithm.name, 5);
             for generation in 0..N_GENERATIONS {
                 let asked = evolution.ask();
                 let is_sound = |gene: &f64| (0.0..=1.0).contains(gene);
@@ -59,8 +59,10 @@ fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
                     "{} {what} {generation}",
                     algorithm.name
                 );
-                let told: Vec<Vec<f64>> =
-                    fitness(generation, &asked.genotypes).into_iter().map(|it| vec![it]).collect();
+                let told: Vec<Vec<f64>> = fitness(generation, &asked.genotypes)
+                    .into_iter()
+                    .map(|fitness| vec![fitness])
+                    .collect();
                 evolution.tell(asked, &told).unwrap();
             }
             let mean = evolution.mean().unwrap_or_default();
@@ -70,7 +72,9 @@ fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
                 algorithm.name
             );
             assert!(
-                evolution.widest().is_none_or(|it| it.is_finite() && it >= 0.0),
+                evolution
+                    .widest()
+                    .is_none_or(|deviation| deviation.is_finite() && deviation >= 0.0),
                 "{} {what}: {:?}",
                 algorithm.name,
                 evolution.widest()
@@ -89,8 +93,10 @@ fn remarks(
     for generation in 0..n_generations {
         let before = evolution.widest();
         let asked = evolution.ask();
-        let told: Vec<Vec<f64>> =
-            fitness(generation, &asked.genotypes).into_iter().map(|it| vec![it]).collect();
+        let told: Vec<Vec<f64>> = fitness(generation, &asked.genotypes)
+            .into_iter()
+            .map(|fitness| vec![fitness])
+            .collect();
         let summary = evolution.tell(asked, &told).unwrap();
         remarks.extend(evolution.remarks(before, &summary, generation + 1 == n_generations));
         if let Some(drifted) = evolution.drifted(&summary) {
@@ -103,34 +109,34 @@ fn remarks(
 #[test]
 fn fitness_that_tells_nobody_apart_is_said_after_ten_generations_and_ever_more_rarely() {
     for algorithm in ALGORITHMS {
-        let (remarks, _) = remarks(&mut of(algorithm.name, 100), 10, flat);
+        let (remarks, _) = remarks(&mut started(algorithm.name, 100), 10, flat);
         let expected = "generations 0 to 9: all 100 individuals have the same fitness 0.25, ";
         assert_eq!(remarks.len(), 1, "{remarks:?}");
         assert!(remarks[0].starts_with(expected), "{remarks:?}");
     }
     let is_flat = |remark: &&String| remark.contains("same fitness");
-    let (of_many, _) = remarks(&mut of("GA", 8), 1200, flat);
+    let (of_many, _) = remarks(&mut started("GA", 8), 1200, flat);
     assert_eq!(of_many.iter().filter(is_flat).count(), 4, "10, 100, 1000 and the end: {of_many:?}");
-    let (of_few, _) = remarks(&mut of("GA", 8), 5, flat);
+    let (of_few, _) = remarks(&mut started("GA", 8), 5, flat);
     assert!(of_few[0].starts_with("generations 0 to 4: all 8 individuals"), "{of_few:?}");
 }
 
 #[test]
 fn fitness_that_tells_individuals_apart_is_no_news() {
     for algorithm in ALGORITHMS {
-        let (remarks, drifted) = remarks(&mut of(algorithm.name, 20), 30, sphere);
+        let (remarks, drifted) = remarks(&mut started(algorithm.name, 20), 30, sphere);
         assert_eq!((remarks, drifted), (vec![], None), "{}", algorithm.name);
     }
 }
 
 #[test]
 fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
-    let (remarks, drifted) = remarks(&mut of("xNES", 6), N_GENERATIONS, flat);
+    let (remarks, drifted) = remarks(&mut started("xNES", 6), N_GENERATIONS, flat);
     let drifted = drifted.expect("the deviations of xNES grow without bound");
     assert!(drifted.n_generations >= 100 && drifted.deviation > 1e6, "{drifted}");
-    assert!(remarks.iter().any(|it| it.contains("it is drawn at random")), "{remarks:?}");
+    assert!(remarks.iter().any(|remark| remark.contains("it is drawn at random")), "{remarks:?}");
     // The same deviations with fitness that tells individuals apart are no reason to end it.
-    let mut wide = of("xNES", 6);
+    let mut wide = started("xNES", 6);
     for generation in 0..drifted.n_generations {
         let asked = wide.ask();
         let told = vec![vec![0.25]; 6];
@@ -145,20 +151,21 @@ fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
 
 #[test]
 fn a_distribution_that_shrinks_to_a_point_is_said_once() {
-    let (remarks, _) = remarks(&mut of("SNES", 12), 3000, sphere);
-    let narrow = remarks.iter().filter(|it| it.contains("all individuals are alike")).count();
+    let (remarks, _) = remarks(&mut started("SNES", 12), 3000, sphere);
+    let narrow =
+        remarks.iter().filter(|remark| remark.contains("all individuals are alike")).count();
     assert_eq!(narrow, 1, "{remarks:?}");
 }
 
 #[test]
 fn generations_without_a_difference_are_no_part_of_the_state() {
-    let mut evolution = of("SNES", 4);
+    let mut evolution = started("SNES", 4);
     let begun = evolution.keyframe();
     remarks(&mut evolution, 12, flat);
     let restored =
         Evolution::restore(&Checkpoint { keyframe: evolution.keyframe(), log: vec![] }).unwrap();
     assert_eq!((&restored, restored.keyframe()), (&evolution, evolution.keyframe()));
-    assert_eq!(begun, of("SNES", 4).keyframe());
+    assert_eq!(begun, started("SNES", 4).keyframe());
 }
 
 #[test]
@@ -182,6 +189,9 @@ fn a_file_with_a_single_individual_is_taken_with_a_warning() {
         .replace(r#""population_size": 32"#, r#""population_size": 1"#);
     let (config, warnings) = ExperimentConfig::from_json(&file, "", ALGORITHMS).unwrap();
     assert_eq!(config.algorithm.population_size, 1);
-    let found: Vec<String> = warnings.iter().map(|it| format!("{it}")).collect();
-    assert!(found.iter().any(|it| it.contains("population_size: with a single")), "{found:?}");
+    let found: Vec<String> = warnings.iter().map(|warning| format!("{warning}")).collect();
+    assert!(
+        found.iter().any(|warning| warning.contains("population_size: with a single")),
+        "{found:?}"
+    );
 }

@@ -83,7 +83,8 @@ fn what_a_state_cannot_carry_is_refused_by_name_and_all_at_once() {
     let fork =
         Fork { parent: &parent, parent_simulation, child: &child, segments: &segments, simulation };
     let problems = after_four(&parent).fork(&fork).unwrap_err().problems;
-    let places: Vec<&str> = problems.iter().map(|it| it.split(':').next().unwrap()).collect();
+    let places: Vec<&str> =
+        problems.iter().map(|problem| problem.split(':').next().unwrap()).collect();
     assert_eq!(
         places,
         [

@@ -9,12 +9,12 @@ use super::*;
 
 /// Fitness in \[0, 1\] of individuals that differ in skill: near 0 in one trial of 25.
 fn fitness(seed: u64, genotype: &[f64], trial_set: TrialSet, trials: Range<u64>) -> Vec<f64> {
-    let of = |trial| {
+    let trial_fitness = |trial| {
         let mut stream = Stream::new(seed, trial_set, trial, Purpose::Reception, 0);
         let (luck, fails) = (stream.uniform(), stream.uniform() < 0.04);
         if fails { 0.05 * luck } else { skill(genotype) * (1.0 - 0.3 * luck * luck * luck) }
     };
-    trials.map(of).collect()
+    trials.map(trial_fitness).collect()
 }
 
 fn skill(genotype: &[f64]) -> f64 {
@@ -52,9 +52,10 @@ fn champion_of_a_run(seed: u64) -> Champion {
 #[test]
 fn champions_are_worth_what_their_judgement_says() {
     let champions: Vec<Champion> = (0..200).map(champion_of_a_run).collect();
-    let errors = |of: fn(&Champion) -> f64| -> (f64, f64) {
-        let errors: Vec<f64> = champions.iter().map(|it| of(it) - worth(&it.genotype)).collect();
-        let HeldOut { mean, ci95, .. } = HeldOut::of(&errors, 0).unwrap();
+    let errors = |claim: fn(&Champion) -> f64| -> (f64, f64) {
+        let errors: Vec<f64> =
+            champions.iter().map(|champion| claim(champion) - worth(&champion.genotype)).collect();
+        let HeldOut { mean, ci95, .. } = HeldOut::from_values(&errors, 0).unwrap();
         (mean.get(), ci95.get())
     };
     let (error, ci95) = errors(|champion| champion.judged.unwrap().mean.get());

@@ -19,7 +19,8 @@ fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
     for _ in 0..n_generations {
         let asked = evolution.ask();
         let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
-        let mut told = Told::of(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
+        let mut told =
+            Told::from_fitness(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
         // Whoever's fitness is not finite is nobody's parent.
         told.trial_fitness[4][0] = f64::NAN;
         genotypes.push(asked.genotypes);
@@ -37,7 +38,9 @@ fn genes_are_from_the_parents_that_are_named() {
             let lineage = pedigree.trace(individual);
             assert_eq!((lineage[0].generation, lineage[0].individual), (5, individual));
             assert_eq!(lineage[0].n_surviving, D);
-            assert!(lineage.iter().all(|it| it.individual != 4 || it.generation == 5));
+            assert!(
+                lineage.iter().all(|ancestor| ancestor.individual != 4 || ancestor.generation == 5)
+            );
             for ancestor in &lineage {
                 let genes = &genotypes[ancestor.generation as usize][ancestor.individual as usize];
                 let birth = ancestor.birth.as_ref().unwrap();
@@ -56,8 +59,8 @@ fn genes_are_from_the_parents_that_are_named() {
                 assert!(n_same >= ancestor.n_surviving, "{crossover}: {ancestor:?}");
             }
             for generation in 0..5 {
-                let of = lineage.iter().filter(|it| it.generation == generation);
-                assert!(of.map(|it| it.n_surviving).sum::<usize>() <= D);
+                let of = lineage.iter().filter(|ancestor| ancestor.generation == generation);
+                assert!(of.map(|ancestor| ancestor.n_surviving).sum::<usize>() <= D);
             }
         }
     }
@@ -72,13 +75,13 @@ fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
     let mut later = Pedigree::starting_at(1);
     for generation in 0..3 {
         let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
-        let told = Told::of(evaluate(&evolution.ask().genotypes));
+        let told = Told::from_fitness(evaluate(&evolution.ask().genotypes));
         if generation > 0 {
             later.push(births, &told);
         }
         evolution.replay(&told).unwrap();
     }
     let lineage = later.trace(8);
-    assert!(lineage.iter().all(|it| it.birth.is_some() == (it.generation == 2)));
+    assert!(lineage.iter().all(|ancestor| ancestor.birth.is_some() == (ancestor.generation == 2)));
     assert!(Setup::new("SNES", D).start().unwrap().births().is_none());
 }

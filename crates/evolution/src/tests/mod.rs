@@ -25,7 +25,7 @@ fn evolution(population_size: usize, segment_lens: &[usize]) -> Evolution {
 }
 
 fn evolution_of(populations: Vec<Algorithm>, population_size: usize) -> Evolution {
-    Evolution::of(11, population_size, populations, "00".repeat(32).parse().unwrap())
+    Evolution::from_parts(11, population_size, populations, "00".repeat(32).parse().unwrap())
 }
 
 /// A noisy sphere: two trials that differ.
@@ -87,12 +87,12 @@ fn the_champion_is_the_best_mean_so_far_and_the_first_of_equals() {
 fn choose(evolution: &mut Evolution, fitness: &[f64]) {
     let mut round = evolution.reevaluation().unwrap();
     while !round.is_over() {
-        let of = |genotype: &Genotype| {
+        let trial_fitness = |genotype: &Genotype| {
             let genotypes = round.candidates().iter().map(|candidate| &candidate.genotype);
             let i = genotypes.into_iter().position(|other| other == genotype).unwrap();
             vec![fitness[i] - 0.1, fitness[i] + 0.1]
         };
-        let block: Vec<Vec<f64>> = round.genotypes().iter().map(of).collect();
+        let block: Vec<Vec<f64>> = round.genotypes().iter().map(trial_fitness).collect();
         round.learn(&block);
     }
     evolution.set_champion(&round);
@@ -170,7 +170,7 @@ fn fitness_that_is_not_finite_ranks_last_and_is_counted() {
     let fitness = [vec![f64::NAN, 9.0], vec![1.0, 1.0], vec![f64::INFINITY, 0.0], vec![2.0, 4.0]];
     let record = evolution.tell(generation, &fitness).unwrap();
     assert_eq!(record.n_non_finite, 2);
-    let [best, mean, min] = [3.0, 2.0, 1.0].map(|it| Real::new(it).unwrap());
+    let [best, mean, min] = [3.0, 2.0, 1.0].map(|value| Real::new(value).unwrap());
     let expected = Statistics { best, mean, min, standard_deviation: min };
     assert_eq!(record.statistics, expected);
     assert_eq!(evolution.champion().unwrap().source, ChampionSource::Individual(3));
@@ -198,10 +198,10 @@ fn a_link_of_the_digest_chain_hashes_the_documented_bytes() {
 #[test]
 fn every_bit_of_genotypes_and_fitness_enters_the_digest() {
     let start: Digest = "00".repeat(32).parse().unwrap();
-    let of = |gene: f64, fitness: f64| start.next(0, &[vec![gene]], &[vec![fitness]]);
-    assert_ne!(of(0.5, 1.0), of(0.5f64.next_up(), 1.0));
-    assert_ne!(of(0.5, 1.0), of(0.5, 1.0f64.next_down()));
-    assert_ne!(of(0.0, 1.0), of(-0.0, 1.0));
+    let digest = |gene: f64, fitness: f64| start.next(0, &[vec![gene]], &[vec![fitness]]);
+    assert_ne!(digest(0.5, 1.0), digest(0.5f64.next_up(), 1.0));
+    assert_ne!(digest(0.5, 1.0), digest(0.5, 1.0f64.next_down()));
+    assert_ne!(digest(0.0, 1.0), digest(-0.0, 1.0));
     assert_ne!(start.next(0, &[], &[]), start.next(1, &[], &[]));
 }
 
@@ -291,7 +291,7 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
 #[test]
 fn the_formats_of_keyframes_and_of_the_log_stay() {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let told = Told::of(vec![vec![0.0], vec![2.0], vec![1.0]]);
+    let told = Told::from_fitness(vec![vec![0.0], vec![2.0], vec![1.0]]);
     assert_eq!(
         hex(&told.to_bytes()),
         "020301000000000000000001000000000000004001000000000000f03f000000",
@@ -326,7 +326,7 @@ fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
     let bytes = |mean: f64, ci95: f64| [mean.to_le_bytes(), ci95.to_le_bytes()].concat();
     let replaced = |old: &[u8], new: &[u8]| {
         let mut keyframe = evolution.keyframe();
-        let places = keyframe.windows(old.len()).enumerate().filter(|(_, it)| *it == old);
+        let places = keyframe.windows(old.len()).enumerate().filter(|(_, window)| *window == old);
         let places: Vec<usize> = places.map(|(at, _)| at).collect();
         for &at in &places {
             keyframe[at..at + old.len()].copy_from_slice(new);
@@ -346,7 +346,7 @@ fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
 fn what_is_no_checkpoint_is_an_error() {
     let mut evolution = evolution(3, &[2]);
     let keyframe = evolution.keyframe();
-    let told = Told::of(evaluate(&evolution.ask().genotypes));
+    let told = Told::from_fitness(evaluate(&evolution.ask().genotypes));
     evolution.replay(&told).unwrap();
     let entry = told.to_bytes();
     let restore = |keyframe: &[u8], log: &[&[u8]]| {

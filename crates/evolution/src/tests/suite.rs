@@ -88,7 +88,7 @@ fn recorded(variant: &Variant) -> (Vec<Evolution>, Vec<Told>) {
     for g in 0..10 {
         let mut evolution = states[g].clone();
         let generation = evolution.ask();
-        let mut told = Told::of(evaluate(&generation.genotypes));
+        let mut told = Told::from_fitness(evaluate(&generation.genotypes));
         evolution.tell(generation, &told.trial_fitness).unwrap();
         if evolution.n_generations().is_multiple_of(3) {
             let mut round = evolution.reevaluation().unwrap();

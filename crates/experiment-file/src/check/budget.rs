@@ -11,7 +11,7 @@ pub(super) fn check(
     algorithm: Option<&AlgorithmDescription>,
     report: &Report<'_>,
 ) {
-    let network = NetworkSize::of(&config.topology);
+    let network = NetworkSize::from_topology(&config.topology);
     network_size(&network, report);
     generation(config, &network, algorithm, report);
     episode(config, &network, report);
@@ -46,7 +46,7 @@ struct NetworkSize {
 }
 
 impl NetworkSize {
-    fn of(topology: &TopologyConfig) -> Self {
+    fn from_topology(topology: &TopologyConfig) -> Self {
         let size = |name: &String| {
             let ensemble = topology.ensembles.get(name).map(|ensemble| ensemble.n);
             u64::from(ensemble.unwrap_or_else(|| topology.n_sources(name)))

@@ -102,7 +102,7 @@ impl Schema {
     /// A row per key.
     fn keys(&self, object: &Value) -> String {
         let required = |key: &str| {
-            object["required"].as_array().is_some_and(|keys| keys.iter().any(|it| it == key))
+            object["required"].as_array().is_some_and(|keys| keys.iter().any(|name| name == key))
         };
         let mut text = "| key | values | default | |\n|---|---|---|---|\n".to_owned();
         let mut ignored = Vec::new();
@@ -175,7 +175,8 @@ impl Schema {
         }
         for union in ["anyOf", "oneOf"] {
             if let Some(variants) = value[union].as_array() {
-                let mut names: Vec<String> = variants.iter().map(|it| self.values(it)).collect();
+                let mut names: Vec<String> =
+                    variants.iter().map(|variant| self.values(variant)).collect();
                 names.dedup();
                 return names.join(" or ");
             }

@@ -335,8 +335,10 @@ fn costs_are_limited_in_sum() {
 /// The shipped leader selection with LIF neurons, one passage replaced.
 #[test]
 fn mistakes_of_spiking_networks_have_answers() {
-    let (_, base) =
-        super::shipped::spiking().into_iter().find(|it| it.0.contains("r_selection_lif")).unwrap();
+    let (_, base) = super::shipped::spiking()
+        .into_iter()
+        .find(|(name, _)| name.contains("r_selection_lif"))
+        .unwrap();
     for (from, to, expected) in SPIKING_MISTAKES {
         assert_eq!(base.matches(from).count(), 1, "{from:?} must occur once");
         assert_eq!(refuse(&base.replace(from, to)), *expected, "{from} -> {to}");

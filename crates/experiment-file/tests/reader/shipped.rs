@@ -56,8 +56,13 @@ fn spiking_swarms_are_shipped_beside_their_rate_neurons() {
             let config = find(&spiking, &format!("{task}_{name}"));
             assert_eq!(config.topology.neuron_model, model);
             assert_eq!(config.world, expected.world);
-            let [ours, theirs] = [&config.algorithm, &expected.algorithm].map(|it| {
-                (it.fitness_function, it.population_size, it.num_evaluations, it.evaluation_steps)
+            let [ours, theirs] = [&config.algorithm, &expected.algorithm].map(|algorithm| {
+                (
+                    algorithm.fitness_function,
+                    algorithm.population_size,
+                    algorithm.num_evaluations,
+                    algorithm.evaluation_steps,
+                )
             });
             assert_eq!(ours, theirs);
         }
@@ -80,7 +85,8 @@ fn encoders_and_plasticity_are_shipped() {
         assert_eq!(find(name).world, find(task).world);
     }
     let encoded = find("light_follower_lif_encoded").topology;
-    let schemes: Vec<EncodingScheme> = encoded.encoding.values().map(|it| it.scheme).collect();
+    let schemes: Vec<EncodingScheme> =
+        encoded.encoding.values().map(|encoding| encoding.scheme).collect();
     use EncodingScheme::{Lif, PoissonRate, RankOrder};
     assert_eq!(schemes, [Lif, RankOrder, PoissonRate]);
     assert!(find("leader_selection_lif_plastic").topology.learning.unwrap().reward.is_some());

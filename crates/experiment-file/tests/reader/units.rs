@@ -116,8 +116,11 @@ fn robots_and_what_they_sense_are_measured_in_cm() {
         let to = format!(r#""wheel_actuator": {{"{key}": {value}}}"#);
         let warnings = warnings(&edited(r#""wheel_actuator": {}"#, &to));
         let path = format!("{at}.wheel_actuator.{key}: ");
-        let of_it: Vec<_> = warnings.iter().filter(|it| it.contains(&path)).collect();
-        assert!(matches!(of_it[..], [it] if it.ends_with(&format!("; {likely}?"))), "{warnings:?}");
+        let of_it: Vec<_> = warnings.iter().filter(|warning| warning.contains(&path)).collect();
+        assert!(
+            matches!(of_it[..], [warning] if warning.ends_with(&format!("; {likely}?"))),
+            "{warnings:?}"
+        );
     }
     let transmitter = r#""wireless_transmitter": {"range": 5000}"#;
     let path = format!("{at}.wireless_transmitter.range");
@@ -125,7 +128,7 @@ fn robots_and_what_they_sense_are_measured_in_cm() {
     for (side, likely) in [("10", CM_FOR_M), ("20000", CM_FOR_MM)] {
         let to = format!("\"world\": {{\n    \"width\": {side}, ");
         let warnings = warnings(&edited("\"world\": {\n", &to));
-        let of_it = warnings.iter().find(|it| it.contains(": world.width: ")).unwrap();
+        let of_it = warnings.iter().find(|warning| warning.contains(": world.width: ")).unwrap();
         assert!(of_it.ends_with(&format!("; {likely}?")), "{of_it}");
     }
     let lamp = r#""params": {"range": 2000}, "controller": null"#;
@@ -174,7 +177,7 @@ fn spiking_neurons_have_milliseconds_and_millivolts() {
     let found = warnings(&file.to_string());
     for parameter in ["thresh", "v_rest"] {
         let path = format!("topology.ensembles.{ensemble}.params.{parameter}: ");
-        let of_it = found.iter().find(|it| it.contains(&path)).unwrap();
+        let of_it = found.iter().find(|warning| warning.contains(&path)).unwrap();
         assert!(of_it.ends_with("; V instead of mV?"), "{of_it}");
     }
     assert_eq!(found.len(), 2, "{found:?}");

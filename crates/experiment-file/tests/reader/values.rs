@@ -289,7 +289,8 @@ fn robots_lights_and_areas_may_be_left_to_the_script() {
     let (config, warnings) =
         read(&with_task.replace("\"neural_controller\"", "\"script_controller\"")).unwrap();
     assert_eq!(config.robots().next().unwrap().1.controller, RobotController::ScriptController);
-    let warning = warnings.iter().find(|it| it.path == "world.objects.bots.controller").unwrap();
+    let warning =
+        warnings.iter().find(|warning| warning.path == "world.objects.bots.controller").unwrap();
     assert!(warning.message.ends_with("but nothing of it evolves"), "{}", warning.message);
 }
 

@@ -18,8 +18,10 @@ impl<'a> Parser<'a> {
                 Kind::Name("def") if n_blocks == 0 && is_line_start => {
                     if let Some(Kind::Name(name)) = next(1) {
                         let parameters = self.tokens[index..].iter().skip(3);
-                        let parameters = parameters.take_while(|it| it.kind != Kind::Operator(")"));
-                        let n = parameters.filter(|it| matches!(it.kind, Kind::Name(_))).count();
+                        let parameters =
+                            parameters.take_while(|token| token.kind != Kind::Operator(")"));
+                        let n =
+                            parameters.filter(|token| matches!(token.kind, Kind::Name(_))).count();
                         self.signatures.push((name, n));
                     }
                 }

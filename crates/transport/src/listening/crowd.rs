@@ -59,8 +59,10 @@ impl Crowd {
             return Duration::ZERO;
         }
         let most = self.n_of_peer.values().max().copied();
-        let of_largest =
-            self.members.values().filter(|it| self.n_of_peer.get(&it.peer).copied() == most);
+        let of_largest = self
+            .members
+            .values()
+            .filter(|member| self.n_of_peer.get(&member.peer).copied() == most);
         let times = of_largest.map(|member| self.time_left(member, now));
         times.min().unwrap_or(Duration::ZERO)
     }

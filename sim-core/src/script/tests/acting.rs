@@ -135,7 +135,8 @@ def fitness(world):
     });
     let light = inputs.filter(|(name, _)| *name == "light_sensor").map(|(_, inputs)| inputs).next();
     let light = light.unwrap();
-    let sum: f64 = of_networks[0].robots.iter().flat_map(|it| &it.stimuli[light.clone()]).sum();
+    let sum: f64 =
+        of_networks[0].robots.iter().flat_map(|robot| &robot.stimuli[light.clone()]).sum();
     assert!((steps[0].fitness.unwrap() - sum).abs() < 1e-5 && sum > 0.0, "{sum}");
 }
 
@@ -204,10 +205,10 @@ def fitness(world):
     config.algorithm.evaluation_steps = 60;
     let steps = watch(&config);
     let hears_it = |step: &StepRecord| {
-        step.robots.iter().any(|it| it.received.is_some_and(|it| it.emitter == 0))
+        step.robots.iter().any(|robot| robot.received.is_some_and(|frame| frame.emitter == 0))
     };
     let n_heard =
-        |range: std::ops::Range<usize>| steps[range].iter().filter(|it| hears_it(it)).count();
+        |range: std::ops::Range<usize>| steps[range].iter().filter(|step| hears_it(step)).count();
     assert!(n_heard(0..21) > 0 && n_heard(41..60) > 0);
     // The script fails it at the end of step 20.
     assert_eq!(n_heard(21..41), 0);

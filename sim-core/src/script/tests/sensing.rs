@@ -71,9 +71,9 @@ def fitness(world):
 ";
     let config = sensing(text, 4);
     let values = said(&config, 0);
-    assert_eq!(values.iter().map(|it| it[0]).collect::<Vec<_>>(), [0.5, 1.0, 1.5, 2.0]);
+    assert_eq!(values.iter().map(|reading| reading[0]).collect::<Vec<_>>(), [0.5, 1.0, 1.5, 2.0]);
     let sum = |step: &crate::record::StepRecord| {
-        step.robots.iter().map(|it| it.stimuli[it.stimuli.len() - 1]).sum::<f64>()
+        step.robots.iter().map(|robot| robot.stimuli[robot.stimuli.len() - 1]).sum::<f64>()
     };
     for step in watch(&config) {
         assert!((step.fitness.unwrap() - sum(&step)).abs() < 1e-5);
@@ -122,8 +122,9 @@ def fitness(world):
     let (config, _) =
         ExperimentConfig::from_json(&file.to_string(), "t", evolution::ALGORITHMS).unwrap();
     let steps = watch(&config);
-    let blind = steps[1].robots.iter().filter(|it| it.stimuli.ends_with(&[0.0, 0.0])).count();
-    let seeing = steps[1].robots.iter().filter(|it| it.stimuli.ends_with(&[1.0, 1.0])).count();
+    let blind = steps[1].robots.iter().filter(|robot| robot.stimuli.ends_with(&[0.0, 0.0])).count();
+    let seeing =
+        steps[1].robots.iter().filter(|robot| robot.stimuli.ends_with(&[1.0, 1.0])).count();
     assert_eq!((blind, seeing), (2, n_robots as usize - 2));
     assert_eq!(steps[1].fitness, Some(2.0 * f64::from(n_robots)));
 }

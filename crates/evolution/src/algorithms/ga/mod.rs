@@ -145,7 +145,7 @@ impl Strategy for Ga {
     fn births(&self, population_size: usize, rng: &mut Stream) -> Option<Vec<Birth>> {
         let drawn = self.draw(population_size, rng).into_iter();
         let parent = |rank: usize| &self.ranked[rank];
-        Some(drawn.map(|(genes, parents)| Birth::of(parents, &genes, parent)).collect())
+        Some(drawn.map(|(genes, parents)| Birth::new(parents, &genes, parent)).collect())
     }
 
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]) {

@@ -86,9 +86,10 @@ fn reach(range: f64, step: f64, path: &Path, doubts: &Doubts<'_>) {
 
 fn robot(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     let (sensors, actuators) = (&robot.sensors, &robot.actuators);
-    let light = sensors.light_sensor.as_ref().map(|it| (it.range, it.decay_rho));
-    let distance = sensors.distance_sensor.as_ref().map(|it| (it.range, it.decay_rho));
-    let receiver = sensors.wireless_receiver.as_ref().map(|it| (it.range, it.decay_rho));
+    let light = sensors.light_sensor.as_ref().map(|sensor| (sensor.range, sensor.decay_rho));
+    let distance = sensors.distance_sensor.as_ref().map(|sensor| (sensor.range, sensor.decay_rho));
+    let receiver =
+        sensors.wireless_receiver.as_ref().map(|receiver| (receiver.range, receiver.decay_rho));
     let mounted =
         [("light_sensor", light), ("distance_sensor", distance), ("wireless_receiver", receiver)];
     for (key, sensor) in mounted {
@@ -237,7 +238,7 @@ fn motion(controller: &LightController, path: &Path, doubts: &Doubts<'_>) {
                 doubts.add(&path.key("angle_step"), what, DEGREES);
             }
             for (key, length) in [("radius", Some(*radius)), ("radius_step", *radius_step)] {
-                if let Some(length) = length.filter(|it| *it > doubts.longer_side() / 2.0) {
+                if let Some(length) = length.filter(|length| *length > doubts.longer_side() / 2.0) {
                     let what = format!("{length} cm leads around the world");
                     doubts.add(&path.key(key), what, SMALLER);
                 }

@@ -38,7 +38,7 @@ pub(super) fn check(doubts: &Doubts<'_>) {
         slow(tau, tau.to_string(), &Path::from(["topology", "motor_tau"]), doubts);
     }
     let steps = doubts.config.algorithm.evaluation_steps;
-    if let Some(reward) = topology.learning.as_ref().and_then(|it| it.reward)
+    if let Some(reward) = topology.learning.as_ref().and_then(|learning| learning.reward)
         && reward.delay >= steps
     {
         let path = Path::from(["topology", "learning", "reward", "delay"]);
@@ -61,9 +61,9 @@ fn wheels(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
 fn perturbations(robot: &RobotConfig, path: &Path, doubts: &Doubts<'_>) {
     let perturbations = &robot.perturbations;
     let path = path.key("perturbations");
-    let failure = perturbations.leader_failure.as_ref().map(|it| it.time_to_failure);
-    let switch = perturbations.topology_switch.as_ref().map(|it| it.every);
-    let rotation = perturbations.uncontrollable_rotation.as_ref().map(|it| it.start);
+    let failure = perturbations.leader_failure.as_ref().map(|failure| failure.time_to_failure);
+    let switch = perturbations.topology_switch.as_ref().map(|switch| switch.every);
+    let rotation = perturbations.uncontrollable_rotation.as_ref().map(|rotation| rotation.start);
     for (kind, key, step) in [
         ("leader_failure", "time_to_failure", failure),
         ("topology_switch", "every", switch),

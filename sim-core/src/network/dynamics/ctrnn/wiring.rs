@@ -62,7 +62,7 @@ type Incoming = BTreeMap<usize, Vec<usize>>;
 impl Wiring {
     /// Orders a network.
     pub fn new(ensembles: &IndexMap<String, Ensemble>, synapses: &[Synapse]) -> Self {
-        let Members { quads, pairs } = Members::of(ensembles);
+        let Members { quads, pairs } = Members::from_ensembles(ensembles);
         let quad_rows = quads.iter().flat_map(|(_, members)| members);
         let pair_rows = pairs.iter().flat_map(|(_, members)| members);
         let n_neurons = ensembles.values().last().map_or(0, |ensemble| ensemble.neurons.end);
@@ -145,7 +145,7 @@ struct Members {
 impl Members {
     /// Neighbours of an ensemble first, because they have most of their presynaptic
     /// neurons in common, then what ensembles have left over.
-    fn of(ensembles: &IndexMap<String, Ensemble>) -> Self {
+    fn from_ensembles(ensembles: &IndexMap<String, Ensemble>) -> Self {
         let (mut quads, mut pairs) = (Vec::new(), Vec::new());
         let mut left_over = [(Activation::Sigmoid, None), (Activation::Tanh, None)];
         for ensemble in ensembles.values() {

@@ -54,7 +54,12 @@ fn neuron(model: NeuronModel, parameters: &Value) -> (Network, Phenotype) {
     let network = Network::compile(&config, &mut problems);
     problems.check().unwrap();
     let value = |name: &'static str| vec![parameters[name].as_f64().unwrap()];
-    let neurons = model.spec().parameters.iter().map(|it| (it.name, value(it.name))).collect();
+    let neurons = model
+        .spec()
+        .parameters
+        .iter()
+        .map(|parameter| (parameter.name, value(parameter.name)))
+        .collect();
     (
         network,
         Phenotype {
@@ -134,7 +139,7 @@ fn dynamic_synapses_work_as_in_brian2() {
     let parameters = &fixture["parameters"];
     let value = |name: &'static str| vec![parameters[name].as_f64().unwrap(); 4];
     let specified = NeuronModel::Lif.spec().parameters.iter();
-    let neurons = specified.map(|it| (it.name, value(it.name))).collect();
+    let neurons = specified.map(|parameter| (parameter.name, value(parameter.name))).collect();
     let delays = numbers(&fixture["delays"]).collect();
     let decoders = vec![vec![1.0; 2]];
     let phenotype = Phenotype {

@@ -193,7 +193,9 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Perceive<'_, W, PLASTIC> 
         for (neuron, drive) in drives.iter_mut().enumerate() {
             let mut sum = [simd.splat_f32s(0.0); W];
             let numbers = circuit.afferent.numbers_of(neuron);
-            for (&(input, shared), &number) in circuit.afferent.of(neuron).iter().zip(numbers) {
+            for (&(input, shared), &number) in
+                circuit.afferent.synapses_of(neuron).iter().zip(numbers)
+            {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
                 let stimulus = &stimuli.row(input)[chunk.first_lane..][..n_lanes];
                 accumulate(simd, &mut sum, weight, &rows::<S, W>(stimulus)[0]);
@@ -234,7 +236,8 @@ impl<const W: usize, const PLASTIC: bool> WithSimd for Propagate<'_, W, PLASTIC>
         let plastic = rows::<S, W>(plastic);
         for &pre in &chunk.active {
             let numbers = circuit.outgoing.numbers_of(pre);
-            for (&(post, shared), &number) in circuit.outgoing.of(pre).iter().zip(numbers) {
+            for (&(post, shared), &number) in circuit.outgoing.synapses_of(pre).iter().zip(numbers)
+            {
                 let weight = weight::<S, W, PLASTIC>(simd, shared, number, plastic);
                 accumulate(simd, &mut currents[post], weight, &spikes[pre]);
             }

@@ -99,7 +99,7 @@ impl Weighted {
 
     /// Synapses of a group.
     #[inline(always)]
-    pub fn of(&self, group: usize) -> &[(usize, f32)] {
+    pub fn synapses_of(&self, group: usize) -> &[(usize, f32)] {
         &self.members[self.groups[group].clone()]
     }
 

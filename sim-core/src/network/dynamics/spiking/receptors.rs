@@ -62,7 +62,10 @@ impl Receptors {
         let gaba_gain = if gaba.reversal.is_some() { gaba.gain } else { -gaba.gain };
         Self {
             delays: phenotype.delays.iter().map(|&delay| delay as usize).collect(),
-            incoming: wiring.receptive.each_ref().map(|it| Weighted::new(it, phenotype)),
+            incoming: wiring
+                .receptive
+                .each_ref()
+                .map(|synapses| Weighted::new(synapses, phenotype)),
             drives: [
                 drive(ampa.gain, ampa.reversal),
                 drive(gaba_gain, gaba.reversal),
@@ -122,7 +125,7 @@ impl Receptors {
             for (receptor, (incoming, (gain, reversal))) in
                 self.incoming.iter().zip(self.drives).enumerate()
             {
-                let synapses = incoming.of(neuron);
+                let synapses = incoming.synapses_of(neuron);
                 if synapses.is_empty() {
                     continue;
                 }

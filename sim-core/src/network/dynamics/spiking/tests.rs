@@ -167,7 +167,8 @@ fn a_window_has_counts_and_first_spikes_of_motor_neurons() {
     let mut n_first = 0;
     let mut counts = vec![[0.0; 3]; network.0.n_neurons()];
     let mut first = vec![[40.0; 3]; network.0.n_neurons()];
-    let motor: Vec<usize> = network.0.outputs.iter().flat_map(|it| it.neurons.clone()).collect();
+    let motor: Vec<usize> =
+        network.0.outputs.iter().flat_map(|output| output.neurons.clone()).collect();
     for substep in 0..40 {
         substeps.step(&held);
         for &neuron in &motor {
