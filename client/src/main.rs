@@ -29,7 +29,6 @@ mod progress;
 mod recorded;
 mod resimulation;
 mod settings;
-mod statistics;
 mod sweep;
 mod synonyms;
 mod table;

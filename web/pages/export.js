@@ -12,12 +12,12 @@ export function save(name, kind, text) {
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** Buttons that save a figure. `svg()`: the element; `table()`: rows of cells, of which the first
+/** Buttons that save a figure. `svg()`: the element, if it is one; `table()`: rows of cells, of which the first
  *  has the names; `name()`: that of the files, without their ends. */
 export function exports({ svg, table, name }) {
   const button = (text, title, onclick) => element("button", { type: "button", className: "save", title, onclick }, text);
   return element("span", { className: "saves" },
-    button("SVG", "save this figure as SVG", () => save(`${name()}.svg`, "image/svg+xml", svgText(svg()))),
+    ...(svg ? [button("SVG", "save this figure as SVG", () => save(`${name()}.svg`, "image/svg+xml", svgText(svg())))] : []),
     button("CSV", "save what it shows as a table", () => save(`${name()}.csv`, "text/csv", csvText(table()))));
 }
 

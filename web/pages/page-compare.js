@@ -2,6 +2,7 @@
 
 import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
+import { differences, statistics } from "swarm/comparison.js";
 import { allExperiments } from "swarm/experiment-list.js";
 import { askJson, bar, complain, main, resolve } from "swarm/page.js";
 import { quantile, seriesStyle } from "swarm/scales.js";
@@ -28,12 +29,14 @@ let experiments = [];
 const select = (name, options, value) => element("select", { id: name, "aria-label": name, onchange: show }, ...options.map((option) => element("option", { value: option, selected: option === value }, option)));
 const axis = select("along", Object.keys(AXES), words.get("along") ?? "generation");
 const column = select("value", Object.keys(COLUMNS), words.get("value") ?? "mean");
-const grouping = select("as", ["runs", "median of groups"], words.get("as") ?? "runs");
+const grouping = select("as", ["runs", "groups"], words.get("as") ?? "runs");
 const list = element("div", { className: "choices" });
 const picture = chart("fitness of several runs");
+const found = element("div", { className: "columns wide" });
+const files = element("div");
 main.replaceChildren(element("h1", {}, "Compare"),
   element("div", { className: "row" }, element("label", {}, "fitness: ", column), element("label", {}, "along: ", axis), element("label", {}, "as: ", grouping)),
-  element("section", { className: "panel tall" }, picture),
+  element("section", { className: "panel tall" }, picture), found, files,
   element("section", { className: "panel" }, element("h2", {}, "Runs"), list));
 
 async function history(id) {
@@ -51,6 +54,20 @@ async function history(id) {
 /** What a run is grouped by. */
 const kind = (it) => [it.group || it.name, it.variant].filter(Boolean).join(" ");
 
+/** Whom the latest answers are of. */
+let explained = "";
+
+/** Statistics of the groups, and where the files of runs differ. */
+async function explain(groups, runs) {
+  const asked = JSON.stringify(groups.map((it) => [it.name, it.runs.map((run) => run.id)]));
+  if (asked === explained) return;
+  explained = asked;
+  const answers = await Promise.all([groups.length ? statistics(groups) : [], runs.length ? differences(runs) : ""]);
+  if (asked !== explained) return;
+  found.replaceChildren(...answers[0]);
+  files.replaceChildren(answers[1]);
+}
+
 async function show() {
   const words = new URLSearchParams({ runs: [...chosen].join(","), along: axis.value, value: column.value, as: grouping.value });
   window.history.replaceState(null, "", `?${words}`);
@@ -63,22 +80,24 @@ async function show() {
       return { it, points: rows.map((row, i) => [along[i], row[COLUMNS[column.value]]]) };
     }));
     const content = { xLabel: label, yLabel: `${column.value} fitness`, lines: [], bands: [] };
+    const groups = [...Map.groupBy(runs, kind)].map(([name, its]) => ({ name, runs: its }));
     if (grouping.value === "runs") {
       content.lines = curves.map(({ it, points }, i) => ({ name: `${it.id} ${kind(it)} seed ${it.seed}`, ...seriesStyle(i, curves.length), points }));
     } else {
-      [...new Set(curves.map(({ it }) => kind(it)))].forEach((name, i) => {
+      groups.forEach(({ name }, i) => {
         const members = curves.filter(({ it }) => kind(it) === name).map(({ points }) => points).filter((points) => points.length);
         const n = Math.min(...members.map((points) => points.length));
         const sorted = (k) => members.map((points) => points[k][1]).sort((a, b) => a - b);
         // Along episodes and time runs differ in where a generation ends: the median of that.
         const at = (k) => quantile(members.map((points) => points[k][0]).sort((a, b) => a - b), 0.5);
         const steps = Array.from({ length: Number.isFinite(n) ? n : 0 }, (_, k) => k);
-        const color = COLORS[i % COLORS.length];
-        content.bands.push({ color, points: steps.map((k) => [at(k), quantile(sorted(k), 0.25), quantile(sorted(k), 0.75)]) });
-        content.lines.push({ name: `${name}, ${members.length} runs, median and quartiles`, color, points: steps.map((k) => [at(k), quantile(sorted(k), 0.5)]) });
+        const style = seriesStyle(i, groups.length);
+        content.bands.push({ name, color: style.color, points: steps.map((k) => [at(k), quantile(sorted(k), 0.25), quantile(sorted(k), 0.75)]) });
+        content.lines.push({ name: `${name}, ${members.length} runs, median and quartiles`, ...style, points: steps.map((k) => [at(k), quantile(sorted(k), 0.5)]) });
       });
     }
     picture.show(content);
+    await explain(groups, runs);
     resolve("compare");
   } catch (error) {
     complain(error, "compare");

@@ -21,6 +21,7 @@ macro_rules! modules {
 modules!(
     "camera.js",
     "clock.js",
+    "comparison.js",
     "dom.js",
     "doing.js",
     "drawing.js",

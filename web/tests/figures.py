@@ -3,6 +3,7 @@
 import csv
 import io
 import itertools
+import json
 import re
 import unittest
 import xml.etree.ElementTree
@@ -118,6 +119,23 @@ class Figures(BrowserTest):
                 import('swarm/scales.js').then(({ seriesStyle }) => done(Array.from({ length: n }, (_, i) => Object.values(seriesStyle(i, n)).join())));
             """, n)
             self.assertEqual(len(set(looks)), n)
+
+    def test_groups_are_compared_as_the_client_does_and_files_by_their_keys(self):
+        self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "sizes", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
+        self.fleet.swarmctl("wait", "sizes")
+        self.open("/compare?runs=2,3,4,5,6,7&as=groups")
+        self.wait_for_text(".differences", "algorithm.population_size")
+        self.wait_for_text(".chart figcaption", "3 runs, median and quartiles")
+        answer = self.script("return fetch('/api/compare?samples=2,3,4;5,6,7').then((it) => it.json())")
+        ours = answer["quantities"][0]
+        told = json.loads(self.fleet.swarmctl("compare", "sizes"))["quantities"][0]
+        self.assertEqual([it["median"] for it in ours["samples"]], [it["median"] for it in told["samples"]])
+        self.assertEqual([it["iqm"] for it in ours["samples"]], [it["iqm"] for it in told["samples"]])
+        pair = told["pairs"][0]
+        self.assertEqual((ours["pairs"][0]["probability"], ours["pairs"][0]["p"]), (pair["probability_of_improvement"], pair["p"]))
+        rows = self.script("return [...document.querySelectorAll('.differences tbody tr')].map((it) => it.lastElementChild.textContent)")
+        self.assertEqual(rows, ["8"] * 3 + ["16"] * 3)
+        self.picture("compare-groups")
 
     def test_borders_of_controls_and_trails_are_seen(self):
         self.open("/")

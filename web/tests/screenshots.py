@@ -35,6 +35,7 @@ def replay(*args):
 class Screenshots(BrowserTest):
     def shoot(self, name, width, height, theme="light"):
         self.prefer(theme)
+        self.browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         # Two frames: one that is asked for now, and one that shows what it has drawn.
@@ -65,9 +66,10 @@ class Screenshots(BrowserTest):
         self.browser.get(fleet.pages + "/?by=variant&open=sizes%2520%25C2%25B7%2520algorithm.population_size%253D48")
         self.wait_for_text("tbody", "median worth of 4 champions")
         self.shoot("pages-experiments", 1250, 620)
-        self.browser.get(fleet.pages + "/compare?runs=" + ",".join(map(str, range(2, 10))) + "&as=median+of+groups")
+        self.browser.get(fleet.pages + "/compare?runs=" + ",".join(map(str, range(2, 10))) + "&as=groups")
         self.wait_for_text(".chart figcaption", "4 runs")
-        self.shoot("pages-compare", 1250, 720)
+        self.find(".differences")
+        self.shoot("pages-compare", 1250, 1150)
         self.browser.get(fleet.pages + "/replay/1#step=40&robot=1")
         self.wait_for_text("#result", "judged")
         self.find(".strip")

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
+use statistics::{interquartile_mean, interval};
 
 use crate::{
     args::Subject,
@@ -20,7 +21,6 @@ use crate::{
     progress::Progress,
     recorded::Source,
     settings::Settings,
-    statistics::{interquartile_mean, interval},
 };
 
 use self::{

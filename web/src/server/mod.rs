@@ -4,6 +4,7 @@
 mod access;
 mod answers;
 mod assets;
+mod compare;
 mod compression;
 mod experiments;
 mod fleet;
@@ -108,6 +109,7 @@ impl Site {
             .route("/workers", get(fleet::workers))
             .route("/timeline", get(fleet::timeline))
             .route("/live", get(list::live))
+            .route("/compare", get(compare::compare))
             .route("/experiments", get(list::all))
             .route("/experiments/{id}", get(experiments::one))
             .route("/experiments/{id}/generations", get(experiments::generations))

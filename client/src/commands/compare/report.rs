@@ -1,13 +1,13 @@
 //! What the comparison found, as numbers and as text.
 
 use serde::Serialize;
+use statistics::{
+    Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
+    probability_of_improvement,
+};
 
 use crate::{
     progress::Part,
-    statistics::{
-        Interval, interquartile_mean, interval, interval_of_two, mann_whitney, mean, median,
-        probability_of_improvement,
-    },
     table::{Column, Table},
     text,
 };

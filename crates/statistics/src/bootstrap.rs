@@ -18,6 +18,7 @@ const LEAST: usize = 3;
 /// A statistic and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
+    /// Of the sample itself.
     pub value: f64,
     /// Lower and upper end; none if a sample has fewer than three runs, which say nothing of
     /// what others would be.

@@ -1,4 +1,4 @@
-//! Against rliable and scipy: `client/tests/fixtures/make.py` wrote what they compute.
+//! Against rliable and scipy: `crates/statistics/tests/fixtures/make.py` wrote what they compute.
 
 use serde::Deserialize;
 
@@ -30,7 +30,7 @@ struct Pair {
 }
 
 fn fixture() -> Fixture {
-    serde_json::from_str(include_str!("../../tests/fixtures/statistics.json")).unwrap()
+    serde_json::from_str(include_str!("../tests/fixtures/statistics.json")).unwrap()
 }
 
 fn close(found: f64, expected: f64, tolerance: f64) -> bool {
