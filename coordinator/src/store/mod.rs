@@ -7,6 +7,7 @@
 mod champions;
 mod deletion;
 mod error;
+mod events;
 mod evidence;
 mod experiments;
 mod file;
@@ -15,6 +16,7 @@ mod forks;
 mod history;
 mod inspection;
 mod labels;
+mod older_schemas;
 mod quarantine;
 mod records;
 mod schema;
@@ -31,6 +33,7 @@ use crate::{failpoint, ids::ExperimentId, priority::Priority};
 use evolution::{Champion, Checkpoint};
 
 pub use error::StoreError;
+use events::{add_notice, add_state_event, set_state};
 pub use evidence::Imported;
 pub use experiments::Wanted;
 pub use file::{Holder, holder};
@@ -124,7 +127,7 @@ impl Store {
                 return Err(StoreError::TooOld { found: version, path: path.clone() });
             }
             if version < schema::VERSION {
-                schema::read_as_latest(&connection, version)?;
+                older_schemas::read_as_latest(&connection, version)?;
             }
             let sealer = Sealer::from_database(&connection)?;
             Ok((connection, sealer))
@@ -447,58 +450,6 @@ fn claim(connection: &Connection) -> rusqlite::Result<(Vec<u8>, Sealer)> {
 /// The token of the coordinator that owns a database.
 fn owner(connection: &Connection) -> rusqlite::Result<Vec<u8>> {
     connection.prepare_cached("SELECT owner FROM identity")?.query_row([], |row| row.get(0))
-}
-
-fn set_state(
-    transaction: &Transaction<'_>,
-    id: ExperimentId,
-    now_ms: u64,
-    state: ExperimentState,
-    reason: &str,
-) -> rusqlite::Result<()> {
-    let n_changed = transaction.execute(
-        "UPDATE experiments SET state = ?2, reason = ?3
-         WHERE id = ?1 AND state IN ('running', 'paused')
-           AND (state <> ?2 OR ?2 = 'paused' AND reason <> ?3)",
-        params![id.0, state.name(), reason],
-    )?;
-    if n_changed > 0 {
-        add_state_event(transaction, id, now_ms, state, reason)?;
-    }
-    Ok(())
-}
-
-fn add_state_event(
-    transaction: &Transaction<'_>,
-    id: ExperimentId,
-    now_ms: u64,
-    state: ExperimentState,
-    reason: &str,
-) -> rusqlite::Result<()> {
-    transaction.execute(
-        "INSERT INTO events (experiment_id, sequence, at_ms, kind, state, message)
-         VALUES (?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
-                 ?2, 'state', ?3, ?4)",
-        params![id.0, now_ms, state.name(), reason],
-    )?;
-    Ok(())
-}
-
-fn add_notice(
-    transaction: &Transaction<'_>,
-    id: ExperimentId,
-    now_ms: u64,
-    text: &str,
-) -> rusqlite::Result<()> {
-    // Of an experiment that is deleted, nothing is worth a line.
-    transaction.execute(
-        "INSERT INTO events (experiment_id, sequence, at_ms, kind, message)
-         SELECT ?1, (SELECT ifnull(max(sequence), 0) + 1 FROM events WHERE experiment_id = ?1),
-                ?2, 'notice', ?3
-         WHERE EXISTS (SELECT 1 FROM experiments WHERE id = ?1)",
-        params![id.0, now_ms, text],
-    )?;
-    Ok(())
 }
 
 /// For tests that make the database fail.

@@ -1,6 +1,5 @@
 //! Executes code.
 
-use std::cmp::Ordering;
 use std::rc::Rc;
 
 use crate::builtins;
@@ -10,6 +9,7 @@ use crate::code::{
 use crate::error::{Fault, Outcome};
 use crate::key::Key;
 use crate::meter::{Meter, cost};
+use crate::sort_keys::Keys;
 use crate::value::Value;
 use crate::{Host, Program};
 
@@ -448,48 +448,6 @@ impl Machine<'_> {
         });
         let values = keyed.into_iter().map(|(_, value)| value).collect();
         Ok(Value::list(values, self.meter)?)
-    }
-}
-
-/// Keys that have a total order, as sorting needs it: all are numbers, or all are texts.
-struct Keys {
-    are_texts: bool,
-    /// Bytes of all texts.
-    n_bytes: usize,
-}
-
-impl Keys {
-    fn from_keyed(keyed: &[(Value, Value)]) -> Outcome<Self> {
-        let Some((first, _)) = keyed.first() else {
-            return Ok(Self { are_texts: false, n_bytes: 0 });
-        };
-        let are_texts = first.as_text().is_some();
-        let mut n_bytes = 0;
-        for (key, _) in keyed {
-            match (key.as_text(), key.number()) {
-                (Some(text), _) if are_texts => n_bytes += text.len(),
-                (_, Some(number)) if !are_texts && !number.is_nan() => {}
-                // A single one needs no order.
-                _ if keyed.len() == 1 => {}
-                _ => return Err(builtins::without_order(first, key)),
-            }
-        }
-        Ok(Self { are_texts, n_bytes })
-    }
-
-    fn order(&self, a: &Value, b: &Value) -> Ordering {
-        if self.are_texts {
-            return a.as_text().cmp(&b.as_text());
-        }
-        let number = |value: &Value| value.number().unwrap_or_default();
-        // As floats, and those that are one float as whole numbers: whole numbers beyond 2^53 have
-        // floats between them.
-        let exact = |value: &Value| match value {
-            Value::Int(value) => i128::from(*value),
-            other => number(other) as i128,
-        };
-        let order = number(a).partial_cmp(&number(b)).unwrap_or(Ordering::Equal);
-        order.then_with(|| exact(a).cmp(&exact(b)))
     }
 }
 

@@ -52,6 +52,7 @@ mod key;
 mod lexer;
 mod meter;
 mod parser;
+mod sort_keys;
 mod value;
 
 use std::rc::Rc;

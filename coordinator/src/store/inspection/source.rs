@@ -4,7 +4,9 @@ use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::Connection;
 
-use super::super::{Result, StoreError, file, schema, seals::Sealer, write_ahead_log};
+use super::super::{
+    Result, StoreError, file, older_schemas, schema, seals::Sealer, write_ahead_log,
+};
 use crate::ids::ExperimentId;
 
 /// Most lines of SQLite's own check that are reported.
@@ -64,7 +66,7 @@ impl Source {
             }
         }
         if (1..schema::VERSION).contains(&version) {
-            schema::read_as_latest(&connection, version)?;
+            older_schemas::read_as_latest(&connection, version)?;
         }
         if damage.is_empty() {
             damage.extend(

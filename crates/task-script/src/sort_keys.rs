@@ -1,0 +1,51 @@
+//! The order in which `sorted` brings values.
+
+use std::cmp::Ordering;
+
+use crate::builtins;
+use crate::error::Outcome;
+use crate::value::Value;
+
+/// Keys that have a total order, as sorting needs it: all are numbers, or all are texts.
+pub struct Keys {
+    are_texts: bool,
+    /// Bytes of all texts.
+    pub n_bytes: usize,
+}
+
+impl Keys {
+    /// The keys of what is to be sorted; an error if they have no order.
+    pub fn from_keyed(keyed: &[(Value, Value)]) -> Outcome<Self> {
+        let Some((first, _)) = keyed.first() else {
+            return Ok(Self { are_texts: false, n_bytes: 0 });
+        };
+        let are_texts = first.as_text().is_some();
+        let mut n_bytes = 0;
+        for (key, _) in keyed {
+            match (key.as_text(), key.number()) {
+                (Some(text), _) if are_texts => n_bytes += text.len(),
+                (_, Some(number)) if !are_texts && !number.is_nan() => {}
+                // A single one needs no order.
+                _ if keyed.len() == 1 => {}
+                _ => return Err(builtins::without_order(first, key)),
+            }
+        }
+        Ok(Self { are_texts, n_bytes })
+    }
+
+    /// How two of them are ordered.
+    pub fn order(&self, a: &Value, b: &Value) -> Ordering {
+        if self.are_texts {
+            return a.as_text().cmp(&b.as_text());
+        }
+        let number = |value: &Value| value.number().unwrap_or_default();
+        // As floats, and those that are one float as whole numbers: whole numbers beyond 2^53 have
+        // floats between them.
+        let exact = |value: &Value| match value {
+            Value::Int(value) => i128::from(*value),
+            other => number(other) as i128,
+        };
+        let order = number(a).partial_cmp(&number(b)).unwrap_or(Ordering::Equal);
+        order.then_with(|| exact(a).cmp(&exact(b)))
+    }
+}
