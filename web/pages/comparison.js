@@ -7,7 +7,7 @@ import { askJson } from "swarm/page.js";
 /** Files that are compared at most. */
 const FILES_MAX = 60;
 
-const span = ({ ci95 }) => (ci95 ? `${decimals(ci95[0], 3)} to ${decimals(ci95[1], 3)}` : "–");
+const span = ({ ci95 }) => (ci95 ? `${decimals(ci95[0], 3)}–${decimals(ci95[1], 3)}` : "–");
 const table = (head, rows) => element("div", { className: "scroll" }, element("table", { className: "list" },
   element("thead", {}, element("tr", {}, ...head.map((name) => element("th", { scope: "col" }, name)))),
   element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map((cell, i) => element("td", { "data-label": head[i] }, cell)))))));
