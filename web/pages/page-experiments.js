@@ -38,7 +38,7 @@ function drawAround() {
   const all = [...experiments.values()];
   const n_archived = all.filter((it) => it.archived).length;
   archivedText.textContent = `archived (${n_archived})`;
-  count.textContent = table.count() === all.length ? `${all.length} experiments` : `${table.count()} of ${all.length}`;
+  count.textContent = table.count() === all.length ? `${all.length} experiment${all.length === 1 ? '' : 's'}` : `${table.count()} of ${all.length}`;
   const names = ["", ...Object.keys(groupings(all))];
   if (grouping.dataset.names !== names.join()) {
     grouping.dataset.names = names.join();
