@@ -3,6 +3,7 @@
 import { decimals, element } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
 import { askJson } from "swarm/page.js";
+import { sweptValues } from "swarm/swept-values.js";
 
 /** Files that are compared at most. */
 const FILES_MAX = 60;
@@ -42,7 +43,7 @@ async function fileOf(id) {
   return files.get(id);
 }
 
-/** Runs as rows, with a column for each key in which their files differ. */
+/** Runs as rows, with a column for each key in which their files differ; and figures of these keys. */
 export async function differences(runs) {
   const shown = runs.slice(0, FILES_MAX);
   const configs = await Promise.all(shown.map((it) => fileOf(it.id)));
@@ -54,7 +55,9 @@ export async function differences(runs) {
   const texts = shown.map((it, i) => [`${it.id} ${it.name}`, String(it.seed), it.champion === null ? "–" : decimals(it.champion, 3), ...keys.map((key) => configs[i].get(key) ?? "–")]);
   const rows = texts.map(([name, ...rest], i) => [element("a", { href: `/experiment/${shown[i].id}` }, name), ...rest]);
   const save = exports({ svg: null, table: () => [["id", "seed", "champion", ...keys], ...shown.map((it, i) => [it.id, it.seed, it.champion, ...texts[i].slice(3)])], name: () => "runs" });
-  return element("section", { className: "panel differences" },
+  const swept = keys.map((key, k) => ({ key, title: head[k + 3], values: configs.map((it) => it.get(key) ?? "–") })).filter(({ key }) => key !== "name");
+  const figures = sweptValues(shown, swept, runs.length);
+  return element("div", {}, figures, element("section", { className: "panel differences" },
     element("div", { className: "row" }, element("h2", {}, "Where their files differ"), element("span", { className: "muted small" }, keys.length ? `${keys.length} keys beside the seed` : "in nothing but the seed"), save),
-    table(head, rows));
+    table(head, rows)));
 }

@@ -3,7 +3,7 @@
 import { element } from "swarm/dom.js";
 
 /** Properties that the style of the pages gives to shapes, and a file has to have itself. */
-const STYLED = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity", "font-size", "font-family", "font-weight", "text-anchor"];
+const STYLED = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity", "paint-order", "font-size", "font-family", "font-weight", "text-anchor"];
 
 /** Has a browser save a text. */
 export function save(name, kind, text) {

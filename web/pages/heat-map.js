@@ -6,23 +6,13 @@ import { path, shape } from "swarm/charts.js";
 import { exports } from "swarm/export.js";
 import { FitnessPages } from "swarm/fitness-pages.js";
 import { complain, resolve } from "swarm/page.js";
-import { ticks } from "swarm/scales.js";
+import { STOPS, rampColor, ticks } from "swarm/scales.js";
 
 /** Around the cells, pixels; left and right as those of charts, so that generations are below
  *  one another. */
 const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
 /** Pixels of a cell from which there are lines between cells. */
 const LINES_FROM = 7;
-
-/** Colours from bad to good: seen by all eyes, and in grey. */
-const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
-
-/** Red, green and blue of a share from 0 to 1. */
-function colorOf(share) {
-  const at = Math.max(0, Math.min(1, share)) * (STOPS.length - 1);
-  const low = Math.min(Math.floor(at), STOPS.length - 2);
-  return STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
-}
 
 /** The map of an experiment; `update(n_generations)` shows more of it. `onZoom(range)`: told which
  *  generations are seen, null for all; `zoom(range)` shows some. */
@@ -76,7 +66,7 @@ export function heatMap(id, onZoom = () => {}) {
       const values = pages.at(page.from + column * page.every);
       if (!values) continue;
       order(values).forEach((individual, place) => {
-        image.data.set([...colorOf((values[individual] - low) / (high - low || 1)), 255], 4 * (place * n_columns + column));
+        image.data.set([...rampColor((values[individual] - low) / (high - low || 1)), 255], 4 * (place * n_columns + column));
       });
     }
     context.putImageData(image, 0, 0);

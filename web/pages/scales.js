@@ -36,6 +36,16 @@ export function quantile(sorted, share) {
   return sorted[low] + (sorted[Math.min(low + 1, sorted.length - 1)] - sorted[low]) * (at - low);
 }
 
+/** Colours from bad to good: seen by all eyes, and in grey. */
+export const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+
+/** Red, green and blue of a share from 0 to 1. */
+export function rampColor(share) {
+  const at = Math.max(0, Math.min(1, share)) * (STOPS.length - 1);
+  const low = Math.min(Math.floor(at), STOPS.length - 2);
+  return STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
+}
+
 /** Colours that are told apart on light and dark, also by most who see fewer of them. */
 const FEW = ["#4269d0", "#e0571c", "#2f9a44", "#a463f2", "#b98a00", "#0a9396", "#e0559a", "#9c6b4e", "#6d8fd6", "#7d828c"];
 const DASHES = ["", "7 4", "2 3"];

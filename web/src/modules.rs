@@ -51,6 +51,7 @@ modules!(
     "robot-pictures.js",
     "robot-trails.js",
     "scales.js",
+    "swept-values.js",
     "timeline.js",
     "trials.js",
     "what-if.js",

@@ -5,10 +5,11 @@ import io
 import itertools
 import json
 import re
+import statistics
 import unittest
 import xml.etree.ElementTree
 
-from harness import CONFIG, BrowserTest, Fleet
+from harness import CONFIG, NARROW, BrowserTest, Fleet
 
 from selenium import webdriver
 from selenium.webdriver.common.by import By
@@ -136,6 +137,46 @@ class Figures(BrowserTest):
         rows = self.script("return [...document.querySelectorAll('.differences tbody tr')].map((it) => it.lastElementChild.textContent)")
         self.assertEqual(rows, ["8"] * 3 + ["16"] * 3)
         self.picture("compare-groups")
+
+    def test_swept_values_are_seen_beside_what_champions_are_worth(self):
+        before = len(json.loads(self.fleet.swarmctl("list")))
+        self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "swept", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
+        self.fleet.swarmctl("wait", "swept")
+        ids = [before + 1 + i for i in range(6)]
+        compare = lambda ids: "/compare?runs=" + ",".join(map(str, ids))
+        self.open(compare(ids))
+        self.find(".parallel .line")
+        its = self.script("return fetch('/api/experiments').then((it) => it.json())")["experiments"]
+        worth = {it["id"]: it["champion"] for it in its if it["id"] in ids}
+        rows = list(csv.DictReader(io.StringIO(self.saved(".parallel .save:last-child"))))
+        self.assertEqual({int(it["id"]): float(it["champion"]) for it in rows}, worth)
+        self.assertEqual([it["algorithm.population_size"] for it in sorted(rows, key=lambda it: int(it["id"]))], ["8"] * 3 + ["16"] * 3)
+        self.open(compare(ids))
+        self.find(".parallel .line")
+        told = list(csv.DictReader(io.StringIO(self.saved(".importance .save:last-child"))))
+        groups = [[worth[it] for it in part] for part in (ids[:3], ids[3:])]
+        middle = statistics.fmean(worth.values())
+        between = sum(3 * (statistics.fmean(it) - middle) ** 2 for it in groups)
+        total = sum((it - middle) ** 2 for it in worth.values())
+        self.assertEqual([it["key"] for it in told], ["algorithm.population_size"])
+        self.assertAlmostEqual(float(told[0]["eta squared"]), between / total, places=12)
+        self.assertEqual(float(told[0]["eta squared by chance"]), 1 / 5)
+        self.assertIn("one-way η²", self.text(".importance svg"))
+        best = int(rows[-1]["id"])
+        self.assertEqual(worth[best], max(worth.values()))
+        self.press(".parallel svg", Keys.END)
+        self.wait(lambda: self.text(".parallel .readout").startswith(f"{best} quickstart"), f"it says {self.text('.parallel .readout')}")
+        self.script("document.querySelector('.swept').scrollIntoView()")
+        self.picture("swept")
+        self.narrow()
+        self.assertLessEqual(self.width(), NARROW)
+        self.script("document.querySelector('.swept').scrollIntoView()")
+        self.picture("narrow-swept")
+        self.press(".parallel svg", Keys.ENTER)
+        self.wait(lambda: self.browser.current_url.endswith(f"/experiment/{best}"), "Enter opens nothing")
+        self.open(compare(ids[:5]))
+        self.find(".differences")
+        self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, ".swept"), [], "five runs say nothing")
 
     def test_borders_of_controls_and_trails_are_seen(self):
         self.open("/")
