@@ -1,6 +1,8 @@
 // Who computed what lately: a row for each worker, a lane for each of its slots.
 
-import { canvas, color, decimals, element } from "swarm/dom.js";
+import { shape } from "swarm/charts.js";
+import { decimals, element } from "swarm/dom.js";
+import { exports } from "swarm/export.js";
 import { span } from "swarm/page.js";
 
 /** Rows of workers that are drawn at most. */
@@ -10,15 +12,15 @@ const LANES_MAX = 16;
 /** No look goes back further, ms. */
 const LONGEST = 300_000;
 /** Pixels. */
-const [AXIS, GAP] = [22, 6];
+const [AXIS, GAP, LETTER] = [22, 6, 7];
 
-/** What is said of each fate, and its colour. */
+/** What is said of each fate; the style has its colour. */
 const FATES = {
-  computed: ["computed", "--line"],
-  unanswered: ["no answer yet", "--relay"],
-  "taken-back": ["not needed any more", "--muted"],
-  failed: ["failed", "--bad"],
-  lost: ["lost with its worker", "--bad"],
+  computed: "computed",
+  unanswered: "no answer yet",
+  "taken-back": "not needed any more",
+  failed: "failed",
+  lost: "lost with its worker",
 };
 
 /** Puts the assignments of a worker into lanes. Results say when they were computed; of the
@@ -56,17 +58,21 @@ export function fleetTimeline() {
   let window = [0, 1];
   let answer = null;
   let slots = new Map();
+  /** What is read out: a row, and an assignment in it if there is one; null: nothing. */
+  let cursor = null;
 
   const choice = element("select", { "aria-label": "how far back", onchange: () => arrange() },
     ...[["", "all that is known"], ["1000", "1 s"], ["10000", "10 s"], ["60000", "1 min"]].map(([value, text]) => element("option", { value }, text)));
-  const readout = element("p", { className: "muted small" });
-  const picture = canvas((context, width, height) => draw(context, width, height), "who computed what");
+  const readout = element("p", { className: "muted small readout", role: "status" });
+  const more = element("p", { className: "muted small" });
+  const picture = shape("svg", { role: "group", tabindex: "0", "aria-roledescription": "timeline", "aria-label": "who computed what; left and right go through what a worker computed, up and down through workers, Escape goes on" });
+  const files = exports({ svg: () => picture, table: () => table(), name: () => "timeline" });
   const broken = element("ul", { className: "events broken" });
-  const keys = Object.entries(FATES).filter(([fate]) => fate !== "failed").map(([fate, [text]]) =>
+  const keys = Object.entries(FATES).filter(([fate]) => fate !== "failed").map(([fate, text]) =>
     element("span", { className: "key" }, element("i", { className: fate }), fate === "lost" ? "failed, or lost" : text));
   const node = element("section", { className: "panel fleet-timeline" },
     element("header", { className: "row" }, element("h2", {}, "Who computed what"), element("span", { className: "space" }), choice),
-    picture, element("p", { className: "row small muted" }, ...keys), readout, broken);
+    picture, element("div", { className: "row small muted" }, ...keys, files), readout, more, broken);
 
   const arrange = () => {
     if (!answer) return;
@@ -80,15 +86,15 @@ export function fleetTimeline() {
     rows = [...byWorker].map(([worker, its]) => {
       const [id, name] = answer.workers[worker];
       const n_lanes = Math.min(LANES_MAX, slots.get(id) ?? 1);
-      return { name, id, isGone: !slots.has(id), n_lanes, its: inLanes(its, n_lanes) };
+      return { name, id, isGone: !slots.has(id), n_lanes, its: inLanes(its, n_lanes).filter((it) => it.end >= window[0]).sort((a, b) => a.start - b.start || a.lane - b.lane) };
     }).sort((a, b) => a.id - b.id);
     const n_more = Math.max(0, rows.length - WORKERS_MAX);
     rows = rows.slice(0, WORKERS_MAX);
-    readout.textContent = n_more ? `${n_more} more workers have no room` : "\u00a0";
+    more.textContent = n_more ? `${n_more} more workers have no room` : "";
+    cursor = null;
     broken.replaceChildren(...brokenLines(all));
     node.dataset.assignments = all.length;
-    picture.style.height = `${AXIS + rows.reduce((sum, row) => sum + height(row) + GAP, 0)}px`;
-    picture.redraw();
+    draw();
   };
 
   /** Assignments without a result, those of a worker and a batch in one line. */
@@ -98,7 +104,7 @@ export function fleetTimeline() {
       const { worker, fate, end, batch } = its[0];
       const individuals = its.map((it) => it.individual).sort((a, b) => a - b);
       return element("li", {}, element("time", { className: "muted" }, new Date(now + end).toLocaleTimeString()),
-        ` ${answer.workers[worker][1]}: `, element("span", { className: "bad" }, FATES[fate][0]),
+        ` ${answer.workers[worker][1]}: `, element("span", { className: "bad" }, FATES[fate]),
         `, ${batch}, ${individuals.length === 1 ? "individual" : "individuals"} ${individuals.slice(0, 12).join(", ")}${individuals.length > 12 ? ", …" : ""}`);
     });
   };
@@ -108,74 +114,114 @@ export function fleetTimeline() {
   const left = (width) => (width < 600 ? 70 : 130);
   const x = (at, width) => left(width) + ((at - window[0]) / (window[1] - window[0])) * (width - left(width) - 4);
 
-  const draw = (context, width, total) => {
-    const begin = left(width);
-    context.clearRect(0, 0, width, total);
-    context.font = "12px system-ui, sans-serif";
-    context.textBaseline = "middle";
-    const [ink, muted, grid] = ["--ink", "--muted", "--grid"].map(color);
+  const text = (at, y, content, more = {}) => shape("text", { x: at, y, class: "axis", ...more }, content);
+
+  const draw = () => {
+    const width = Math.max(260, picture.clientWidth);
+    const total = AXIS + Math.max(AXIS, rows.reduce((sum, row) => sum + height(row) + GAP, 0));
+    picture.setAttribute("viewBox", `0 0 ${width} ${total}`);
+    picture.style.height = `${total}px`;
+    picture.replaceChildren(...timeAxis(width, total), shape("g", {}, ...bars(width)), shape("g", { class: "cursor" }));
+    if (rows.length === 0) picture.append(text(width / 2, AXIS, "nothing was computed lately", { "text-anchor": "middle" }));
+    drawCursor();
+  };
+
+  const timeAxis = (width, total) => {
     const length = window[1] - window[0];
-    const ago = (at) => (step < 10 ? span(-at) : `${Number((-at / 1000).toFixed(3))} s`);
     const power = 10 ** Math.floor(Math.log10(length / 4));
     const step = [1, 2, 5, 10].map((factor) => factor * power).find((it) => it >= length / (width > 700 ? 8 : 4)) ?? 10 * power;
+    const ago = (at) => (step < 10 ? span(-at) : `${Number((-at / 1000).toFixed(3))} s`);
+    const nodes = [text(width - 2, total - 6, "now", { "text-anchor": "end" })];
     for (let at = 0; at >= window[0]; at -= step) {
-      context.fillStyle = grid;
-      context.fillRect(Math.round(x(at, width)), 0, 1, total - AXIS);
-      context.fillStyle = muted;
-      context.textAlign = at === 0 ? "right" : "center";
-      context.fillText(at === 0 ? "now" : `−${ago(at)}`, at === 0 ? width - 2 : x(at, width), total - AXIS / 2);
+      nodes.push(shape("line", { x1: x(at, width), x2: x(at, width), y1: 0, y2: total - AXIS, class: "grid" }));
+      if (at < 0) nodes.push(text(x(at, width), total - 6, `−${ago(at)}`, { "text-anchor": "middle" }));
     }
+    return nodes;
+  };
+
+  const bars = (width) => {
+    const begin = left(width);
+    const room = Math.floor((begin - 8) / LETTER);
+    const nodes = [];
     let top = 0;
     for (const row of rows) {
       const tall = height(row);
-      const lane = tall / row.n_lanes;
-      context.textAlign = "left";
-      context.fillStyle = row.isGone ? muted : ink;
-      context.fillText(row.name, 0, top + tall / 2, begin - 8);
-      context.fillStyle = grid;
-      context.fillRect(begin, top + tall + GAP / 2, width - begin, 1);
+      row.top = top;
+      const name = row.name.length > room ? `${row.name.slice(0, room - 1)}…` : row.name;
+      nodes.push(text(0, top + tall / 2 + 4, name, { class: row.isGone ? "axis" : "axis name" }),
+        shape("line", { x1: begin, x2: width, y1: top + tall + GAP / 2, y2: top + tall + GAP / 2, class: "grid" }));
       for (const it of row.its) {
-        if (it.end < window[0]) continue;
-        const [from, to] = [Math.max(begin, x(it.start, width)), x(it.end, width)];
-        const y = top + it.lane * lane;
-        context.fillStyle = color(FATES[it.fate][1]);
+        const box = boxOf(row, it, width);
         // One generation is told from the next.
-        context.globalAlpha = it.fate === "computed" && it.number % 2 ? 0.55 : it.fate === "taken-back" ? 0.45 : 1;
-        const wide = Math.max(1, to - from - (to - from > 4 ? 1 : 0));
-        context.fillRect(from, y, wide, lane - 1);
-        context.globalAlpha = 1;
-        if (it.fate === "lost" || it.fate === "failed") context.fillText("✕", to - 5, y + lane / 2);
+        nodes.push(shape("rect", { ...box, class: it.number % 2 ? `${it.fate} odd` : it.fate }));
+        if (it.fate === "lost" || it.fate === "failed") nodes.push(text(box.x + box.width, box.y + box.height / 2 + 4, "✕", { class: "axis lost", "text-anchor": "end" }));
       }
       top += tall + GAP;
     }
-    if (rows.length === 0) {
-      context.fillStyle = muted;
-      context.textAlign = "center";
-      context.fillText("nothing was computed lately", width / 2, total / 2);
-    }
+    return nodes;
   };
 
+  /** Where an assignment is. */
+  const boxOf = (row, it, width) => {
+    const lane = height(row) / row.n_lanes;
+    const [from, to] = [Math.max(left(width), x(it.start, width)), x(it.end, width)];
+    return { x: from, y: row.top + it.lane * lane, width: Math.max(1, to - from - (to - from > 4 ? 1 : 0)), height: lane - 1 };
+  };
+
+  /** Frames the assignment of the cursor, and reads it out. */
+  const drawCursor = () => {
+    const group = picture.querySelector(".cursor");
+    const { row, it } = cursor ?? {};
+    readout.textContent = !row ? "\u00a0" : !it ? row.name
+      : `${row.name}: ${it.batch}, individual ${it.individual}, trials ${it.trials[0]} to ${it.trials[1] - 1}; ${FATES[it.fate]}, ${decimals(it.end - it.start, 1)} ms`;
+    if (!it) return group?.replaceChildren();
+    const box = boxOf(row, it, Math.max(260, picture.clientWidth));
+    return group.replaceChildren(shape("rect", { ...box, x: box.x - 1, y: box.y - 1, width: box.width + 2, height: box.height + 2 }));
+  };
+
+  /** What is drawn, as a table. */
+  const table = () => [["worker", "lane", "batch", "individual", "first trial", "end of trials", "start, ms", "end, ms", "fate"],
+    ...rows.flatMap((row) => row.its.map((it) => [row.name, it.lane, it.batch, it.individual, ...it.trials, it.start, it.end, it.fate]))];
+
+  const goTo = (to) => {
+    cursor = to;
+    drawCursor();
+  };
   picture.addEventListener("pointermove", (event) => {
     const box = picture.getBoundingClientRect();
     const begin = left(box.width);
     const at = window[0] + ((event.clientX - box.left - begin) / (box.width - begin - 4)) * (window[1] - window[0]);
-    let top = 0;
-    for (const row of rows) {
-      const inside = event.clientY - box.top - top;
-      if (inside >= 0 && inside < height(row)) {
-        const lane = Math.floor(inside / (height(row) / row.n_lanes));
-        const found = row.its.find((it) => it.lane === lane && at >= it.start && at <= it.end);
-        readout.textContent = found
-          ? `${row.name}: ${found.batch}, individual ${found.individual}, trials ${found.trials[0]} to ${found.trials[1] - 1}; ${FATES[found.fate][0]}, ${decimals(found.end - found.start, 1)} ms`
-          : row.name;
-        return;
-      }
-      top += height(row) + GAP;
-    }
+    const inside = (row) => event.clientY - box.top - row.top;
+    const row = rows.find((it) => inside(it) >= 0 && inside(it) < height(it));
+    if (!row) return;
+    const lane = Math.floor(inside(row) / (height(row) / row.n_lanes));
+    goTo({ row, it: row.its.find((it) => it.lane === lane && at >= it.start && at <= it.end) });
   });
+  picture.addEventListener("pointerleave", () => goTo(null));
+  picture.addEventListener("blur", () => goTo(null));
+  picture.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || rows.length === 0) return;
+    const row = cursor?.row ?? rows[0];
+    const place = cursor?.it ? row.its.indexOf(cursor.it) : -1;
+    const by = event.shiftKey ? 10 : 1;
+    const go = (to) => goTo({ row, it: row.its[Math.max(0, Math.min(row.its.length - 1, to))] });
+    // The same time at another worker.
+    const goToRow = (to) => {
+      const other = rows[Math.max(0, Math.min(rows.length - 1, to))];
+      const at = cursor?.it?.start ?? window[1];
+      const nearest = (a, b) => (Math.abs(b.start - at) < Math.abs(a.start - at) ? b : a);
+      goTo({ row: other, it: other.its.length ? other.its.reduce(nearest) : undefined });
+    };
+    const actions = { ArrowRight: () => go(place + by), ArrowLeft: () => go((place < 0 ? row.its.length : place) - by), Home: () => go(0), End: () => go(row.its.length - 1),
+      ArrowDown: () => goToRow(cursor ? rows.indexOf(row) + 1 : 0), ArrowUp: () => goToRow(rows.indexOf(row) - 1), Escape: () => goTo(null) };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  });
+  new ResizeObserver(draw).observe(node);
   node.show = (latest, workers) => {
-    // Who points at something wants it to stay.
-    if (picture.matches(":hover")) return;
+    // Who points at something, or goes through it with keys, wants it to stay.
+    if (picture.matches(":hover") || cursor) return;
     answer = latest;
     now = Date.now();
     slots = new Map(workers.map((it) => [it.id, it.slots]));

@@ -178,6 +178,44 @@ class Figures(BrowserTest):
         self.find(".differences")
         self.assertEqual(self.browser.find_elements(By.CSS_SELECTOR, ".swept"), [], "five runs say nothing")
 
+    def test_keys_go_through_the_timeline_and_it_is_saved(self):
+        fleet = Fleet()
+        self.addCleanup(fleet.stop)
+        for name in ["left", "right"]:
+            fleet.start_worker(name)
+        fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
+        picture, readout = ".fleet-timeline > svg", ".fleet-timeline .readout"
+        self.browser.get(fleet.pages + "/fleet")
+        names = lambda: self.script(f"return [...document.querySelectorAll('{picture} .name')].map((it) => it.textContent)")
+        self.wait(lambda: sorted(names()) == ["left", "right"], "not both have a row")
+        first, second = names()
+        self.press(picture, Keys.HOME)
+        said = [self.text(readout)]
+        self.assertRegex(said[0], rf"^{first}: experiment 1, generation \d+, individual \d+, trials 0 to \d+; ")
+        self.press(picture, Keys.ARROW_RIGHT)
+        said.append(self.text(readout))
+        self.assertNotEqual(said[1], said[0])
+        self.press(picture, Keys.ARROW_LEFT)
+        self.assertEqual(self.text(readout), said[0])
+        self.press(picture, Keys.ARROW_DOWN)
+        self.assertTrue(self.text(readout).startswith(f"{second}: "), self.text(readout))
+        self.assertEqual(self.script(f"return document.querySelectorAll('{picture} .cursor rect').length"), 1)
+        self.picture("timeline-keys")
+        n_bars = self.script(f"return document.querySelectorAll('{picture} > g:not(.cursor) rect').length")
+        # It stays as it is while somebody goes through it.
+        rows = list(csv.DictReader(io.StringIO(self.saved(".fleet-timeline .save:last-child"))))
+        self.assertEqual(len(rows), n_bars)
+        self.assertEqual({it["worker"] for it in rows}, {"left", "right"})
+        svg = self.saved(".fleet-timeline .save")
+        filled = [it.get("fill") for it in xml.etree.ElementTree.fromstring(svg).iter() if it.tag.endswith("rect")]
+        self.assertGreater(len(filled), n_bars)
+        self.assertTrue(all(re.match("rgb|#|none", it) for it in filled), set(filled))
+        self.press(picture, Keys.ESCAPE)
+        self.assertEqual(self.text(readout).strip(), "")
+        self.narrow()
+        self.assertLessEqual(self.width(), NARROW)
+        self.picture("narrow-timeline-keys")
+
     def test_borders_of_controls_and_trails_are_seen(self):
         self.open("/")
         for scheme in ["light", "dark"]:
