@@ -10,6 +10,7 @@ use swarm_proto::v1::{
 use console::truncate_str;
 use coordinator::store::Holder;
 use swarm_telemetry::escape;
+pub use swarm_telemetry::number;
 
 use crate::{clock, json::state_name, settings::DEFAULT_COORDINATOR};
 
@@ -66,17 +67,6 @@ pub fn large_number(number: f64) -> String {
     match units.into_iter().find(|(unit, _)| number >= *unit) {
         Some((unit, name)) => format!("{:.2} {name}", number / unit),
         None => format!("{number:.0}"),
-    }
-}
-
-/// From here on a number is written with an exponent.
-const PLAIN_MAX: f64 = 1e7;
-
-/// A number with so many decimals, and never a long one: beyond ten million it has an exponent.
-pub fn number(value: f64, decimals: usize) -> String {
-    match value.is_finite() && value.abs() >= PLAIN_MAX {
-        true => format!("{value:.decimals$e}"),
-        false => format!("{value:.decimals$}"),
     }
 }
 

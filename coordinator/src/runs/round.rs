@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use experiment_file::ExperimentConfig;
 use sim_core::TrialSet;
+use swarm_telemetry::number;
 
 use crate::{engine::EvaluatedBatch, store::GenerationRecord};
 use evolution::{
@@ -238,8 +239,9 @@ pub fn completion(config: &ExperimentConfig, summary: &GenerationSummary) -> Opt
 pub fn describe(champion: &Champion) -> String {
     let held_out = match &champion.held_out {
         Some(held_out) => format!(
-            "selected with mean {:.6} on {} held-out trials, optimistic",
-            held_out.mean, held_out.n_trials
+            "selected with mean {} on {} held-out trials, optimistic",
+            number(held_out.mean.get(), 6),
+            held_out.n_trials
         ),
         None => "without finite fitness on held-out trials".to_owned(),
     };
@@ -258,8 +260,11 @@ pub fn describe(champion: &Champion) -> String {
 pub fn describe_judgement(champion: &Champion) -> String {
     match &champion.judged {
         Some(judged) => format!(
-            "champion judged: {:.6} (95 %: {:.6} to {:.6}) on {} trials that selected nothing",
-            judged.mean, judged.low, judged.high, judged.n_trials
+            "champion judged: {} (95 %: {} to {}) on {} trials that selected nothing",
+            number(judged.mean.get(), 6),
+            number(judged.low.get(), 6),
+            number(judged.high.get(), 6),
+            judged.n_trials
         ),
         None => "champion not judged: its fitness is not finite in every trial".to_owned(),
     }

@@ -19,7 +19,7 @@ pub use log::{LogArgs, LogError};
 pub use metric::{Kind, Metric, Scrape};
 pub use prometheus::Histogram;
 pub use runtime::{EXIT_STARVED, Starved, block_on, runtime};
-pub use text::{EscapingWriter, escape, escape_lines, is_unprintable, report};
+pub use text::{EscapingWriter, escape, escape_lines, is_unprintable, number, report};
 
 /// Version of the programs, and in release builds the commit, such as
 /// `0.1.0 (1a2b3c4)`.

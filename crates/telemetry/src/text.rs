@@ -33,6 +33,17 @@ pub fn escape_lines(text: &str) -> Cow<'_, str> {
     escape_if(text, |c| !matches!(c, '\n' | '\t') && is_unprintable(c))
 }
 
+/// From here on a number is written with an exponent.
+const PLAIN_MAX: f64 = 1e7;
+
+/// A number with so many decimals, and never a long one: beyond ten million it has an exponent.
+pub fn number(value: f64, decimals: usize) -> String {
+    match value.is_finite() && value.abs() >= PLAIN_MAX {
+        true => format!("{value:.decimals$e}"),
+        false => format!("{value:.decimals$}"),
+    }
+}
+
 /// A line, or several, on standard error. If that takes none there is no place left to report to.
 pub fn report(text: &str) {
     let _ = writeln!(io::stderr(), "{}", escape_lines(text));
@@ -92,5 +103,24 @@ mod tests {
         let mut written = Vec::new();
         EscapingWriter(&mut written).write_all("\u{1b}[31mname=\u{202e}x\n".as_bytes()).unwrap();
         assert_eq!(written, b"\x1b[31mname=\\u202ex\n");
+    }
+
+    #[test]
+    fn a_number_is_never_long() {
+        for (value, expected) in [
+            (0.0, "0.000"),
+            (-1.2345, "-1.234"),
+            (9_999_999.0, "9999999.000"),
+            (-9e98, "-9.000e98"),
+            (f64::MAX, "1.798e308"),
+            (f64::INFINITY, "inf"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(number(value, 3), expected);
+        }
+        for exponent in -308..=308 {
+            let value: f64 = format!("-1.234567891e{exponent}").parse().unwrap();
+            assert!(number(value, 6).len() <= 15, "{value:e}");
+        }
     }
 }

@@ -53,3 +53,11 @@ fn trials_within_the_smallest_numbers_are_judged() {
     let (notices, _) = run("SNES", 2, |i| [0.0, 5e-324, 1e-323][i % 3]);
     assert!(notices.iter().any(|notice| notice.starts_with("champion judged: ")), "{notices:?}");
 }
+
+#[test]
+fn a_notice_has_no_long_number() {
+    let (notices, _) = run("SNES", 2, |i| [-9e98, 1e100][i % 2]);
+    let judged = notices.iter().find(|notice| notice.starts_with("champion judged: ")).unwrap();
+    assert!(judged.len() < 120 && judged.contains("e98"), "{judged}");
+    assert!(notices.iter().all(|notice| notice.len() < 120), "{notices:?}");
+}
