@@ -20,7 +20,7 @@ use crate::{
     experiment_file::{ExperimentFile, Overrides},
     json,
     progress::Progress,
-    text,
+    text, waiting,
 };
 
 /// The experiment to simulate if none is named.
@@ -61,14 +61,19 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
     };
     let duration = Duration::from_secs(args.seconds.into());
     let n_trials = config.algorithm.num_evaluations;
-    let speed = thread::scope(|scope| {
-        let simulate = |core| {
-            let experiment = &experiment;
-            move || Speed::of_core(experiment, n_trials, core, duration)
-        };
-        let cores: Vec<_> = (0..n_cores as u64).map(|core| scope.spawn(simulate(core))).collect();
-        let speeds = cores.into_iter().map(|core| core.join().expect("simulation does not panic"));
-        speeds.fold(Speed::default(), Speed::and)
+    let what = format!("simulating on {n_cores} cores for {} s; --seconds has fewer", args.seconds);
+    let speed = waiting::busy(&what, || {
+        thread::scope(|scope| {
+            let simulate = |core| {
+                let experiment = &experiment;
+                move || Speed::of_core(experiment, n_trials, core, duration)
+            };
+            let cores: Vec<_> =
+                (0..n_cores as u64).map(|core| scope.spawn(simulate(core))).collect();
+            let speeds =
+                cores.into_iter().map(|core| core.join().expect("simulation does not panic"));
+            speeds.fold(Speed::default(), Speed::and)
+        })
     });
     let report = Report::new(&config, isa, n_cores, &speed);
     progress.print(&if progress.is_json() { json::document(&report) } else { report.to_text() })
