@@ -295,7 +295,10 @@ impl Connection {
     /// What is waited for. `failure`: of the last attempt.
     pub fn waits(&self, failure: Option<&str>) -> String {
         match failure {
-            None => format!("the answer of the coordinator at {}", self.address),
+            None => match &self.way {
+                Way::Link(_) => format!("the answer of the coordinator at {}", self.address),
+                Way::Here(_) => format!("the data directory {}", self.address),
+            },
             Some(reason) => {
                 let (address, patience) = (&self.address, self.patience.as_secs());
                 format!("the coordinator at {address} for up to {patience} s: {reason}")
