@@ -369,26 +369,56 @@ async fn an_experiment_that_is_queued_beside_another_is_alone_once_that_is_pause
     assert_undisturbed(&coordinator, id);
 }
 
+/// A program that follows an experiment, and its remarks.
+fn follow(
+    coordinator: &CoordinatorProcess,
+    command: &str,
+    id: u64,
+) -> (Child, impl Iterator<Item = String> + use<>) {
+    let mut process = Command::new(binary("swarmctl"));
+    process.args(["--coordinator", &coordinator.url(), command, &id.to_string()]);
+    let mut process = process.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let remarks = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
+    (process, remarks)
+}
+
 #[test]
 fn what_an_experiment_waits_for_is_said_at_once_to_those_who_watch_and_of_the_fleet() {
     let coordinator = CoordinatorProcess::start();
     let id = submit(&coordinator);
-    let mut watch = Command::new(binary("swarmctl"));
-    watch.args(["--coordinator", &coordinator.url(), "watch", &id.to_string()]);
-    let mut watch = watch.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut remarks = BufReader::new(watch.stderr.take().unwrap()).lines().map(Result::unwrap);
-    assert_eq!(remarks.next().unwrap(), "waiting: no worker is connected");
-    let advice = remarks.next().unwrap();
-    assert!(advice.contains("start some: worker --coordinator"), "{advice}");
+    let mut following = ["watch", "wait"].map(|command| follow(&coordinator, command, id));
+    for (_, remarks) in &mut following {
+        assert_eq!(remarks.next().unwrap(), "waiting: no worker is connected");
+        let advice = remarks.next().unwrap();
+        assert!(advice.contains("start some: worker --coordinator"), "{advice}");
+    }
 
     let fleet = coordinator.swarmctl(&["explain"]).expect_success().json();
     assert_eq!(fleet["workers"], 0);
     assert_eq!(fleet["experiments"][0]["findings"][0]["kind"], "no_workers");
 
     coordinator.swarmctl(&["pause", &id.to_string(), "--reason", "lunch"]).expect_success();
-    assert_eq!(remarks.next().unwrap(), "waiting: it is paused: paused by a client: lunch");
+    for (_, remarks) in &mut following {
+        assert_eq!(remarks.next().unwrap(), "waiting: it is paused: paused by a client: lunch");
+    }
     coordinator.swarmctl(&["resume", &id.to_string()]).expect_success();
     let _worker = WorkerProcess::start(&coordinator, "ada");
-    drop(remarks.by_ref().last());
-    assert!(watch.wait().unwrap().success());
+    for (mut process, remarks) in following {
+        drop(remarks.last());
+        assert!(process.wait().unwrap().success());
+    }
+}
+
+#[test]
+fn whoever_only_looks_is_told_at_an_interrupt_that_no_experiment_changes() {
+    let coordinator = CoordinatorProcess::start();
+    let id = submit(&coordinator);
+    for command in ["watch", "wait"] {
+        let (mut process, mut remarks) = follow(&coordinator, command, id);
+        assert_eq!(remarks.next().unwrap(), "waiting: no worker is connected");
+        let interrupt = Command::new("kill").args(["-INT", &process.id().to_string()]).status();
+        assert!(interrupt.unwrap().success());
+        assert_eq!(remarks.last().unwrap(), "interrupted; this changes no experiment");
+        assert_eq!(process.wait().unwrap().code(), Some(130));
+    }
 }

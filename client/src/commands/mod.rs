@@ -235,7 +235,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         }
         place => {
             let connection = Connection::to(place, intent).await?;
-            ask(connection, command, &mut progress, interrupt).await
+            ask(connection, command, intent, &mut progress, interrupt).await
         }
     }
 }
@@ -244,14 +244,18 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
 async fn ask(
     connection: Connection,
     command: RemoteCommand,
+    intent: Intent,
     progress: &mut Progress,
     interrupt: CancellationToken,
 ) -> Result<(), Error> {
     let result = tokio::select! {
         biased;
-        () = interrupt.cancelled() => Err(match connection.data_dir() {
-            None => interrupt::error(),
-            Some(_) => Error::Interrupted("nothing is changed that was not printed".into()),
+        () = interrupt.cancelled() => Err(match intent {
+            Intent::Read => Error::Interrupted("this changes no experiment".into()),
+            Intent::Submit | Intent::Continue if connection.data_dir().is_none() => {
+                interrupt::error()
+            }
+            _ => Error::Interrupted("nothing is changed that was not printed".into()),
         }),
         result = command.execute(&connection, progress) => result,
     };

@@ -10,6 +10,8 @@ use super::{Remote, watch};
 use crate::{args::Target, connection::Connection, error::Error, json, progress::Progress, text};
 
 /// Wait until an experiment ends, or all experiments of a group.
+///
+/// Standard error says what keeps an experiment from being computed, such as a lack of workers.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WaitArgs {
@@ -54,7 +56,7 @@ impl Remote for WaitArgs {
             let of = [experiment.clone()];
             let ended = async {
                 tokio::select! {
-                    ended = watch::ended(connection, experiment) => ended,
+                    ended = watch::ended(connection, experiment, progress) => ended,
                     error = watch::deserted(connection, &of) => Err(error),
                 }
             };

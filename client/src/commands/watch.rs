@@ -159,7 +159,7 @@ pub async fn follow(
         let follower = Follower {
             connection: connection.clone(),
             experiment_id: experiment.id,
-            news: Some(sender.clone()),
+            news: sender.clone(),
         };
         let (sender, streams) = (sender.clone(), streams.clone());
         followers.spawn(async move {
@@ -217,14 +217,44 @@ async fn final_state(
     Ok(Followed { experiment, champion, first_best })
 }
 
-/// An experiment once it has ended; shows nothing.
-pub async fn ended(connection: &Connection, experiment: Experiment) -> Result<Experiment, Error> {
+/// An experiment once it has ended. Says nothing but what keeps it from being computed, and that
+/// the coordinator is lost: neither may be waited for in silence.
+pub async fn ended(
+    connection: &Connection,
+    experiment: Experiment,
+    progress: &Progress,
+) -> Result<Experiment, Error> {
     if has_ended(experiment.state()) {
         return Ok(experiment);
     }
     let (experiment_id, next) = (experiment.id, experiment.last_sequence + 1);
     let connection = connection.with_patience(PATIENCE);
-    Follower { connection: connection.clone(), experiment_id, news: None }.run(next).await?;
+    let (sender, mut news) = mpsc::channel(NEWS_MAX);
+    let follower = Follower { connection: connection.clone(), experiment_id, news: sender.clone() };
+    let end = async {
+        tokio::select! {
+            end = follower.run(next) => end,
+            // Those who follow the experiment see its end.
+            never = async {
+                situation::tell(connection.clone(), vec![experiment_id], sender).await;
+                pending().await
+            } => never,
+        }
+    };
+    let say = async {
+        while let Some(news) = news.recv().await {
+            match news {
+                News::Situation(id, finding) => progress.situation(id, finding.as_ref()),
+                News::Lost(text) => progress.remark(&text),
+                _ => {}
+            }
+        }
+        pending().await
+    };
+    tokio::select! {
+        end = end => end?,
+        never = say => never,
+    };
     connection.experiment(experiment_id).await
 }
 
@@ -283,8 +313,8 @@ enum News {
 struct Follower {
     connection: Connection,
     experiment_id: u64,
-    /// Shows what happens, if anybody looks.
-    news: Option<mpsc::Sender<News>>,
+    /// Shows what happens.
+    news: mpsc::Sender<News>,
 }
 
 /// How a stream of events ended.
@@ -361,10 +391,8 @@ impl Follower {
     }
 
     async fn tell(&self, news: News) {
-        if let Some(sender) = &self.news {
-            // Whoever is not interested any more ends this task.
-            let _ = sender.send(news).await;
-        }
+        // Whoever is not interested any more ends this task.
+        let _ = self.news.send(news).await;
     }
 
     /// Shows an event once.

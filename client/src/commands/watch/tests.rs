@@ -82,7 +82,8 @@ async fn waiting_follows_the_events_instead_of_asking_again() {
         ..Script::default()
     })
     .await;
-    let experiment = ended(&connection, running).await.unwrap();
+    let progress = Captured::default().progress(OutputFormat::Table);
+    let experiment = ended(&connection, running, &progress).await.unwrap();
     assert_eq!(experiment.state(), completed);
     assert_eq!(fake.script(|script| script.watched_from.clone()), [5, 6]);
 }
@@ -103,7 +104,7 @@ async fn a_coordinator_that_stays_away_is_unreachable() {
     let args = WatchArgs { target: Target { subject: Subject::Experiment(3) } };
     let error = args.execute(&connection, &mut progress).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
-    let follower = Follower { connection, experiment_id: 3, news: None };
+    let follower = Follower { connection, experiment_id: 3, news: mpsc::channel(1).0 };
     let error = follower.run(1).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
     assert!(error.to_string().to_lowercase().contains("connection refused"), "{error}");
