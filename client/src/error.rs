@@ -201,15 +201,19 @@ impl Error {
             | StoreError::NothingSound { .. } => Self::Damaged(text),
             StoreError::Bug(_) => Self::Internal(text),
             StoreError::NoDatabase { path } => {
-                let directory = path.parent().unwrap_or(Path::new(""));
-                let other = file_kind::expect(directory, &[], "a data directory");
-                Self::Input(match other {
-                    Err(what) => format!("{}: {what}", directory.display()),
-                    Ok(()) => text,
-                })
+                Self::no_data_directory(path.parent().unwrap_or(Path::new("")), text)
             }
+            StoreError::Directory { path, .. } => Self::no_data_directory(path, text),
             _ => Self::Input(text),
         }
+    }
+
+    /// The error that a path is no data directory: what else it is, or `text`.
+    fn no_data_directory(path: &Path, text: String) -> Self {
+        Self::Input(match file_kind::expect(path, &[], "a data directory") {
+            Err(other) => format!("{}: {other}", path.display()),
+            Ok(()) => text,
+        })
     }
 
     /// The error of opening a data directory to ask it.

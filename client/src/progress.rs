@@ -393,7 +393,8 @@ impl Progress {
         if let Some(line) = self.word(clock::now(), n_done, n_all, what) {
             return self.remark(&line);
         }
-        if self.has_terminal && !self.is_json() {
+        // A bar of a single step would only flash.
+        if self.has_terminal && !self.is_json() && n_all > 1 {
             self.show_bar(String::new(), n_all, &escape(what));
             self.bar.set_position(n_done);
         }

@@ -220,12 +220,14 @@ async fn there_is_a_limit_to_unfinished_experiments() {
     let text = Experiment::small(1).text();
     submit(&coordinator.url(), "", text.clone()).await.unwrap();
     let database = coordinator.database();
-    let mut copies = String::from("BEGIN; CREATE TEMP TABLE copy AS SELECT * FROM experiments;");
+    let columns =
+        "id, name, config, config_digest, fingerprint, genotype_len, state, submitted_at_ms";
+    let mut copies = format!("BEGIN; CREATE TEMP TABLE copy AS SELECT {columns} FROM experiments;");
     for id in 2..=1000 {
         let state = if id % 2 == 0 { "paused" } else { "running" };
         copies += &format!(
-            "UPDATE copy SET id = {id}, request_id = NULL, state = '{state}';
-             INSERT INTO experiments SELECT * FROM copy;"
+            "UPDATE copy SET id = {id}, state = '{state}';
+             INSERT INTO experiments ({columns}) SELECT {columns} FROM copy;"
         );
     }
     database.execute_batch(&(copies + "COMMIT;")).unwrap();

@@ -54,7 +54,7 @@ fn a_backup_of_a_running_experiment_continues_elsewhere_to_the_same_bits() {
     // One more is refused as long as this one is there.
     let again = on(coordinator.data_dir(), "backup", &[&to]);
     assert_eq!(again.code, Some(2), "{again:#?}");
-    assert!(again.stderr.contains("is not empty"), "{}", again.stderr);
+    assert!(again.stderr.contains("exists already; choose another name"), "{}", again.stderr);
 }
 
 #[test]
