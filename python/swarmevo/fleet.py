@@ -312,9 +312,15 @@ class FleetRun(RecordedRun):
     def watch(self) -> Iterator[Generation]:
         """All generations, each once, those that are done first, until the experiment has ended; through restarts of
         the coordinator. That there are no workers is a :class:`FleetWarning`."""
-        client = self._records
+        self._warn_if_it_waits(4)
+        yield from self._watched()
+
+    def _warn_if_it_waits(self, stacklevel: int) -> None:
         if self.state not in ENDS:
-            client._warn_without_workers(3)
+            self._records._warn_without_workers(stacklevel)
+
+    def _watched(self) -> Iterator[Generation]:
+        client = self._records
         call, request_class = client._call_of("ExperimentService", "WatchExperiment", "unary_stream")
         request = request_class(experiment_id=self.id, from_sequence=1)
         is_over = False
@@ -343,7 +349,8 @@ class FleetRun(RecordedRun):
     def wait(self, *, progress: bool = True) -> FleetRun:
         """Waits for its end. ``progress``: whether tqdm, if it is installed, shows how far it
         is. Raises :class:`FleetError` if it fails or is cancelled."""
-        for _ in shown(self.watch(), self.name, progress, total=self.message.generations):
+        self._warn_if_it_waits(4)
+        for _ in shown(self._watched(), self.name, progress, total=self.message.generations):
             pass
         state = self.state
         if state != "completed":

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -82,6 +83,48 @@ def test_any_individual_comes_back(run, short, client):
     assert run.experiment.to_json() == short.to_json()
 
 
+def test_fitness_travels_without_genotypes(run, client, monkeypatch):
+    told, answers, call = run.individuals(2), [], client._call
+
+    def spy(name, **request):
+        answers.append(call(name, **request))
+        return answers[-1]
+
+    monkeypatch.setattr(client, "_call", spy)
+    assert np.array_equal(run.fitness(2), told.fitness)
+    log = run.fitness_log([2])
+    assert np.array_equal(log.fitness.to_numpy().reshape(told.fitness.shape), told.fitness)
+    individuals = [it for answer in answers for it in answer.individuals]
+    assert len(individuals) == 2 * len(told.fitness) and not any(it.genotype for it in individuals)
+
+
+ASKING = {
+    "evaluate": lambda client, short, genotypes: client.evaluate(short, genotypes),
+    "wait": lambda client, short, _: client.submit(short).wait(progress=False),
+    "watch": lambda client, short, _: list(client.submit(short).watch()),
+}
+
+
+@pytest.mark.parametrize("ask", ASKING)
+def test_waiting_for_workers_that_are_not_there_is_a_warning(programs, tmp_path, short, genotypes, ask):
+    seen = []
+    with fleet(programs, tmp_path) as started, started.connect() as client, warnings.catch_warnings():
+
+        def show(message, category, filename, *_):
+            seen.append((category, filename))
+            assert f"`worker --coordinator {started.url}`" in str(message)
+            started.start_worker()
+
+        warnings.simplefilter("always")
+        warnings.showwarning = show
+        ASKING[ask](client, short, genotypes)
+        assert seen == [(swarmevo.FleetWarning, __file__)]
+        # Now there is one.
+        client.evaluate(short, genotypes, trials=50)
+        client.submit(short, seed=7).wait(progress=False)
+        assert len(seen) == 1
+
+
 def test_experiments_are_listed_and_found_by_name(run, client):
     table = client.experiments()
     row = table[table.id == run.id].iloc[0]
@@ -140,6 +183,7 @@ def test_an_experiment_is_paused_resumed_and_cancelled(client, quickstart):
     run.set_priority(7)
     run.cancel()
     assert run.state == "cancelled" and run.message.priority == 7
+    assert client.run("long").id == run.id
     with pytest.raises(FleetError, match="cancelled"):
         run.wait(progress=False)
 
