@@ -237,6 +237,40 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_goes_on_knows_for_how_long_fitness_has_been_the_same() {
+        let n_done = 170;
+        let directory = tempfile::tempdir().unwrap();
+        let mut run = LocalRun::open(directory.path(), file(1000)).unwrap();
+        let mut evolution = run.evolution().unwrap();
+        let fitness_of = |generation: u64, n: usize| -> Vec<Vec<f64>> {
+            // Somebody without finite fitness is another difference.
+            let first = if generation == 9 { f64::NAN } else { 0.25 };
+            (0..n).map(|i| vec![if i == 0 { first } else { 0.25 }]).collect()
+        };
+        for generation in 0..n_done {
+            let asked = evolution.ask();
+            let fitness = fitness_of(generation, asked.genotypes.len());
+            evolution.tell(asked, &fitness).unwrap();
+            run.commit(&Done {
+                evolution: &evolution,
+                told: &Told::from_fitness(fitness),
+                notices: &[],
+                duration: Duration::from_millis(5),
+                n_workers: 1,
+                completed: None,
+            })
+            .unwrap();
+        }
+        let (_, checkpoint) = run.store.resumable(run.id).unwrap();
+        assert!(checkpoint.log.len() < n_done as usize, "there is a keyframe in between");
+        drop(run);
+        let run = LocalRun::open(directory.path(), file(1000)).unwrap();
+        let restored = run.evolution().unwrap();
+        assert_eq!((restored.n_flat(), evolution.n_flat()), (n_done - 10, n_done - 10));
+        assert_eq!(restored.digest(), evolution.digest());
+    }
+
+    #[test]
     fn a_longer_run_goes_on_from_a_shorter_one_and_a_paused_one_is_resumed() {
         let directory = tempfile::tempdir().unwrap();
         compute(&mut LocalRun::open(directory.path(), file(2)).unwrap(), 2, 2);

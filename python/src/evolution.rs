@@ -66,13 +66,22 @@ impl Evolution {
         Ok(Self::wrap(evolution))
     }
 
-    /// From what `to_json` has given.
+    /// From what `to_json` has given. `n_flat`: of as many generations before, which are no part of
+    /// the state.
     #[staticmethod]
-    fn from_json(text: &str) -> PyResult<Self> {
-        let evolution = serde_json::from_str(text).map_err(|error| {
+    #[pyo3(signature = (text, n_flat=0))]
+    fn from_json(text: &str, n_flat: u64) -> PyResult<Self> {
+        let evolution: evolution::Evolution = serde_json::from_str(text).map_err(|error| {
             PyValueError::new_err(format!("not the state of an evolution: {error}"))
         })?;
-        Ok(Self::wrap(evolution))
+        let n_flat = n_flat.min(evolution.n_generations());
+        Ok(Self::wrap(evolution.after_flat(n_flat)))
+    }
+
+    /// The number of latest generations in which all individuals had the same fitness.
+    #[getter]
+    fn n_flat(&self, py: Python<'_>) -> PyResult<u64> {
+        self.0.with(py, |state| state.evolution.n_flat())
     }
 
     /// The state.

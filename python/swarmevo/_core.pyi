@@ -44,6 +44,7 @@ class Evolution:
     champion: dict[str, Any] | None
     mean: _Floats | None
     has_challenger: bool
+    n_flat: int
     def __init__(
         self,
         algorithm: str,
@@ -53,7 +54,7 @@ class Evolution:
         params: dict[str, int | float | str],
     ) -> None: ...
     @staticmethod
-    def from_json(text: str) -> Evolution: ...
+    def from_json(text: str, n_flat: int = 0) -> Evolution: ...
     def to_json(self) -> str: ...
     def ask(self) -> _Floats: ...
     def tell(

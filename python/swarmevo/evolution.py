@@ -189,10 +189,11 @@ class Evolution:
         return type(self)._of(self._core.copy(), self._trials, self._origin)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"json": self.to_json(), "trials": self._trials, "origin": self._origin}
+        n_flat = self._core.n_flat
+        return {"json": self.to_json(), "n_flat": n_flat, "trials": self._trials, "origin": self._origin}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._core = _core.Evolution.from_json(state["json"])
+        self._core = _core.Evolution.from_json(state["json"], state.get("n_flat", 0))
         self._trials = state.get("trials", (CHAMPION_TRIALS, JUDGEMENT_TRIALS))
         self._origin = state.get("origin")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from . import _core
 from .champion import Champion, Judged, Selection
+from .errors import EvolutionError
 from .evolution import Evolution, Generation, Judgement
 from .experiment import Experiment
 
@@ -132,6 +134,7 @@ class InFile(Keeper):
         self._experiment = experiment
         self._written_at = time.monotonic()
         self._is_new = False
+        self._failed: str | None = None
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._lock = _lock(self.path.with_suffix(".lock"))
         try:
@@ -146,13 +149,15 @@ class InFile(Keeper):
             found = json.loads(self.path.read_text(encoding="utf-8"))
             if found["format"] != FORMAT or found["config_digest"] != self._experiment.config_digest:
                 raise ValueError("it has another format, or is of another experiment")
-            state = _core.Evolution.from_json(found["evolution"])
             generations = [Generation(**it) for it in found["generations"]]
+            state = _core.Evolution.from_json(found["evolution"], _n_flat(generations, self._experiment.population_size))
             if state.n_generations != len(generations) or (generations and state.digest != generations[-1].digest):
                 raise ValueError("its generations are not those of its evolution")
             end = None if found["end"] is None else _end_of(found["end"], self._experiment)
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{self.path} is no run to go on with: {error}; move it elsewhere to begin anew") from None
+        if found.get("failed") is not None:
+            raise EvolutionError(f"{found['failed']}; the run in {self.path} has ended so: move the file elsewhere to begin anew")
         self.evolution = Evolution._of(state, self.evolution._trials, self.evolution._origin)
         self.generations = generations
         if end is not None and len(generations) >= self._experiment.generations:
@@ -166,6 +171,11 @@ class InFile(Keeper):
         self._is_new = True
         if time.monotonic() - self._written_at >= WRITE_EVERY_S:
             self._write()
+
+    def fail(self, reason: str) -> None:
+        # Where no generation is kept, there is nothing that another beginning would lose.
+        if self.generations:
+            self._failed, self._is_new = reason, True
 
     def close(self) -> None:
         try:
@@ -183,6 +193,7 @@ class InFile(Keeper):
             "generations": [vars(it) for it in self.generations],
             "evolution": self.evolution.to_json(),
             "end": None if self.end is None else _end_to(self.end),
+            "failed": self._failed,
         }
         unfinished = self.path.with_suffix(".new")
         with unfinished.open("w", encoding="utf-8") as file:
@@ -191,6 +202,14 @@ class InFile(Keeper):
             os.fsync(file.fileno())
         os.replace(unfinished, self.path)
         self._written_at, self._is_new = time.monotonic(), False
+
+
+def _n_flat(generations: list[Generation], population_size: int) -> int:
+    """In how many of the latest generations all individuals had the same fitness."""
+    if population_size < 2:
+        return 0
+    same = itertools.takewhile(lambda it: it.n_non_finite == 0 and it.best == it.min, reversed(generations))
+    return sum(1 for _ in same)
 
 
 def _lock(path: Path) -> IO[str]:

@@ -101,7 +101,8 @@ def evolve(
     Warnings of the experiment, and what a coordinator would have as notices because evolution learns nothing, are an
     ``EvolutionWarning``. Where a coordinator's run fails for that reason, this one ends with the same words in an
     ``EvolutionError``, a ValueError; ``data_dir`` keeps the generations before. Its database has the failure, too,
-    and the same call begins another run there, as ``swarmctl run`` does.
+    and the same call begins another run there, as ``swarmctl run`` does; a file of ``evaluate`` has it with the
+    generations, and the same call raises it again at once.
 
     Ctrl-C raises :class:`Interrupted`, a KeyboardInterrupt whose ``run`` has all that is complete; within a second
     where the experiment itself computes fitness.

@@ -1,5 +1,6 @@
 """Evolution that learns nothing is no secret, and ends as a coordinator's run does."""
 
+import pickle
 import sqlite3
 import subprocess
 import warnings
@@ -96,6 +97,44 @@ def test_evolve_says_what_a_coordinator_has_as_notices(still, tmp_path):
     with sqlite3.connect(tmp_path / "database" / "swarmevo.sqlite3") as database:
         kept = [text for (text,) in database.execute("SELECT message FROM events WHERE kind = 'notice'")]
     assert set(said) < set(kept)
+
+
+@pytest.mark.parametrize("evaluate", [None, flat])
+def test_a_run_that_goes_on_counts_the_generations_before_it_was_interrupted(still, tmp_path, evaluate):
+    def stop(generation, evolution):
+        if generation.index == 6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(swarmevo.Interrupted) as stopped, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        swarmevo.evolve(still, evaluate=evaluate, progress=False, data_dir=tmp_path, callback=stop)
+    with pytest.warns(swarmevo.EvolutionWarning) as caught:
+        swarmevo.evolve(still, evaluate=evaluate, progress=False, data_dir=tmp_path)
+    assert any(str(it.message).startswith(FLAT) for it in caught), [str(it.message) for it in caught]
+    copied = pickle.loads(pickle.dumps(stopped.value.run.evolution))
+    with pytest.warns(swarmevo.EvolutionWarning, match=FLAT):
+        for _ in range(3):
+            copied.tell([0.25] * 6)
+
+
+def test_a_failed_run_in_a_file_stays_failed_and_one_without_generations_begins_anew(still, tmp_path):
+    warnings.simplefilter("ignore")
+    long, asked = still.replace(generations=20_000), []
+
+    def until_the_third(genotypes, trial_set, n_trials):
+        asked.append(trial_set)
+        return np.full((len(genotypes), n_trials), np.nan if len(asked) > 3 else 0.25)
+
+    for _ in range(2):
+        with pytest.raises(swarmevo.EvolutionError, match="no individual of generation 3 has a finite fitness") as failed:
+            swarmevo.evolve(long, evaluate=until_the_third, progress=False, data_dir=tmp_path)
+    assert len(asked) == 4
+    (file,) = tmp_path.glob("*.evolve.json")
+    assert str(file) in str(failed.value)
+    file.unlink()
+    with pytest.raises(swarmevo.EvolutionError, match="generation 0"):
+        swarmevo.evolve(long, evaluate=lambda *it: np.nan * flat(*it), progress=False, data_dir=tmp_path)
+    assert not file.exists()
 
 
 def test_evolve_fails_where_swarmctl_run_does_and_with_the_same_words(still, programs, tmp_path):

@@ -136,7 +136,7 @@ mod tests {
             fork: None,
         };
         let stored = StoredExperiment { record, config_json };
-        (stored, Checkpoint { keyframe: new.keyframe, log: Vec::new() })
+        (stored, Checkpoint { keyframe: new.keyframe, ..Checkpoint::default() })
     }
 
     #[test]
@@ -170,7 +170,7 @@ mod tests {
             ..Submission::default()
         };
         let keyframe = of_other_seed.check(&|| true).unwrap().new.keyframe;
-        let other = Checkpoint { keyframe, log: Vec::new() };
+        let other = Checkpoint { keyframe, ..Checkpoint::default() };
         let what = Runnable::restore(&sound, &other).unwrap_err();
         assert!(what.contains("its history has 0 generations"), "{what}");
     }

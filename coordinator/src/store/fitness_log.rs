@@ -5,7 +5,7 @@
 //! a checkpoint of every state since.
 
 use bundle::Keyframes;
-use evolution::Checkpoint;
+use evolution::{Checkpoint, FLAT_COUNTED_MAX, Told};
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use super::{
@@ -127,7 +127,33 @@ pub fn checkpoint(
             };
         log.push(told);
     }
-    Ok(is_sound.then_some(Checkpoint { keyframe, log }))
+    if !is_sound {
+        return Ok(None);
+    }
+    let n_flat = n_flat_before(connection, id, first)?;
+    Ok(Some(Checkpoint { keyframe, log, n_flat }))
+}
+
+/// How many generations before this one, without a gap, told nobody apart, as far as the log says.
+fn n_flat_before(connection: &Connection, id: ExperimentId, end: u64) -> rusqlite::Result<u64> {
+    let mut statement = connection.prepare_cached(
+        "SELECT generation, best = min, told
+         FROM fitness_log JOIN generations USING (experiment_id, generation)
+         WHERE experiment_id = ?1 AND generation < ?2 ORDER BY generation DESC LIMIT ?3",
+    )?;
+    let mut rows = statement.query(params![id.0, end, FLAT_COUNTED_MAX])?;
+    let mut n_flat = 0;
+    while let Some(row) = rows.next()? {
+        // Whose fitness is not finite is in no statistics, so that what was told decides.
+        let is_flat = row.get::<_, u64>(0)? + n_flat + 1 == end
+            && row.get(1)?
+            && Told::from_bytes(row.get_ref(2)?.as_blob()?).is_ok_and(|told| told.is_flat());
+        if !is_flat {
+            break;
+        }
+        n_flat += 1;
+    }
+    Ok(n_flat)
 }
 
 /// Whether the log says nothing of a generation from this one on.

@@ -46,7 +46,7 @@ fn generation(generation: u64) -> GenerationRecord {
 pub fn checkpoint_after(number: u64) -> Checkpoint {
     let keyframe = format!("after {}", number / 2 * 2).into();
     let log = (number % 2 == 1).then(|| format!("told {number}").into());
-    Checkpoint { keyframe, log: log.into_iter().collect() }
+    Checkpoint { keyframe, log: log.into_iter().collect(), n_flat: 0 }
 }
 
 pub fn commit(
@@ -396,7 +396,7 @@ fn pruning_frees_the_log_of_an_ended_experiment_and_leaves_what_it_continues_fro
     assert!(store.prune(ids[0], Some(b"now"), 8).unwrap() > 0);
     assert!(store.prune(ids[1], None, 8).unwrap() > 0);
     assert_eq!(store.prune(ids[0], Some(b"now"), 9).unwrap(), 0, "it is pruned already");
-    let now = Checkpoint { keyframe: b"now".to_vec(), log: Vec::new() };
+    let now = Checkpoint { keyframe: b"now".to_vec(), ..Checkpoint::default() };
     assert_eq!(store.resumable(ids[0]).unwrap().1, now);
     assert!(store.resumable(ids[1]).is_err(), "nothing continues from it");
     for id in ids {
@@ -409,7 +409,7 @@ fn pruning_frees_the_log_of_an_ended_experiment_and_leaves_what_it_continues_fro
     commit(&mut store, ids[0], 3, None).unwrap();
     let keyframe = b"now".to_vec();
     let log = vec![b"told 3".to_vec()];
-    assert_eq!(store.resumable(ids[0]).unwrap().1, Checkpoint { keyframe, log });
+    assert_eq!(store.resumable(ids[0]).unwrap().1, Checkpoint { keyframe, log, n_flat: 0 });
     drop(store);
     let problems = inspect(directory.path()).unwrap().findings;
     assert!(problems.iter().all(|problem| !problem.what.contains("keyframe")), "{problems:?}");

@@ -352,7 +352,7 @@ fn fork_start(bundle: &Bundle, own: Digest, new: &Evolution) -> Result<Evolution
         return Err(flaw(&format!("the link {} does not follow from {parent}", fork.link)));
     }
     let keyframe = bundle.keyframes[0].1.clone();
-    let state = Evolution::restore(&Checkpoint { keyframe, log: Vec::new() });
+    let state = Evolution::restore(&Checkpoint { keyframe, ..Checkpoint::default() });
     let state = state.map_err(|error| Claim::Keyframes.flaw(error))?;
     if !state.has_shape_of(new)
         || state.n_generations() != bundle.first_own()

@@ -32,12 +32,15 @@ const GENERATIONS_MAX: u64 = 150;
 const ROOM_PER_GENERATION: u64 = 128 << 10;
 
 /// What an evolution can be restored from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Checkpoint {
     /// Evolution after some generation.
     pub keyframe: Vec<u8>,
     /// The entries of the log since, in order.
     pub log: Vec<Vec<u8>>,
+    /// Generations up to the keyframe in which all individuals had the same fitness, as far as
+    /// they are counted.
+    pub n_flat: u64,
 }
 
 /// Why there is no evolution in a checkpoint. It is damaged, or of another version.
@@ -93,7 +96,8 @@ impl Evolution {
 
     /// The evolution that a checkpoint is of.
     pub fn restore(checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
-        let mut evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
+        let evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
+        let mut evolution = evolution.after_flat(checkpoint.n_flat);
         for entry in &checkpoint.log {
             evolution.replay(&Told::from_bytes(entry)?)?;
         }

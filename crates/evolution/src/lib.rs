@@ -85,7 +85,7 @@ pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use replay::{Outcome, Replay, Round};
 pub use setup::{Setup, SetupError};
-pub use stall::{Drifted, Learnt};
+pub use stall::{Drifted, FLAT_COUNTED_MAX, Learnt};
 pub use statistics::{Statistics, between, deviation, finite_mean};
 pub use told::{End, Told};
 
@@ -140,8 +140,7 @@ pub struct GenerationSummary {
     pub statistics: Statistics,
     /// Individuals whose fitness is not finite; they rank last.
     pub n_non_finite: usize,
-    /// Generations up to this one in which all individuals had the same fitness, of those that
-    /// this evolution was told since it started or was restored; 0 if some differ.
+    /// Generations up to this one in which all individuals had the same fitness; 0 if some differ.
     pub n_flat: u64,
     /// Link of the digest chain.
     pub digest: Digest,
@@ -280,7 +279,7 @@ impl Evolution {
         let Generation { index, genotypes, samples } = generation;
         assert_eq!(index, self.n_generations, "generations are told in order");
         assert_eq!(genotypes.len(), trial_fitness.len(), "one fitness per individual");
-        let fitness: Vec<f64> = trial_fitness.iter().map(|trials| mean(trials)).collect();
+        let fitness = means(trial_fitness);
         let ranking = ranking::ranking(&fitness);
         let best = ranking[0];
         if !has_finite_fitness(trial_fitness) {
@@ -308,8 +307,7 @@ impl Evolution {
         self.n_generations += 1;
         let statistics = Statistics::from_fitness(&fitness);
         let n_non_finite = fitness.iter().filter(|value| !value.is_finite()).count();
-        let is_flat = n_non_finite == 0 && statistics.best == statistics.min && fitness.len() > 1;
-        self.n_flat = self.n_flat.next(is_flat);
+        self.n_flat = self.n_flat.next(stall::is_flat(&fitness));
         Ok(GenerationSummary {
             generation: index,
             statistics,
@@ -365,6 +363,11 @@ pub fn has_finite_fitness(trial_fitness: &[Vec<f64>]) -> bool {
 /// Plain mean, summed in order.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The mean of every individual's trials.
+fn means(trial_fitness: &[Vec<f64>]) -> Vec<f64> {
+    trial_fitness.iter().map(|trials| mean(trials)).collect()
 }
 
 #[cfg(test)]

@@ -4,10 +4,13 @@
 //! Nothing of it changes a bit of a run. It is what a run is told in words, and what ends one
 //! that goes on by chance alone.
 
-use super::{Evolution, EvolutionError, Generation, GenerationSummary, algorithms::Strategy as _};
+use super::{
+    Evolution, EvolutionError, Generation, GenerationSummary, Told, algorithms::Strategy as _,
+    means,
+};
 
-/// How many of the latest generations told nobody apart, as far as they were told here: what
-/// is restored begins anew. It is no part of the state, so all of them are equal.
+/// How many of the latest generations told nobody apart. It is no part of the state, so all of
+/// them are equal; whoever restores one counts again, in what the generations were told.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FlatGenerations(pub u64);
 
@@ -30,6 +33,10 @@ const FLAT_MIN: u64 = 10;
 /// After so many generations without a difference, a distribution that is wider than
 /// [`DEVIATION_MAX`] ends the run.
 const FLAT_MAX: u64 = 100;
+
+/// So many generations are enough to count of those before a state that is restored: more than
+/// decide whether a run ends.
+pub const FLAT_COUNTED_MAX: u64 = 10 * FLAT_MAX;
 
 /// Deviations of genes, whose range is 1, of which nothing comes back: individuals are drawn
 /// from all of the range alike, wherever the mean is.
@@ -69,7 +76,32 @@ pub struct Learnt {
     pub completed: Option<String>,
 }
 
+impl Told {
+    /// Whether all individuals of the generation have the same fitness.
+    pub fn is_flat(&self) -> bool {
+        is_flat(&means(&self.trial_fitness))
+    }
+}
+
+/// Whether a generation of this fitness tells nobody apart. One individual alone is not told apart
+/// from others anyway.
+pub(crate) fn is_flat(fitness: &[f64]) -> bool {
+    fitness.len() > 1 && fitness.iter().all(|it| it.is_finite() && *it == fitness[0])
+}
+
 impl Evolution {
+    /// The number of latest generations without a difference.
+    pub fn n_flat(&self) -> u64 {
+        self.n_flat.0
+    }
+
+    /// It, after so many generations without a difference: of one that was read, which has
+    /// forgotten them.
+    #[must_use]
+    pub fn after_flat(self, n_generations: u64) -> Self {
+        Self { n_flat: FlatGenerations(n_generations), ..self }
+    }
+
     /// Learns from a generation as [`tell`](Self::tell) does, for whoever computes a run: with
     /// what is worth a word, and an error where the run should end because nothing can be learnt
     /// any more; evolution is of no use after it. `completion`: why the generation is the last one.

@@ -158,14 +158,28 @@ fn a_distribution_that_shrinks_to_a_point_is_said_once() {
 }
 
 #[test]
-fn generations_without_a_difference_are_no_part_of_the_state() {
+fn generations_without_a_difference_are_no_part_of_the_state_but_go_on_from_a_checkpoint() {
     let mut evolution = started("SNES", 4);
     let begun = evolution.keyframe();
     remarks(&mut evolution, 12, flat);
     let restored =
-        Evolution::restore(&Checkpoint { keyframe: evolution.keyframe(), log: vec![] }).unwrap();
+        Evolution::restore(&Checkpoint { keyframe: evolution.keyframe(), ..Checkpoint::default() })
+            .unwrap();
     assert_eq!((&restored, restored.keyframe()), (&evolution, evolution.keyframe()));
     assert_eq!(begun, started("SNES", 4).keyframe());
+    let checkpoint =
+        Checkpoint { keyframe: evolution.keyframe(), n_flat: 12, ..Checkpoint::default() };
+    assert_eq!((restored.n_flat(), Evolution::restore(&checkpoint).unwrap().n_flat()), (0, 12));
+}
+
+#[test]
+fn fitness_tells_nobody_apart_if_it_is_finite_and_the_same_for_several() {
+    let is_flat = |means: &[f64]| {
+        Told::from_fitness(means.iter().map(|it| vec![*it, *it]).collect()).is_flat()
+    };
+    assert!(is_flat(&[0.5, 0.5]) && is_flat(&[0.0, -0.0, 0.0]));
+    assert!(!is_flat(&[0.5, 0.25]) && !is_flat(&[0.5, f64::NAN]) && !is_flat(&[0.5]));
+    assert!(Told::from_fitness(vec![vec![1.0, 2.0], vec![2.0, 1.0]]).is_flat(), "means count");
 }
 
 #[test]

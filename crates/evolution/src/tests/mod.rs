@@ -332,13 +332,16 @@ fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
             keyframe[at..at + old.len()].copy_from_slice(new);
         }
         assert_eq!(places.len(), 1);
-        Evolution::restore(&Checkpoint { keyframe, log: Vec::new() })
+        Evolution::restore(&Checkpoint { keyframe, ..Checkpoint::default() })
     };
     let known = bytes(mean.get(), ci95.get());
     let old = replaced(&known, &bytes(mean.get(), f64::NAN)).unwrap();
     let found = old.champion().unwrap().held_out.unwrap();
     assert_eq!((found.mean, found.ci95.get()), (mean, f64::INFINITY));
-    assert!(Evolution::restore(&Checkpoint { keyframe: old.keyframe(), log: Vec::new() }).is_ok());
+    assert!(
+        Evolution::restore(&Checkpoint { keyframe: old.keyframe(), ..Checkpoint::default() })
+            .is_ok()
+    );
     assert!(replaced(&known, &bytes(f64::NAN, 0.5)).is_err(), "no version kept such a mean");
 }
 
@@ -351,7 +354,7 @@ fn what_is_no_checkpoint_is_an_error() {
     let entry = told.to_bytes();
     let restore = |keyframe: &[u8], log: &[&[u8]]| {
         let log = log.iter().map(|entry| entry.to_vec()).collect();
-        Evolution::restore(&Checkpoint { keyframe: keyframe.to_vec(), log })
+        Evolution::restore(&Checkpoint { keyframe: keyframe.to_vec(), log, n_flat: 0 })
     };
     assert_eq!(restore(&keyframe, &[&entry]).unwrap(), evolution);
     assert!(matches!(restore(b"", &[]), Err(CheckpointError::Malformed(_))));

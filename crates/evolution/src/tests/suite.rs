@@ -118,8 +118,11 @@ fn every_generation_comes_back_from_every_keyframe_before_it() {
         for (g, state) in states.iter().enumerate() {
             for (k, earlier) in states[..=g].iter().enumerate() {
                 let keyframe = earlier.keyframe();
-                let restored =
-                    Evolution::restore(&Checkpoint { keyframe, log: log[k..g].to_vec() });
+                let restored = Evolution::restore(&Checkpoint {
+                    keyframe,
+                    log: log[k..g].to_vec(),
+                    n_flat: 0,
+                });
                 // Genotypes, champions, digests, and all that follows from them.
                 assert_eq!(restored.unwrap(), *state, "{variant:?} generation {g} from {k}");
             }
