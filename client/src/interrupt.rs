@@ -1,14 +1,20 @@
-//! SIGINT and SIGTERM: the first requests an orderly end, the second ends at once.
+//! SIGINT and SIGTERM: the first requests an orderly end, the second ends at once. Where nothing
+//! waits for an orderly end, the first one ends at once. No end leaves unfinished files.
 
 use std::{
+    fs, io,
+    path::{Path, PathBuf},
     process,
     sync::{
-        OnceLock,
+        Mutex, MutexGuard, Once, OnceLock, PoisonError,
         atomic::{AtomicBool, Ordering::Relaxed},
     },
 };
 
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::{
+    runtime::{Handle, RuntimeFlavor},
+    signal::unix::{Signal, SignalKind, signal},
+};
 use tokio_util::sync::CancellationToken;
 
 use crate::error::Error;
@@ -19,6 +25,90 @@ const EXIT_INTERRUPTED: i32 = 130;
 static TOKEN: OnceLock<CancellationToken> = OnceLock::new();
 /// Whether an experiment may have reached a coordinator.
 static SUBMITTED: AtomicBool = AtomicBool::new(false);
+
+/// Files and directories that are removed unless they are finished.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A file or directory that an end by a signal removes; until this is dropped.
+#[derive(Debug)]
+pub struct Unfinished(PathBuf);
+
+impl Unfinished {
+    /// Makes it, and keeps it in mind before a signal can be heard.
+    pub fn make<T>(
+        make: impl FnOnce() -> io::Result<T>,
+        path: impl FnOnce(&T) -> &Path,
+    ) -> io::Result<(T, Self)> {
+        listen_for_the_end();
+        let mut all = unfinished();
+        let made = make()?;
+        let path = path(&made).to_owned();
+        all.push(path.clone());
+        Ok((made, Self(path)))
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        unfinished().retain(|path| *path != self.0);
+    }
+}
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the process at once, without what is unfinished. Nobody begins anything meanwhile.
+fn end() -> ! {
+    let all = unfinished();
+    for path in all.iter() {
+        // Whatever cannot be removed stays, as it would without this.
+        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+    process::exit(EXIT_INTERRUPTED)
+}
+
+/// Has the first signal end the process as [`end`] does, unless somebody waits for an orderly end.
+fn listen_for_the_end() {
+    static ONCE: Once = Once::new();
+    // Without a runtime, there is no command; one without threads hears nothing while it computes.
+    let runtime = Handle::try_current();
+    let runtime = runtime.ok().filter(|it| it.runtime_flavor() != RuntimeFlavor::CurrentThread);
+    if let (None, Some(runtime)) = (TOKEN.get(), runtime) {
+        ONCE.call_once(|| {
+            let _entered = runtime.enter();
+            // Where signals cannot be heard, they end the process by themselves.
+            if let Ok(mut signals) = Signals::listen() {
+                runtime.spawn(async move {
+                    signals.next().await;
+                    if TOKEN.get().is_none() {
+                        end();
+                    }
+                });
+            }
+        });
+    }
+}
+
+/// Signals that ask for an end.
+struct Signals {
+    interrupt: Signal,
+    terminate: Signal,
+}
+
+impl Signals {
+    fn listen() -> io::Result<Self> {
+        let interrupt = signal(SignalKind::interrupt())?;
+        Ok(Self { interrupt, terminate: signal(SignalKind::terminate())? })
+    }
+
+    async fn next(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+    }
+}
 
 /// Whether no signal has come, for work that nothing else would end. While nobody listens for
 /// signals, they end the process.
@@ -44,21 +134,15 @@ pub fn error() -> Error {
 /// A token that the first signal cancels; the second ends the process, which
 /// loses nothing that is stored.
 pub fn token() -> Result<CancellationToken, Error> {
-    let listen = |kind| {
-        signal(kind).map_err(|error| Error::Internal(format!("cannot listen for signals: {error}")))
-    };
-    let mut interrupt = listen(SignalKind::interrupt())?;
-    let mut terminate = listen(SignalKind::terminate())?;
+    let mut signals = Signals::listen()
+        .map_err(|error| Error::Internal(format!("cannot listen for signals: {error}")))?;
     let token = TOKEN.get_or_init(CancellationToken::new).clone();
     let cancelled = token.clone();
     tokio::spawn(async move {
         loop {
-            tokio::select! {
-                _ = interrupt.recv() => {}
-                _ = terminate.recv() => {}
-            }
+            signals.next().await;
             if cancelled.is_cancelled() {
-                process::exit(EXIT_INTERRUPTED);
+                end();
             }
             cancelled.cancel();
         }

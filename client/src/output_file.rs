@@ -11,7 +11,7 @@ use clap::Args;
 use coordinator::store;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
-use crate::error::Error;
+use crate::{error::Error, interrupt::Unfinished};
 
 /// How a file or directory is called until it is complete.
 const UNFINISHED: &str = ".unfinished-";
@@ -63,7 +63,10 @@ impl Overwrite {
             _ => {
                 // What a link leads to is replaced, and not the link.
                 let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-                Target::Beside(unfinished(&place, found.as_ref()).map_err(failed)?, place)
+                let (file, unfinished) =
+                    Unfinished::make(|| unfinished(&place, found.as_ref()), |it| it.path())
+                        .map_err(failed)?;
+                Target::Beside { file, place, unfinished }
             }
         };
         Ok(OutputFile { path: path.to_owned(), target, overwrite: self })
@@ -89,10 +92,9 @@ impl Overwrite {
         self.check_files(to, names)?;
         let failed = |error: io::Error| unwritable(to, &error);
         let parent = if to.is_dir() { to } else { parent(to) };
-        let unfinished = fs::create_dir_all(parent)
-            .and_then(|()| Builder::new().prefix(UNFINISHED).tempdir_in(parent));
-        let unfinished = unfinished.map_err(failed)?;
-        Ok(OutputFiles { to: to.to_owned(), unfinished, overwrite: self })
+        let unfinished = fs::create_dir_all(parent).and_then(|()| unfinished_directory(parent));
+        let (directory, unfinished) = unfinished.map_err(failed)?;
+        Ok(OutputFiles { to: to.to_owned(), directory, overwrite: self, _unfinished: unfinished })
     }
 
     /// Has a data directory made; one that exists, and that no program uses, is replaced by it if
@@ -114,9 +116,11 @@ impl Overwrite {
         if let Some(holder) = store::holder(to) {
             return Err(failed(io::Error::other(format!("{holder} uses it"))));
         }
-        let aside = Builder::new().prefix(UNFINISHED).tempdir_in(parent(to)).map_err(failed)?;
+        let (aside, unfinished) = unfinished_directory(parent(to)).map_err(failed)?;
         let [new, old] = ["new", "old"].map(|name| aside.path().join(name));
         let made = make(&new)?;
+        // From here on, the only copy of what is replaced may be there.
+        drop(unfinished);
         if store::is_in(&new) {
             fs::rename(to, &old).map_err(failed)?;
             if let Err(error) = fs::rename(&new, to) {
@@ -139,7 +143,7 @@ pub struct OutputFile {
 #[derive(Debug)]
 enum Target {
     /// A file beside its place, removed if it is not finished.
-    Beside(NamedTempFile, PathBuf),
+    Beside { file: NamedTempFile, place: PathBuf, unfinished: Unfinished },
     /// What is written as it is.
     Stream(File),
 }
@@ -148,11 +152,11 @@ impl OutputFile {
     /// Puts the file where it belongs.
     pub fn finish(self) -> Result<(), Error> {
         let Self { path, target, overwrite } = self;
-        let (file, place) = match target {
+        let (file, place, _unfinished) = match target {
             Target::Stream(mut file) => {
                 return file.flush().map_err(|error| unwritable(&path, &error));
             }
-            Target::Beside(file, place) => (file, place),
+            Target::Beside { file, place, unfinished } => (file, place, unfinished),
         };
         file.as_file().sync_all().map_err(|error| unwritable(&path, &error))?;
         let moved = match overwrite.force {
@@ -171,14 +175,14 @@ impl OutputFile {
 impl Write for OutputFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.target {
-            Target::Beside(file, _) => file.write(bytes),
+            Target::Beside { file, .. } => file.write(bytes),
             Target::Stream(file) => file.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match &mut self.target {
-            Target::Beside(file, _) => file.flush(),
+            Target::Beside { file, .. } => file.flush(),
             Target::Stream(file) => file.flush(),
         }
     }
@@ -188,14 +192,15 @@ impl Write for OutputFile {
 #[derive(Debug)]
 pub struct OutputFiles {
     to: PathBuf,
-    unfinished: TempDir,
+    directory: TempDir,
     overwrite: Overwrite,
+    _unfinished: Unfinished,
 }
 
 impl OutputFiles {
     /// Where they are while they are written.
     pub fn unfinished(&self) -> &Path {
-        self.unfinished.path()
+        self.directory.path()
     }
 
     /// Writes one of them.
@@ -206,11 +211,11 @@ impl OutputFiles {
 
     /// Puts all that were written where they belong; none if one may not be written over.
     pub fn finish(self) -> Result<(), Error> {
-        let Self { to, unfinished, overwrite } = self;
+        let Self { to, directory, overwrite, _unfinished } = self;
         let failed = |error: io::Error| unwritable(&to, &error);
         fs::create_dir_all(&to).map_err(failed)?;
         let entries =
-            fs::read_dir(unfinished.path()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+            fs::read_dir(directory.path()).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let moves: Vec<(PathBuf, PathBuf)> = entries
             .map_err(failed)?
             .iter()
@@ -256,6 +261,11 @@ fn unfinished(place: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTemp
         file.as_file().set_permissions(found.permissions())?;
     }
     Ok(file)
+}
+
+/// A directory for what is not finished.
+fn unfinished_directory(parent: &Path) -> io::Result<(TempDir, Unfinished)> {
+    Unfinished::make(|| Builder::new().prefix(UNFINISHED).tempdir_in(parent), |it| it.path())
 }
 
 /// The permissions of a file that nobody says more of: the system takes the user's mask off.

@@ -3,9 +3,11 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    thread,
+    time::Duration,
 };
 
-use harness::{Experiment, Outcome, swarmctl, workspace_file};
+use harness::{Experiment, Outcome, swarmctl, swarmctl_process, workspace_file};
 use serde_json::{Value, json};
 
 fn simulate(config: &Path, args: &[&str]) -> Outcome {
@@ -44,6 +46,31 @@ fn every_shipped_experiment_can_be_simulated() {
             assert!(!metrics.is_empty(), "{path:?}");
             assert!(metrics.values().all(|m| m.as_f64().is_some_and(f64::is_finite)), "{of}");
         }
+    }
+}
+
+#[test]
+fn an_interrupted_trace_leaves_no_file() {
+    let quickstart = workspace_file("configs/quickstart.json");
+    for signal in ["INT", "TERM"] {
+        let directory = tempfile::tempdir().unwrap();
+        let names = || -> Vec<_> {
+            let entries = fs::read_dir(directory.path()).unwrap();
+            entries.map(|entry| entry.unwrap().file_name()).collect()
+        };
+        let trace = directory.path().join("trace.csv");
+        let config = quickstart.to_str().unwrap();
+        let args = ["simulate", config, "--trials", "1000", "--steps", "100000", "--trace"];
+        let mut simulating = swarmctl_process(args.iter().copied().chain(trace.to_str()));
+        let mut n_looks = 0;
+        while names().is_empty() {
+            n_looks += 1;
+            assert!(n_looks < 3000, "the trace has not begun");
+            thread::sleep(Duration::from_millis(20));
+        }
+        simulating.signal(signal);
+        assert_eq!(simulating.wait().code(), Some(130), "{signal}");
+        assert_eq!(names(), [""; 0], "{signal}");
     }
 }
 

@@ -189,7 +189,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         progress.end_with_reader();
     }
     let command = match command {
-        // An interrupt ends these at once: they leave nothing to clean up.
+        // An interrupt ends these at once, and removes the files that they have begun.
         Command::Validate(args) => return validate::validate(&args, &mut progress),
         Command::New(args) => return new::new(&args, &mut progress),
         Command::Schema(_) => return schema::schema(&mut progress),
