@@ -11,7 +11,10 @@ use swarm_telemetry::EXIT_STARVED;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
 
-use crate::{file_kind, text::with_reason};
+use crate::{
+    file_kind,
+    text::{self, with_reason},
+};
 
 /// Why a command did not succeed.
 #[derive(Debug, thiserror::Error)]
@@ -190,6 +193,13 @@ impl Error {
             Self::Interrupted(_) | Self::OutputClosed => self.to_string(),
             _ => format!("error: {self}"),
         }
+    }
+
+    /// The report, in lines of a terminal of this width; none if it is no terminal. A line about a
+    /// place in a file stays whole: editors follow it.
+    pub fn report_within(&self, width: Option<usize>) -> String {
+        let width = width.filter(|_| !matches!(self, Self::Config { .. }));
+        text::fitting(&self.report(), width)
     }
 
     /// The error of reading a data directory, or of making one.
@@ -379,6 +389,20 @@ mod tests {
         let error = Error::Config { file, problems: "line 3: x\nworld: y".into() };
         assert_eq!(error.report(), "a.json: line 3: x\na.json: world: y");
         assert_eq!(error.exit_code(), 2);
+    }
+
+    #[test]
+    fn errors_fit_a_terminal_but_places_in_files_stay_whole() {
+        let error = Error::Input("a.csv exists already; choose another name or --force".into());
+        let narrow = error.report_within(Some(40));
+        assert!(
+            narrow.lines().count() > 1 && narrow.lines().all(|line| line.len() <= 40),
+            "{narrow}"
+        );
+        assert_eq!(error.report_within(None), error.report());
+        let problems = "line 3: this is longer than forty characters are".into();
+        let error = Error::Config { file: "a.json".into(), problems };
+        assert_eq!(error.report_within(Some(40)), error.report());
     }
 
     #[test]

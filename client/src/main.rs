@@ -58,7 +58,7 @@ fn main() -> ExitCode {
         Err(starved) => Err(starved.into()),
     };
     let Err(error) = result else { return ExitCode::SUCCESS };
-    report(&error.report());
+    report(&error.report_within(table::stderr_width()));
     error.exit_code().into()
 }
 
@@ -67,7 +67,7 @@ fn end(answer: &clap::Error) -> ! {
     let code = match answer.print() {
         Err(source) if !answer.use_stderr() => {
             let error = Error::from_stdout(source);
-            report(&error.report());
+            report(&error.report_within(table::stderr_width()));
             error.exit_code().into()
         }
         // If standard error is closed, the exit code says enough.

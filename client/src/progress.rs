@@ -50,6 +50,8 @@ pub struct Progress {
     /// What happens when the reader of standard output goes.
     when_closed: WhenClosed,
     screen: Screen,
+    /// Characters per line of remarks; none if they go to no terminal.
+    remark_width: Option<usize>,
     /// Whether remarks are left out.
     is_silent: bool,
     /// Whether everything is said of experiments that are followed.
@@ -128,7 +130,8 @@ impl Progress {
     pub fn new(format: OutputFormat) -> Self {
         let has_terminal = io::stdout().is_terminal() && io::stderr().is_terminal();
         let screen = Screen::of_stdout();
-        Self { has_terminal, screen, ..Self::to(format, Box::new(io::stdout())) }
+        let remark_width = table::stderr_width();
+        Self { has_terminal, screen, remark_width, ..Self::to(format, Box::new(io::stdout())) }
     }
 
     /// Prints to a writer that is not a terminal.
@@ -139,6 +142,7 @@ impl Progress {
             unwritten: Unwritten::default(),
             when_closed: WhenClosed::GoOn,
             screen: Screen::default(),
+            remark_width: None,
             is_silent: false,
             is_verbose: false,
             has_terminal: false,
@@ -256,10 +260,7 @@ impl Progress {
         if self.is_silent {
             return;
         }
-        let text = match self.screen.width {
-            Some(width) => text::wrapped(text, width),
-            None => text.to_owned(),
-        };
+        let text = text::fitting(text, self.remark_width);
         // If standard error is closed there is no place left to report to.
         let _ = self.stderr()().write_all(format!("{}\n", escape_lines(&text)).as_bytes());
     }

@@ -28,14 +28,19 @@ pub struct Screen {
 impl Screen {
     /// The screen of standard output.
     pub fn of_stdout() -> Self {
-        let term = Term::stdout();
         // As `NO_COLOR` is defined: an empty value does not count.
         let no_colour = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-        Self {
-            width: term.size_checked().filter(|_| term.is_term()).map(|(_, width)| width.into()),
-            has_colours: !no_colour && console::colors_enabled(),
-        }
+        Self { width: width(&Term::stdout()), has_colours: !no_colour && console::colors_enabled() }
     }
+}
+
+/// Characters per line of standard error; none if it is not a terminal.
+pub fn stderr_width() -> Option<usize> {
+    width(&Term::stderr())
+}
+
+fn width(term: &Term) -> Option<usize> {
+    term.size_checked().filter(|_| term.is_term()).map(|(_, width)| width.into())
 }
 
 /// A column's heading and properties.

@@ -314,6 +314,11 @@ pub fn wrapped(text: &str, width: usize) -> String {
     text.split('\n').map(wrap).collect::<Vec<_>>().join("\n")
 }
 
+/// [`wrapped`], where there is a screen.
+pub fn fitting(text: &str, width: Option<usize>) -> String {
+    width.map_or_else(|| text.to_owned(), |width| wrapped(text, width))
+}
+
 /// Says that a data directory has no workers, and who uses it.
 pub fn no_fleet(data_dir: &Path, holder: Option<&Holder>) -> String {
     let data_dir = data_dir.display();

@@ -84,6 +84,21 @@ fn no_answer_is_wider_than_the_terminal_or_shows_escape_codes() {
 }
 
 #[test]
+fn no_error_is_wider_than_the_terminal() {
+    let directory = directory();
+    let Some(terminal) = terminal(&directory, 40) else { return };
+    for command in ["plot 1 --to history.csv", "history 4711", "verify history.csv"] {
+        let shown = terminal.swarmctl(command, "");
+        let text = seen(&shown.stdout);
+        assert!(shown.code != Some(0) && text.contains("error: "), "{command}: {shown:#?}");
+        let widths = text.split(['\n', '\r']).map(|line| line.trim_end().chars().count());
+        assert!(widths.max() <= Some(40), "{command}: {text}");
+    }
+    let piped = terminal.swarmctl("plot 1 --to history.csv 2>&1 | cat", "").stdout;
+    assert!(piped.lines().any(|line| line.chars().count() > 40), "{piped}");
+}
+
+#[test]
 fn colours_do_not_move_columns_and_are_where_they_are_wanted() {
     let directory = directory();
     let Some(terminal) = terminal(&directory, 80) else { return };
