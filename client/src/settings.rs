@@ -172,14 +172,16 @@ fn user_file() -> Option<PathBuf> {
 }
 
 fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
-    // Some editors begin a file with a byte order mark.
+    // Some editors begin a file with a byte order mark; comments and trailing commas are as in
+    // experiment files.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let file: SettingsFile = serde_json::from_str(text).map_err(|error| {
-        let place = format!(" at line {} column {}", error.line(), error.column());
-        let message = error.to_string();
-        let message = message.strip_suffix(&place).unwrap_or(&message);
-        Error::Input(format!("{}: line {}: {message}; {REMEDY}", path.display(), error.line()))
-    })?;
+    let file: SettingsFile =
+        serde_json::from_str(&experiment_file::plain(text)).map_err(|error| {
+            let place = format!(" at line {} column {}", error.line(), error.column());
+            let message = error.to_string();
+            let message = message.strip_suffix(&place).unwrap_or(&message);
+            Error::Input(format!("{}: line {}: {message}; {REMEDY}", path.display(), error.line()))
+        })?;
     Ok(file.within(path.parent().unwrap_or(Path::new(""))))
 }
 
@@ -241,7 +243,7 @@ mod tests {
     #[test]
     fn a_mistake_in_the_file_is_named_with_its_line() {
         let path = Path::new("config.json");
-        for empty in ["{}", "\u{feff}{}"] {
+        for empty in ["{}", "\u{feff}{}", "{ // the usual place\n}", "/* none */ {}"] {
             assert_eq!(parse(path, empty).unwrap(), settings(None));
         }
         for (text, expected) in [

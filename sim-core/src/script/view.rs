@@ -318,7 +318,9 @@ impl<'a> View<'a> {
             (Named::Neighbours, [of, range]) => self.neighbours(of, number(range)?, meter)?,
             (Named::Border, []) => {
                 let evaluated = self.world.evaluated();
-                meter.work(evaluated.len() * evaluated.len() / 16)?;
+                // Each robot has a part of its own, which is all that a small swarm costs.
+                let n = evaluated.len();
+                meter.work(n * n / 16 + 30 * n)?;
                 let positions = &self.swarm.positions[evaluated.clone()];
                 let World { alpha, .. } = self.world;
                 let range = self.world.communication_range();
