@@ -12,7 +12,7 @@ use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
 
 use crate::{
-    file_kind,
+    file_kind::{self, Kind},
     text::{self, with_reason},
 };
 
@@ -220,7 +220,7 @@ impl Error {
 
     /// The error that a path is no data directory: what else it is, or `text`.
     fn no_data_directory(path: &Path, text: String) -> Self {
-        Self::Input(match file_kind::expect(path, &[], "a data directory") {
+        Self::Input(match file_kind::expect(path, &[Kind::DataDirectory], "a data directory") {
             Err(other) => format!("{}: {other}", path.display()),
             Ok(()) => text,
         })
