@@ -64,7 +64,7 @@ impl Overwrite {
                 // What a link leads to is replaced, and not the link.
                 let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
                 let (file, unfinished) =
-                    Unfinished::make(|| unfinished(&place, found.as_ref()), |it| it.path())
+                    Unfinished::make(|| unfinished(&place, found.as_ref()), |file| file.path())
                         .map_err(failed)?;
                 Target::Beside { file, place, unfinished }
             }
@@ -124,8 +124,11 @@ impl Overwrite {
         if store::is_in(&new) {
             fs::rename(to, &old).map_err(failed)?;
             if let Err(error) = fs::rename(&new, to) {
-                fs::rename(&old, to).map_err(failed)?;
-                return Err(failed(error));
+                let Err(back) = fs::rename(&old, to) else { return Err(failed(error)) };
+                // It would be removed with the directory that it is in.
+                let kept = aside.keep().join("old");
+                let what = format!("{back}; what was there is in {}", kept.display());
+                return Err(failed(io::Error::other(what)));
             }
         }
         Ok(made)
@@ -265,7 +268,10 @@ fn unfinished(place: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTemp
 
 /// A directory for what is not finished.
 fn unfinished_directory(parent: &Path) -> io::Result<(TempDir, Unfinished)> {
-    Unfinished::make(|| Builder::new().prefix(UNFINISHED).tempdir_in(parent), |it| it.path())
+    Unfinished::make(
+        || Builder::new().prefix(UNFINISHED).tempdir_in(parent),
+        |directory| directory.path(),
+    )
 }
 
 /// The permissions of a file that nobody says more of: the system takes the user's mask off.
