@@ -110,7 +110,7 @@ impl Kind {
 
     fn of_json(path: &Path) -> Option<Self> {
         let text = read_text(path, GENOTYPE_BYTES).ok()?;
-        match serde_json::from_str(&text).ok()? {
+        match serde_json::from_str(&experiment_file::plain(&text)).ok()? {
             Value::Array(genes) => {
                 let is_genes = !genes.is_empty() && genes.iter().all(Value::is_number);
                 is_genes.then_some(Self::Genes)
@@ -217,6 +217,7 @@ mod tests {
         let path = directory.path().join("file");
         for (content, kind) in [
             (r#"{"world": 3}"#, Some(Kind::Experiment)),
+            ("// mine\n{\"world\": 3,}", Some(Kind::Experiment)),
             (r#"{"seed": 3, "genotype": [1]}"#, Some(Kind::Champion)),
             ("[0.5, 1]", Some(Kind::Genes)),
             ("[]", None),
