@@ -17,7 +17,10 @@ impl Connection {
             let page = request.clone();
             let answer = self.call(async |client| client.list_experiments(page.clone()).await);
             let page = answer.await?.experiments;
-            // A coordinator of an earlier version knows no pages, and sends everything.
+            // A coordinator of an earlier version knows no pages, and sends everything each time.
+            if page.first().is_some_and(|first| first.id <= request.after) {
+                return Ok(all);
+            }
             let is_last = page.len() != PAGE_LEN as usize;
             request.after = page.last().map_or(0, |last| last.id);
             all.extend(page);
@@ -58,7 +61,8 @@ impl Connection {
     /// The experiments of a group, oldest first; or the one experiment of that name.
     pub async fn group(&self, name: &str) -> Result<Vec<Experiment>, Error> {
         let wanted = ListExperimentsRequest { named: name.to_owned(), ..Default::default() };
-        // A coordinator of an earlier version sends others, too.
+        // One of an earlier version knows no names either, and whoever is cancelled by a name must be
+        // of it.
         let (members, others): (Vec<Experiment>, Vec<Experiment>) =
             self.list(wanted).await?.into_iter().partition(|experiment| experiment.group == name);
         if !members.is_empty() {

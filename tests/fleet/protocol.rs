@@ -214,24 +214,38 @@ async fn a_silent_worker_loses_its_items_and_its_stream() {
     assert_eq!(worker.receive().await.unwrap_err().code(), Code::Aborted);
 }
 
-#[tokio::test]
-async fn there_is_a_limit_to_unfinished_experiments() {
-    let coordinator = CoordinatorProcess::start();
-    let text = Experiment::small(1).text();
-    submit(&coordinator.url(), "", text.clone()).await.unwrap();
-    let database = coordinator.database();
+/// Copies experiment 1 of a coordinator to the numbers up to this one. `state`: that of each.
+fn copy_to(coordinator: &CoordinatorProcess, last: u64, state: impl Fn(u64) -> &'static str) {
     let columns =
         "id, name, config, config_digest, fingerprint, genotype_len, state, submitted_at_ms";
     let mut copies = format!("BEGIN; CREATE TEMP TABLE copy AS SELECT {columns} FROM experiments;");
-    for id in 2..=1000 {
-        let state = if id % 2 == 0 { "paused" } else { "running" };
+    for id in 2..=last {
+        let state = state(id);
         copies += &format!(
             "UPDATE copy SET id = {id}, state = '{state}';
              INSERT INTO experiments ({columns}) SELECT {columns} FROM copy;"
         );
     }
-    database.execute_batch(&(copies + "COMMIT;")).unwrap();
+    coordinator.database().execute_batch(&(copies + "COMMIT;")).unwrap();
+}
+
+#[tokio::test]
+async fn there_is_a_limit_to_unfinished_experiments() {
+    let coordinator = CoordinatorProcess::start();
+    let text = Experiment::small(1).text();
+    submit(&coordinator.url(), "", text.clone()).await.unwrap();
+    copy_to(&coordinator, 1000, |id| if id % 2 == 0 { "paused" } else { "running" });
     let status = submit(&coordinator.url(), "", text).await.unwrap_err();
     assert_eq!(status.code(), Code::ResourceExhausted);
     assert!(status.message().contains("1000 experiments are unfinished"), "{status}");
+}
+
+#[tokio::test]
+async fn a_list_of_several_pages_is_whole() {
+    let coordinator = CoordinatorProcess::start();
+    submit(&coordinator.url(), "", Experiment::small(1).text()).await.unwrap();
+    copy_to(&coordinator, 4_000, |_| "cancelled");
+    let listed = coordinator.swarmctl(&["list"]).expect_success().json();
+    let ids = listed.as_array().unwrap().iter().map(|found| found["id"].as_u64().unwrap());
+    assert!(ids.eq(1..=4_000), "each once, in order");
 }

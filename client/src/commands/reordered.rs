@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use serde_json::{Value, json};
-use swarm_proto::v1::{Experiment, ExperimentState};
+use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{connection::Connection, text};
 
@@ -15,7 +15,10 @@ const COMPARED_MAX: usize = 16;
 pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option<String> {
     let first = submitted.first()?;
     // What has been submitted is so, even if nothing can be said of it.
-    let mut earlier = connection.experiments().await.ok()?;
+    let states = [ExperimentState::Completed, ExperimentState::Running, ExperimentState::Paused];
+    let states = states.map(Into::into).to_vec();
+    let wanted = ListExperimentsRequest { states, ..Default::default() };
+    let mut earlier = connection.list(wanted).await.ok()?;
     earlier.retain(|experiment| may_be_reordered(experiment, first));
     if earlier.is_empty() {
         return None;
@@ -38,12 +41,10 @@ pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option
 
 /// Whether an experiment could be of the same file as a later one, but for the order.
 fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
-    use ExperimentState::{Completed, Paused, Running};
     earlier.id < later.id
         && (&earlier.name, earlier.seed) == (&later.name, later.seed)
         && earlier.config_digest != later.config_digest
         && earlier.forked_from.is_none()
-        && matches!(earlier.state(), Completed | Running | Paused)
 }
 
 /// A file in canonical form as a value that equals those with its keys in another order, without

@@ -159,16 +159,12 @@ async fn existing(
     let config = compiled.map_err(|error| run.file.invalid(&error))?.config;
     let digest = Digest::of_config(&config, sim_core::FINGERPRINT).to_string();
     let wanted = ListExperimentsRequest {
-        config_digest: digest.clone(),
+        config_digest: digest,
         states: vec![ExperimentState::Completed.into()],
         ..Default::default()
     };
-    // A coordinator of an earlier version sends others, too.
     let is_it = |experiment: &Experiment| {
-        experiment.state() == ExperimentState::Completed
-            && experiment.config_digest == digest
-            && experiment.generations == config.algorithm.generations
-            && experiment.forked_from.is_none()
+        experiment.generations == config.algorithm.generations && experiment.forked_from.is_none()
     };
     let same = connection.list(wanted).await?.into_iter().filter(is_it);
     let same = same.max_by_key(|experiment| {

@@ -12,8 +12,8 @@ use crate::{
     memory::{self, Shortage},
     runs::Runnable,
     store::{
-        ExperimentRecord, ExperimentState, ForkRecord, NewExperiment, Store, StoreError,
-        StoredExperiment, Summary, Wanted,
+        ExperimentRecord, ExperimentState, Filter, ForkRecord, NewExperiment, Store, StoreError,
+        StoredExperiment, Summary,
     },
 };
 
@@ -71,7 +71,7 @@ fn place_beside(
         return Ok(Placement::RunsAlready(id));
     }
     let config_json = new.config.to_canonical_json();
-    let unfinished = store.experiments(&Wanted::unfinished())?;
+    let unfinished = store.experiments(&Filter::unfinished())?;
     let summary = Summary::from_config(&new.config, &config_json);
     let shortage = shortage(&unfinished, &summary, new.genotype_len as u64, memory_budget);
     if resume_unfinished && let Some(placement) = resume(store, new, &config_json, shortage)? {
@@ -116,7 +116,7 @@ fn of_the_same_digest(
 ) -> Result<Vec<StoredExperiment>, StoreError> {
     // The digest tells versions of the simulation apart.
     let config_digest = Some(new.config_digest.to_string());
-    let found = store.experiments(&Wanted { config_digest, ..Wanted::default() })?;
+    let found = store.experiments(&Filter { config_digest, ..Filter::default() })?;
     let stored = found.iter().rev().map(|found| store.experiment(found.id));
     Ok(stored.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
@@ -133,7 +133,7 @@ pub fn check_room(
     genotype_len: u64,
     memory_budget: u64,
 ) -> Result<(), ControlError> {
-    let unfinished = store.experiments(&Wanted::unfinished())?;
+    let unfinished = store.experiments(&Filter::unfinished())?;
     if unfinished.len() >= UNFINISHED_MAX {
         return Err(ControlError::TooManyUnfinished);
     }

@@ -9,7 +9,7 @@ use crate::{
     driver::DriverEvent,
     ids::ExperimentId,
     runs::Runnable,
-    store::{ExperimentRecord, ExperimentState, StoreError, Wanted},
+    store::{ExperimentRecord, ExperimentState, Filter, StoreError},
 };
 
 use super::{Control, ControlError};
@@ -19,7 +19,7 @@ impl Control {
     /// first those that are not paused, as memory may not suffice for all. One that is
     /// damaged is paused, and the others go on.
     pub async fn run_unfinished(&self) -> Result<(), StoreError> {
-        let unfinished = Wanted::unfinished();
+        let unfinished = Filter::unfinished();
         let mut experiments = self.store.read(move |store| store.experiments(&unfinished)).await?;
         experiments.sort_by_key(|experiment| experiment.state == ExperimentState::Paused);
         for ExperimentRecord { id, .. } in experiments {
@@ -35,7 +35,7 @@ impl Control {
 
     /// Takes nothing up that is unfinished: [`Self::take_up`] does when it is asked for.
     pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
-        let unfinished = Wanted::unfinished();
+        let unfinished = Filter::unfinished();
         let unfinished = self.store.read(move |store| store.experiments(&unfinished)).await?;
         let mut left = self.left_alone.lock().unwrap_or_else(PoisonError::into_inner);
         left.extend(unfinished.into_iter().map(|experiment| experiment.id));

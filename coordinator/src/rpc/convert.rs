@@ -15,8 +15,8 @@ use crate::{
     priority::Priority,
     queries::{Address, DynamicsPage, Individuals, Lineage, Page},
     store::{
-        Event, EventKind, ExperimentRecord, ExperimentState, GenerationRecord, StoredExperiment,
-        Wanted,
+        Event, EventKind, ExperimentRecord, ExperimentState, Filter, GenerationRecord,
+        StoredExperiment,
     },
     text::printable,
 };
@@ -198,7 +198,7 @@ pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
 }
 
 /// Which experiments a client wants; INVALID_ARGUMENT for a state that there is not.
-pub fn wanted(request: v1::ListExperimentsRequest) -> Result<Wanted, Status> {
+pub fn filter(request: v1::ListExperimentsRequest) -> Result<Filter, Status> {
     let states = request.states().map(stored_state).collect::<Result<_, _>>()?;
     let v1::ListExperimentsRequest {
         named,
@@ -214,7 +214,7 @@ pub fn wanted(request: v1::ListExperimentsRequest) -> Result<Wanted, Status> {
         Some((key, value)) => (key.to_owned(), Some(value.to_owned())),
         None => (label, None),
     };
-    Ok(Wanted {
+    Ok(Filter {
         named: some(named),
         states,
         labels: labels.into_iter().map(label).collect(),

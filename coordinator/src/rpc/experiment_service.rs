@@ -132,8 +132,8 @@ impl ExperimentService for Experiments {
         &self,
         request: Request<ListExperimentsRequest>,
     ) -> Result<Response<ListExperimentsResponse>, Status> {
-        let wanted = convert::wanted(request.into_inner())?;
-        let experiments = self.store.read(move |store| store.experiments(&wanted)).await?;
+        let filter = convert::filter(request.into_inner())?;
+        let experiments = self.store.read(move |store| store.experiments(&filter)).await?;
         let experiments = experiments.into_iter().map(convert::experiment).collect();
         Ok(Response::new(ListExperimentsResponse { experiments }))
     }

@@ -23,7 +23,7 @@ use crate::{
     limits::RECONSTRUCTIONS_OF_PAGES_MAX,
     queries::{self, QueryError, Several, StoredDynamics, StoredIndividuals},
     shared_store::SharedStore,
-    store::{Store, StoreError, Wanted},
+    store::{Filter, Store, StoreError},
 };
 
 use super::{Experiments, convert, explain, status};
@@ -58,7 +58,7 @@ impl PagesArchive {
 #[async_trait]
 impl Archive for PagesArchive {
     async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
-        let experiments = self.store.read(|store| store.experiments(&Wanted::default())).await?;
+        let experiments = self.store.read(|store| store.experiments(&Filter::default())).await?;
         Ok(experiments.into_iter().map(convert::experiment).collect())
     }
 

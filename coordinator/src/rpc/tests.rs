@@ -1,10 +1,10 @@
-//! Watchers that do not read.
+//! Watchers that do not read, and lists.
 
 use std::{sync::Arc, time::Duration};
 
 use rusqlite::params;
 use swarm_proto::v1::{
-    SubmitExperimentRequest, WatchExperimentRequest,
+    ExperimentState, ListExperimentsRequest, SubmitExperimentRequest, WatchExperimentRequest,
     experiment_service_server::ExperimentService as _,
 };
 use tokio::sync::Semaphore;
@@ -106,4 +106,44 @@ async fn a_watcher_that_pauses_is_not_dropped() {
     let (seen, status) = read(&service(&directory).await, 0, WATCH_PATIENCE / 2).await;
     assert!(status.is_none());
     assert_eq!(seen, (1..=N_NOTICES).collect::<Vec<_>>());
+}
+
+#[tokio::test]
+async fn a_list_has_what_is_wanted_page_by_page() {
+    let directory = tempfile::tempdir().unwrap();
+    let service = service(&directory).await;
+    let request = SubmitExperimentRequest {
+        config_json: include_str!("../../../configs/quickstart.json").to_owned(),
+        seed: Some(2),
+        labels: [("user".to_owned(), "ada".to_owned())].into(),
+        ..Default::default()
+    };
+    service.submit_experiment(Request::new(request)).await.unwrap();
+    let list = async |request| {
+        let answer = service.list_experiments(Request::new(request)).await?.into_inner();
+        Ok::<_, Status>(answer.experiments.iter().map(|found| found.id).collect::<Vec<u64>>())
+    };
+    let all = ListExperimentsRequest::default;
+    assert_eq!(list(all()).await.unwrap(), [1, 2]);
+    assert_eq!(list(ListExperimentsRequest { page_size: 1, ..all() }).await.unwrap(), [1]);
+    assert_eq!(list(ListExperimentsRequest { after: 1, ..all() }).await.unwrap(), [2]);
+    for (label, expected) in [("user", vec![2]), ("user=ada", vec![2]), ("user=eve", vec![])] {
+        let labels = vec![label.to_owned()];
+        let found = list(ListExperimentsRequest { labels, ..all() }).await.unwrap();
+        assert_eq!(found, expected, "{label}");
+    }
+    for (state, expected) in
+        [(ExperimentState::Running, vec![1, 2]), (ExperimentState::Completed, vec![])]
+    {
+        let states = vec![state.into()];
+        let found = list(ListExperimentsRequest { states, ..all() }).await.unwrap();
+        assert_eq!(found, expected, "{state:?}");
+    }
+    for (named, expected) in [("quickstart", vec![1, 2]), ("other", vec![])] {
+        let named = named.to_owned();
+        assert_eq!(list(ListExperimentsRequest { named, ..all() }).await.unwrap(), expected);
+    }
+    let states = vec![ExperimentState::Unspecified.into()];
+    let error = list(ListExperimentsRequest { states, ..all() }).await.unwrap_err();
+    assert_eq!(error.code(), Code::InvalidArgument);
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    store::{NewExperiment, Wanted},
+    store::{Filter, NewExperiment},
     submission::Submission,
 };
 
@@ -27,7 +27,7 @@ fn new_experiment() -> NewExperiment {
 }
 
 async fn n_experiments(store: &SharedStore) -> usize {
-    store.read(|store| store.experiments(&Wanted::default())).await.unwrap().len()
+    store.read(|store| store.experiments(&Filter::default())).await.unwrap().len()
 }
 
 async fn pragma(store: &SharedStore, name: &'static str, value: u32) {

@@ -11,7 +11,7 @@ use super::{
 
 /// Which experiments a list has: those that are all of what is said here.
 #[derive(Debug, Clone, Default)]
-pub struct Wanted {
+pub struct Filter {
     /// Of the group of this name, or, if there is none, the experiments of this name.
     pub named: Option<String>,
     /// In one of these states; empty: in any.
@@ -28,7 +28,7 @@ pub struct Wanted {
     pub limit: Option<u32>,
 }
 
-impl Wanted {
+impl Filter {
     /// Those that have not ended.
     pub fn unfinished() -> Self {
         let states = vec![ExperimentState::Running, ExperimentState::Paused];
@@ -93,9 +93,9 @@ pub fn get(connection: &Connection, id: ExperimentId) -> Result<Option<StoredExp
 }
 
 /// Those that are wanted, oldest first.
-pub fn list(connection: &Connection, wanted: &Wanted) -> Result<Vec<ExperimentRecord>> {
-    let (condition, values) = wanted.condition();
-    let limit = wanted.limit.map_or(-1, i64::from);
+pub fn list(connection: &Connection, filter: &Filter) -> Result<Vec<ExperimentRecord>> {
+    let (condition, values) = filter.condition();
+    let limit = filter.limit.map_or(-1, i64::from);
     let sql =
         format!("SELECT {COLUMNS} FROM {TABLES} WHERE {condition} ORDER BY e.id LIMIT {limit}");
     let mut statement = connection.prepare_cached(&sql)?;
@@ -213,15 +213,15 @@ mod tests {
         (directory, store)
     }
 
-    fn ids(store: &Store, wanted: Wanted) -> Vec<u64> {
-        store.experiments(&wanted).unwrap().iter().map(|found| found.id.0).collect()
+    fn ids(store: &Store, filter: Filter) -> Vec<u64> {
+        store.experiments(&filter).unwrap().iter().map(|found| found.id.0).collect()
     }
 
     #[test]
     fn a_name_is_that_of_a_group_before_it_is_that_of_experiments() {
         let (_directory, store) = store();
         let named =
-            |name: &str| ids(&store, Wanted { named: Some(name.into()), ..Wanted::default() });
+            |name: &str| ids(&store, Filter { named: Some(name.into()), ..Filter::default() });
         assert_eq!(named("a"), [1, 4]);
         assert_eq!(named("b"), [2, 3]);
         assert_eq!(named("c"), [4]);
@@ -232,24 +232,24 @@ mod tests {
     #[test]
     fn all_that_is_wanted_holds_together() {
         let (_directory, store) = store();
-        let all = Wanted::default;
+        let all = Filter::default;
         assert_eq!(ids(&store, all()), [1, 2, 3, 4]);
-        assert_eq!(ids(&store, Wanted::unfinished()), [3, 4]);
-        assert_eq!(ids(&store, Wanted { without_archived: true, ..all() }), [1, 3, 4]);
+        assert_eq!(ids(&store, Filter::unfinished()), [3, 4]);
+        assert_eq!(ids(&store, Filter { without_archived: true, ..all() }), [1, 3, 4]);
         let label =
             |key: &str, value: Option<&str>| vec![(key.to_owned(), value.map(str::to_owned))];
-        assert_eq!(ids(&store, Wanted { labels: label("user", None), ..all() }), [1, 2, 3, 4]);
-        assert_eq!(ids(&store, Wanted { labels: label("a b", Some("")), ..all() }), [1, 2, 3, 4]);
+        assert_eq!(ids(&store, Filter { labels: label("user", None), ..all() }), [1, 2, 3, 4]);
+        assert_eq!(ids(&store, Filter { labels: label("a b", Some("")), ..all() }), [1, 2, 3, 4]);
         let of_ada = || label("user", Some("ada"));
-        assert_eq!(ids(&store, Wanted { labels: of_ada(), ..all() }), [1, 3]);
-        assert_eq!(ids(&store, Wanted { labels: of_ada(), ..Wanted::unfinished() }), [3]);
-        assert_eq!(ids(&store, Wanted { labels: label("us%", None), ..all() }), [0_u64; 0]);
-        assert_eq!(ids(&store, Wanted { after: 2, ..all() }), [3, 4]);
-        assert_eq!(ids(&store, Wanted { after: 1, limit: Some(2), ..all() }), [2, 3]);
-        assert_eq!(ids(&store, Wanted { after: u64::MAX, ..all() }), [0_u64; 0]);
+        assert_eq!(ids(&store, Filter { labels: of_ada(), ..all() }), [1, 3]);
+        assert_eq!(ids(&store, Filter { labels: of_ada(), ..Filter::unfinished() }), [3]);
+        assert_eq!(ids(&store, Filter { labels: label("us%", None), ..all() }), [0_u64; 0]);
+        assert_eq!(ids(&store, Filter { after: 2, ..all() }), [3, 4]);
+        assert_eq!(ids(&store, Filter { after: 1, limit: Some(2), ..all() }), [2, 3]);
+        assert_eq!(ids(&store, Filter { after: u64::MAX, ..all() }), [0_u64; 0]);
         let config_digest = Some(store.experiments(&all()).unwrap()[0].config_digest.clone());
-        assert_eq!(ids(&store, Wanted { config_digest, ..all() }), [1, 2, 3, 4]);
+        assert_eq!(ids(&store, Filter { config_digest, ..all() }), [1, 2, 3, 4]);
         let config_digest = Some("0".to_owned());
-        assert_eq!(ids(&store, Wanted { config_digest, ..all() }), [0_u64; 0]);
+        assert_eq!(ids(&store, Filter { config_digest, ..all() }), [0_u64; 0]);
     }
 }

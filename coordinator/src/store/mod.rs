@@ -35,7 +35,7 @@ use evolution::{Champion, Checkpoint};
 pub use error::StoreError;
 use events::{add_notice, add_state_event, set_state};
 pub use evidence::Imported;
-pub use experiments::Wanted;
+pub use experiments::Filter;
 pub use file::{Holder, holder};
 pub use fitness_log::Entry;
 pub use forks::ForkRecord;
@@ -394,9 +394,9 @@ impl Store {
         })
     }
 
-    /// Reads those of the experiments that are wanted, oldest first.
-    pub fn experiments(&self, wanted: &Wanted) -> Result<Vec<ExperimentRecord>> {
-        self.read(|connection| experiments::list(connection, wanted))
+    /// Reads the experiments that a filter lets through, oldest first.
+    pub fn experiments(&self, filter: &Filter) -> Result<Vec<ExperimentRecord>> {
+        self.read(|connection| experiments::list(connection, filter))
     }
 
     /// The champion so far; none before the first generation.

@@ -5,7 +5,8 @@ use rusqlite::{Connection, TransactionBehavior};
 use super::{StoreError, seals};
 
 /// Makes the column `summary` of the column `config`: a list of what
-/// [`Summary`](super::Summary) has. `->` keeps all digits of a seed.
+/// [`Summary`](super::Summary) has. `->` keeps all digits of a seed. It is part of a migration, so
+/// it never changes.
 macro_rules! summary {
     () => {
         "CASE WHEN json_valid(config) THEN json_array(

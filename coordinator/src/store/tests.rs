@@ -207,7 +207,7 @@ fn a_request_id_creates_one_experiment() {
     assert_eq!(store.create(&new_experiment(Some("key")), 6).unwrap(), (first, false));
     let (other, is_new) = store.create(&new_experiment(None), 7).unwrap();
     assert!(is_new && other != first);
-    assert_eq!(store.experiments(&Wanted::default()).unwrap().len(), 2);
+    assert_eq!(store.experiments(&Filter::default()).unwrap().len(), 2);
 }
 
 #[test]
@@ -435,7 +435,7 @@ fn a_wall_clock_that_jumps_changes_no_order() {
 
     let store = Store::open(directory.path()).unwrap();
     let ids: Vec<ExperimentId> =
-        store.experiments(&Wanted::default()).unwrap().iter().map(|e| e.id).collect();
+        store.experiments(&Filter::default()).unwrap().iter().map(|e| e.id).collect();
     assert_eq!(ids, [first, second], "by id, not by time of submission");
     let events = store.events(first, 1, 100).unwrap();
     let times: Vec<u64> = events.iter().map(|event| event.at_ms).collect();

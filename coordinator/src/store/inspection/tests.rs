@@ -14,7 +14,7 @@ use super::{
     *,
 };
 use crate::store::{
-    Entry, ExperimentState, GenerationCommit, GenerationRecord, LogGap, Store, StoreError, Wanted,
+    Entry, ExperimentState, Filter, GenerationCommit, GenerationRecord, LogGap, Store, StoreError,
 };
 
 /// Commits a generation of a real evolution, whose fitness is its index.
@@ -84,7 +84,7 @@ pub fn findings(directory: &Path) -> Vec<(Option<u64>, String)> {
 
 /// Everything of the experiments in a directory, bit for bit.
 fn contents(store: &Store) -> Vec<String> {
-    let experiments = store.experiments(&Wanted::default()).unwrap();
+    let experiments = store.experiments(&Filter::default()).unwrap();
     let all = experiments.iter().map(|experiment| {
         let id = experiment.id;
         let generations = store.generations(id, 0, 100).unwrap();

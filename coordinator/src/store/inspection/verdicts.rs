@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     runs::restore_evolution,
-    store::{Store, Wanted},
+    store::{Filter, Store},
 };
 
 /// The unfinished experiment with generations.
@@ -85,7 +85,7 @@ fn doctor_and_coordinator_give_the_same_verdict_of_every_kind_of_damage() {
         recover(directory.path(), &recovered).unwrap();
         assert_eq!(findings(&recovered), [], "{sql}");
         let store = Store::open(&recovered).unwrap();
-        for experiment in store.experiments(&Wanted::default()).unwrap() {
+        for experiment in store.experiments(&Filter::default()).unwrap() {
             let error = store.resumable(experiment.id).err();
             let is_sound = match &error {
                 None => goes_on(&store, experiment.id),
@@ -109,7 +109,7 @@ fn a_damaged_experiment_takes_no_other_ones_backup() {
         inspection.findings.iter().filter_map(|finding| finding.experiment).collect();
     assert_eq!(damaged, [ExperimentId(1)]);
     let copy = Store::open(&to).unwrap();
-    assert_eq!(copy.experiments(&Wanted::default()).unwrap().len(), 4);
+    assert_eq!(copy.experiments(&Filter::default()).unwrap().len(), 4);
     assert!(goes_on(&copy, RUNNING));
     assert!(matches!(copy.champion(ExperimentId(1)), Err(StoreError::Corrupt(_))));
 }
@@ -197,7 +197,7 @@ fn tables_of_another_program_are_refused_in_one_short_line() {
             for error in [
                 Store::open(directory.path()).map(drop).unwrap_err(),
                 Store::open_read_only(directory.path())
-                    .and_then(|store| store.experiments(&Wanted::default()))
+                    .and_then(|store| store.experiments(&Filter::default()))
                     .map(drop)
                     .unwrap_err(),
             ] {
@@ -271,5 +271,5 @@ fn what_forks_need_is_deleted_after_them_only() {
     for id in [grandchild, child, parent] {
         store.delete(id).unwrap();
     }
-    assert_eq!(store.experiments(&Wanted::default()).unwrap().len(), 0);
+    assert_eq!(store.experiments(&Filter::default()).unwrap().len(), 0);
 }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::super::{
-    Wanted,
+    Filter,
     tests::{WITHOUT_JUDGEMENTS, WITHOUT_LOG, checkpoint_after, commit, new_experiment},
     *,
 };
@@ -148,7 +148,7 @@ fn a_coordinator_that_has_lost_the_database_writes_nothing_and_still_reads() {
         assert!(matches!(result, Err(StoreError::TakenOver { .. })), "{result:?}");
     }
     assert_eq!(store.events(id, 1, 100).unwrap(), before);
-    assert_eq!(store.experiments(&Wanted::default()).unwrap().len(), 2);
+    assert_eq!(store.experiments(&Filter::default()).unwrap().len(), 2);
 }
 
 /// Copies the database of a directory, with or without its log.
@@ -212,7 +212,7 @@ fn a_long_log_is_moved_into_the_main_file_which_still_needs_it() {
     assert!(matches!(Store::open(copied.path()), Err(StoreError::WithoutLog { .. })));
     let copied = copy(directory.path(), true);
     assert_eq!(
-        Store::open(copied.path()).unwrap().experiments(&Wanted::default()).unwrap().len(),
+        Store::open(copied.path()).unwrap().experiments(&Filter::default()).unwrap().len(),
         40
     );
 }
@@ -286,7 +286,7 @@ fn bytes_that_are_no_text_and_rows_that_are_gone_are_damage_with_the_path() {
     };
     let garbage = "UPDATE experiments SET name = CAST(x'ff' AS TEXT), config = CAST(x'ff' AS TEXT)";
     store.connection.execute_batch(garbage).unwrap();
-    assert_damage(store.experiments(&Wanted::default()).map(|_| ()));
+    assert_damage(store.experiments(&Filter::default()).map(|_| ()));
     assert_damage(store.experiment(id).map(|_| ()));
     store.connection.execute_batch("DELETE FROM identity").unwrap();
     assert_damage(store.notice(id, 1, "look"));
