@@ -22,7 +22,7 @@ export function exports({ svg, table, name }) {
 }
 
 /** An SVG that looks the same without the pages' style. */
-export function svgText(svg) {
+function svgText(svg) {
   const copy = svg.cloneNode(true);
   const [shown, copied] = [svg, copy].map((root) => [root, ...root.querySelectorAll("*")]);
   shown.forEach((node, i) => {
@@ -39,7 +39,7 @@ export function svgText(svg) {
 }
 
 /** Cells with commas, quotes or lines within quotes. */
-export function csvText(rows) {
+function csvText(rows) {
   const cell = (value) => {
     const text = value === null || value === undefined || Number.isNaN(value) ? "" : String(value);
     return /[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;

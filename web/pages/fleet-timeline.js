@@ -26,7 +26,7 @@ const FATES = {
 /** Puts the assignments of a worker into lanes. Results say when they were computed; of the
  *  others only when they were given is known, so each takes what is left free before its end,
  *  and those for which nothing is left had not begun. */
-export function inLanes(assignments, n_lanes) {
+function inLanes(assignments, n_lanes) {
   const lanes = Array.from({ length: n_lanes }, () => []);
   const placed = [];
   const put = (it, lane, start) => {

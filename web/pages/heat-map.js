@@ -205,7 +205,6 @@ export function heatMap(id, onZoom = () => {}) {
     const [from, to] = window();
     const ends = [drag.at, drag.to].sort((a, b) => a - b).map((x) => from + (x / width) * (to - from));
     zoomTo([Math.max(0, Math.round(ends[0])), Math.min(n_generations - 1, Math.round(ends[1]))]);
-    drag.isOver = true;
     picture.dataset.dragged = "1";
   });
   picture.addEventListener("click", (event) => {

@@ -9,7 +9,7 @@ const left = (it) => (it.state === "running" && it.generation_ms !== null ? it.g
 const number = (value) => decimals(value ?? NaN, 3);
 
 /** The labels of an experiment, each as a mark. */
-export const labelMarks = (it) => Object.entries(it.labels).map(([key, value]) => element("span", { className: "tag" }, value ? `${key}=${value}` : key));
+const labelMarks = (it) => Object.entries(it.labels).map(([key, value]) => element("span", { className: "tag" }, value ? `${key}=${value}` : key));
 
 /** The worth of a champion leads: it was found on trials that selected nothing. What there is
  *  before a judgement is optimistic, and looks like it. */

@@ -4,6 +4,7 @@
 import { decimals, element } from "swarm/dom.js";
 import { counted } from "swarm/page.js";
 import { groupings } from "swarm/list-view.js";
+import { quantile } from "swarm/scales.js";
 
 /** Rows are laid out as grids, of which a browser skips those out of sight; what they are is said
  *  again for those who do not see it. */
@@ -93,7 +94,7 @@ export function listTable(view, chosen, onChoose) {
     groups.set(name, made);
     const states = [...Map.groupBy(members, (it) => it.state)].map(([state, its]) => `${its.length} ${state}`).join(", ");
     const worth = members.map((it) => it.champion).filter((it) => it !== null).sort((a, b) => a - b);
-    const middle = worth.length ? (worth[(worth.length - 1) >> 1] + worth[worth.length >> 1]) / 2 : null;
+    const middle = worth.length ? quantile(worth, 0.5) : null;
     const isOpen = view.isOpen(name);
     const ids = members.map((it) => it.id);
     const says = JSON.stringify([states, worth, isOpen, ids]);

@@ -17,7 +17,7 @@ export function bar(title, current) {
 }
 
 /** What a server says that cannot do what was asked, and its status; 0: there was no answer. */
-export class Refusal extends Error {
+class Refusal extends Error {
   constructor(message, status) {
     super(message);
     this.status = status;

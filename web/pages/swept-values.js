@@ -27,7 +27,7 @@ function colorOf(share) {
 
 /** Share of the variance of `worths` between groups with the same value, and the share that values
  *  without an effect have on average; null if each run has its own value, or all are worth the same. */
-export function etaSquared(values, worths) {
+function etaSquared(values, worths) {
   const mean = (all) => all.reduce((sum, it) => sum + it, 0) / all.length;
   const groups = [...Map.groupBy(worths, (_, i) => values[i]).values()];
   const middle = mean(worths);

@@ -47,7 +47,7 @@ def free_port():
 
 
 class Fleet:
-    """A coordinator with pages, and a worker."""
+    """A coordinator with pages; workers when a test starts them."""
 
     def __init__(self, *args, environment=None):
         self.directory = tempfile.TemporaryDirectory()

@@ -74,8 +74,8 @@ pub async fn compare(
     let mut judged = Vec::new();
     let mut means = Vec::new();
     for sample in &samples {
-        let runs: Vec<&Experiment> = known.iter().filter(|it| sample.contains(&it.id)).collect();
-        judged.push(runs.iter().filter_map(|it| it.champion_fitness).collect());
+        let runs: Vec<&Experiment> = known.iter().filter(|run| sample.contains(&run.id)).collect();
+        judged.push(runs.iter().filter_map(|run| run.champion_fitness).collect());
         let mut last = Vec::new();
         for run in runs {
             last.extend(mean_of_last(&shared, run).await?);
@@ -99,7 +99,11 @@ async fn mean_of_last(shared: &Shared, run: &Experiment) -> Result<Option<f64>, 
         page_size: LAST as u32,
     };
     let page = shared.archive.generations(request).await?;
-    let means = page.generations.iter().filter_map(|it| it.summary.as_ref()).map(|it| it.mean);
+    let means = page
+        .generations
+        .iter()
+        .filter_map(|completed| completed.summary.as_ref())
+        .map(|summary| summary.mean);
     let means: Vec<f64> = means.collect();
     Ok((!means.is_empty()).then(|| mean(&means)))
 }
