@@ -100,7 +100,7 @@ Exit codes:
   12   the bundle is not what it says (verify)
   71   the system gives it too few threads or file descriptors, or too little memory
   130  interrupted
-  141  standard output was closed (watch, logs); the other commands go on without it";
+  141  standard output was closed (watch, logs, help); the other commands go on without it";
 
 /// The experiment, or the group of them, that a command is about.
 #[derive(Debug, ClapArgs)]

@@ -1,4 +1,4 @@
-//! Numbers and names of experiments, for a shell that completes them.
+//! The words that a shell completes: experiments, groups, labels and workers in quarantine.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

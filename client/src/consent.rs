@@ -15,7 +15,7 @@ use crate::{error::Error, json, progress::Progress, text};
 /// Before something is done to several experiments that cannot be undone.
 #[derive(Debug, Args)]
 pub struct Consent {
-    /// Do it to all runs of a group without a question.
+    /// Ask no question before several experiments are changed; needed where nobody can answer.
     #[arg(long, short)]
     yes: bool,
     /// Say what would be done, and do nothing.

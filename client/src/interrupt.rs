@@ -73,7 +73,8 @@ fn listen_for_the_end() {
     static ONCE: Once = Once::new();
     // Without a runtime, there is no command; one without threads hears nothing while it computes.
     let runtime = Handle::try_current();
-    let runtime = runtime.ok().filter(|it| it.runtime_flavor() != RuntimeFlavor::CurrentThread);
+    let runtime =
+        runtime.ok().filter(|runtime| runtime.runtime_flavor() != RuntimeFlavor::CurrentThread);
     if let (None, Some(runtime)) = (TOKEN.get(), runtime) {
         ONCE.call_once(|| {
             let _entered = runtime.enter();

@@ -58,7 +58,7 @@ pub fn evaluations(number: usize) -> Option<String> {
         1 => "1 evaluation is not done".to_owned(),
         n => format!("{n} evaluations are not done"),
     };
-    Some(format!("{what}, too; `swarmctl explain` says what is waited for"))
+    Some(format!("{what}; see why: swarmctl explain"))
 }
 
 /// A count that may be large, to three digits, such as "1.50 billion".

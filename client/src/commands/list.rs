@@ -56,8 +56,8 @@ const CSV_KEYS: [&str; 28] = [
 ///
 /// `judged` is the mean fitness of the champion on trials that selected nothing, once the
 /// run has ended; `selection` that on the held-out trials by which it was selected, which
-/// is optimistic. `best` and `mean` are those of the latest generation. `eta` is the time that the generations left take if they are as fast as the
-/// latest ones. A narrow terminal shows fewer columns, `--output wide` all.
+/// is optimistic. `best` and `mean` are those of the latest generation. `eta` is the time that
+/// the generations left take if they are as fast as the latest ones. A narrow terminal shows fewer columns, `--output wide` all.
 #[derive(Debug, Args)]
 #[command(visible_alias = "ls", after_help = HELP)]
 pub struct ListArgs {

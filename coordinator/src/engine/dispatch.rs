@@ -369,8 +369,7 @@ impl Engine {
 
     /// A worker computes an assignment no more.
     pub(super) fn forget_holder(&mut self, assignment_id: AssignmentId, assignment: &AssignedItem) {
-        let work = self.jobs.get_mut(&assignment.job);
-        let Some(batch) = work.and_then(|work| work.batch.as_mut()) else { return };
+        let Some(batch) = self.batch_mut(assignment.job) else { return };
         batch.remove_holder(assignment_id, assignment.item.individual);
         batch.uncovered.remove(&(assignment.expected, assignment_id));
     }

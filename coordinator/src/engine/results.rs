@@ -305,7 +305,7 @@ impl Engine {
     ) {
         let NoResult::WorkerLost { process, is_alone } = lost else { return };
         let (job, item) = (assignment.job, &assignment.item);
-        let batch = self.jobs.get_mut(&job).and_then(|work| work.batch.as_mut());
+        let batch = self.batch_mut(job);
         let Some(batch) = batch.filter(|batch| batch.trial_set() == assignment.trial_set) else {
             return;
         };
@@ -322,8 +322,7 @@ impl Engine {
     pub(super) fn requeue_delayed(&mut self, now: Instant) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
-            let take_due =
-                |engine: &mut Self| engine.jobs.get_mut(&id)?.batch.as_mut()?.take_due(now);
+            let take_due = |engine: &mut Self| engine.batch_mut(id)?.take_due(now);
             while let Some(item) = take_due(self) {
                 self.requeue(id, &item);
             }

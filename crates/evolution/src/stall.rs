@@ -86,7 +86,7 @@ impl Told {
 /// Whether a generation of this fitness tells nobody apart. One individual alone is not told apart
 /// from others anyway.
 pub(crate) fn is_flat(fitness: &[f64]) -> bool {
-    fitness.len() > 1 && fitness.iter().all(|it| it.is_finite() && *it == fitness[0])
+    fitness.len() > 1 && fitness.iter().all(|each| each.is_finite() && *each == fitness[0])
 }
 
 impl Evolution {
@@ -95,8 +95,8 @@ impl Evolution {
         self.n_flat.0
     }
 
-    /// It, after so many generations without a difference: of one that was read, which has
-    /// forgotten them.
+    /// Sets the number of latest generations without a difference, which no state that is read
+    /// has.
     #[must_use]
     pub fn after_flat(self, n_generations: u64) -> Self {
         Self { n_flat: FlatGenerations(n_generations), ..self }

@@ -183,7 +183,7 @@ pub fn png(
     }
     let sampled = shown.range.clone().step_by(n_frames.div_ceil(SAMPLED)).map(frame);
     let sampled: Vec<Vec<u8>> = sampled.collect::<Result<_, _>>()?;
-    let palette = Palette::of(sampled.iter().map(Vec::as_slice));
+    let palette = Palette::from_frames(sampled.iter().map(Vec::as_slice));
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_palette(palette.bytes());
     encoder.set_trns(Palette::opacity());

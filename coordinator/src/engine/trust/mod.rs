@@ -3,13 +3,13 @@
 //! The rest of the engine reports trouble, and asks three things: whether a worker may have
 //! items, which items wait for an answer, and whether a batch still waits for an audit.
 //!
-//! | trouble | file | consequence |
+//! | event | file | consequence |
 //! |---|---|---|
 //! | a worker reports a failure, or two return different bits | `doubts.rs` | a question for the referee (`questions.rs`) |
 //! | workers are lost with the same item | `losses.rs` | the item becomes a suspect, and then a question |
 //! | a worker is lost before it returns anything | `crash_loops.rs` | it gets its next item later, and one only |
 //! | the referee answers | `verdicts.rs` | the item fails its job, or a worker is quarantined (`quarantine.rs`) |
-//! | none | `audits.rs`, `unaudited.rs` | a share of the results is computed by a second worker, too |
+//! | a result comes in | `audits.rs`, `unaudited.rs` | a second worker computes a share of the results, too |
 
 mod audits;
 mod crash_loops;
@@ -22,7 +22,7 @@ mod verdicts;
 
 use std::time::{Duration, Instant};
 
-use super::{Engine, Introduction, OpenQuestion, worker::Worker};
+use super::{Engine, Introduction, OpenQuestion, item::Item, worker::Worker};
 use crate::ids::JobId;
 
 use self::{
@@ -95,7 +95,7 @@ impl Trust {
     }
 
     /// Takes the first such audit.
-    pub fn pop_audit_for(&self, name: &str, audits: &mut Audits) -> Option<super::item::Item> {
+    pub fn pop_audit_for(&self, name: &str, audits: &mut Audits) -> Option<Item> {
         audits.pop_for(name, &self.doubted)
     }
 

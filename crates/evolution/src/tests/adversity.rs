@@ -175,7 +175,7 @@ fn generations_without_a_difference_are_no_part_of_the_state_but_go_on_from_a_ch
 #[test]
 fn fitness_tells_nobody_apart_if_it_is_finite_and_the_same_for_several() {
     let is_flat = |means: &[f64]| {
-        Told::from_fitness(means.iter().map(|it| vec![*it, *it]).collect()).is_flat()
+        Told::from_fitness(means.iter().map(|&mean| vec![mean, mean]).collect()).is_flat()
     };
     assert!(is_flat(&[0.5, 0.5]) && is_flat(&[0.0, -0.0, 0.0]));
     assert!(!is_flat(&[0.5, 0.25]) && !is_flat(&[0.5, f64::NAN]) && !is_flat(&[0.5]));

@@ -21,7 +21,7 @@ pub struct Palette {
 
 impl Palette {
     /// Those that are most frequent in some frames.
-    pub fn of<'a>(frames: impl Iterator<Item = &'a [u8]>) -> Self {
+    pub fn from_frames<'a>(frames: impl Iterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<Rgb, usize> = BTreeMap::new();
         for frame in frames {
             for pixel in frame.as_chunks().0 {
@@ -121,7 +121,7 @@ mod tests {
     fn colours_are_kept_if_they_are_few_and_the_nearest_ones_taken_otherwise() {
         let frame: Vec<u8> =
             (0..=255).flat_map(|i| [i, i, 0].repeat(if i == 7 { 1 } else { 2 })).collect();
-        let mut palette = Palette::of([&*frame].into_iter());
+        let mut palette = Palette::from_frames([&*frame].into_iter());
         assert_eq!(palette.bytes().len(), 3 * 256);
         assert_ne!(palette.place([8, 8, 0]), palette.place([9, 9, 0]));
         assert!(
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn what_changes_has_a_rectangle() {
-        let mut frames = Frames::new(4, Palette::of(std::iter::empty()));
+        let mut frames = Frames::new(4, Palette::from_frames(std::iter::empty()));
         frames.shown = vec![1; 16];
         assert_eq!(frames.changed(&[1; 16]), [0, 0, 1, 1]);
         let mut next = vec![1; 16];
