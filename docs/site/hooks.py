@@ -1,0 +1,157 @@
+"""Brings into the site what the pages of docs/ link to elsewhere in the repository.
+
+- A link to a Markdown file, such as ../CONTRIBUTING.md, leads to a page with its text.
+- A link to another text file leads to a page that shows the file, a link to a folder to a page
+  that lists it.
+- Reference pages are made of what the programs are made of: every command's help, the protocol
+  and the Python API. A link to one of their sources leads to the page.
+
+The pages in docs/ stay readable where the repository is hosted: their links are plain.
+"""
+
+import ast
+import posixpath
+import re
+from pathlib import Path
+
+from mkdocs.structure.files import File
+
+ROOT = Path(__file__).resolve().parents[2]
+HELP = "client/src/commands/snapshots/swarmctl__commands__tests__the_manual.snap"
+PROTOCOL = "proto/swarm/v1"
+PAGES = ["CHANGELOG.md", "CONTRIBUTING.md"]
+PYTHON = "python/swarmevo/__init__.py"
+
+LINK = re.compile(r"(?<=\]\()(?!\w+:|#)(?P<path>[^)\s#]+)(?P<anchor>#[^)\s]*)?(?=[)\s])")
+FENCE = re.compile(r"^(```+|~~~+).*?^\1", re.MULTILINE | re.DOTALL)
+LEXERS = {
+    ".ipynb": "json", ".json": "json", ".py": "python", ".rs": "rust", ".proto": "protobuf",
+    ".star": "python", ".service": "ini", ".toml": "toml", ".yaml": "yaml", ".sbatch": "bash",
+}
+
+# The address in the site of a file of the repository that is not in docs/.
+_pages: dict[str, str] = {}
+
+
+def on_files(files, config):
+    _pages.clear()
+    made = {"commands.md": commands(), "protocol.md": protocol(), "python-api.md": python_api()}
+    _pages[HELP] = "commands.md"
+    _pages[PYTHON] = "python-api.md"
+    _pages[PROTOCOL] = "protocol.md"
+    for file in (ROOT / PROTOCOL).glob("*.proto"):
+        _pages[f"{PROTOCOL}/{file.name}"] = "protocol.md"
+    waiting = [f"docs/{file.src_uri}" for file in files.documentation_pages()] + PAGES
+    while waiting:
+        source = waiting.pop()
+        text = (ROOT / source).read_text(encoding="utf-8")
+        if not source.startswith("docs/"):
+            address = source if source in PAGES else f"source/{source}"
+            _pages[source], made[address] = address, text
+        for match in LINK.finditer(FENCE.sub("", text)):
+            target = _target(source, match["path"])
+            path = ROOT / target
+            if target in _pages or _is_in_docs(target) or target in waiting or not path.exists():
+                continue
+            if path.suffix == ".md":
+                waiting.append(target)
+            else:
+                _pages[target] = f"source/{target}.md"
+                made[f"source/{target}.md"] = shown(path)
+    for uri, content in made.items():
+        files.append(File.generated(config, uri, content=content))
+    return files
+
+
+def on_page_markdown(markdown, page, config, files):
+    """Leads links that leave docs/ to the pages that were made for them."""
+    here = page.file.src_uri
+    source = next((path for path, uri in _pages.items() if uri == here), f"docs/{here}")
+
+    def replaced(match):
+        target = _target(source, match["path"])
+        if _is_in_docs(target):
+            address = target.removeprefix("docs/")
+        elif target in _pages:
+            address = _pages[target]
+        else:
+            return match[0]
+        return posixpath.relpath(address, posixpath.dirname(here) or ".") + (match["anchor"] or "")
+
+    kept = []
+
+    def keep(match):
+        kept.append(match[0])
+        return f"\0{len(kept) - 1}\0"
+
+    text = LINK.sub(replaced, FENCE.sub(keep, markdown))
+    return re.sub("\0(\\d+)\0", lambda match: kept[int(match[1])], text)
+
+
+def _target(source, link):
+    return posixpath.normpath(posixpath.join(posixpath.dirname(source), link))
+
+
+def _is_in_docs(path):
+    return path.startswith("docs/") and not path.startswith("docs/deploy")
+
+
+def shown(path):
+    """A page with a file's text, or the names in a folder."""
+    name = path.relative_to(ROOT)
+    head = f"---\nsearch: {{exclude: true}}\n---\n\n# `{name}`\n\n"
+    if path.is_dir():
+        names = sorted(f"{entry.name}/" if entry.is_dir() else entry.name for entry in path.iterdir())
+        return head + "\n".join(f"- `{name}`" for name in names if not name.startswith((".", "__")))
+    try:
+        text = path.read_text(encoding="utf-8").rstrip()
+    except UnicodeDecodeError:
+        return head + f"{path.stat().st_size} bytes that are no text."
+    return f"{head}{fenced(text, LEXERS.get(path.suffix, 'text'))}\n"
+
+
+def fenced(text, language):
+    fence = "`" * max(3, max((len(run) + 1 for run in re.findall("`{3,}", text)), default=3))
+    return f"{fence}{language}\n{text}\n{fence}"
+
+
+def commands():
+    """The help of every command, as the program prints it; a test keeps the file so."""
+    text = (ROOT / HELP).read_text(encoding="utf-8").split("\n---\n", 1)[1]
+    pages = re.split(r"\n={80}\n", text)
+    parts = ["# Commands\n\nWhat `swarmctl COMMAND --help` prints. [By task](swarmctl.md)."]
+    seen = set()
+    for page in pages:
+        usage = re.search(r"^Usage: (swarmctl(?: [a-z]+)*)", page, re.MULTILINE)[1]
+        # The summaries of `-h` come first, before the manuals of the same commands.
+        if usage != "swarmctl" and "see more with '--help'" in page:
+            continue
+        if usage not in seen:
+            seen.add(usage)
+            parts.append(f"## {usage}\n\n{fenced(page.strip(), 'text')}")
+    return "\n\n".join(parts) + "\n"
+
+
+def protocol():
+    """Every message and service of the protocol, with the comments of its source."""
+    parts = ["# Protocol\n\nThe gRPC interface of the coordinator. [How to write a client](clients.md)."]
+    for path in sorted((ROOT / PROTOCOL).glob("*.proto"), key=lambda path: path.name != "experiment.proto"):
+        parts.append(f"## {path.name}")
+        text = path.read_text(encoding="utf-8")
+        for block in re.split(r"\n{2,}(?=//|message |service |enum )", text):
+            named = re.search(r"^(message|service|enum) (\w+)", block, re.MULTILINE)
+            if named:
+                parts.append(f"### {named[2]}\n\n{fenced(block.strip(), 'protobuf')}")
+    return "\n\n".join(parts) + "\n"
+
+
+def python_api():
+    """What the package exports, by its docstrings."""
+    tree = ast.parse((ROOT / PYTHON).read_text(encoding="utf-8"))
+    parts = [
+        "# Python API\n\nThe docstrings of the package `swarmevo`. [How to use it](python.md).",
+    ]
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.module != "_core":
+            parts += [f"::: swarmevo.{node.module}.{alias.name}" for alias in node.names]
+    return "\n\n".join(parts) + "\n"
