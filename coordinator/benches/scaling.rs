@@ -1,6 +1,6 @@
 //! How well a fleet is used, from one worker to ten thousand: the real engine
 //! drives simulated workers in virtual time. Prints the tables of
-//! `docs/scaling.md`.
+//! `docs/notebook/2026-11-fleet.md`.
 
 #[path = "../tests/api/simulated_fleet/mod.rs"]
 #[allow(dead_code, reason = "shared with the tests, which use more of it")]

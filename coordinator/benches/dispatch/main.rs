@@ -1,7 +1,7 @@
 //! How fast the coordinator hands out work and takes results: the coordinator as
 //! a process of its own, and workers that answer at once, over gRPC on loopback.
-//! Prints the tables of `docs/scaling.md`; an argument selects lines by a part of
-//! their name.
+//! Prints the tables of `docs/notebook/2026-11-fleet.md`; an argument selects lines by a
+//! part of their name.
 
 mod alone;
 mod coordinator_process;

@@ -369,7 +369,7 @@ fn what_is_no_checkpoint_is_an_error() {
     assert!(matches!(hopeless, Err(CheckpointError::Evolution(_))), "{hopeless:?}");
 }
 
-/// At the size of experiment A; `docs/data.md` has these numbers.
+/// At the size of experiment A; `docs/notebook/2026-11-storage.md` has these numbers.
 #[test]
 fn keyframes_are_as_far_apart_as_time_and_room_allow() {
     let interval = |algorithm: &str, population_size: usize, d: usize, n_trials: usize| {
