@@ -3,8 +3,8 @@
 
     results/compare.py
 
-Each value is the median over the runs in results/, in brackets the least and the greatest. Needs
-swarmctl in the PATH, Python 3.9 and nothing else.
+Each value is the median over the runs in results/, in brackets the least and the greatest: run
+results/fetch before, for all seeds. Needs swarmctl in the PATH, Python 3.9 and nothing else.
 """
 
 import json

@@ -3,6 +3,7 @@
 
     results/report.py [DIRECTORY]    runs and evaluations in it; results/ by default
 
+Run results/fetch before: the report is about all seeds, and a clone's tree has one of each run.
 Needs Python 3.9 and nothing else. `swarmctl compare` prints the statistics of samples.
 """
 
@@ -120,6 +121,9 @@ def evaluation(folder):
         errors(folder, trials)
     if "near_light_photosensitive" in metrics:
         lost_lights(folder)
+    if not (folder / "steps.csv").exists():
+        print("Curves by step: not in this tree; results/fetch writes them.\n")
+        return
     steps = read_csv(folder / "steps.csv")
     medians = defaultdict(dict)
     for row in steps:

@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p sim-core --example watch -- configs/leader_selection_snes.json \
-//!     results/champions/leader_selection_snes-2.json
+//!     results/champions/leader_selection_snes-0.json
 //! ```
 
 use std::{env, error::Error, fs};

@@ -4,6 +4,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     env, fs,
+    os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -223,15 +224,48 @@ fn evaluations_have_the_same_bits_again() {
     }
 }
 
+/// A project with the runs of all seeds; none without Python or the history of this one.
+fn project_with_all_runs() -> Option<TempDir> {
+    let mut fetch = python_script(results("fetch"))?;
+    let first = fs::read_to_string(results("assets.csv")).unwrap();
+    let blob = first.lines().nth(1).and_then(|line| line.rsplit(',').next()).unwrap().to_owned();
+    let git = Command::new("git").args(["cat-file", "-e", &blob]).current_dir(results("")).status();
+    if !git.is_ok_and(|status| status.success()) {
+        skipped_for_want_of("the history of this clone", "git fetch --unshallow");
+        return None;
+    }
+    let project = tempfile::tempdir().unwrap();
+    Outcome::of_command(fetch.arg("--to").arg(project.path().join("results"))).expect_success();
+    symlink(workspace_file("configs"), project.path().join("configs")).unwrap();
+    Some(project)
+}
+
+#[test]
+fn every_file_that_is_listed_is_here_with_its_digest_or_can_be_fetched() {
+    let list = fs::read_to_string(results("assets.csv")).unwrap();
+    let listed: Vec<&str> =
+        list.lines().skip(1).map(|line| line.split_once(',').unwrap().0).collect();
+    assert!(listed.is_sorted() && listed.len() > 300, "{}", listed.len());
+    let Some(project) = project_with_all_runs() else { return };
+    let fetched = project.path().join("results");
+    for path in &listed {
+        assert!(fetched.join(path).exists(), "{path}");
+    }
+    let damaged = fetched.join(listed[0]);
+    fs::write(&damaged, "other").unwrap();
+    let again =
+        Outcome::of_command(Command::new(fetched.join("fetch")).arg("--from").arg(results("")));
+    assert!(again.stderr.contains(listed[0]), "{again:?}");
+    assert_eq!(fs::read_to_string(damaged).unwrap(), "other");
+}
+
 /// Numbers of `docs/reproduction.md`, one of each table.
 #[test]
 fn the_script_of_the_report_prints_its_numbers() {
+    let Some(project) = project_with_all_runs() else { return };
+    let results = |path: &str| project.path().join("results").join(path);
     let mut command = Command::new(results("report.py"));
     command.arg(results("format-2"));
-    if Command::new("python3").arg("--version").output().is_err() {
-        skipped_for_want_of("python3", "apt-get install python3");
-        return;
-    }
     let report = Outcome::of_command(&mut command).expect_success().stdout;
     for row in [
         "| leader_selection_snes-0 | 1000 | 1.737 |",
@@ -276,7 +310,8 @@ fn project_with(script: &str) -> TempDir {
 
 #[test]
 fn the_report_has_what_the_algorithms_came_to_on_each_task() {
-    let Some(mut command) = python_script(results("compare.py")) else { return };
+    let Some(project) = project_with_all_runs() else { return };
+    let mut command = script(project.path().join("results/compare.py"));
     let table = Outcome::of_command(&mut command).expect_success().stdout;
     let report = fs::read_to_string(workspace_file("docs/reproduction.md")).unwrap();
     assert!(table.contains("| D | "), "{table}");
