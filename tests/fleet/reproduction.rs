@@ -309,14 +309,18 @@ fn project_with(script: &str) -> TempDir {
 }
 
 #[test]
-fn the_report_has_what_the_algorithms_came_to_on_each_task() {
+fn pages_have_the_tables_that_scripts_make_of_the_runs() {
     let Some(project) = project_with_all_runs() else { return };
-    let mut command = script(project.path().join("results/compare.py"));
-    let table = Outcome::of_command(&mut command).expect_success().stdout;
-    let report = fs::read_to_string(workspace_file("docs/reproduction.md")).unwrap();
-    assert!(table.contains("| D | "), "{table}");
-    for row in table.lines() {
-        assert!(report.contains(row), "{row}");
+    for (name, page) in
+        [("compare.py", "docs/reproduction.md"), ("thesis.py", "docs/howto/did-the-thesis-hold.md")]
+    {
+        let mut command = script(project.path().join("results").join(name));
+        let table = Outcome::of_command(&mut command).expect_success().stdout;
+        let text = fs::read_to_string(workspace_file(page)).unwrap();
+        assert!(table.contains("| D | "), "{table}");
+        for row in table.lines() {
+            assert!(text.contains(row), "{page} lacks what {name} prints: {row}");
+        }
     }
 }
 

@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+"""Prints what each reading of the thesis comes to: its tables, and the constants of its program.
+
+    results/thesis.py              the table of docs/howto/did-the-thesis-hold.md
+    results/thesis.py --update     writes it into that page
+
+The mean fitness is that of the last 50 generations, a median over the runs, in brackets the least and
+the greatest. A champion's worth is the median run's, with its 95 % interval, then the range over all
+runs. Readings without runs in results/ have no row. Needs Python 3.9 and nothing else.
+"""
+
+import json
+import statistics
+import sys
+
+from report import LAST, RESULTS, read_csv
+
+PAGE = RESULTS.parent / "docs" / "howto" / "did-the-thesis-hold.md"
+BEGIN, END = "<!-- generated: readings -->\n", "<!-- end: readings -->"
+# Experiment, reading, algorithm, and the name of the experiment file.
+READINGS = [
+    ("A", "Table 3.4", "GA", "leader_selection_ga"),
+    ("A", "the program's rates", "SNES", "leader_selection_snes"),
+    ("B", "Table 3.4", "GA", "borderline_ga"),
+    ("B", "two constants of the program", "GA", "borderline_ga_original"),
+    ("B", "the program's file", "GA", "borderline_ga_program"),
+    ("B", "the program's rates", "SNES", "borderline_snes"),
+    ("C", "Eq. 5.5 and Table 3.4", "GA", "orientation_consensus_ga"),
+    ("C", "Eq. 5.5, the program's rates", "SNES", "orientation_consensus_snes"),
+    ("C", "the program's function, Table 3.4", "GA", "orientation_consensus_alignment_ga"),
+    ("C", "the program's function and rates", "SNES", "orientation_consensus_alignment_snes"),
+    ("C", "the program's file", "GA", "orientation_consensus_ga_program"),
+    ("D", "Table 3.2 and 3.4, twice the program's speed", "GA", "light_follower_thesis_sensors_ga"),
+    ("D", "Table 3.2, twice the program's speed", "SNES", "light_follower_thesis_sensors_snes"),
+    ("D", "Table 3.4, the program's sensors, twice its speed", "GA", "light_follower_ga"),
+    ("D", "the program's sensors and rates, twice its speed", "SNES", "light_follower_snes"),
+    ("D", "the program's constants and speed, its network for the GA", "SNES", "light_follower_snes_original"),
+    ("D", "the program's file", "GA", "light_follower_ga_program"),
+    ("D", "the program's file", "SNES", "light_follower_snes_program"),
+]
+
+
+def spread(values):
+    """The range of several values."""
+    return f" ({min(values):.3f} to {max(values):.3f})" if len(values) > 1 else ""
+
+
+def row(experiment, reading, algorithm, name):
+    """A line of the table; nothing without runs."""
+    stems = sorted(path.stem for path in (RESULTS / "champions").glob(f"{name}-*.json"))
+    if not stems:
+        return []
+    histories = [read_csv(RESULTS / "histories" / f"{stem}.csv") for stem in stems]
+    champions = [json.loads((RESULTS / "champions" / f"{stem}.json").read_text())["judged"] for stem in stems]
+    means = [statistics.fmean(float(it["mean"]) for it in history[-LAST:]) for history in histories]
+    worths = sorted(champions, key=lambda it: it["mean"])
+    middle = worths[(len(worths) - 1) // 2]
+    worth = f"{middle['mean']:.3f}, 95 % {middle['ci95'][0]:.3f} to {middle['ci95'][1]:.3f}"
+    cells = [
+        experiment,
+        reading,
+        algorithm,
+        len(stems),
+        len(histories[0]),
+        f"{statistics.median(means):.3f}{spread(means)}",
+        f"{worth}{spread([it['mean'] for it in worths])}",
+    ]
+    return ["| " + " | ".join(map(str, cells)) + " |"]
+
+
+def table():
+    head = ["experiment", "reading", "algorithm", "seeds", "generations", f"mean, last {LAST}", "champion"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(sum((row(*reading) for reading in READINGS), lines)) + "\n"
+
+
+def main():
+    if sys.argv[1:] == ["--update"]:
+        before, rest = PAGE.read_text().split(BEGIN)
+        _, after = rest.split(END)
+        PAGE.write_text(f"{before}{BEGIN}\n{table()}\n{END}{after}")
+    else:
+        print(table(), end="")
+
+
+if __name__ == "__main__":
+    main()
