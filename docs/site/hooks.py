@@ -2,7 +2,7 @@
 
 - A link to a Markdown file, such as ../CONTRIBUTING.md, leads to a page with its text.
 - A link to another text file leads to a page that shows the file, a link to a folder to a page
-  that lists it.
+  that lists its files, with what their first lines say.
 - Reference pages are made of what the programs are made of: every command's help, the protocol
   and the Python API. A link to one of their sources leads to the page.
 
@@ -28,6 +28,15 @@ LEXERS = {
     ".ipynb": "json", ".json": "json", ".py": "python", ".rs": "rust", ".proto": "protobuf",
     ".star": "python", ".service": "ini", ".toml": "toml", ".yaml": "yaml", ".sbatch": "bash",
 }
+
+# What the first comment of a file is, up to an empty line in it.
+FIRST_COMMENT = {
+    ".js": r"((?:// .*\n)+)",
+    ".py": r'(?:#!.*\n)?"""([^"]+?)(?:"""|\n\n)',
+    ".rs": r"((?://! .*\n)+)",
+    ".sh": r"#!.*\n((?:# .*\n)+)",
+}
+UNLISTED = re.compile(r"(^|/)(target|node_modules|__pycache__|secrets|\.[^/]*)(/|$)|\.so$")
 
 # The address in the site of a file of the repository that is not in docs/.
 _pages: dict[str, str] = {}
@@ -101,13 +110,26 @@ def shown(path):
     name = path.relative_to(ROOT)
     head = f"---\nsearch: {{exclude: true}}\n---\n\n# `{name}`\n\n"
     if path.is_dir():
-        names = sorted(f"{entry.name}/" if entry.is_dir() else entry.name for entry in path.iterdir())
-        return head + "\n".join(f"- `{name}`" for name in names if not name.startswith((".", "__")))
+        files = (file for file in sorted(path.rglob("*")) if file.is_file())
+        rows = [
+            f"| `{file.relative_to(path)}` | {subject(file)} |"
+            for file in files
+            if not UNLISTED.search(str(file.relative_to(ROOT)))
+        ]
+        return head + "\n".join(["| file | subject |", "|---|---|", *rows])
     try:
         text = path.read_text(encoding="utf-8").rstrip()
     except UnicodeDecodeError:
         return head + f"{path.stat().st_size} bytes that are no text."
     return f"{head}{fenced(text, LEXERS.get(path.suffix, 'text'))}\n"
+
+
+def subject(path):
+    """What the first comment of a source file says, up to its first empty line."""
+    pattern = FIRST_COMMENT.get(path.suffix)
+    found = pattern and re.match(pattern, path.read_text(encoding="utf-8"))
+    lines = [line.lstrip("/!# ").strip() for line in (found[1] if found else "").splitlines()]
+    return " ".join(lines).replace("|", "\\|").replace("[`", "`").replace("`]", "`")
 
 
 def fenced(text, language):
