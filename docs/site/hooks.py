@@ -19,7 +19,7 @@ from mkdocs.structure.files import File
 ROOT = Path(__file__).resolve().parents[2]
 HELP = "client/src/commands/snapshots/swarmctl__commands__tests__the_manual.snap"
 PROTOCOL = "proto/swarm/v1"
-PAGES = ["CHANGELOG.md", "CONTRIBUTING.md"]
+PAGES = {"README.md": "start.md", "CHANGELOG.md": "CHANGELOG.md", "CONTRIBUTING.md": "CONTRIBUTING.md"}
 PYTHON = "python/swarmevo/__init__.py"
 
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)(?P<path>[^)\s#]+)(?P<anchor>#[^)\s]*)?(?=[)\s])")
@@ -50,12 +50,12 @@ def on_files(files, config):
     _pages[PROTOCOL] = "protocol.md"
     for file in (ROOT / PROTOCOL).glob("*.proto"):
         _pages[f"{PROTOCOL}/{file.name}"] = "protocol.md"
-    waiting = [f"docs/{file.src_uri}" for file in files.documentation_pages()] + PAGES
+    waiting = [f"docs/{file.src_uri}" for file in files.documentation_pages()] + list(PAGES)
     while waiting:
         source = waiting.pop()
         text = (ROOT / source).read_text(encoding="utf-8")
         if not source.startswith("docs/"):
-            address = source if source in PAGES else f"source/{source}"
+            address = PAGES.get(source, f"source/{source}")
             _pages[source], made[address] = address, text
         for match in LINK.finditer(FENCE.sub("", text)):
             target = _target(source, match["path"])
@@ -95,6 +95,15 @@ def on_page_markdown(markdown, page, config, files):
 
     text = LINK.sub(replaced, FENCE.sub(keep, markdown))
     return re.sub("\0(\\d+)\0", lambda match: kept[int(match[1])], text)
+
+
+def on_page_content(html, page, config, files):
+    """Lets long names in tables break where their parts do, so that a table fits a phone."""
+
+    def breakable(match):
+        return re.sub(r"(?<=[_/.=])(?=\w)", "<wbr>", match[0])
+
+    return re.sub(r"(?<=<code>)[^<]{12,}(?=</code>)", breakable, html)
 
 
 def _target(source, link):
