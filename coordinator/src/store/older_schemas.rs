@@ -90,3 +90,6 @@ pub fn read_as_latest(connection: &Connection, version: i64) -> rusqlite::Result
     }
     Ok(())
 }
+
+#[cfg(test)]
+pub mod tests;

@@ -21,7 +21,7 @@ pub(super) use summary;
 
 /// Statements that lead from version i to version i + 1. Never change an entry
 /// that has been released; add one.
-const MIGRATIONS: &[&str] = &[
+pub(super) const MIGRATIONS: &[&str] = &[
     "
     CREATE TABLE experiments (
         id INTEGER PRIMARY KEY AUTOINCREMENT,

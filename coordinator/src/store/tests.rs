@@ -79,44 +79,6 @@ pub fn commit(
     )
 }
 
-/// Takes a database to version 7.
-pub const WITHOUT_LOG: &str = "
-    DROP TABLE forks;
-    CREATE TABLE checkpoints (experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
-                              state BLOB NOT NULL, seal BLOB NOT NULL DEFAULT x'') STRICT;
-    INSERT OR REPLACE INTO checkpoints SELECT experiment_id, state, seal FROM keyframes
-    ORDER BY n_generations;
-    CREATE TABLE checkpoint_steps (
-        experiment_id INTEGER NOT NULL REFERENCES experiments (id),
-        generation INTEGER NOT NULL, step BLOB NOT NULL, seal BLOB NOT NULL,
-        PRIMARY KEY (experiment_id, generation)) STRICT, WITHOUT ROWID;
-    INSERT INTO checkpoint_steps SELECT * FROM fitness_log AS l
-    WHERE generation >= (SELECT max(n_generations) FROM keyframes AS k
-                         WHERE k.experiment_id = l.experiment_id);
-    DROP TABLE keyframes;
-    DROP TABLE fitness_log;
-    DROP INDEX experiments_by_name;
-    DROP INDEX experiments_by_group;
-    DROP INDEX experiments_by_digest;
-    DROP INDEX experiments_by_state;
-    ALTER TABLE experiments DROP COLUMN summary;
-    ALTER TABLE experiments DROP COLUMN labels;
-    ALTER TABLE experiments DROP COLUMN archived;
-    ALTER TABLE experiments DROP COLUMN log_from;
-    ALTER TABLE experiments DROP COLUMN log_gap;
-    PRAGMA user_version = 7;";
-
-/// Takes it from there to version 5.
-pub const WITHOUT_JUDGEMENTS: &str = "
-    ALTER TABLE champions DROP COLUMN judged_mean;
-    ALTER TABLE champions DROP COLUMN judged_low;
-    ALTER TABLE champions DROP COLUMN judged_high;
-    ALTER TABLE champions DROP COLUMN judged_trials;
-    ALTER TABLE champions DROP COLUMN judged_generation;
-    ALTER TABLE experiments DROP COLUMN group_name;
-    ALTER TABLE experiments DROP COLUMN variant;
-    PRAGMA user_version = 5;";
-
 fn open() -> (tempfile::TempDir, Store) {
     let directory = tempfile::tempdir().unwrap();
     let store = Store::open(directory.path()).unwrap();

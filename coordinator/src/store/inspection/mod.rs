@@ -86,6 +86,6 @@ fn inspect_file(path: &Path, restore: &str) -> Result<Inspection> {
 }
 
 #[cfg(test)]
-mod tests;
+pub mod tests;
 #[cfg(test)]
 mod verdicts;

@@ -7,10 +7,7 @@ use rusqlite::Connection;
 use tempfile::TempDir;
 
 use super::{
-    super::{
-        file, schema,
-        tests::{WITHOUT_JUDGEMENTS, WITHOUT_LOG, new_experiment},
-    },
+    super::{file, older_schemas::tests::downgrade, schema, tests::new_experiment},
     *,
 };
 use crate::store::{
@@ -23,7 +20,7 @@ pub fn advance(store: &mut Store, id: ExperimentId, completed: Option<&str>) {
 }
 
 /// `is_keyframe`: whether a keyframe is kept.
-fn advance_to(is_keyframe: bool, store: &mut Store, id: ExperimentId, completed: Option<&str>) {
+pub fn advance_to(is_keyframe: bool, store: &mut Store, id: ExperimentId, completed: Option<&str>) {
     let (_, checkpoint) = store.resumable(id).unwrap();
     let mut evolution = Evolution::restore(&checkpoint).unwrap();
     let generation = evolution.ask();
@@ -329,22 +326,8 @@ fn older_schemas_are_looked_at_and_recovered_without_a_change() {
     let mut store = Store::open(directory.path()).unwrap();
     advance_to(true, &mut store, ExperimentId(2), None);
     drop(store);
-    edit(directory.path(), WITHOUT_LOG);
-    edit(directory.path(), WITHOUT_JUDGEMENTS);
-    let inspection = inspect(directory.path()).unwrap();
-    assert!(inspection.findings.is_empty(), "{:?}", inspection.findings);
-    assert_eq!((inspection.schema_version, inspection.n_generations), (5, 8));
-    edit(
-        directory.path(),
-        "DELETE FROM checkpoints WHERE experiment_id IN (1, 3);
-         DROP TABLE checkpoint_steps;
-         ALTER TABLE experiments DROP COLUMN seal;
-         ALTER TABLE generations DROP COLUMN seal;
-         ALTER TABLE checkpoints DROP COLUMN seal;
-         ALTER TABLE champions DROP COLUMN seal;
-         DROP TABLE identity;
-         PRAGMA user_version = 2;",
-    );
+    downgrade(directory.path(), 2);
+    edit(directory.path(), "DELETE FROM checkpoints WHERE experiment_id IN (1, 3)");
     let path = file::path_in(directory.path());
     let before = fs::read(&path).unwrap();
     let inspection = inspect(directory.path()).unwrap();

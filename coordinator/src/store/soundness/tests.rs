@@ -4,7 +4,8 @@ use std::{fs, path::Path};
 
 use super::super::{
     Filter,
-    tests::{WITHOUT_JUDGEMENTS, WITHOUT_LOG, checkpoint_after, commit, new_experiment},
+    older_schemas::tests::downgrade,
+    tests::{checkpoint_after, commit, new_experiment},
     *,
 };
 
@@ -223,26 +224,9 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     let (mut store, [running, ended]) = two_experiments(directory.path());
     commit(&mut store, running, 2, None).unwrap();
     drop(store);
+    downgrade(directory.path(), 2);
     let database = Connection::open(file::path_in(directory.path())).unwrap();
-    database.execute_batch(WITHOUT_LOG).unwrap();
-    database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
-    database
-        .execute_batch(
-            "ALTER TABLE experiments DROP COLUMN seal;
-             ALTER TABLE generations DROP COLUMN seal;
-             ALTER TABLE champions DROP COLUMN seal;
-             CREATE TABLE texts (experiment_id INTEGER PRIMARY KEY REFERENCES experiments (id),
-                                 state TEXT NOT NULL) STRICT;
-             INSERT INTO texts SELECT experiment_id, CAST(state AS TEXT) FROM checkpoints;
-             DROP TABLE checkpoints;
-             ALTER TABLE texts RENAME TO checkpoints;
-             DROP TABLE checkpoint_steps;
-             DROP TABLE identity;
-             DROP TABLE quarantine;
-             PRAGMA user_version = 2;
-             UPDATE experiments SET state = 'cancelled' WHERE id = 2;",
-        )
-        .unwrap();
+    database.execute("UPDATE experiments SET state = 'cancelled' WHERE id = 2", []).unwrap();
     drop(database);
     let store = Store::open(directory.path()).unwrap();
     assert_eq!(store.resumable(running).unwrap().1, checkpoint_after(2));
@@ -254,21 +238,6 @@ fn a_database_of_the_second_schema_is_sealed_as_it_is() {
     };
     assert_eq!(log_of(running), (3, LogGap::Older));
     assert_eq!(log_of(ended), (2, LogGap::Older), "its checkpoint was deleted");
-}
-
-#[test]
-fn a_champion_of_a_version_that_judged_nobody_keeps_what_it_has() {
-    let directory = tempfile::tempdir().unwrap();
-    let (store, [id, _]) = two_experiments(directory.path());
-    let champion = store.champion(id).unwrap();
-    drop(store);
-    let database = Connection::open(file::path_in(directory.path())).unwrap();
-    database.execute_batch(WITHOUT_LOG).unwrap();
-    database.execute_batch(WITHOUT_JUDGEMENTS).unwrap();
-    drop(database);
-    let store = Store::open(directory.path()).unwrap();
-    assert!(champion.as_ref().is_some_and(|champion| champion.judged.is_none()));
-    assert_eq!(store.champion(id).unwrap(), champion);
 }
 
 #[test]
