@@ -1,0 +1,39 @@
+//! The page on `coordinator` and `worker` has what they print themselves.
+
+use std::{env, fmt::Write, fs, process::Command};
+
+use harness::{binary, workspace_file};
+
+const PAGE: &str = "docs/programs.md";
+
+#[test]
+fn the_page_on_programs_has_their_help() {
+    let mut expected = String::from(
+        "# Options of coordinator and worker\n\nA test compares this page with the programs; \
+         `UPDATE_DOCS=1 cargo test -p fleet-tests\n--test documents programs::` writes it.\n",
+    );
+    for program in ["coordinator", "worker"] {
+        // No variable of this shell is shown as the default of an option.
+        let output = Command::new(binary(program))
+            .arg("--help")
+            .env_clear()
+            .env("COLUMNS", "80")
+            .output()
+            .unwrap();
+        let help = String::from_utf8(output.stdout).unwrap();
+        let lines: Vec<&str> = help.lines().map(str::trim_end).collect();
+        let help = lines.join("\n");
+        write!(expected, "\n## {program}\n\n```text\n{}\n```\n", help.trim_end()).unwrap();
+    }
+    let path = workspace_file(PAGE);
+    if env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(path, &expected).unwrap();
+    } else {
+        let page = fs::read_to_string(path).unwrap();
+        assert!(
+            page == expected,
+            "{PAGE} is out of date: UPDATE_DOCS=1 cargo test -p fleet-tests --test documents \
+             programs::"
+        );
+    }
+}
