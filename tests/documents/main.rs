@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod logs;
+mod pages;
 mod programs;
 mod reliability;
 mod targets;
