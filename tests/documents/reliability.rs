@@ -25,13 +25,13 @@ fn tests_in(path: &Path) -> Vec<String> {
 }
 
 #[test]
-fn every_test_that_the_page_on_reliability_names_exists() {
+fn every_test_that_the_page_on_faults_names_exists() {
     let tests: BTreeSet<String> = ["tests", "coordinator", "worker", "client"]
         .iter()
         .flat_map(|directory| rust_files(&workspace_file(directory)))
         .flat_map(|path| tests_in(&path))
         .collect();
-    let page = fs::read_to_string(workspace_file("docs/reliability.md")).unwrap();
+    let page = fs::read_to_string(workspace_file("docs/faults.md")).unwrap();
     // Between backticks, and with more underscores than anything else has.
     let named: Vec<&str> = page
         .split('`')
