@@ -8,7 +8,7 @@
 //! The tasks are the quickstart, cut down, and a fitness that is easy to compute, bounded
 //! and skewed, with a rare tail near 0. Of each it prints the mean error of the judgement
 //! and of the mean that selected the champion, with their standard errors, and how often the
-//! 95 % interval has the value on fresh trials. docs/evaluation.md has the results.
+//! 95 % interval has the value on fresh trials. docs/notebook/2026-11-algorithms.md has the results.
 
 use std::{
     env,

@@ -1,4 +1,4 @@
-//! What documents and manifests state agrees with the sources. Needs no fleet.
+//! What documents and manifests state agrees with the sources, and with what programs print.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod logs;
@@ -8,6 +8,7 @@ mod reliability;
 mod targets;
 mod tasks;
 mod versions;
+mod walks;
 
 use std::{
     fs,
