@@ -16,7 +16,13 @@ use sim_core::Isa;
 use swarm_telemetry::VERSION;
 
 use crate::{
-    commands::Command, complete, experiment_file::Overrides, help::WIDTH_MAX, settings::Settings,
+    commands::Command,
+    complete,
+    error::Error,
+    examples::{self, Example},
+    experiment_file::{ExperimentFile, Overrides},
+    help::WIDTH_MAX,
+    settings::Settings,
     sweep::SweepArgs,
 };
 
@@ -160,7 +166,12 @@ impl FromStr for Subject {
 #[derive(Debug, ClapArgs)]
 pub struct ExperimentArgs {
     /// The experiment file; - is standard input.
-    pub config: PathBuf,
+    #[arg(required_unless_present = "example")]
+    config: Option<PathBuf>,
+    /// Evolve an experiment that is part of this program, instead of a file: `swarmctl examples`
+    /// lists them.
+    #[arg(long, value_name = "NAME", conflicts_with = "config", value_parser = examples::parser(), hide_possible_values = true)]
+    example: Option<&'static Example>,
     /// Number of generations, instead of the file's.
     #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
     pub generations: Option<u64>,
@@ -174,6 +185,39 @@ pub struct ExperimentArgs {
 }
 
 impl ExperimentArgs {
+    /// An experiment file, and nothing that replaces its values.
+    #[cfg(test)]
+    pub fn of(config: PathBuf) -> Self {
+        Self {
+            config: Some(config),
+            example: None,
+            generations: None,
+            seed: SeedArg::default(),
+            sweep: SweepArgs::default(),
+            labels: Vec::new(),
+        }
+    }
+
+    /// Reads the experiment file.
+    pub fn file(&self) -> Result<ExperimentFile, Error> {
+        match (&self.config, self.example) {
+            (_, Some(example)) => Ok(example.file()),
+            (Some(path), None) => {
+                ExperimentFile::read(path).map_err(|error| Error::invalid(path, &error))
+            }
+            (None, None) => unreachable!("the command line requires one of them"),
+        }
+    }
+
+    /// The words of a command line that name the experiment.
+    pub fn words(&self) -> Vec<String> {
+        match (&self.config, self.example) {
+            (_, Some(example)) => vec!["--example".into(), example.name.into()],
+            (Some(path), None) => vec![path.to_string_lossy().into_owned()],
+            (None, None) => Vec::new(),
+        }
+    }
+
     /// The replacements.
     pub fn overrides(&self) -> Overrides {
         let Self { seed: SeedArg { seed }, generations, .. } = *self;
@@ -259,9 +303,29 @@ mod tests {
     #[test]
     fn run_has_defaults() {
         let Command::Run(args) = parse("swarmctl run a.json").unwrap().command else { panic!() };
-        assert_eq!(args.experiment.config, PathBuf::from("a.json"));
+        assert_eq!(args.experiment.words(), ["a.json"]);
         assert_eq!(args.experiment.overrides(), Overrides::default());
         assert_eq!(args.workers, None);
+    }
+
+    #[test]
+    fn an_example_stands_for_a_file() {
+        for name in ["leader_selection_snes", "leader_selection"] {
+            let line = format!("swarmctl run --example {name} --generations 3");
+            let Command::Run(args) = parse(&line).unwrap().command else { panic!() };
+            assert_eq!(args.experiment.words(), ["--example", "leader_selection_snes"]);
+            let file = args.experiment.file().unwrap();
+            assert_eq!(file.name().as_deref(), Some("leader_selection_snes"));
+        }
+        let kinds =
+            ["swarmctl run", "swarmctl run a.json --example chain", "swarmctl run --example x"]
+                .map(|line| parse(line).unwrap_err());
+        let expected = [
+            ErrorKind::MissingRequiredArgument,
+            ErrorKind::ArgumentConflict,
+            ErrorKind::InvalidValue,
+        ];
+        assert_eq!(kinds, expected);
     }
 
     #[test]

@@ -30,7 +30,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
         ],
     ),
     ("Fleet", &["workers", "fleet"]),
-    ("Experiment files", &["new", "validate", "schema"]),
+    ("Experiment files", &["examples", "new", "validate", "schema"]),
     ("Tools", &["completions", "man", "help"]),
 ];
 

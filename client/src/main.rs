@@ -11,6 +11,7 @@ mod complete;
 mod connection;
 mod consent;
 mod error;
+mod examples;
 mod experiment_file;
 mod experiments;
 #[cfg(test)]

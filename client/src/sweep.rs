@@ -84,8 +84,8 @@ impl SweepRun {
 /// All runs that the arguments ask for, or every mistake in them. One run alone belongs to
 /// a group only if the arguments name the group or a set of seeds.
 pub fn runs(args: &ExperimentArgs) -> Result<Vec<SweepRun>, Error> {
-    let invalid = |error: ConfigError| Error::invalid(&args.config, &error);
-    let file = ExperimentFile::read(&args.config).map_err(invalid)?;
+    let file = args.file()?;
+    let invalid = |error: ConfigError| file.invalid(&error);
     let overrides = args.overrides();
     let seeds: Vec<Option<u64>> = match &args.sweep.seeds {
         Some(Seeds(seeds)) => seeds.iter().copied().map(Some).collect(),

@@ -10,6 +10,7 @@ mod compute;
 mod control;
 mod doctor;
 mod evaluate;
+mod examples;
 mod explain;
 mod export;
 mod fleet;
@@ -60,6 +61,7 @@ pub enum Command {
     #[command(flatten)]
     Remote(RemoteCommand),
     New(new::NewArgs),
+    Examples(examples::ExamplesArgs),
     Validate(validate::ValidateArgs),
     Schema(schema::SchemaArgs),
     Simulate(simulate::SimulateArgs),
@@ -192,6 +194,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         // An interrupt ends these at once, and removes the files that they have begun.
         Command::Validate(args) => return validate::validate(&args, &mut progress),
         Command::New(args) => return new::new(&args, &mut progress),
+        Command::Examples(_) => return examples::examples(&mut progress),
         Command::Schema(_) => return schema::schema(&mut progress),
         Command::Simulate(args) => {
             return simulate::simulate(settings, &args, &mut progress).await;

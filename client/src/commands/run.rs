@@ -70,6 +70,7 @@ With --output json it prints a line per generation (numbered from 0), then one
 with state, digest and champion.
 
 Examples:
+  swarmctl run --example quickstart
   swarmctl run experiment.json
   swarmctl run experiment.json --web
   swarmctl run experiment.json --seeds 0..4
@@ -91,7 +92,7 @@ pub async fn run(
     }
     let n_workers = args.workers.map_or_else(cores, usize::from);
     log::init(progress.stderr());
-    if let Some(remark) = running_coordinator(settings, &args.experiment.config).await {
+    if let Some(remark) = running_coordinator(settings, args.experiment.words()).await {
         progress.remark(&remark);
     }
     let pages = args.web.then_some(PAGES);
@@ -192,14 +193,14 @@ fn already_completed(existing: &Experiment, name: &str) -> String {
 }
 
 /// Suggests the coordinator of the settings, if one answers there.
-async fn running_coordinator(settings: Settings, config: &Path) -> Option<String> {
+async fn running_coordinator(settings: Settings, experiment: Vec<String>) -> Option<String> {
     let settings = settings.or_file().ok()?;
     let connection = Connection::new(settings.address(), &settings.credentials().ok()?);
     let connection = connection.ok()?.with_patience(Duration::ZERO);
     let request = ListWorkersRequest {};
     let listing = connection.call_fleet(async |client| client.list_workers(request).await);
     let n_workers = timeout(ANSWER_TIME, listing).await.ok()?.ok()?.workers.len() as u64;
-    let command = ["swarmctl", "submit", &config.to_string_lossy()].map(str::to_owned);
+    let command = ["swarmctl", "submit"].map(str::to_owned).into_iter().chain(experiment);
     Some(format!(
         "a coordinator with {} runs at {}: {} evolves there; this command uses this machine only",
         text::counted(n_workers, "worker"),

@@ -168,14 +168,12 @@ mod tests {
         experiment_file::tests::quickstart,
         fake_coordinator::{FakeCoordinator, Script},
         progress::tests::Captured,
-        sweep::SweepArgs,
     };
 
     fn args(config: PathBuf) -> SubmitArgs {
         let seed = SeedArg { seed: Some(7) };
-        let sweep = SweepArgs::default();
-        let experiment =
-            ExperimentArgs { config, generations: None, seed, sweep, labels: Vec::new() };
+        let mut experiment = ExperimentArgs::of(config);
+        experiment.seed = seed;
         SubmitArgs { experiment, priority: Some(200), reuse: false, watch: false }
     }
 
