@@ -37,7 +37,7 @@ mod tensorboard;
 mod text;
 mod waiting;
 
-use std::process::ExitCode;
+use std::{env, ffi::OsString, path::Path, process::ExitCode};
 
 use clap::{CommandFactory as _, FromArgMatches as _};
 use clap_complete::CompleteEnv;
@@ -45,7 +45,15 @@ use swarm_telemetry::{block_on, report, runtime};
 
 use crate::{args::Args, error::Error, progress::Progress, synonyms::with_suggestions};
 
+/// The programs that this one can be instead. It contains all of their code, because `run` starts
+/// a coordinator and workers, so that a release is one file with three names.
+const OTHERS: [(&str, fn(Vec<OsString>) -> ExitCode); 2] =
+    [("coordinator", coordinator::program::main), ("worker", worker::program::main)];
+
 fn main() -> ExitCode {
+    if let Some((main, words)) = other_program(env::args_os().collect()) {
+        return main(words);
+    }
     // Answers a shell that asks what a command line may become, and ends then.
     CompleteEnv::with_factory(Args::command).complete();
     let args = help::matches().and_then(|matches| Args::from_arg_matches(&matches));
@@ -63,6 +71,18 @@ fn main() -> ExitCode {
     error.exit_code().into()
 }
 
+/// The program that a command line is for, if it is not `swarmctl`, and the words for it: by the
+/// name that this file is called by, or, where a file has one name only, by the first word.
+fn other_program(words: Vec<OsString>) -> Option<(fn(Vec<OsString>) -> ExitCode, Vec<OsString>)> {
+    let named = |word: &OsString| OTHERS.iter().find(|(name, _)| *word == **name);
+    let called = words.first().and_then(|word| Path::new(word).file_stem());
+    if let Some((_, main)) = called.and_then(|name| named(&name.to_owned())) {
+        return Some((*main, words));
+    }
+    let (_, main) = words.get(1).and_then(named)?;
+    Some((*main, words[1..].to_vec()))
+}
+
 /// Ends with what the command line gets instead of a command: an error, or help.
 fn end(answer: &clap::Error) -> ! {
     let code = match answer.print() {
@@ -75,4 +95,25 @@ fn end(answer: &clap::Error) -> ! {
         _ => answer.exit_code(),
     };
     std::process::exit(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_other_programs_are_found_by_their_names() {
+        let found = |line: &str| {
+            let words = line.split(' ').map(OsString::from).collect();
+            let (_, words) = other_program(words)?;
+            Some(words.join(&OsString::from(" ")).into_string().unwrap())
+        };
+        for line in ["coordinator --version", "/opt/swarmevo/worker --slots 2"] {
+            assert_eq!(found(line).as_deref(), Some(line));
+        }
+        assert_eq!(found("swarmctl worker --help").as_deref(), Some("worker --help"));
+        for line in ["swarmctl", "swarmctl workers", "swarmctl run coordinator", "my-worker list"] {
+            assert_eq!(found(line), None, "{line}");
+        }
+    }
 }

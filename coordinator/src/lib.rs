@@ -19,6 +19,7 @@
 //! - [`metrics`]: what can be scraped
 //! - `memory`: what an experiment takes of it
 //! - [`limits`]: every bound on what the network can ask for
+//! - [`program`]: the command line of the program
 
 mod clock;
 mod control;
@@ -34,6 +35,7 @@ pub mod local;
 mod memory;
 pub mod metrics;
 pub mod priority;
+pub mod program;
 mod queries;
 pub mod referee;
 mod rpc;

@@ -10,6 +10,7 @@ mod evaluators;
 mod lifetime;
 pub mod metrics;
 mod pool;
+pub mod program;
 mod session;
 mod session_file;
 mod stats;

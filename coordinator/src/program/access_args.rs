@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::builder::FalseyValueParser;
-use coordinator::{Access, AccessError, Tls, Tokens};
 use swarm_transport::{Expiries, Identity, PemError, Token, TokenError, certificates};
+
+use crate::{Access, AccessError, Tls, Tokens};
 
 const CLIENT_TOKEN: &str = "SWARM_CLIENT_TOKEN";
 const WORKER_TOKEN: &str = "SWARM_WORKER_TOKEN";
