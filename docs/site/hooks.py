@@ -111,7 +111,7 @@ def _target(source, link):
 
 
 def _is_in_docs(path):
-    return path.startswith("docs/") and not path.startswith(("docs/deploy", "docs/site"))
+    return path.startswith("docs/") and not f"{path}/".startswith(("docs/deploy/", "docs/site/"))
 
 
 def shown(path):
