@@ -9,7 +9,9 @@ use sim_core::TrialSet;
 
 use crate::ids::{JobId, WorkerId};
 
-use super::{Engine, batch::BatchInProgress, job::JobWork, worker::Worker};
+use super::{
+    Engine, availability::Availability, batch::BatchInProgress, job::JobWork, worker::Worker,
+};
 
 /// What a job is doing, and which workers could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -115,38 +117,31 @@ impl Engine {
     /// What a job is doing; without a batch if the engine does not know it.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
         let work = self.jobs.get(&id);
-        let batch = work.and_then(|work| work.batch.as_ref());
         let usable = self.workers.values().filter(|worker| worker.is_usable());
         let (takers, others): (Vec<&Worker>, Vec<&Worker>) =
             usable.partition(|worker| work.is_none_or(|work| worker.takes(work)));
+        let questions = self.trust.questions.about(id);
         let rivals = self.jobs.iter().filter(|(other, work)| **other != id && work.is_ready());
         JobActivity {
-            batch: batch.map(|batch| self.batch_activity(now, id, batch)),
+            batch: self.batch(id).map(|batch| self.batch_activity(now, id, batch)),
             n_workers: self.workers.len(),
             n_workers_available: takers.len(),
             n_workers_of_others: others.len(),
             withheld: self.withheld(now),
-            questions: self.trust.open_questions(id),
+            questions: questions.map(|(_, question)| question.activity()).collect(),
             rivals: rivals.map(|(&other, _)| other).collect(),
         }
     }
 
     fn withheld(&self, now: Instant) -> Vec<WithheldWorker> {
-        let withheld = self.workers.iter().filter_map(|(&id, worker)| {
-            let quarantined = worker.quarantined.clone();
-            let is_quarantined = quarantined.is_some();
-            let reason = quarantined.or_else(|| worker.waits(now))?;
-            let name = self
-                .trust
-                .quarantine_name(&worker.introduction)
-                .unwrap_or(worker.name())
-                .to_owned();
-            (!worker.is_draining).then_some(WithheldWorker {
-                worker: id,
-                name,
-                reason,
-                is_quarantined,
-            })
+        let withheld = self.workers.iter().filter_map(|(&worker_id, worker)| {
+            let (is_quarantined, reason) = match worker.availability() {
+                Availability::Quarantined(reason) => (true, reason.to_owned()),
+                _ => (false, worker.waits(now)?),
+            };
+            let name = self.trust.quarantine.name(&worker.introduction);
+            let name = name.unwrap_or(worker.name()).to_owned();
+            Some(WithheldWorker { worker: worker_id, name, reason, is_quarantined })
         });
         withheld.collect()
     }
@@ -163,7 +158,7 @@ impl Engine {
             })
         });
         BatchActivity {
-            trial_set: batch.trial_set(),
+            trial_set: batch.request.trial_set,
             n_episodes: batch.known.n_episodes(),
             n_episodes_left: batch.known.n_episodes_left(),
             n_items_queued: batch.n_waiting() - batch.audits.n_waiting(),

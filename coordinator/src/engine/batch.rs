@@ -4,7 +4,6 @@
 use std::{
     collections::BTreeMap,
     mem,
-    ops::Range,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -16,7 +15,7 @@ use crate::ids::{AssignmentId, WorkerId};
 use super::{
     Batch, EvaluatedBatch, SharedGenotype,
     fleet_time::FleetTime,
-    item::Item,
+    item::{Item, ItemState},
     known_results::KnownResults,
     queue::Queue,
     trust::{Audits, LossRecord},
@@ -42,41 +41,47 @@ fn trials_per_item(batch: &Batch) -> u32 {
     n_trials.max(1)
 }
 
-/// A worker that computes an item.
+/// A worker that computes an item, which is not an audit.
 #[derive(Debug, Clone)]
 struct Holder {
     assignment_id: AssignmentId,
     worker: WorkerId,
-    trials: Range<u32>,
-    is_audit: bool,
+    item: Item,
+}
+
+/// How long an item is given to no worker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Until {
+    Time(Instant),
+    Answer,
 }
 
 /// A batch that is being computed.
 #[derive(Debug)]
 pub struct BatchInProgress {
-    batch: Batch,
-    /// What no worker has been given, in the order in which it will be.
-    queue: Queue,
-    /// Items that workers were lost with and that no worker has been given again.
-    suspects: Queue,
-    /// Items that no worker is given until the referee has answered.
-    held_back: Vec<Item>,
-    /// Items that no worker is given until a time.
-    delayed: Vec<(Instant, Item)>,
+    /// What is computed.
+    pub request: Batch,
+    /// The [queued](ItemState::Queued) items, in the order in which workers are given them.
+    pub queue: Queue,
+    /// Queued items that workers were lost with.
+    pub suspects: Queue,
+    /// The [assigned](ItemState::Assigned) items and their copies, by individual.
+    holders: BTreeMap<u32, Vec<Holder>>,
+    /// The [delayed](ItemState::Delayed) and [held](ItemState::Held) items; twice, where two
+    /// copies were lost.
+    withheld: Vec<(Item, Until)>,
+    /// The results of the trials that are [done](ItemState::Done).
+    pub known: KnownResults,
+    /// Assignments that are not duplicated yet, by when they should be done.
+    pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
+    /// Done items that another worker has to confirm.
+    pub audits: Audits,
+    /// Items that workers were lost with.
+    pub losses: LossRecord,
     /// Disagreements that the referee has not settled.
     pub n_disagreements: usize,
     /// Individuals that the referee has evaluated because none has a finite fitness.
     pub n_without_fitness: u32,
-    /// The workers that compute items, by individual.
-    holders: BTreeMap<u32, Vec<Holder>>,
-    /// Assignments that are not duplicated yet, by when they should be done.
-    pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
-    /// Items that workers were lost with.
-    pub losses: LossRecord,
-    /// The results so far.
-    pub known: KnownResults,
-    /// What another worker has to confirm.
-    pub audits: Audits,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
@@ -94,62 +99,98 @@ fn items(batch: &Batch) -> impl Iterator<Item = Item> + use<> {
 
 impl BatchInProgress {
     /// A batch without results.
-    pub fn new(batch: Batch, now: Instant, fleet_time: FleetTime) -> Self {
-        let n_individuals = batch.genotypes.len();
-        let known = KnownResults::new(n_individuals, batch.n_trials, batch.values_per_trial);
+    pub fn new(request: Batch, now: Instant, fleet_time: FleetTime) -> Self {
+        let n_individuals = request.genotypes.len();
         Self {
-            queue: items(&batch).collect(),
+            queue: items(&request).collect(),
             suspects: Queue::default(),
-            held_back: Vec::new(),
-            delayed: Vec::new(),
+            holders: BTreeMap::new(),
+            withheld: Vec::new(),
+            known: KnownResults::new(n_individuals, request.n_trials, request.values_per_trial),
+            uncovered: BTreeMap::new(),
+            audits: Audits::default(),
+            losses: LossRecord::default(),
             n_disagreements: 0,
             n_without_fitness: 0,
-            holders: BTreeMap::new(),
-            uncovered: BTreeMap::new(),
-            losses: LossRecord::default(),
-            known,
-            audits: Audits::default(),
-            batch,
+            request,
             started: now,
             fleet_time_at_start: fleet_time,
         }
     }
 
-    /// Which worlds and noise its trials meet.
-    pub fn trial_set(&self) -> TrialSet {
-        self.batch.trial_set
+    /// The state of a trial of an individual.
+    pub fn state(&self, individual: u32, trial: u32) -> ItemState {
+        if self.known.has(individual, trial) {
+            return ItemState::Done;
+        }
+        let withheld = self.withheld.iter().filter(|(item, _)| item.includes(individual, trial));
+        let withheld = withheld.map(|(_, until)| match until {
+            Until::Time(_) => ItemState::Delayed,
+            Until::Answer => ItemState::Held,
+        });
+        withheld.max().unwrap_or_else(|| {
+            let is_assigned =
+                self.holders_of(individual).any(|holder| holder.item.trials.contains(&trial));
+            if is_assigned { ItemState::Assigned } else { ItemState::Queued }
+        })
     }
 
-    /// What workers can draw its genotypes from.
-    pub fn distribution(&self) -> Option<&Arc<[u8]>> {
-        self.batch.distribution.as_ref()
+    /// The parts of an item whose state satisfies a condition.
+    pub fn parts(&self, item: &Item, is_in: impl Fn(ItemState) -> bool) -> Vec<Item> {
+        item.parts(|trial| is_in(self.state(item.individual, trial)))
     }
 
-    /// What workers return for a trial.
-    pub fn output(&self) -> Output {
-        self.batch.output
+    /// The first part of an item that may be given to another worker as well.
+    pub fn duplicable(&self, item: &Item) -> Option<Item> {
+        self.parts(item, |state| state <= ItemState::Assigned).into_iter().next()
+    }
+
+    /// Whether all results of an item are known.
+    pub fn is_known(&self, item: &Item) -> bool {
+        item.trials.clone().all(|trial| self.known.has(item.individual, trial))
     }
 
     /// The genotype of an individual.
     pub fn genotype(&self, individual: u32) -> SharedGenotype {
-        SharedGenotype { population: Arc::clone(&self.batch.genotypes), individual }
+        SharedGenotype { population: Arc::clone(&self.request.genotypes), individual }
+    }
+
+    fn queue_of(&mut self, item: &Item) -> &mut Queue {
+        if self.losses.is_suspect(item) { &mut self.suspects } else { &mut self.queue }
+    }
+
+    fn queue_behind(&mut self, item: &Item) {
+        for part in self.parts(item, |state| state == ItemState::Queued) {
+            self.queue_of(&part).push_back(part);
+        }
+    }
+
+    /// Queues those parts of an item before all others that have left their state.
+    pub fn queue_first(&mut self, item: &Item) {
+        for part in self.parts(item, |state| state == ItemState::Queued).into_iter().rev() {
+            self.queue_of(&part).push_front(part);
+        }
     }
 
     /// Queues everything without a result, as no worker computes it any more.
     pub fn requeue_all(&mut self) {
         self.holders.clear();
-        self.audits.n_in_flight = 0;
+        self.audits.in_flight.clear();
         self.uncovered.clear();
         (self.queue, self.suspects) = Default::default();
-        for item in items(&self.batch) {
-            for item in self.unclaimed(&item) {
-                self.queue_back(item);
-            }
-        }
+        items(&self.request).for_each(|item| self.queue_behind(&item));
     }
 
-    fn queue_back(&mut self, item: Item) {
-        self.queue_of(&item).push_back(item);
+    /// Takes those parts of an individual out of the queues that are done or withheld.
+    pub fn unqueue(&mut self, individual: u32) {
+        let [mut queue, mut suspects] = [&mut self.queue, &mut self.suspects].map(mem::take);
+        let rest = |item: Item| match item.individual == individual {
+            true => self.parts(&item, |state| state == ItemState::Queued),
+            false => vec![item],
+        };
+        queue.divide(rest);
+        suspects.divide(rest);
+        (self.queue, self.suspects) = (queue, suspects);
     }
 
     /// Forgets all values of a worker, and the audits of them, and queues what is unknown
@@ -157,117 +198,46 @@ impl BatchInProgress {
     pub fn discard(&mut self, name: &str) {
         self.audits.discard(name);
         for item in self.known.discard(name) {
-            for part in self.unclaimed(&item) {
-                self.queue_back(part);
-            }
+            self.queue_behind(&item);
         }
     }
 
-    /// Takes what is known or held back of an individual out of the queues.
-    pub fn unqueue(&mut self, individual: u32) {
-        let queues = [mem::take(&mut self.queue), mem::take(&mut self.suspects)];
-        let rest = |item: Item| {
-            if item.individual == individual { self.unclaimed(&item) } else { vec![item] }
-        };
-        let [queue, suspects] = queues.map(|queue| queue.into_iter().flat_map(rest).collect());
-        (self.queue, self.suspects) = (queue, suspects);
-    }
-
     /// Gives an item to no worker until [`Self::release`].
-    pub fn hold_back(&mut self, item: Item) {
+    pub fn hold(&mut self, item: Item) {
         let individual = item.individual;
-        self.held_back.push(item);
+        self.withheld.push((item, Until::Answer));
         self.unqueue(individual);
     }
 
-    /// Takes back [`Self::hold_back`]; whether it was in force.
+    /// Takes back [`Self::hold`]; whether it was in force.
     pub fn release(&mut self, item: &Item) -> bool {
-        let index = self.held_back.iter().position(|held_back| held_back == item);
-        index.map(|index| self.held_back.swap_remove(index)).is_some()
+        self.end_withholding(|held, until| held == item && until == Until::Answer).is_some()
     }
 
     /// Gives an item to no worker until a time.
     pub fn delay(&mut self, item: Item, until: Instant) {
-        self.delayed.push((until, item));
+        self.withheld.push((item, Until::Time(until)));
     }
 
     /// An item whose time has come. One at a time: an item that waits twice, because two
-    /// copies were lost, is held back until the second one is taken, too.
+    /// copies were lost, stays delayed until the second one is taken, too.
     pub fn take_due(&mut self, now: Instant) -> Option<Item> {
-        let index = self.delayed.iter().position(|(until, _)| *until < now)?;
-        Some(self.delayed.remove(index).1)
+        self.end_withholding(|_, until| matches!(until, Until::Time(time) if time < now))
     }
 
-    fn is_held_back(&self, individual: u32, trial: u32) -> bool {
-        let delayed = self.delayed.iter().map(|(_, item)| item);
-        let mut items = self.held_back.iter().chain(delayed);
-        items.any(|item| item.individual == individual && item.trials.contains(&trial))
+    fn end_withholding(&mut self, is_over: impl Fn(&Item, Until) -> bool) -> Option<Item> {
+        let index = self.withheld.iter().position(|(item, until)| is_over(item, *until))?;
+        Some(self.withheld.remove(index).0)
     }
 
-    /// The parts of an item that have no result, that no worker computes, and that
-    /// are not held back.
-    pub fn unclaimed(&self, item: &Item) -> Vec<Item> {
-        item.parts(|trial| {
-            !self.known.has(item.individual, trial)
-                && self.n_copies(item.individual, trial) == 0
-                && !self.is_held_back(item.individual, trial)
-        })
-    }
-
-    /// The first part of an item that may be given to another worker as well.
-    pub fn duplicable(&self, item: &Item) -> Option<Item> {
-        let may = |trial| {
-            !self.known.has(item.individual, trial) && !self.is_held_back(item.individual, trial)
-        };
-        item.parts(may).into_iter().next()
-    }
-
-    /// Whether a worker computes a part of an item, apart from audits.
-    pub fn is_holder(&self, worker: WorkerId, item: &Item) -> bool {
-        let holders = self.holders.get(&item.individual).into_iter().flatten();
-        let mut holders = holders.filter(|holder| !holder.is_audit && holder.worker == worker);
-        holders.any(|holder| {
-            holder.trials.start < item.trials.end && item.trials.start < holder.trials.end
-        })
-    }
-
-    fn n_copies(&self, individual: u32, trial: u32) -> usize {
-        let holders = self.holders.get(&individual).into_iter().flatten();
-        holders.filter(|holder| !holder.is_audit && holder.trials.contains(&trial)).count()
-    }
-
-    /// Queues an item before all others; a suspect, with the suspects.
-    pub fn queue_front(&mut self, item: Item) {
-        self.queue_of(&item).push_front(item);
-    }
-
-    fn queue_of(&mut self, item: &Item) -> &mut Queue {
-        if self.losses.is_suspect(item) { &mut self.suspects } else { &mut self.queue }
-    }
-
-    /// Takes at most `n_trials` trials of the first item that waits: [`Queue::pop_front`].
-    pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
-        self.queue.pop_front(n_trials)
-    }
-
-    /// The same with the rests last: [`Queue::pop_whole_first`].
+    /// Takes at most `n_trials` trials, items with all trials first: [`Queue::pop_whole_first`].
     pub fn pop_whole_first(&mut self, n_trials: usize) -> Option<Item> {
-        self.queue.pop_whole_first(n_trials, trials_per_item(&self.batch) as usize)
-    }
-
-    /// Trials per individual.
-    pub fn n_trials(&self) -> u32 {
-        self.batch.n_trials
+        self.queue.pop_whole_first(n_trials, trials_per_item(&self.request) as usize)
     }
 
     /// Numbers that so many trials give.
     pub fn n_values(&self, n_trials: usize) -> usize {
-        n_trials * self.batch.values_per_trial
-    }
-
-    /// Items in the queue.
-    pub fn n_queued(&self) -> usize {
-        self.queue.len()
+        n_trials * self.request.values_per_trial
     }
 
     /// Items that wait for a worker, audits included.
@@ -275,64 +245,50 @@ impl BatchInProgress {
         self.queue.len() + self.suspects.len() + self.audits.n_waiting()
     }
 
-    /// Items that workers have.
-    pub fn n_in_flight(&self) -> usize {
-        self.holders.values().map(Vec::len).sum()
-    }
-
-    /// Trials that wait.
-    pub fn n_trials_queued(&self) -> usize {
-        self.queue.n_trials()
-    }
-
-    /// Whether a suspect waits.
-    pub fn has_suspects(&self) -> bool {
-        !self.suspects.is_empty()
-    }
-
-    /// Takes the first suspect.
-    pub fn pop_suspect(&mut self) -> Option<Item> {
-        self.suspects.pop_front(usize::MAX)
-    }
-
     /// Whether anything waits.
     pub fn has_waiting(&self) -> bool {
         !self.queue.is_empty() || !self.suspects.is_empty() || !self.audits.is_empty()
     }
 
+    /// Items that workers have.
+    pub fn n_in_flight(&self) -> usize {
+        self.holders.values().map(Vec::len).sum::<usize>() + self.audits.in_flight.len()
+    }
+
     /// An item has been given to a worker.
-    pub fn add_holder(
-        &mut self,
-        assignment_id: AssignmentId,
-        worker: WorkerId,
-        item: &Item,
-        is_audit: bool,
-    ) {
-        self.audits.n_in_flight += usize::from(is_audit);
-        let holder = Holder { assignment_id, worker, trials: item.trials.clone(), is_audit };
-        self.holders.entry(item.individual).or_default().push(holder);
+    pub fn add_holder(&mut self, assignment_id: AssignmentId, worker: WorkerId, item: Item) {
+        let holder = Holder { assignment_id, worker, item };
+        self.holders.entry(holder.item.individual).or_default().push(holder);
     }
 
     /// A worker does not compute an item any more.
     pub fn remove_holder(&mut self, assignment_id: AssignmentId, individual: u32) {
         let Some(holders) = self.holders.get_mut(&individual) else { return };
-        let Some(index) = holders.iter().position(|holder| holder.assignment_id == assignment_id)
-        else {
-            return;
-        };
-        let holder = holders.remove(index);
+        holders.retain(|holder| holder.assignment_id != assignment_id);
         if holders.is_empty() {
             self.holders.remove(&individual);
         }
-        self.audits.n_in_flight -= usize::from(holder.is_audit);
     }
 
-    /// The workers that compute parts of an individual, apart from audits.
+    fn holders_of(&self, individual: u32) -> impl Iterator<Item = &Holder> {
+        self.holders.get(&individual).into_iter().flatten()
+    }
+
+    /// The workers that compute parts of an individual.
     pub fn holders(&self, individual: u32) -> impl Iterator<Item = (WorkerId, AssignmentId)> {
-        let holders = self.holders.get(&individual).into_iter().flatten();
-        holders
-            .filter(|holder| !holder.is_audit)
-            .map(|holder| (holder.worker, holder.assignment_id))
+        self.holders_of(individual).map(|holder| (holder.worker, holder.assignment_id))
+    }
+
+    /// Whether a worker computes a part of an item.
+    pub fn is_holder(&self, worker: WorkerId, item: &Item) -> bool {
+        let mut holders = self.holders_of(item.individual);
+        holders.any(|holder| holder.worker == worker && holder.item.overlaps(item))
+    }
+
+    /// Assignments of an individual whose results are all known.
+    pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, AssignmentId)> {
+        let redundant = self.holders_of(individual).filter(|holder| self.is_known(&holder.item));
+        redundant.map(|holder| (holder.worker, holder.assignment_id)).collect()
     }
 
     /// Queues an audit of what workers have computed of an item, in parts that are each
@@ -343,11 +299,6 @@ impl BatchInProgress {
                 self.audits.push(name, part);
             }
         }
-    }
-
-    /// The parts of an item without a result.
-    pub fn unknown(&self, item: &Item) -> Vec<Item> {
-        item.parts(|trial| !self.known.has(item.individual, trial))
     }
 
     /// The name of the worker whose values for an item are known.
@@ -366,16 +317,6 @@ impl BatchInProgress {
         names.map(|name| (Arc::clone(name), self.audits.has_confirmed(name)))
     }
 
-    /// Assignments of an individual, apart from audits, whose results are all known.
-    pub fn redundant(&self, individual: u32) -> Vec<(WorkerId, AssignmentId)> {
-        let holders = self.holders.get(&individual).into_iter().flatten();
-        holders
-            .filter(|holder| !holder.is_audit)
-            .filter(|holder| holder.trials.clone().all(|trial| self.known.has(individual, trial)))
-            .map(|holder| (holder.worker, holder.assignment_id))
-            .collect()
-    }
-
     /// Individuals with trials that a worker was computing when it was lost, and that have
     /// no result since.
     pub fn n_individuals_failing(&self) -> usize {
@@ -389,7 +330,7 @@ impl BatchInProgress {
 
     /// What it is called in messages.
     pub fn name(&self) -> String {
-        name_of(self.batch.trial_set)
+        name_of(self.request.trial_set)
     }
 
     /// Whether all fitness is known and undisputed, and no audit is under way, or waits for
@@ -397,7 +338,7 @@ impl BatchInProgress {
     pub fn is_finished(&self, is_there: impl Fn(&Self) -> bool) -> bool {
         self.is_known_throughout()
             && self.n_disagreements == 0
-            && self.audits.n_in_flight == 0
+            && self.audits.in_flight.is_empty()
             && (self.audits.is_empty() || !is_there(self))
     }
 
@@ -409,14 +350,14 @@ impl BatchInProgress {
     /// If no individual of a generation has a finite fitness: the next that the referee
     /// evaluates for that reason. Call when all fitness is known.
     pub fn without_fitness(&self) -> Option<Item> {
-        let is_generation = matches!(self.batch.trial_set, TrialSet::Generation(_));
-        let n_individuals = self.batch.genotypes.len() as u32;
+        let is_generation = matches!(self.request.trial_set, TrialSet::Generation(_));
+        let n_individuals = self.request.genotypes.len() as u32;
         let individual = self.n_without_fitness;
         let is_open = is_generation
-            && self.batch.output == Output::Fitness
+            && self.request.output == Output::Fitness
             && individual < n_individuals.min(WITHOUT_FITNESS_MIN)
             && !evolution::has_finite_fitness(self.known.values());
-        is_open.then_some(Item { individual, trials: 0..self.batch.n_trials })
+        is_open.then_some(Item { individual, trials: 0..self.request.n_trials })
     }
 
     /// The outcome.
@@ -428,7 +369,7 @@ impl BatchInProgress {
         notices: Vec<String>,
     ) -> EvaluatedBatch {
         EvaluatedBatch {
-            trial_set: self.batch.trial_set,
+            trial_set: self.request.trial_set,
             n_unaudited: self.audits.n_waiting(),
             n_audited: self.audits.n_agreed(),
             values: self.known.into_values(),
@@ -439,44 +380,39 @@ impl BatchInProgress {
         }
     }
 
-    /// Panics if the state contradicts itself; `in_flight`: what workers hold of
-    /// it, in any order.
+    /// Panics if the state contradicts itself; `in_flight`: what workers hold of it, and whether
+    /// that is an audit.
     pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
-        let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
-        assert_eq!(n_queued, self.queue.n_trials());
         self.known.sanity_check();
-        let mut n_holders = 0;
+        let mut held = BTreeMap::new();
         for (&individual, holders) in &self.holders {
             assert!(!holders.is_empty());
-            for Holder { assignment_id, worker, trials, is_audit } in holders {
-                n_holders += 1;
-                let item = Item { individual, trials: trials.clone() };
-                assert_eq!(in_flight[assignment_id], (*worker, item, *is_audit));
+            for Holder { assignment_id, worker, item } in holders {
+                assert_eq!(item.individual, individual);
+                held.insert(*assignment_id, (*worker, item.clone(), false));
             }
         }
-        assert_eq!(n_holders, in_flight.len(), "every holder is known");
-        let n_audits = in_flight.values().filter(|(.., is_audit)| *is_audit).count();
-        assert_eq!(n_audits, self.audits.n_in_flight);
+        let (audits, others): (BTreeMap<_, _>, BTreeMap<_, _>) =
+            in_flight.clone().into_iter().partition(|(_, (.., is_audit))| *is_audit);
+        assert_eq!(held, others);
+        assert!(audits.keys().eq(&self.audits.in_flight));
         for ((_, assignment_id), worker) in &self.uncovered {
             assert_eq!(in_flight[assignment_id].0, *worker);
         }
-        // Every trial has a result, is queued or is being computed, possibly by several, or
-        // held back; and it is queued only if it is nothing else.
-        let n_trials = self.batch.n_trials as usize;
-        let mut claims = vec![0_u32; self.known.n_episodes()];
+        let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
+        assert_eq!(n_queued, self.queue.n_trials());
+        // A trial is in one queued item if it is queued, else in none.
+        let n_trials = self.request.n_trials as usize;
+        let mut n_queued = vec![0_u32; self.known.n_episodes()];
         for item in self.queue.iter().chain(self.suspects.iter()) {
             for trial in item.trials.clone() {
-                claims[item.individual as usize * n_trials + trial as usize] += 1;
+                n_queued[item.individual as usize * n_trials + trial as usize] += 1;
             }
         }
-        for (index, n_queued) in claims.into_iter().enumerate() {
+        for (index, n_queued) in n_queued.into_iter().enumerate() {
             let (individual, trial) = ((index / n_trials) as u32, (index % n_trials) as u32);
-            let n_copies = self.n_copies(individual, trial);
-            let is_known = self.known.has(individual, trial);
-            let is_held_back = self.is_held_back(individual, trial);
-            let is_waited_for = !is_known && (n_copies > 0 || is_held_back);
-            let n_states = u32::from(is_known) + n_queued + u32::from(is_waited_for);
-            assert_eq!(n_states, 1, "individual {individual}, trial {trial}");
+            let is_queued = self.state(individual, trial) == ItemState::Queued;
+            assert_eq!(n_queued, u32::from(is_queued), "individual {individual}, trial {trial}");
         }
     }
 }

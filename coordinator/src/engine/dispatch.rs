@@ -10,22 +10,18 @@
 
 use std::{
     collections::BTreeMap,
-    mem,
-    sync::Arc,
     time::{Duration, Instant},
 };
-
-use sim_core::{Output, TrialSet};
 
 use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
-    Assignment, Command, Engine,
+    Assignment, Engine,
     batch::BatchInProgress,
     item::Item,
     job::{CALL_OVERHEAD, JobWork, remaining},
     timeline::Fate,
-    worker::{AssignedItem, FULL_LOAD, Worker},
+    worker::{AssignedItem, FULL_LOAD, Source, Worker},
 };
 
 /// What moving work costs: a round trip, and the coordinator's own delays.
@@ -36,61 +32,11 @@ const MOVING_COST: Duration = Duration::from_millis(20);
 const LOST_PER_SLOT: f64 = 0.7;
 /// Workers that are looked at when the first is not suitable.
 const N_LOOKED_AT: usize = 8;
-/// Bytes of a distribution that fit into a message with room to spare.
-const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
 /// Time after which an item is late whose like nobody has computed yet.
 const UNKNOWN_LATE: Duration = Duration::from_secs(5);
 /// Copies of such an item for each that is late: the first may hang, too, and so may the
 /// next, so that their number has to grow.
 const UNKNOWN_COPIES: usize = 2;
-
-/// From where a worker's next item is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Source {
-    Queue,
-    Suspects,
-    Audits,
-}
-
-/// Messages to workers that are being put together.
-#[derive(Debug, Default)]
-pub struct Outgoing {
-    recalled: BTreeMap<WorkerId, Vec<AssignmentId>>,
-    /// In the order given, so that what a worker computes first is what [`InFlight`] has as its
-    /// oldest: a loss is blamed on that.
-    ///
-    /// [`InFlight`]: super::in_flight::InFlight
-    assignments: BTreeMap<WorkerId, Vec<AssignmentsOfBatch>>,
-}
-
-/// What one message has room for: items of one batch.
-#[derive(Debug)]
-struct AssignmentsOfBatch {
-    job: JobId,
-    trial_set: TrialSet,
-    output: Output,
-    assignments: Vec<Assignment>,
-}
-
-impl Outgoing {
-    /// Whether there is nothing to send.
-    pub fn is_empty(&self) -> bool {
-        self.recalled.is_empty() && self.assignments.is_empty()
-    }
-
-    fn add(&mut self, worker: WorkerId, job: JobId, batch: &BatchInProgress, item: Assignment) {
-        let messages = self.assignments.entry(worker).or_default();
-        match messages.last_mut() {
-            Some(last) if last.job == job => last.assignments.push(item),
-            _ => messages.push(AssignmentsOfBatch {
-                job,
-                trial_set: batch.trial_set(),
-                output: batch.output(),
-                assignments: vec![item],
-            }),
-        }
-    }
-}
 
 impl Engine {
     /// Gives every slot something to do, as far as there is something.
@@ -112,66 +58,31 @@ impl Engine {
 
     fn hand_out_queued(&mut self, now: Instant) {
         while let Some((job, worker, source)) = self.next_item() {
-            self.virtual_now = self.virtual_now.max(self.jobs[&job].virtual_time);
-            let item = match source {
-                Source::Audits => {
-                    let name = self.workers[&worker].name();
-                    let batch = self.jobs.get_mut(&job).and_then(|work| work.batch.as_mut());
-                    batch.and_then(|batch| self.trust.pop_audit_for(name, &mut batch.audits))
-                }
-                Source::Suspects => self.batch_mut(job).and_then(BatchInProgress::pop_suspect),
-                Source::Queue => {
-                    let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
-                    let is_short = self.is_short(job);
-                    self.batch_mut(job).and_then(|batch| match is_short {
-                        true => batch.pop_whole_first(n_trials),
-                        false => batch.pop_front(n_trials),
-                    })
-                }
-            };
-            let (Some(item), Some(work)) = (item, self.jobs.get_mut(&job)) else { return };
-            let pace = self.workers[&worker].pace;
-            let charge = work.charge(item.trials.len(), pace);
-            let was = work.virtual_time;
-            work.add_charge(charge);
-            self.ready_queue.remove(&(was, job));
-            if work.is_ready() {
-                self.ready_queue.insert((work.virtual_time, job));
-            }
+            let Some(item) = self.take(job, worker, source) else { return };
+            let Some(work) = self.jobs.get_mut(&job) else { return };
+            let charge = work.charge(item.trials.len(), self.workers[&worker].pace);
+            self.ready_queue.charge(job, work, charge);
             self.give(now, worker, job, item, source, charge);
         }
     }
 
-    /// The job whose item is next, the worker that gets it, and where it is. A job whose
-    /// next item waits for a free slot keeps later jobs from being served ahead: no slot would
-    /// become free. They get slots that are idle, which are those of workers that do not take
-    /// the job.
+    /// The job whose item is next, the worker that gets it, and the queue that it is in. A job
+    /// whose next item waits for a free slot keeps later jobs from being served ahead: no slot
+    /// would become free. They get slots that are idle, which are those of workers that do not
+    /// take the job.
     fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
         if self.load_index.available.is_empty() {
             return None;
         }
         let mut is_awaited = false;
-        for &(_, id) in &self.ready_queue {
-            let Some(batch) = &self.jobs[&id].batch else { continue };
-            let mut takers = self.takers(&self.jobs[&id]).peekable();
-            let Some(&(load, first)) = takers.peek() else { continue };
-            if !batch.audits.is_empty() {
-                let mut workers = self.takers(&self.jobs[&id]).map(|(_, worker)| worker);
-                let may = |id: &WorkerId| {
-                    self.trust.has_audit_for(self.workers[id].name(), &batch.audits)
-                };
-                if let Some(auditor) = workers.find(may) {
-                    return Some((id, auditor, Source::Audits));
-                }
+        for id in self.ready_queue.iter() {
+            let work = &self.jobs[&id];
+            let Some(batch) = &work.batch else { continue };
+            let Some((load, first)) = self.takers(work).next() else { continue };
+            if let Some((worker, source)) = self.next_check(work, batch) {
+                return Some((id, worker, source));
             }
-            if batch.has_suspects() {
-                let idle = takers.take_while(|(load, _)| *load < FULL_LOAD);
-                let mut workers = idle.map(|(_, worker)| worker);
-                if let Some(worker) = workers.find(|id| !self.workers[id].has_suspect()) {
-                    return Some((id, worker, Source::Suspects));
-                }
-            }
-            if batch.n_queued() > 0 {
+            if !batch.queue.is_empty() {
                 if load < FULL_LOAD || (!is_awaited && self.hands_out_ahead(id)) {
                     return Some((id, first, Source::Queue));
                 }
@@ -184,14 +95,32 @@ impl Engine {
         None
     }
 
+    /// Takes a worker's next item out of a queue.
+    fn take(&mut self, job: JobId, worker: WorkerId, source: Source) -> Option<Item> {
+        match source {
+            Source::Audits => self.take_audit(job, worker),
+            Source::Suspects => self.batch_mut(job)?.suspects.pop_front(usize::MAX),
+            Source::Queue => {
+                let n_trials = self.n_trials_per_item(job, &self.workers[&worker]);
+                let is_short = self.is_short(job);
+                let batch = self.batch_mut(job)?;
+                if is_short {
+                    batch.pop_whole_first(n_trials)
+                } else {
+                    batch.queue.pop_front(n_trials)
+                }
+            }
+        }
+    }
+
     /// The workers with credit that take a job's items, the least loaded first, each with its
     /// rank.
-    fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
+    pub(super) fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
         let available = self.load_index.available.iter().map(|&(load, _, id)| (load, id));
         available.filter(|(_, id)| self.workers[id].takes(work))
     }
 
-    /// Slots among which a job's items are divided: the jobs in the ready queue get
+    /// Slots among which a job's items are divided: the jobs with something to hand out get
     /// about equal parts of them.
     fn n_slots_each(&self, n_slots: usize) -> usize {
         n_slots / self.ready_queue.len().max(1)
@@ -201,10 +130,10 @@ impl Engine {
     /// of a batch, when the worker that is free first should have what is left;
     /// except items so short that they take no longer than a round trip.
     fn hands_out_ahead(&self, id: JobId) -> bool {
-        let work = &self.jobs[&id];
-        let Some(batch) = &work.batch else { return false };
-        let n_left = batch.n_trials() as usize * self.n_slots_each(self.load_index.n_usable_slots);
-        !self.config.split || batch.n_trials_queued() > n_left || self.is_short(id)
+        let Some(batch) = self.batch(id) else { return false };
+        let n_slots = self.n_slots_each(self.load_index.n_usable_slots);
+        let n_left = batch.request.n_trials as usize * n_slots;
+        !self.config.split || batch.queue.n_trials() > n_left || self.is_short(id)
     }
 
     /// Whether a job's trials take no longer than a round trip, as far as is known.
@@ -216,18 +145,15 @@ impl Engine {
     /// stay empty, or the batch is near its end, when the worker's share of what is left is
     /// smaller than an item.
     fn n_trials_per_item(&self, id: JobId, worker: &Worker) -> usize {
-        let Some(batch) = &self.jobs[&id].batch else { return usize::MAX };
-        if !self.config.split {
-            return usize::MAX;
-        }
-        let n_trials = batch.n_trials() as usize;
+        let Some(batch) = self.batch(id).filter(|_| self.config.split) else { return usize::MAX };
+        let n_trials = batch.request.n_trials as usize;
         let n_idle_slots = self.n_slots_each(self.load_index.n_idle_slots);
-        let n_parts = (n_idle_slots / batch.n_queued().max(1)).max(1);
+        let n_parts = (n_idle_slots / batch.queue.len().max(1)).max(1);
         let share = if self.is_short(id) {
             self.share_of_batch(batch, worker).floor()
         } else {
             let n_slots = self.n_slots_each(self.load_index.n_usable_slots).max(1);
-            (batch.n_trials_queued() as f64 / (n_slots as f64 * worker.pace)).ceil()
+            (batch.queue.n_trials() as f64 / (n_slots as f64 * worker.pace)).ceil()
         };
         n_trials.div_ceil(n_parts).min(share as usize).max(1)
     }
@@ -238,7 +164,7 @@ impl Engine {
     fn share_of_batch(&self, batch: &BatchInProgress, worker: &Worker) -> f64 {
         let n_slots = self.load_index.n_usable_slots as f64;
         let n_left = self.ready_queue.len().max(1) as f64 * batch.known.n_episodes_left() as f64;
-        let n_calls = (n_left / f64::from(batch.n_trials())).max(n_slots);
+        let n_calls = (n_left / f64::from(batch.request.n_trials)).max(n_slots);
         let work = n_left + CALL_OVERHEAD * n_calls + LOST_PER_SLOT * n_slots;
         let share = worker.usable_speed() as f64 / self.load_index.usable_speed.max(1) as f64;
         let held = &worker.in_flight;
@@ -253,7 +179,7 @@ impl Engine {
                 let worker = &self.workers[&holder];
                 let mut waiting = worker.in_flight.iter().rev().take(worker.n_waiting());
                 let (&assignment_id, _) = waiting.find(|(_, a)| {
-                    !a.is_audit
+                    !a.is_audit()
                         && a.expected > now + MOVING_COST
                         && self.idle_taker(&self.jobs[&a.job], |_| true).is_some()
                 })?;
@@ -276,9 +202,8 @@ impl Engine {
         });
         let Some((job, Slow { key, item, n_parts, n_copies })) = candidate else { return false };
         let other = |engine: &Self, item: &Item| {
-            let work = &engine.jobs[&job];
-            let batch = work.batch.as_ref();
-            engine.idle_taker(work, |id| batch.is_some_and(|batch| !batch.is_holder(id, item)))
+            let batch = engine.batch(job)?;
+            engine.idle_taker(&engine.jobs[&job], |id| !batch.is_holder(id, item))
         };
         if other(self, &item).is_none() {
             return false;
@@ -320,7 +245,6 @@ impl Engine {
         source: Source,
         charge: Duration,
     ) {
-        let (is_audit, is_suspect) = (source == Source::Audits, source == Source::Suspects);
         let Some(work) = self.jobs.get_mut(&job) else { return };
         let worker = &self.workers[&worker_id];
         let expected = work.expected(item.trials.len(), worker.pace).unwrap_or_default();
@@ -330,27 +254,27 @@ impl Engine {
         let Some(batch) = &mut work.batch else { return };
         self.n_items_assigned += 1;
         let id = AssignmentId(self.n_items_assigned);
-        batch.add_holder(id, worker_id, &item, is_audit);
+        if source == Source::Audits {
+            batch.audits.in_flight.insert(id);
+        } else {
+            batch.add_holder(id, worker_id, item.clone());
+        }
         // A copy of a suspect might take another worker down.
         if source == Source::Queue {
             batch.uncovered.insert((expected, id), worker_id);
         }
-        let trial_set = batch.trial_set();
-        let genotype = batch.genotype(item.individual);
-        // Audits are sent genotypes, so that they compare the two ways, too.
-        let is_drawn = !is_audit && batch.distribution().is_some();
-        let assignment = Assignment { id, trials: item.trials.clone(), genotype, is_drawn };
-        self.outgoing.add(worker_id, job, batch, assignment);
-        let assigned = AssignedItem {
-            job,
-            trial_set,
-            item,
-            is_audit,
-            is_suspect,
-            assigned: now,
-            expected,
-            charge,
+        let request = &batch.request;
+        let trial_set = request.trial_set;
+        let assignment = Assignment {
+            id,
+            trials: item.trials.clone(),
+            genotype: batch.genotype(item.individual),
+            // Audits are sent genotypes, so that they compare the two ways, too.
+            is_drawn: source != Source::Audits && request.distribution.is_some(),
         };
+        self.outgoing.assign(worker_id, job, request, assignment);
+        let assigned =
+            AssignedItem { job, trial_set, item, source, assigned: now, expected, charge };
         self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 
@@ -370,6 +294,7 @@ impl Engine {
     /// A worker computes an assignment no more.
     pub(super) fn forget_holder(&mut self, assignment_id: AssignmentId, assignment: &AssignedItem) {
         let Some(batch) = self.batch_mut(assignment.job) else { return };
+        batch.audits.in_flight.remove(&assignment_id);
         batch.remove_holder(assignment_id, assignment.item.individual);
         batch.uncovered.remove(&(assignment.expected, assignment_id));
     }
@@ -384,68 +309,12 @@ impl Engine {
         let assignment = self.take_assignment(id, assignment_id)?;
         self.counters.n_items_recalled += 1;
         self.correct_charge(assignment.job, assignment.charge, Duration::ZERO);
-        self.outgoing.recalled.entry(id).or_default().push(assignment_id);
+        self.outgoing.recall(id, assignment_id);
         let worker = self.workers.get_mut(&id)?;
         let ended = assignment.clone();
         self.timeline.add(now, (id, worker), ended, Fate::TakenBack, Duration::ZERO);
         worker.remember_recalled(assignment_id, assignment.clone());
         Some(assignment)
-    }
-
-    /// Has a worker draw the genotypes of its assignments where that is possible, if it has
-    /// the distribution, or if that is shorter than the genotypes that it is expected to be
-    /// given of the batch; else has them sent.
-    fn choose_way(&mut self, id: WorkerId, job: JobId, assignments: &mut [Assignment]) {
-        let drawn: Vec<&mut Assignment> =
-            assignments.iter_mut().filter(|assignment| assignment.is_drawn).collect();
-        let [first, ..] = &drawn[..] else { return };
-        let batch = self.jobs[&job].batch.as_ref();
-        let Some((batch, distribution)) =
-            batch.and_then(|batch| Some((batch, batch.distribution()?)))
-        else {
-            return;
-        };
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        let trial_set = Some(batch.trial_set());
-        if worker.known_jobs.get(&job) == Some(&trial_set) {
-            return;
-        }
-        let share = worker.n_slots() as f64 / self.load_index.n_usable_slots.max(1) as f64;
-        let n_expected = drawn.len() as f64 + batch.n_queued() as f64 * share.min(1.0);
-        let is_shorter = distribution.len() as f64
-            <= (n_expected * size_of_val(&first.genotype[..]) as f64)
-                .min(DISTRIBUTION_LEN_MAX as f64);
-        if is_shorter {
-            worker.known_jobs.insert(job, trial_set);
-            let distribution = Arc::clone(distribution);
-            self.commands.push_back(Command::SendDistribution { worker: id, job, distribution });
-        } else {
-            drawn.into_iter().for_each(|assignment| assignment.is_drawn = false);
-        }
-    }
-
-    /// Turns what has been put together into commands.
-    fn send(&mut self) {
-        let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
-        for (worker, assignments) in recalled {
-            if self.workers.contains_key(&worker) {
-                self.commands.push_back(Command::SendDrop { worker, assignments });
-            }
-        }
-        let messages = assignments.into_iter().flat_map(|(worker, messages)| {
-            messages.into_iter().map(move |message| (worker, message))
-        });
-        for (worker, AssignmentsOfBatch { job, trial_set, output, mut assignments }) in messages {
-            let known = self.workers.get_mut(&worker).map(|worker| &mut worker.known_jobs);
-            if let Some(known) = known.filter(|known| !known.contains_key(&job)) {
-                known.insert(job, None);
-                let spec = Arc::clone(&self.jobs[&job].spec);
-                self.commands.push_back(Command::SendSpec { worker, job, spec });
-            }
-            self.choose_way(worker, job, &mut assignments);
-            let send = Command::SendAssignments { worker, job, trial_set, output, assignments };
-            self.commands.push_back(send);
-        }
     }
 }
 
@@ -470,7 +339,7 @@ impl JobWork {
         pace: f64,
         workers: &BTreeMap<WorkerId, Worker>,
     ) -> Option<Slow> {
-        let batch = self.batch.as_ref().filter(|batch| batch.n_queued() == 0)?;
+        let batch = self.batch.as_ref().filter(|batch| batch.queue.len() == 0)?;
         let ends = [batch.uncovered.last_key_value(), batch.uncovered.first_key_value()];
         ends.into_iter().flatten().find_map(|(&key, holder)| {
             let (expected, assignment_id) = key;

@@ -1,4 +1,4 @@
-//! The unit of scheduling: one genotype on a range of trials.
+//! The unit of scheduling: one genotype on a range of trials, and the states that it goes through.
 
 use std::ops::Range;
 
@@ -9,6 +9,23 @@ pub struct Item {
     pub individual: u32,
     /// The trials to run.
     pub trials: Range<u32>,
+}
+
+/// The state of a trial of a batch. The trials of an item share it until the item is divided.
+/// Where several states apply, the last of them counts: copies of a held item may still be
+/// computed, and one of them may make it done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ItemState {
+    /// It waits in a queue of the batch, in exactly one item.
+    Queued,
+    /// A worker computes it, or several do.
+    Assigned,
+    /// No worker is given it before a certain time, because workers were lost with it.
+    Delayed,
+    /// No worker is given it until the referee has answered.
+    Held,
+    /// Its result is known.
+    Done,
 }
 
 impl Item {
@@ -23,5 +40,16 @@ impl Item {
             }
         }
         parts
+    }
+
+    /// Whether it includes a trial of an individual.
+    pub fn includes(&self, individual: u32, trial: u32) -> bool {
+        self.individual == individual && self.trials.contains(&trial)
+    }
+
+    /// Whether two items have a trial in common.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let Range { start, end } = self.trials;
+        self.individual == other.individual && start < other.trials.end && other.trials.start < end
     }
 }

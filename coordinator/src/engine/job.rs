@@ -89,12 +89,7 @@ impl JobWork {
         *smoothed = (*smoothed + gain * (trial_s - *smoothed)).max(1e-9);
     }
 
-    /// Charges it for workers' time.
-    pub fn add_charge(&mut self, time: Duration) {
-        self.virtual_time += self.weighted(time);
-    }
-
-    /// Replaces a charge by what it was really.
+    /// Replaces a charge by the time that it took.
     pub fn correct_charge(&mut self, charged: Duration, real: Duration) {
         self.virtual_time =
             (self.virtual_time + self.weighted(real)).saturating_sub(self.weighted(charged));

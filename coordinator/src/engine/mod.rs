@@ -1,43 +1,37 @@
 //! Who computes what: a synchronous state machine.
 //!
-//! The shell calls a handler for everything that happens and then carries out
-//! the [`Command`]s it collects with [`Engine::poll_command`]. Time comes in as
-//! an argument; there is no I/O, no clock and no randomness, so a test can drive
-//! any fleet through any history.
+//! The shell calls a handler for everything that happens and then carries out the [`Command`]s
+//! that it collects with [`Engine::poll_command`]. Time is an argument; there is no I/O, no clock
+//! and no randomness, so a test can drive any fleet through any history.
 //!
-//! A *job* is an experiment or an evaluation. It has at most one *batch* at a time:
-//! genotypes times trials of one trial set. A batch is computed as *items*, each one
-//! genotype and a range of trials; an item given to a worker is an *assignment*.
+//! A *job* (`job.rs`) is an experiment or an evaluation. It has at most one *batch* (`batch.rs`)
+//! at a time: genotypes times trials of one trial set. A batch is computed as *items*
+//! (`item.rs`), each one genotype and a range of trials. An item given to a worker
+//! (`worker.rs`) is an *assignment*. Items go through these states
+//! ([`ItemState`](item::ItemState)), in which [`BatchInProgress`] keeps them:
 //!
-//! The rules:
-//! - A worker holds one assignment per slot, and as many ahead as it computes in
-//!   some tens of milliseconds.
-//! - A worker takes the jobs that its pattern of names matches; usually all.
-//! - Jobs with items to hand out share the workers' time in proportion to their
-//!   priorities, by stride scheduling (Waldspurger & Weihl, "Stride Scheduling:
-//!   Deterministic Proportional-Share Resource Management", MIT/LCS/TM-528, 1995):
-//!   a job's *virtual time* grows by the workers' time that it gets, divided by its
-//!   priority, and the job with the least virtual time comes first. A job that had
-//!   nothing to hand out starts again at the present virtual time, so that nobody
-//!   saves up time.
-//! - Near the end of a batch, and when slots would be idle, items are split by
-//!   trial; when nothing is left to hand out, assigned items are duplicated if idle
-//!   workers should be done sooner. The first result counts, and the other workers
-//!   are told to drop the assignment.
-//! - An item returns to the front of the queue when its worker leaves, falls silent, or
-//!   finishes nothing for long while others do.
-//! - A result counts by its place in the batch, not by its arrival, and the first
-//!   one for each place is kept. So who computes what, and how often, cannot change
-//!   the results of a batch.
-//! - Trouble with workers is settled by proof, and never fails a job. What an item comes
-//!   to is the same everywhere, so the *referee*, a process of the coordinator's, is asked
-//!   (`trust`): when a worker reports a failure; when two results for the same place
-//!   differ in their bits; when workers were lost again and again with the same item. If the item fails there, too, it fails its job, and no other. A worker
-//!   whose word was wrong is put in quarantine, and what it computed for the batch is
-//!   computed again. To find such workers, a share of the individuals can be audited:
-//!   computed by a second worker, too, if there is one.
+//! | from | to | when | in |
+//! |---|---|---|---|
+//! | | queued | a batch is requested | `batch.rs` |
+//! | queued | assigned | it is a job's turn (`ready_queue.rs`), and a worker has room (`load_index.rs`) | `dispatch.rs` |
+//! | assigned | done | a worker returns values that contradict no others | `results.rs`, `known_results.rs` |
+//! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); or another worker is free | `results.rs` (`retry`, `requeue`), `dispatch.rs` |
+//! | assigned | delayed | two workers are lost with copies of it at the same time | `results.rs` (`retry`) |
+//! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
+//! | any but done | held | a worker says that it fails, or workers are lost with it: the referee is asked | `trust/verdicts.rs` |
+//! | held | done, or queued | the referee has computed it, or knows nothing | `trust/verdicts.rs` |
+//! | done | queued | its worker is proved faulty | `trust/verdicts.rs` (`discard`) |
+//!
+//! Beside this, slow items are assigned to further workers as *copies* (`dispatch.rs`), and a
+//! share of the done items is computed by a second worker as *audits* (`trust/`). A result
+//! counts by its place in the batch, and the first one for each place is kept. So who computes
+//! what, and how often, cannot change the results of a batch.
+//!
+//! Whether a worker is given items is its [`Availability`](availability::Availability).
+//! Trouble with workers is settled by proof (`trust/`), and never fails a job.
 
 mod activity;
+mod availability;
 mod batch;
 mod dispatch;
 mod fleet_time;
@@ -48,7 +42,9 @@ mod known_results;
 mod load_index;
 mod messages;
 mod name_pattern;
+mod outgoing;
 mod queue;
+mod ready_queue;
 mod results;
 mod sanity;
 mod stalls;
@@ -58,11 +54,13 @@ mod trust;
 mod worker;
 
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, VecDeque},
     mem,
     sync::Arc,
     time::{Duration, Instant},
 };
+
+use sim_core::TrialSet;
 
 use crate::{
     ids::{AssignmentId, JobId, WorkerId},
@@ -72,8 +70,8 @@ use crate::{
 pub use activity::{
     BatchActivity, EvaluationActivity, HeldItems, JobActivity, OpenQuestion, WithheldWorker,
 };
+use availability::Obstacles;
 use batch::BatchInProgress;
-use dispatch::Outgoing;
 use fleet_time::FleetTime;
 use job::JobWork;
 use load_index::WorkerLoadIndex;
@@ -82,6 +80,8 @@ pub use messages::{
     SharedGenotype, WorkerStatus,
 };
 pub use name_pattern::NamePattern;
+use outgoing::Outgoing;
+use ready_queue::ReadyQueue;
 use results::NoResult;
 pub use stats::{Counters, FleetStats, JobStats};
 use timeline::Timeline;
@@ -119,11 +119,7 @@ pub struct Engine {
     workers: BTreeMap<WorkerId, Worker>,
     load_index: WorkerLoadIndex,
     jobs: BTreeMap<JobId, JobWork>,
-    /// Jobs with something to hand out, by virtual time.
-    ready_queue: BTreeSet<(u128, JobId)>,
-    /// The present virtual time: that of the job that was given workers last. A job
-    /// that comes back from waiting starts here, so that nobody saves up time.
-    virtual_now: u128,
+    ready_queue: ReadyQueue,
     trust: Trust,
     outgoing: Outgoing,
     commands: VecDeque<Command>,
@@ -143,8 +139,7 @@ impl Engine {
             workers: BTreeMap::new(),
             load_index: WorkerLoadIndex::default(),
             jobs: BTreeMap::new(),
-            ready_queue: BTreeSet::new(),
-            virtual_now: 0,
+            ready_queue: ReadyQueue::default(),
             trust: Trust::new(now),
             outgoing: Outgoing::default(),
             commands: VecDeque::new(),
@@ -181,11 +176,15 @@ impl Engine {
         self.counters.n_workers_joined += 1;
         let id = WorkerId(self.n_workers_seen);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
-        let rest = self.trust.rest(&introduction.name);
+        let rest = self.trust.crash_loops.rest(&introduction.name);
+        let quarantined = self.trust.quarantine.reason(&introduction).map(str::to_owned);
         let mut worker = Worker::new(introduction, now);
-        worker.quarantined = self.trust.quarantine_reason(&worker.introduction).map(str::to_owned);
-        worker.is_on_probation = rest.is_some();
-        worker.resting_until = rest.filter(|&until| until > now && self.has_usable_worker());
+        worker.obstacles = Obstacles {
+            quarantined,
+            is_on_probation: rest.is_some(),
+            resting_until: rest.filter(|&until| until > now && self.has_usable_worker()),
+            ..Obstacles::default()
+        };
         self.load_index.add(id, &worker);
         self.take_up_stranded(&worker);
         self.workers.insert(id, worker);
@@ -199,13 +198,14 @@ impl Engine {
         if self.workers.is_empty() {
             return;
         }
-        let waiting = self.ready_queue.iter().filter(|(_, id)| {
+        let is_stranded = |id: &JobId| {
             let work = &self.jobs[id];
             joining.takes(work) && !self.workers.values().any(|worker| worker.takes(work))
-        });
-        for (virtual_time, id) in waiting.copied().collect::<Vec<_>>() {
-            self.ready_queue.remove(&(virtual_time, id));
-            self.make_ready(id);
+        };
+        for id in self.ready_queue.iter().filter(is_stranded).collect::<Vec<_>>() {
+            if let Some(work) = self.jobs.get_mut(&id) {
+                self.ready_queue.renew(id, work);
+            }
         }
     }
 
@@ -227,7 +227,7 @@ impl Engine {
     pub fn on_draining(&mut self, now: Instant, id: WorkerId) {
         self.on_heartbeat(now, id);
         if self.workers.contains_key(&id) {
-            self.update_worker(id, |worker| worker.is_draining = true);
+            self.update_worker(id, |worker| worker.obstacles.is_draining = true);
             self.finish_waived(now);
         }
     }
@@ -259,7 +259,7 @@ impl Engine {
         assert!(work.batch.is_none(), "one batch at a time");
         self.fleet_time.advance(now);
         work.batch = Some(BatchInProgress::new(batch, now, self.fleet_time));
-        self.make_ready(id);
+        self.update_readiness(id);
         self.assign(now);
     }
 
@@ -274,7 +274,7 @@ impl Engine {
     pub fn on_job_resumed(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         work.is_paused = false;
-        self.make_ready(id);
+        self.update_readiness(id);
         self.finish_waived(now);
         self.assign(now);
     }
@@ -331,49 +331,36 @@ impl Engine {
     fn wake_rested(&mut self, now: Instant) {
         let is_needed = !self.has_usable_worker();
         let resting = self.workers.iter().filter(|(_, worker)| {
-            worker.resting_until.is_some_and(|until| is_needed || until <= now)
+            let resting_until = worker.obstacles.resting_until;
+            resting_until.is_some_and(|until| is_needed || until <= now)
         });
         for id in resting.map(|(&id, _)| id).collect::<Vec<WorkerId>>() {
-            self.update_worker(id, |worker| worker.resting_until = None);
+            self.update_worker(id, |worker| worker.obstacles.resting_until = None);
         }
     }
 
-    /// Puts a job into the ready queue or takes it out, as it has something to hand out or not.
+    /// Gives a job a turn if it has something to hand out, and else none.
     fn update_readiness(&mut self, id: JobId) {
-        let Some(work) = self.jobs.get(&id) else { return };
-        if work.is_ready() {
-            self.make_ready(id);
-        } else {
-            self.ready_queue.remove(&(work.virtual_time, id));
+        if let Some(work) = self.jobs.get_mut(&id) {
+            self.ready_queue.update(id, work);
         }
     }
 
-    /// Puts a job into the ready queue, if it has something to hand out.
-    fn make_ready(&mut self, id: JobId) {
-        let Some(work) = self.jobs.get_mut(&id) else { return };
-        if work.is_ready() && !self.ready_queue.contains(&(work.virtual_time, id)) {
-            work.virtual_time = work.virtual_time.max(self.virtual_now);
-            self.ready_queue.insert((work.virtual_time, id));
-        }
-    }
-
+    /// Replaces what a job was charged for an item by the time that the item took.
     fn correct_charge(&mut self, id: JobId, charged: Duration, real: Duration) {
-        let Some(work) = self.jobs.get_mut(&id) else { return };
-        let has_turn = self.ready_queue.remove(&(work.virtual_time, id));
-        work.correct_charge(charged, real);
-        if has_turn {
-            self.ready_queue.insert((work.virtual_time, id));
+        if let Some(work) = self.jobs.get_mut(&id) {
+            self.ready_queue.correct_charge(id, work, charged, real);
         }
     }
 
     /// `is_evidence`: whether the items that the worker was computing may have taken it down.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, is_evidence: bool) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
-        if worker.is_draining {
+        if worker.obstacles.is_draining {
             self.counters.n_workers_left += 1;
         } else {
             self.counters.n_workers_lost += 1;
-            self.trust.on_lost(now, worker.name());
+            self.trust.crash_loops.on_lost(now, worker.name());
         }
         self.load_index.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
@@ -381,7 +368,7 @@ impl Engine {
         // one per slot. A worker that said goodbye was not taken down.
         let n_items = worker.in_flight.len();
         let n_computing = n_items - worker.n_waiting();
-        let is_evidence = is_evidence && !worker.is_draining;
+        let is_evidence = is_evidence && !worker.obstacles.is_draining;
         for item in worker.in_flight.values().chain(worker.written_off.values()) {
             self.timeline.add(now, (id, &worker), item.clone(), Fate::Lost, Duration::ZERO);
         }
@@ -409,7 +396,8 @@ impl Engine {
 
     fn forget_job(&mut self, now: Instant, id: JobId) {
         self.withdraw_questions(id, |_| true);
-        self.withdraw(now, id);
+        // It has no turn then.
+        self.pause(now, id);
         self.jobs.remove(&id);
     }
 
@@ -422,8 +410,6 @@ impl Engine {
 
     /// Takes a job away from all workers; its items wait again.
     fn withdraw(&mut self, now: Instant, id: JobId) {
-        let Some(work) = self.jobs.get_mut(&id) else { return };
-        self.ready_queue.remove(&(work.virtual_time, id));
         let mut audits = Vec::new();
         for (&worker_id, worker) in &mut self.workers {
             worker.recalled.retain(|(_, assignment)| assignment.job != id);
@@ -436,22 +422,38 @@ impl Engine {
                     let who = (worker_id, &*worker);
                     self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
                 }
-                audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit).map(|(_, a)| a.item));
+                audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit()).map(|(_, a)| a.item));
                 // Nothing is left that it could answer.
-                worker.is_stalled &= !worker.written_off.is_empty();
+                worker.obstacles.is_stalled &= !worker.written_off.is_empty();
                 self.load_index.add(worker_id, worker);
                 self.commands.push_back(Command::SendEnd { worker: worker_id, job: id });
             }
         }
-        if let Some(batch) = &mut work.batch {
+        if let Some(batch) = self.batch_mut(id) {
             batch.requeue_all();
             audits.iter().for_each(|item| batch.push_audit(item));
         }
+        self.update_readiness(id);
+    }
+
+    /// The batch that a job computes at present.
+    fn batch(&self, id: JobId) -> Option<&BatchInProgress> {
+        self.jobs.get(&id)?.batch.as_ref()
     }
 
     /// The batch that a job computes at present.
     fn batch_mut(&mut self, id: JobId) -> Option<&mut BatchInProgress> {
         self.jobs.get_mut(&id)?.batch.as_mut()
+    }
+
+    /// The same, if it is that of a trial set: else that one is over.
+    fn batch_with(&self, id: JobId, trial_set: TrialSet) -> Option<&BatchInProgress> {
+        self.batch(id).filter(|batch| batch.request.trial_set == trial_set)
+    }
+
+    /// The same, if it is that of a trial set: else that one is over.
+    fn batch_with_mut(&mut self, id: JobId, trial_set: TrialSet) -> Option<&mut BatchInProgress> {
+        self.batch_mut(id).filter(|batch| batch.request.trial_set == trial_set)
     }
 
     /// Changes a worker; none if it has left.

@@ -1,6 +1,9 @@
 //! Items that wait for a worker, in the order in which they are given out.
 
-use std::collections::{VecDeque, vec_deque};
+use std::{
+    collections::{VecDeque, vec_deque},
+    mem,
+};
 
 use super::item::Item;
 
@@ -44,6 +47,11 @@ impl Queue {
         self.items.push_back(item);
     }
 
+    /// Replaces each item by some of its parts.
+    pub fn divide(&mut self, parts: impl Fn(Item) -> Vec<Item>) {
+        *self = mem::take(&mut self.items).into_iter().flat_map(parts).collect();
+    }
+
     /// Takes at most `n_trials` trials, the first ones, of the first item. The rest is first then.
     pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
         let item = self.items.pop_front()?;
@@ -83,15 +91,6 @@ impl FromIterator<Item> for Queue {
         let items: VecDeque<Item> = items.into_iter().collect();
         let n_trials = items.iter().map(|item| item.trials.len()).sum();
         Self { items, n_trials }
-    }
-}
-
-impl IntoIterator for Queue {
-    type Item = Item;
-    type IntoIter = vec_deque::IntoIter<Item>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.items.into_iter()
     }
 }
 

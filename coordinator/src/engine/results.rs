@@ -5,17 +5,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sim_core::Output;
+use sim_core::{Output, TrialSet};
 
 use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
     Command, Engine, ItemResult,
     batch::BatchInProgress,
-    item::Item,
+    item::{Item, ItemState},
     timeline::Fate,
     trust::{AfterLoss, Doubt},
-    worker::{AssignedItem, Worker},
+    worker::{AssignedItem, Source, Worker},
 };
 
 /// Why an item has no result yet.
@@ -28,71 +28,69 @@ pub enum NoResult {
 }
 
 impl Engine {
+    /// A worker has answered an assignment that it has, or had when it was written off; or one
+    /// that was taken back from it. Another answer does no harm: the job has ended meanwhile,
+    /// or the worker makes items up.
     pub(super) fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        let is_in_flight =
-            worker.written_off.is_empty() || worker.in_flight.contains_key(&result.id);
-        let assignment = worker.in_flight.get(&result.id);
-        let Some(assignment) = assignment.or_else(|| worker.written_off.get(&result.id)) else {
-            if let (Some(recalled), Ok(values)) = (worker.take_recalled(result.id), result.outcome)
-                && self.is_due(recalled.job, result.output)
-            {
-                self.on_late_result(now, id, &recalled, &values);
-            }
-            // Else the experiment has ended meanwhile, or the worker makes items
-            // up. Neither can do harm.
-            return;
+        let Some(worker) = self.workers.get(&id) else { return };
+        let in_flight = worker.in_flight.get(&result.id);
+        let is_late = in_flight.is_none();
+        let Some(assignment) = in_flight.or_else(|| worker.written_off.get(&result.id)) else {
+            return self.compare_recalled(now, id, &result);
         };
-        let n_trials = assignment.item.trials.len();
-        let batch = self.jobs[&assignment.job].batch.as_ref();
-        let n_values = batch.map_or(n_trials, |batch| batch.n_values(n_trials));
-        let is_wanted = batch.is_some_and(|batch| batch.trial_set() == assignment.trial_set);
-        let impossible = match &result.outcome {
-            Ok(values) if is_wanted && values.len() != n_values => {
-                Some(format!("it returned {} values for {n_trials} trials", values.len()))
-            }
-            Ok(_) if batch.is_some_and(|batch| batch.output() != result.output) => {
-                Some(match result.output {
-                    Output::Fitness => "it returned fitness where measures are due".to_owned(),
-                    Output::Measures => "it returned measures where fitness is due".to_owned(),
-                })
-            }
-            _ => None,
-        };
-        if let Some(reason) = impossible {
+        if let Some(reason) = self.impossibility(assignment, &result) {
             return self.put_in_quarantine(now, &self.party(id), &reason);
         }
-        let is_ok = result.outcome.is_ok();
-        if is_ok {
-            self.trust.on_result(&self.workers[&id]);
+        if result.outcome.is_ok() {
+            self.trust.crash_loops.on_result(&self.workers[&id]);
         }
         let Some((assignment, busy)) = self.end_assignment(now, id, &result) else { return };
-        if is_in_flight {
+        if !is_late {
             self.forget_holder(result.id, &assignment);
         }
         match result.outcome {
             Ok(values) => {
                 self.counters.n_items_computed += 1;
                 self.fleet_time.add_busy(busy);
-                if is_in_flight && is_wanted {
-                    self.accept(now, id, &assignment, &values);
-                } else {
-                    self.accept_late(now, id, &assignment, &values);
-                }
+                self.accept(now, id, &assignment, &values, is_late);
             }
             Err(message) => {
                 self.counters.n_items_failed += 1;
-                if is_in_flight {
+                if !is_late {
                     self.on_failure_reported(now, id, assignment, message);
                 }
             }
         }
     }
 
-    /// Whether this is what the results of a job's batch are.
-    fn is_due(&self, job: JobId, output: Output) -> bool {
-        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
-        batch.is_none_or(|batch| batch.output() == output)
+    /// Why a result is not one that a worker in order returns for an assignment.
+    fn impossibility(&self, assignment: &AssignedItem, result: &ItemResult) -> Option<String> {
+        let batch = self.batch(assignment.job)?;
+        let values = result.outcome.as_ref().ok()?;
+        let n_trials = assignment.item.trials.len();
+        if batch.request.trial_set == assignment.trial_set
+            && values.len() != batch.n_values(n_trials)
+        {
+            return Some(format!("it returned {} values for {n_trials} trials", values.len()));
+        }
+        (batch.request.output != result.output).then(|| match result.output {
+            Output::Fitness => "it returned fitness where measures are due".to_owned(),
+            Output::Measures => "it returned measures where fitness is due".to_owned(),
+        })
+    }
+
+    /// Another's result came first, but this one is here, so they are compared.
+    fn compare_recalled(&mut self, now: Instant, id: WorkerId, result: &ItemResult) {
+        let worker = self.workers.get_mut(&id);
+        let recalled = worker.and_then(|worker| worker.take_recalled(result.id));
+        if let (Some(AssignedItem { job, trial_set, item, .. }), Ok(values)) =
+            (recalled, &result.outcome)
+            && let Some(batch) = self.batch_with(job, trial_set)
+            && batch.request.output == result.output
+            && let Err(disagreement) = batch.known.compare(&item, values)
+        {
+            self.on_disagreement(now, job, id, &item, disagreement);
+        }
     }
 
     /// Ends an assignment that is answered, and learns how long things take, and that its
@@ -120,8 +118,8 @@ impl Engine {
             worker.learn(busy, jobs[&assignment.job].expected(n_trials, 1.0));
         }
         worker.last_result = Some(now);
-        worker.is_stalled = false;
-        worker.is_on_probation &= !is_ok;
+        worker.obstacles.is_stalled = false;
+        worker.obstacles.is_on_probation &= !is_ok;
         self.load_index.add(id, worker);
         let fate = if is_ok { Fate::Computed } else { Fate::Failed };
         self.timeline.add(now, (id, worker), assignment.clone(), fate, busy);
@@ -132,22 +130,36 @@ impl Engine {
         Some((assignment, busy))
     }
 
-    fn accept(&mut self, now: Instant, id: WorkerId, assignment: &AssignedItem, values: &[f64]) {
-        let (job, item) = (assignment.job, &assignment.item);
-        let Some(batch) = self.batch_mut(job) else { return };
+    /// Takes the values of an assignment, or finds that another worker's differ. `is_late`: others
+    /// have been given the item meanwhile.
+    fn accept(
+        &mut self,
+        now: Instant,
+        id: WorkerId,
+        assignment: &AssignedItem,
+        values: &[f64],
+        is_late: bool,
+    ) {
+        let (job, item, is_audit) = (assignment.job, &assignment.item, assignment.is_audit());
+        if self.jobs.get(&job).is_none_or(|work| work.is_paused) {
+            return;
+        }
+        let Some(batch) = self.batch_with_mut(job, assignment.trial_set) else { return };
         if let Err(disagreement) = batch.known.compare(item, values) {
-            if assignment.is_audit {
+            if !is_late && is_audit {
                 batch.push_audit(item);
                 self.update_readiness(job);
-            } else {
+            } else if !is_late {
                 self.requeue(job, item);
             }
-            self.on_disagreement(now, job, id, item, disagreement);
+            return self.on_disagreement(now, job, id, item, disagreement);
+        }
+        if is_late && is_audit {
             return;
         }
         // What was to be audited may have been discarded meanwhile.
-        let n_new = self.take_values(now, job, id, item, values, assignment.is_audit);
-        if assignment.is_audit && n_new == 0 {
+        let n_new = self.take_values(now, job, id, item, values, is_late || is_audit);
+        if is_audit && n_new == 0 {
             let auditor = self.party(id).name;
             let Some(batch) = self.batch_mut(job) else { return };
             if batch.computed_by(item) == Some(&auditor) {
@@ -157,11 +169,7 @@ impl Engine {
                 batch.count_audited(item, auditor);
             }
         }
-        if assignment.is_audit {
-            self.update_readiness(job);
-        } else {
-            self.make_ready(job);
-        }
+        self.update_readiness(job);
         self.finish_if_evaluated(now, job);
     }
 
@@ -181,7 +189,11 @@ impl Engine {
         let Some(batch) = &mut work.batch else { return 0 };
         // The referee is nobody's name.
         let name = self.workers.get(&id).map_or("", Worker::name);
-        let new = if is_audited { batch.unknown(item) } else { Vec::new() };
+        let new = if is_audited {
+            batch.parts(item, |state| state != ItemState::Done)
+        } else {
+            Vec::new()
+        };
         let n_new = batch.known.accept(id, name, item, values);
         new.iter().for_each(|part| batch.push_audit(part));
         if may_be_queued && n_new > 0 {
@@ -193,29 +205,6 @@ impl Engine {
             self.recall(now, holder, assignment_id);
         }
         n_new
-    }
-
-    /// A worker that had been given up has computed an item after all.
-    fn accept_late(
-        &mut self,
-        now: Instant,
-        id: WorkerId,
-        assignment: &AssignedItem,
-        values: &[f64],
-    ) {
-        let (job, item) = (assignment.job, &assignment.item);
-        let Some(work) = self.jobs.get(&job).filter(|work| !work.is_paused) else { return };
-        let Some(batch) = &work.batch else { return };
-        if batch.trial_set() != assignment.trial_set {
-            return;
-        }
-        if let Err(disagreement) = batch.known.compare(item, values) {
-            self.on_disagreement(now, job, id, item, disagreement);
-        } else if !assignment.is_audit {
-            self.take_values(now, job, id, item, values, true);
-            self.update_readiness(job);
-            self.finish_if_evaluated(now, job);
-        }
     }
 
     /// Finishes batches whose last audits no worker can do any more.
@@ -252,15 +241,15 @@ impl Engine {
             return;
         }
         if let Some(item) = batch.without_fitness() {
-            if self.trust.n_questions(id, |doubt| matches!(doubt, Doubt::NoFitness)) == 0 {
+            if self.trust.questions.n_about(id, |doubt| matches!(doubt, Doubt::NoFitness)) == 0 {
                 self.ask_referee(id, item, Doubt::NoFitness);
             }
             return;
         }
-        self.ready_queue.remove(&(work.virtual_time, id));
         self.fleet_time.advance(now);
         let Some(batch) = work.batch.take() else { return };
-        if let sim_core::TrialSet::Generation(generation) = batch.trial_set() {
+        self.ready_queue.update(id, work);
+        if let TrialSet::Generation(generation) = batch.request.trial_set {
             work.unaudited.add(generation, batch.contributors());
         }
         let notices = std::mem::take(&mut work.notices);
@@ -271,11 +260,11 @@ impl Engine {
 
     /// Queues an item again that gave no result.
     pub(super) fn retry(&mut self, now: Instant, assignment: AssignedItem, why: NoResult) {
-        let AssignedItem { job: id, item, is_audit, .. } = assignment;
+        let AssignedItem { job: id, item, source, .. } = assignment;
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = &mut work.batch else { return };
         self.counters.n_items_requeued += 1;
-        if is_audit {
+        if source == Source::Audits {
             // It may have been the second worker that made an audit possible.
             batch.push_audit(&item);
             self.update_readiness(id);
@@ -305,12 +294,8 @@ impl Engine {
     ) {
         let NoResult::WorkerLost { process, is_alone } = lost else { return };
         let (job, item) = (assignment.job, &assignment.item);
-        let batch = self.batch_mut(job);
-        let Some(batch) = batch.filter(|batch| batch.trial_set() == assignment.trial_set) else {
-            return;
-        };
-        let is_loss = !assignment.is_audit;
-        if is_loss
+        let Some(batch) = self.batch_with_mut(job, assignment.trial_set) else { return };
+        if !assignment.is_audit()
             && batch.losses.add(now, item, process, is_alone) == AfterLoss::Ask
             && self.may_ask_about_losses(job, item)
         {
@@ -335,14 +320,12 @@ impl Engine {
         let Some(batch) = self.jobs.get_mut(&id).and_then(|work| work.batch.as_mut()) else {
             return;
         };
-        for part in batch.unclaimed(item).into_iter().rev() {
-            batch.queue_front(part);
-        }
+        batch.queue_first(item);
         let holders: Vec<(WorkerId, AssignmentId)> = batch.holders(item.individual).collect();
         for (holder, assignment_id) in holders {
             let worker: Option<&Worker> = self.workers.get(&holder);
             if let Some(assignment) = worker.and_then(|worker| worker.in_flight.get(&assignment_id))
-                && !assignment.is_suspect
+                && assignment.source != Source::Suspects
             {
                 batch.uncovered.insert((assignment.expected, assignment_id), holder);
             }

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::ids::JobId;
 
-use super::{Engine, job::JobWork, load_index::WorkerLoadIndex, stats::Counters, worker::Worker};
+use super::{
+    Engine, availability::Availability, job::JobWork, load_index::WorkerLoadIndex, stats::Counters,
+    worker::Worker,
+};
 
 impl Engine {
     /// Panics if the state contradicts itself. For tests: it looks at everything.
@@ -18,16 +21,12 @@ impl Engine {
             assert_eq!(n_trials, worker.in_flight.n_trials());
             for (&assignment_id, assignment) in worker.in_flight.iter() {
                 assert!(worker.known_jobs.contains_key(&assignment.job));
-                let entry = (id, assignment.item.clone(), assignment.is_audit);
+                let entry = (id, assignment.item.clone(), assignment.is_audit());
                 in_flight.entry(assignment.job).or_default().insert(assignment_id, entry);
             }
             assert!(worker.recalled.len() <= 2 * worker.n_slots());
-            assert!(
-                worker.is_usable()
-                    || worker.is_draining
-                    || worker.quarantined.is_none()
-                    || worker.in_flight.is_empty()
-            );
+            let is_quarantined = matches!(worker.availability(), Availability::Quarantined(_));
+            assert!(!is_quarantined || worker.in_flight.is_empty());
         }
         assert_eq!(load_index.available, self.load_index.available);
         assert_eq!(load_index.backlogged, self.load_index.backlogged);
@@ -37,7 +36,7 @@ impl Engine {
         for (&id, work) in &self.jobs {
             let in_flight = in_flight.remove(&id).unwrap_or_default();
             assert!(!work.is_paused || in_flight.is_empty(), "paused work is nobody's");
-            assert_eq!(self.ready_queue.contains(&(work.virtual_time, id)), work.is_ready());
+            assert_eq!(self.ready_queue.has(id, work), work.is_ready());
             match &work.batch {
                 Some(batch) => batch.sanity_check(&in_flight),
                 None => assert!(in_flight.is_empty()),
@@ -47,7 +46,7 @@ impl Engine {
         let n_ready = self.jobs.values().filter(|work| work.is_ready()).count();
         assert_eq!(self.ready_queue.len(), n_ready);
         let has_queued = |work: &&JobWork| {
-            work.is_ready() && work.batch.as_ref().is_some_and(|batch| batch.n_queued() > 0)
+            work.is_ready() && work.batch.as_ref().is_some_and(|batch| !batch.queue.is_empty())
         };
         let is_neglected = |work: &JobWork| self.idle_taker(work, |_| true).is_some();
         assert!(

@@ -59,7 +59,7 @@ impl Engine {
         let mut others = self.workers.iter().filter(|&(&other, _)| other != id);
         let may_audit =
             |other: &Worker| other.is_usable() && other.takes(work) && Some(other.name()) != first;
-        let (times, more) = if oldest.is_audit && !others.any(|(_, other)| may_audit(other)) {
+        let (times, more) = if oldest.is_audit() && !others.any(|(_, other)| may_audit(other)) {
             PATIENCE_WITH_AUDITOR
         } else {
             PATIENCE
@@ -71,7 +71,7 @@ impl Engine {
     /// what it should be computing is given to others as well.
     fn write_off(&mut self, now: Instant, id: WorkerId) {
         self.counters.n_workers_stalled += 1;
-        self.update_worker(id, |worker| worker.is_stalled = true);
+        self.update_worker(id, |worker| worker.obstacles.is_stalled = true);
         let worker = &self.workers[&id];
         let n_computing = worker.in_flight.len() - worker.n_waiting();
         let in_flight: Vec<_> = worker.in_flight.keys().copied().collect();

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::ids::JobId;
 
-use super::{Engine, batch::BatchInProgress};
+use super::{Engine, availability::Availability, batch::BatchInProgress};
 
 /// What has happened since the engine began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -75,19 +75,26 @@ impl Engine {
     pub fn fleet_stats(&self, now: Instant) -> FleetStats {
         let mut fleet_time = self.fleet_time;
         fleet_time.advance(now);
-        let n_draining = self.workers.values().filter(|worker| worker.is_draining).count();
-        let n_available = self.workers.values().filter(|worker| worker.is_usable()).count();
-        let quarantined = self.workers.values().filter(|worker| worker.quarantined.is_some());
-        let n_quarantined = quarantined.filter(|worker| !worker.is_draining).count();
+        let [mut n_available, mut n_draining, mut n_waiting, mut n_quarantined] = [0; 4];
+        for worker in self.workers.values() {
+            *match worker.availability() {
+                Availability::Free | Availability::OnProbation => &mut n_available,
+                Availability::Draining => &mut n_draining,
+                Availability::Quarantined(_) => &mut n_quarantined,
+                Availability::Stalled | Availability::Doubted | Availability::Resting(_) => {
+                    &mut n_waiting
+                }
+            } += 1;
+        }
         FleetStats {
             counters: Counters {
                 n_items_assigned: self.n_items_assigned,
-                n_questions: self.trust.n_asked(),
+                n_questions: self.trust.questions.n_asked(),
                 ..self.counters
             },
             n_workers_available: n_available,
             n_workers_draining: n_draining,
-            n_workers_waiting: self.workers.len() - n_available - n_draining - n_quarantined,
+            n_workers_waiting: n_waiting,
             n_workers_quarantined: n_quarantined,
             n_slots: fleet_time.n_slots(),
             slot_time_s: fleet_time.capacity_s(),

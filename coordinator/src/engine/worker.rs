@@ -9,10 +9,14 @@ use std::{
 use sim_core::TrialSet;
 use swarm_proto::ITEMS_PER_SLOT_MAX;
 
-use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
+use crate::ids::{AssignmentId, JobId, WorkerId};
 
 use super::{
-    Introduction, WorkerStatus, fleet_time::WorkerTime, in_flight::InFlight, item::Item,
+    Introduction, WorkerStatus,
+    availability::{Availability, Obstacles},
+    fleet_time::WorkerTime,
+    in_flight::InFlight,
+    item::Item,
     job::JobWork,
 };
 
@@ -34,19 +38,8 @@ pub struct Worker {
     pub shared_name: Arc<str>,
     /// When it last gave a sign of life.
     pub last_heard: Instant,
-    /// Whether it wants no more items.
-    pub is_draining: bool,
-    /// Why it is in quarantine, if it is.
-    pub quarantined: Option<String>,
-    /// The question that its word is in doubt for; it gets nothing until that is answered.
-    pub question: Option<QuestionId>,
-    /// Until when it is given nothing, as it was lost before it returned anything.
-    pub resting_until: Option<Instant>,
-    /// Whether it was lost, and has returned nothing since: it is given one item.
-    pub is_on_probation: bool,
-    /// Whether it has returned nothing for a long time while others have: it gets nothing
-    /// until it does.
-    pub is_stalled: bool,
+    /// What keeps items from it.
+    pub obstacles: Obstacles,
     /// When it last returned something.
     pub last_result: Option<Instant>,
     /// Jobs whose specification it has, each with the trial set of the batch whose
@@ -68,6 +61,17 @@ pub struct Worker {
     n_learnt: u32,
 }
 
+/// The queue of a batch that an item comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// What has to be computed.
+    Queue,
+    /// The same, but workers were lost with it: a worker has one such item at a time.
+    Suspects,
+    /// What is computed only to be compared.
+    Audits,
+}
+
 /// An item that a worker has.
 #[derive(Debug, Clone)]
 pub struct AssignedItem {
@@ -77,16 +81,21 @@ pub struct AssignedItem {
     pub trial_set: TrialSet,
     /// The item.
     pub item: Item,
-    /// Whether it is computed only to be compared.
-    pub is_audit: bool,
-    /// Whether workers were lost with it: a worker has one such item at a time.
-    pub is_suspect: bool,
+    /// The queue that it comes from.
+    pub source: Source,
     /// When it was sent.
     pub assigned: Instant,
     /// When it should be done.
     pub expected: Instant,
     /// Time that the job was charged for it.
     pub charge: Duration,
+}
+
+impl AssignedItem {
+    /// Whether it is computed only to be compared.
+    pub fn is_audit(&self) -> bool {
+        self.source == Source::Audits
+    }
 }
 
 impl Worker {
@@ -97,12 +106,7 @@ impl Worker {
             shared_name: introduction.name.as_str().into(),
             introduction,
             last_heard: now,
-            is_draining: false,
-            quarantined: None,
-            question: None,
-            resting_until: None,
-            is_on_probation: false,
-            is_stalled: false,
+            obstacles: Obstacles::default(),
             last_result: None,
             known_jobs: BTreeMap::new(),
             in_flight: InFlight::default(),
@@ -129,26 +133,16 @@ impl Worker {
         self.introduction.experiments.matches(&job.name)
     }
 
-    /// Whether it may be given items now.
-    pub fn is_usable(&self) -> bool {
-        self.may_audit() && self.question.is_none() && self.resting_until.is_none()
-    }
-
-    /// Whether audits wait for it: it may be given items now, or soon.
-    pub fn may_audit(&self) -> bool {
-        !self.is_draining && self.quarantined.is_none() && !self.is_stalled
-    }
-
     /// Whether it has an item that workers were lost with.
     pub fn has_suspect(&self) -> bool {
-        self.in_flight.values().any(|assigned| assigned.is_suspect)
+        self.in_flight.values().any(|assigned| assigned.source == Source::Suspects)
     }
 
     /// Most items it may hold: one per slot, and as many more as it computes in
     /// [`WORK_AHEAD`], so that few items wait behind long ones, and slots do not
     /// wait for short ones. At first, two per slot; one in all after a loss.
     pub fn n_credits(&self) -> usize {
-        if self.is_on_probation {
+        if self.availability() == Availability::OnProbation {
             return 1;
         }
         let n_slots = self.n_slots();
@@ -198,10 +192,10 @@ impl Worker {
 
     /// Slots that may have an item.
     pub fn n_usable_slots(&self) -> usize {
-        match (self.is_usable(), self.is_on_probation) {
-            (false, _) => 0,
-            (true, true) => 1,
-            (true, false) => self.n_slots(),
+        match self.availability() {
+            Availability::Free => self.n_slots(),
+            Availability::OnProbation => 1,
+            _ => 0,
         }
     }
 
@@ -260,30 +254,9 @@ impl Worker {
             idle_share,
             connected_for: now.saturating_duration_since(self.time.joined()),
             silent_for: now.saturating_duration_since(self.last_heard),
-            is_draining: self.is_draining,
-            quarantined: self.quarantined.clone(),
+            is_draining: self.obstacles.is_draining,
+            quarantined: self.obstacles.quarantined.clone(),
             waits: self.waits(now),
-        }
-    }
-
-    /// Why it is given nothing for a while.
-    pub fn waits(&self, now: Instant) -> Option<String> {
-        if self.question.is_some() {
-            Some("its word is in doubt until the referee has answered".to_owned())
-        } else if let Some(until) = self.resting_until {
-            let left = until.saturating_duration_since(now).as_secs_f64();
-            Some(format!(
-                "it was lost, and has returned nothing since; it gets an item in {left:.1} s"
-            ))
-        } else if self.is_stalled {
-            let silent = self.last_result.map_or(self.time.joined(), |at| at);
-            let seconds = now.saturating_duration_since(silent).as_secs();
-            Some(format!(
-                "it has returned nothing for {seconds} s while others have; it gets items when it \
-                 does"
-            ))
-        } else {
-            None
         }
     }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use sim_core::TrialSet;
 
-use crate::ids::JobId;
+use crate::ids::{AssignmentId, JobId};
 
 use super::super::{Engine, item::Item};
 
@@ -20,7 +20,7 @@ pub struct Audits {
     /// Items that another worker has to confirm, by the name of the first; none is empty.
     waiting: BTreeMap<Arc<str>, VecDeque<Item>>,
     /// Audits that workers compute.
-    pub n_in_flight: usize,
+    pub in_flight: BTreeSet<AssignmentId>,
     n_agreed: usize,
     /// Workers that an audit agreed with.
     confirmed: BTreeSet<Arc<str>>,
@@ -94,13 +94,12 @@ impl Engine {
     /// on nothing but the place of the individual, so that the same individuals are
     /// audited whoever computes them.
     pub(in crate::engine) fn is_audited(&self, id: JobId, item: &Item) -> bool {
-        let Some(work) = self.jobs.get(&id) else { return false };
-        let Some(batch) = &work.batch else { return false };
+        let Some(batch) = self.batch(id) else { return false };
         let (kind, number) = match id {
             JobId::Experiment(id) => (0, id.0),
             JobId::Evaluation(id) => (1, id.0),
         };
-        let (set, generation) = match batch.trial_set() {
+        let (set, generation) = match batch.request.trial_set {
             TrialSet::Generation(generation) => (0, generation),
             TrialSet::Evaluation => (2, 0),
             TrialSet::Judgement(generation) => (3, generation),

@@ -48,7 +48,7 @@ impl CrashLoops {
     /// A worker has returned a result.
     pub fn on_result(&mut self, worker: &Worker) {
         // Few have an entry: this is called for every result.
-        if worker.is_on_probation {
+        if worker.obstacles.is_on_probation {
             self.by_name.remove(worker.name());
         }
     }

@@ -1,4 +1,4 @@
-//! Turns trouble with workers into questions for the referee.
+//! ReadyQueue trouble with workers into questions for the referee.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use super::{
         item::Item,
         known_results::{Disagreement, REFEREE},
         results::NoResult,
-        worker::{AssignedItem, Worker},
+        worker::AssignedItem,
     },
     questions::{Doubt, Party},
     verdicts::{place, wrong},
@@ -34,8 +34,8 @@ impl Engine {
             return self.fail(now, job, &item, &confirmed);
         }
         // A worker whose word is in doubt already says nothing new.
-        let is_doubted = self.workers[&id].question.is_some();
-        if assignment.is_audit || is_doubted || self.jobs[&job].batch.is_none() {
+        let is_doubted = self.is_doubted(id);
+        if assignment.is_audit() || is_doubted || self.batch(job).is_none() {
             self.retry(now, assignment, NoResult::TakenBack);
         }
         if !is_doubted {
@@ -56,16 +56,14 @@ impl Engine {
         let Disagreement { first, first_name, trial, values: [first_values, second_values] } =
             disagreement;
         let second = self.party(second);
-        let Some(batch) = &self.jobs[&job].batch else { return };
+        let Some(batch) = self.batch(job) else { return };
         let item = Item { individual: item.individual, trials: trial..trial + 1 };
         if first == REFEREE {
             let reason = wrong(&second_values, &first_values, &place(&item), &batch.name());
             return self.put_in_quarantine(now, &second, &reason);
         }
-        let is_doubted =
-            |id| self.workers.get(&id).is_some_and(|worker: &Worker| worker.question.is_some());
         // What they differ about will be compared again when it is clear who is right.
-        if is_doubted(first) || is_doubted(second.id) {
+        if self.is_doubted(first) || self.is_doubted(second.id) {
             return;
         }
         let first = Party { id: first, name: first_name };
@@ -73,32 +71,18 @@ impl Engine {
         self.ask_referee(job, item, Doubt::Disagreement { parties });
     }
 
-    /// Another's result came first, but this one is here, so compare them.
-    pub(in crate::engine) fn on_late_result(
-        &mut self,
-        now: Instant,
-        id: WorkerId,
-        recalled: &AssignedItem,
-        values: &[f64],
-    ) {
-        let job = recalled.job;
-        let work = self.jobs.get(&job);
-        let batch = work.and_then(|work| work.batch.as_ref());
-        if let Some(batch) = batch
-            && batch.trial_set() == recalled.trial_set
-            && let Err(disagreement) = batch.known.compare(&recalled.item, values)
-        {
-            self.on_disagreement(now, job, id, &recalled.item, disagreement);
-        }
-    }
-
     /// Whether an item is to be computed by the referee because workers were lost with it. It
     /// computes one at a time, and so is no help against many.
     pub(in crate::engine) fn may_ask_about_losses(&self, job: JobId, item: &Item) -> bool {
-        let batch = self.jobs.get(&job).and_then(|work| work.batch.as_ref());
-        let is_open = batch.is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
+        let is_open =
+            self.batch(job).is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
         let n_asked = self.trust.questions.n_about(job, |doubt| matches!(doubt, Doubt::Losses));
         is_open && n_asked < LOSS_QUESTIONS_MAX
+    }
+
+    /// Whether the referee is asked about a worker's word already.
+    fn is_doubted(&self, id: WorkerId) -> bool {
+        self.workers.get(&id).is_some_and(|worker| worker.obstacles.question.is_some())
     }
 
     /// A connected worker, as one whose word may be in doubt.

@@ -1,7 +1,12 @@
 //! Finds out whom to believe when workers disagree, fail or disappear.
 //!
-//! The rest of the engine reports trouble, and asks three things: whether a worker may have
-//! items, which items wait for an answer, and whether a batch still waits for an audit.
+//! The rest of the engine reports trouble. Consequences are items that wait ([`ItemState::Held`],
+//! [`ItemState::Delayed`]), workers that get nothing ([`Availability`]), items that are computed
+//! for the sake of trust ([`Engine::next_check`]), and batches that wait for an audit.
+//!
+//! [`ItemState::Held`]: super::item::ItemState::Held
+//! [`ItemState::Delayed`]: super::item::ItemState::Delayed
+//! [`Availability`]: super::availability::Availability
 //!
 //! | event | file | consequence |
 //! |---|---|---|
@@ -22,8 +27,14 @@ mod verdicts;
 
 use std::time::{Duration, Instant};
 
-use super::{Engine, Introduction, OpenQuestion, item::Item, worker::Worker};
-use crate::ids::JobId;
+use super::{
+    Engine,
+    batch::BatchInProgress,
+    item::Item,
+    job::JobWork,
+    worker::{Source, Worker},
+};
+use crate::ids::{JobId, WorkerId};
 
 use self::{
     audits::Doubted, crash_loops::CrashLoops, quarantine::Quarantine, questions::Questions,
@@ -43,11 +54,14 @@ const AUDITOR_GRACE: Duration = Duration::from_secs(30);
 /// What is known of the workers' reliability.
 #[derive(Debug)]
 pub struct Trust {
-    questions: Questions,
+    /// What the referee is asked.
+    pub questions: Questions,
     /// The workers that questions are about.
     doubted: Doubted,
-    quarantine: Quarantine,
-    crash_loops: CrashLoops,
+    /// The workers that are proved faulty.
+    pub quarantine: Quarantine,
+    /// The workers that were lost before they returned anything.
+    pub crash_loops: CrashLoops,
     /// When there were last two workers that can audit each other, or the engine began.
     auditors_seen: Instant,
 }
@@ -64,63 +78,44 @@ impl Trust {
         }
     }
 
-    /// Why a worker is in quarantine, if it is.
-    pub fn quarantine_reason(&self, introduction: &Introduction) -> Option<&str> {
-        self.quarantine.reason(introduction)
-    }
-
-    /// The name under which a worker is in quarantine, if it is: an operator readmits that one.
-    pub fn quarantine_name(&self, introduction: &Introduction) -> Option<&str> {
-        self.quarantine.name(introduction)
-    }
-
-    /// When a worker that joins may have an item, if it was lost before it returned anything.
-    pub fn rest(&self, name: &str) -> Option<Instant> {
-        self.crash_loops.rest(name)
-    }
-
-    /// A worker was lost.
-    pub fn on_lost(&mut self, now: Instant, name: &str) {
-        self.crash_loops.on_lost(now, name);
-    }
-
-    /// A worker has returned a result.
-    pub fn on_result(&mut self, worker: &Worker) {
-        self.crash_loops.on_result(worker);
-    }
-
-    /// Whether a worker may do one of these audits now: of values whose worker is not in doubt.
-    pub fn has_audit_for(&self, name: &str, audits: &Audits) -> bool {
-        audits.has_clear_for(name, &self.doubted)
-    }
-
-    /// Takes the first such audit.
-    pub fn pop_audit_for(&self, name: &str, audits: &mut Audits) -> Option<Item> {
-        audits.pop_for(name, &self.doubted)
-    }
-
     /// Whether a second worker, for audits, may still come.
     pub fn awaits_auditor(&self, now: Instant) -> bool {
         now < self.auditors_seen + AUDITOR_GRACE
     }
-
-    /// The open questions about a job, for people.
-    pub fn open_questions(&self, job: JobId) -> Vec<OpenQuestion> {
-        self.questions.about(job).map(|(_, question)| question.activity()).collect()
-    }
-
-    /// How many questions about a job have this doubt.
-    pub fn n_questions(&self, job: JobId, is_reason: impl Fn(&Doubt) -> bool) -> usize {
-        self.questions.n_about(job, is_reason)
-    }
-
-    /// Number of questions since the engine began.
-    pub fn n_asked(&self) -> u64 {
-        self.questions.n_asked()
-    }
 }
 
 impl Engine {
+    /// The worker that is to compute something of a job's batch for the sake of trust: an audit
+    /// of values whose worker is not in doubt already, or an item that workers were lost with,
+    /// one at a time.
+    pub(super) fn next_check(
+        &self,
+        work: &JobWork,
+        batch: &BatchInProgress,
+    ) -> Option<(WorkerId, Source)> {
+        if !batch.audits.is_empty() {
+            let mut takers = self.takers(work).map(|(_, id)| id);
+            let may = |id: &WorkerId| {
+                batch.audits.has_clear_for(self.workers[id].name(), &self.trust.doubted)
+            };
+            if let Some(auditor) = takers.find(may) {
+                return Some((auditor, Source::Audits));
+            }
+        }
+        if batch.suspects.is_empty() {
+            return None;
+        }
+        let taker = self.idle_taker(work, |id| !self.workers[&id].has_suspect())?;
+        Some((taker, Source::Suspects))
+    }
+
+    /// Takes the first audit that a worker may do.
+    pub(super) fn take_audit(&mut self, job: JobId, worker: WorkerId) -> Option<Item> {
+        let name = self.workers.get(&worker)?.name();
+        let batch = self.jobs.get_mut(&job)?.batch.as_mut()?;
+        batch.audits.pop_for(name, &self.trust.doubted)
+    }
+
     /// Notes when there were last two workers that can audit each other.
     pub(super) fn note_auditors(&mut self, now: Instant) {
         let mut auditors = self.workers.values().filter(|worker| worker.may_audit());

@@ -6,7 +6,6 @@
 
 use std::{
     collections::BTreeMap,
-    ops::Range,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -217,13 +216,5 @@ impl Questions {
     /// Number of questions since the engine began.
     pub fn n_asked(&self) -> u64 {
         self.n_asked
-    }
-}
-
-impl Item {
-    /// Whether two items have a trial in common.
-    pub fn overlaps(&self, other: &Self) -> bool {
-        let Range { start, end } = self.trials;
-        self.individual == other.individual && start < other.trials.end && other.trials.start < end
     }
 }

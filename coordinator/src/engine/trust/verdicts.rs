@@ -14,8 +14,8 @@ use crate::{
 
 use super::{
     super::{
-        Command, Engine,
-        batch::name_of,
+        Batch, Command, Engine,
+        batch::{BatchInProgress, name_of},
         item::Item,
         known_results::{REFEREE, same_bits},
         results::NoResult,
@@ -60,14 +60,15 @@ impl Engine {
         let Some(work) = self.jobs.get_mut(&job) else { return };
         let spec = Arc::clone(&work.spec);
         let Some(batch) = &mut work.batch else { return };
-        let what = (batch.trial_set(), batch.output(), batch.genotype(item.individual));
+        let Batch { trial_set, output, .. } = batch.request;
+        let what = (trial_set, output, batch.genotype(item.individual));
         let question = Question::new(job, spec, what, item.clone(), doubt);
         match question.doubt {
             Doubt::Disagreement { .. } => batch.n_disagreements += 1,
             Doubt::NoFitness => {}
             // An audit's is known.
-            Doubt::Failure { .. } | Doubt::Losses if batch.unknown(&item).is_empty() => {}
-            Doubt::Failure { .. } | Doubt::Losses => batch.hold_back(item),
+            Doubt::Failure { .. } | Doubt::Losses if batch.is_known(&item) => {}
+            Doubt::Failure { .. } | Doubt::Losses => batch.hold(item),
         }
         for party in question.parties() {
             *self.trust.doubted.entry(Arc::clone(&party.name)).or_default() += 1;
@@ -75,9 +76,7 @@ impl Engine {
         let parties: Vec<WorkerId> = question.parties().iter().map(|party| party.id).collect();
         let (id, command) = self.trust.questions.ask(question);
         for party in parties {
-            if self.workers.contains_key(&party) {
-                self.update_worker(party, |worker| worker.question = Some(id));
-            }
+            self.update_worker(party, |worker| worker.obstacles.question = Some(id));
         }
         self.update_readiness(job);
         self.commands.push_back(command);
@@ -102,7 +101,7 @@ impl Engine {
         let others = questions.filter_map(|question| match &question.doubt {
             Doubt::Failure { reporter, message: same }
                 if question.trouble.is_some()
-                    && self.batch_of(question)
+                    && self.batch_with(job, question.trial_set).is_some()
                     && same == message
                     && question.item.overlaps(item) =>
             {
@@ -117,7 +116,7 @@ impl Engine {
         let trusted = self
             .workers
             .iter()
-            .filter(|(_, worker)| worker.quarantined.is_none() && worker.takes(work));
+            .filter(|(_, worker)| worker.obstacles.quarantined.is_none() && worker.takes(work));
         let (mut n_slots, mut n_reporting) = (0, 0);
         for (id, worker) in trusted {
             n_slots += worker.n_slots();
@@ -155,7 +154,7 @@ impl Engine {
                 self.put_in_quarantine(now, party, &reason);
             }
         }
-        if self.batch_of(question) {
+        if self.batch_of(question).is_some() {
             self.fail(now, question.job, &question.item, failure);
         }
     }
@@ -183,13 +182,9 @@ impl Engine {
                 }
             }
         }
-        if self.batch_of(question) {
+        if let Some(progress) = self.batch_of(question) {
             let (job, item) = (question.job, &question.item);
-            if matches!(question.doubt, Doubt::NoFitness)
-                && let Some(batch) = self.batch_mut(job)
-            {
-                batch.n_without_fitness += 1;
-            }
+            progress.n_without_fitness += u32::from(matches!(question.doubt, Doubt::NoFitness));
             // What a third worker returned meanwhile may be wrong, too.
             while let Some(progress) = self.batch_mut(job)
                 && let Err(disagreement) = progress.known.compare(item, values)
@@ -200,9 +195,8 @@ impl Engine {
                 let reason = wrong(&returned, &right, &place, &batch);
                 self.put_in_quarantine(now, &party, &reason);
             }
-            if self.batch_mut(job).map(|batch| batch.n_values(item.trials.len()))
-                == Some(values.len())
-            {
+            let n_values = self.batch(job).map(|batch| batch.n_values(item.trials.len()));
+            if n_values == Some(values.len()) {
                 self.take_values(now, job, REFEREE, item, values, true);
             }
             self.update_readiness(job);
@@ -210,11 +204,9 @@ impl Engine {
         }
     }
 
-    /// Whether the batch that a question is about is still being computed.
-    fn batch_of(&self, question: &Question) -> bool {
-        let work = self.jobs.get(&question.job);
-        let batch = work.and_then(|work| work.batch.as_ref());
-        batch.is_some_and(|batch| batch.trial_set() == question.trial_set)
+    /// The batch that a question is about, if it is still being computed.
+    fn batch_of(&mut self, question: &Question) -> Option<&mut BatchInProgress> {
+        self.batch_with_mut(question.job, question.trial_set)
     }
 
     /// Whoever was in doubt because of a question is not any more.
@@ -227,14 +219,12 @@ impl Engine {
                 }
             }
             let worker = self.workers.get(&party.id);
-            if worker.is_some_and(|worker| worker.question == Some(id)) {
-                self.update_worker(party.id, |worker| worker.question = None);
+            if worker.is_some_and(|worker| worker.obstacles.question == Some(id)) {
+                self.update_worker(party.id, |worker| worker.obstacles.question = None);
             }
         }
         if matches!(question.doubt, Doubt::Disagreement { .. }) {
-            if self.batch_of(question)
-                && let Some(batch) = self.batch_mut(question.job)
-            {
+            if let Some(batch) = self.batch_of(question) {
                 batch.n_disagreements -= 1;
             }
         } else if question.holds_back() {
@@ -244,9 +234,7 @@ impl Engine {
 
     /// Gives a question's item to workers again.
     fn release(&mut self, question: &Question) {
-        if self.batch_of(question)
-            && self.batch_mut(question.job).is_some_and(|batch| batch.release(&question.item))
-        {
+        if self.batch_of(question).is_some_and(|batch| batch.release(&question.item)) {
             self.requeue(question.job, &question.item);
         }
     }
@@ -270,7 +258,7 @@ impl Engine {
             .filter(|(_, worker)| self.trust.quarantine.reason(&worker.introduction).is_some());
         let its = its.map(|(&id, _)| id).chain([party.id]).collect::<BTreeSet<WorkerId>>();
         for id in its {
-            if self.workers.get(&id).is_some_and(|worker| worker.quarantined.is_none()) {
+            if self.workers.get(&id).is_some_and(|worker| worker.obstacles.quarantined.is_none()) {
                 self.isolate(now, id, reason);
             }
         }
@@ -282,9 +270,9 @@ impl Engine {
     fn isolate(&mut self, now: Instant, id: WorkerId, reason: &str) {
         let in_flight: Vec<_> = self.workers[&id].in_flight.keys().copied().collect();
         let written_off = self.update_worker(id, |worker| {
-            worker.quarantined = Some(reason.to_owned());
-            worker.question = None;
-            worker.is_stalled = false;
+            worker.obstacles.quarantined = Some(reason.to_owned());
+            worker.obstacles.question = None;
+            worker.obstacles.is_stalled = false;
             mem::take(&mut worker.written_off)
         });
         for item in written_off.into_iter().flatten().map(|(_, item)| item) {
@@ -333,7 +321,7 @@ impl Engine {
             // It may be there under another name as well.
             let reason = self.trust.quarantine.reason(&self.workers[&id].introduction);
             let reason = reason.map(str::to_owned);
-            self.update_worker(id, |worker| worker.quarantined = reason);
+            self.update_worker(id, |worker| worker.obstacles.quarantined = reason);
         }
         self.finish_waived(now);
         self.assign(now);

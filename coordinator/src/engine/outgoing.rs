@@ -1,0 +1,112 @@
+//! Messages to workers that are being put together while items are assigned.
+
+use std::{collections::BTreeMap, mem, sync::Arc};
+
+use sim_core::{Output, TrialSet};
+
+use crate::ids::{AssignmentId, JobId, WorkerId};
+
+use super::{Assignment, Batch, Command, Engine};
+
+/// Bytes of a distribution that fit into a message with room to spare.
+const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
+
+/// The messages so far.
+#[derive(Debug, Default)]
+pub struct Outgoing {
+    recalled: BTreeMap<WorkerId, Vec<AssignmentId>>,
+    /// In the order given, so that what a worker computes first is what [`InFlight`] has as its
+    /// oldest: a loss is blamed on that.
+    ///
+    /// [`InFlight`]: super::in_flight::InFlight
+    assignments: BTreeMap<WorkerId, Vec<AssignmentsOfBatch>>,
+}
+
+/// What one message has room for: items of one batch.
+#[derive(Debug)]
+struct AssignmentsOfBatch {
+    job: JobId,
+    trial_set: TrialSet,
+    output: Output,
+    assignments: Vec<Assignment>,
+}
+
+impl Outgoing {
+    /// Whether there is nothing to send.
+    pub fn is_empty(&self) -> bool {
+        self.recalled.is_empty() && self.assignments.is_empty()
+    }
+
+    /// A worker drops an assignment.
+    pub fn recall(&mut self, worker: WorkerId, assignment: AssignmentId) {
+        self.recalled.entry(worker).or_default().push(assignment);
+    }
+
+    /// A worker computes an item of a job's batch.
+    pub fn assign(&mut self, worker: WorkerId, job: JobId, batch: &Batch, assignment: Assignment) {
+        let messages = self.assignments.entry(worker).or_default();
+        match messages.last_mut() {
+            Some(last) if last.job == job => last.assignments.push(assignment),
+            _ => messages.push(AssignmentsOfBatch {
+                job,
+                trial_set: batch.trial_set,
+                output: batch.output,
+                assignments: vec![assignment],
+            }),
+        }
+    }
+}
+
+impl Engine {
+    /// ReadyQueue what has been put together into commands.
+    pub(super) fn send(&mut self) {
+        let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
+        for (worker, assignments) in recalled {
+            if self.workers.contains_key(&worker) {
+                self.commands.push_back(Command::SendDrop { worker, assignments });
+            }
+        }
+        let messages = assignments.into_iter().flat_map(|(worker, messages)| {
+            messages.into_iter().map(move |message| (worker, message))
+        });
+        for (worker, AssignmentsOfBatch { job, trial_set, output, mut assignments }) in messages {
+            let known = self.workers.get_mut(&worker).map(|worker| &mut worker.known_jobs);
+            if let Some(known) = known.filter(|known| !known.contains_key(&job)) {
+                known.insert(job, None);
+                let spec = Arc::clone(&self.jobs[&job].spec);
+                self.commands.push_back(Command::SendSpec { worker, job, spec });
+            }
+            self.choose_way(worker, job, &mut assignments);
+            let send = Command::SendAssignments { worker, job, trial_set, output, assignments };
+            self.commands.push_back(send);
+        }
+    }
+
+    /// Has a worker draw the genotypes of its assignments where that is possible, if it has
+    /// the distribution, or if that is shorter than the genotypes that it is expected to be
+    /// given of the batch; else has them sent.
+    fn choose_way(&mut self, id: WorkerId, job: JobId, assignments: &mut [Assignment]) {
+        let drawn: Vec<&mut Assignment> =
+            assignments.iter_mut().filter(|assignment| assignment.is_drawn).collect();
+        let [first, ..] = &drawn[..] else { return };
+        let Some(batch) = self.jobs[&job].batch.as_ref() else { return };
+        let Some(distribution) = &batch.request.distribution else { return };
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let trial_set = Some(batch.request.trial_set);
+        if worker.known_jobs.get(&job) == Some(&trial_set) {
+            return;
+        }
+        let share = worker.n_slots() as f64 / self.load_index.n_usable_slots.max(1) as f64;
+        let n_expected = drawn.len() as f64 + batch.queue.len() as f64 * share.min(1.0);
+        let is_shorter = distribution.len() as f64
+            <= (n_expected * size_of_val(&first.genotype[..]) as f64)
+                .min(DISTRIBUTION_LEN_MAX as f64);
+        if is_shorter {
+            worker.known_jobs.insert(job, trial_set);
+            let distribution = Arc::clone(distribution);
+            self.commands.push_back(Command::SendDistribution { worker: id, job, distribution });
+        } else {
+            drawn.into_iter().for_each(|assignment| assignment.is_drawn = false);
+        }
+    }
+}
