@@ -9,7 +9,10 @@ mod simulated_fleet;
 use std::time::{Duration, Instant};
 
 use coordinator::{
-    engine::{Batch, Command, Engine, EngineConfig, Introduction, ItemResult, NamePattern},
+    engine::{
+        Assignments, Batch, Command, Engine, EngineConfig, Introduction, ItemResult, NamePattern,
+        ToWorker,
+    },
     ids::{ExperimentId, JobId},
     priority::Priority,
 };
@@ -210,11 +213,11 @@ fn throughput() -> f64 {
     let mut n_items = 0;
     loop {
         match engine.poll_command() {
-            Some(Command::SendAssignments { worker, assignments, .. }) => {
-                n_items += assignments.len();
+            Some(Command::Send(worker, ToWorker::Assignments(Assignments { items, .. }))) => {
+                n_items += items.len();
                 now += Duration::from_micros(10);
                 let compute_time = Duration::from_millis(100);
-                for assignment in assignments {
+                for assignment in items {
                     let outcome = Ok(vec![fitness(&assignment.genotype, 0)]);
                     let result = ItemResult {
                         id: assignment.id,

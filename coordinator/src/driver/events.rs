@@ -1,17 +1,14 @@
-//! What the driver is told, and what it tells workers.
+//! What the driver is told.
 
-use std::sync::Arc;
-
-use sim_core::{Output, TrialSet};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
     engine::{
-        Assignment, EvaluationActivity, Introduction, ItemResult, JobActivity, TimelineEntry,
+        EvaluationActivity, Introduction, ItemResult, JobActivity, TimelineEntry, ToWorker,
         WorkerStatus,
     },
-    ids::{AssignmentId, ExperimentId, JobId, WorkerId},
+    ids::{ExperimentId, WorkerId},
     memory::Shortage,
     runs::{Evaluation, Request, Runnable},
 };
@@ -102,49 +99,6 @@ pub struct WorkerLink {
     pub outbox: mpsc::Sender<ToWorker>,
     /// Cancelled when the coordinator has dropped the worker.
     pub dropped: CancellationToken,
-}
-
-/// What a worker is told.
-#[derive(Debug)]
-pub enum ToWorker {
-    /// It is welcome under this id.
-    Welcome(WorkerId),
-    /// A job's specification.
-    Spec(JobId, Arc<str>),
-    /// What a worker draws genotypes of a job's batch from.
-    Distribution(JobId, Arc<[u8]>),
-    /// Items of a job's batch.
-    Assignments {
-        /// The job whose batch it is.
-        job: JobId,
-        /// Which worlds and noise the trials meet.
-        trial_set: TrialSet,
-        /// What is returned for a trial.
-        output: Output,
-        /// At least one.
-        assignments: Vec<Assignment>,
-    },
-    /// Assignments whose results are not wanted any more.
-    Drop(Vec<AssignmentId>),
-    /// A job is over, or paused.
-    End(JobId),
-    /// It is dropped; the text says why.
-    Dropped(String),
-}
-
-impl ToWorker {
-    /// Bytes of what makes it long: a specification, or genes.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Spec(_, spec) => spec.len(),
-            Self::Distribution(_, distribution) => distribution.len(),
-            Self::Assignments { assignments, .. } => {
-                let sent = assignments.iter().filter(|assignment| !assignment.is_drawn);
-                sent.map(|assignment| size_of_val(assignment.genotype.as_slice())).sum()
-            }
-            Self::Welcome(_) | Self::Drop(_) | Self::End(_) | Self::Dropped(_) => 0,
-        }
-    }
 }
 
 /// Sends events to the driver.

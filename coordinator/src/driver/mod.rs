@@ -28,7 +28,7 @@ use tracing::{debug, error, info, warn};
 
 use crate::{
     clock,
-    engine::{self, Engine, EngineConfig, EvaluatedBatch},
+    engine::{self, Assignments, Engine, EngineConfig, EvaluatedBatch, ToWorker},
     failpoint,
     ids::{EvaluationId, ExperimentId, JobId, QuestionId},
     referee::{Referee, RefereeRequest, Verdict},
@@ -38,8 +38,7 @@ use crate::{
 };
 
 pub use events::{
-    DriverEvent, EvaluationReply, EventSender, ReadmissionReply, ToWorker, WorkerLink,
-    WorkerMessage, channel,
+    DriverEvent, EvaluationReply, EventSender, ReadmissionReply, WorkerLink, WorkerMessage, channel,
 };
 use questions::{Question, Questions};
 pub use stats::StatsSnapshot;
@@ -345,26 +344,19 @@ impl Driver {
     fn carry_out_for_engine(&mut self, command: engine::Command) {
         use engine::Command;
         match command {
-            Command::SendSpec { worker, job, spec } => self.send(worker, ToWorker::Spec(job, spec)),
-            Command::SendDistribution { worker, job, distribution } => {
-                self.send(worker, ToWorker::Distribution(job, distribution));
-            }
-            Command::SendAssignments { worker, job, trial_set, output, assignments } => {
+            Command::Send(worker, ToWorker::Assignments(assignments)) => {
+                let Assignments { job, trial_set, output, items } = assignments;
                 debug!(
                     %worker, %job, generation = trial_set.generation(), trials = trial_set.kind(),
-                    items = assignments.len(), "items assigned"
+                    items = items.len(), "items assigned"
                 );
-                let genotype_len = size_of_val(assignments[0].genotype.as_slice()).max(1);
-                for assignments in assignments.chunks((ITEMS_LEN_MAX / genotype_len).max(1)) {
-                    let assignments = assignments.to_vec();
-                    let message = ToWorker::Assignments { job, trial_set, output, assignments };
-                    self.send(worker, message);
+                let genotype_len = size_of_val(items[0].genotype.as_slice()).max(1);
+                for items in items.chunks((ITEMS_LEN_MAX / genotype_len).max(1)) {
+                    let message = Assignments { job, trial_set, output, items: items.to_vec() };
+                    self.send(worker, ToWorker::Assignments(message));
                 }
             }
-            Command::SendDrop { worker, assignments } => {
-                self.send(worker, ToWorker::Drop(assignments));
-            }
-            Command::SendEnd { worker, job } => self.send(worker, ToWorker::End(job)),
+            Command::Send(worker, message) => self.send(worker, message),
             Command::Disconnect { worker, reason, n_items_requeued } => {
                 self.send(worker, ToWorker::Dropped(reason.clone()));
                 self.forget_worker(worker, &reason, n_items_requeued);

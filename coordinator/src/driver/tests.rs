@@ -71,9 +71,11 @@ impl Rig {
         loop {
             self.driver.carry_out_all();
             let Ok(message) = self.inbox.try_recv() else { return answered };
-            let ToWorker::Assignments { trial_set, assignments, .. } = message else { continue };
+            let ToWorker::Assignments(Assignments { trial_set, items, .. }) = message else {
+                continue;
+            };
             answered = trial_set.generation();
-            let results = assignments.into_iter().map(|assignment| ItemResult {
+            let results = items.into_iter().map(|assignment| ItemResult {
                 id: assignment.id,
                 output: sim_core::Output::Fitness,
                 outcome: Ok(assignment.trials.map(|_| assignment.genotype[0]).collect()),

@@ -5,9 +5,13 @@ use std::collections::BTreeMap;
 use tokio::sync::oneshot;
 use tracing::{info, warn};
 
-use crate::{clock, engine::Introduction, ids::WorkerId};
+use crate::{
+    clock,
+    engine::{Introduction, ToWorker},
+    ids::WorkerId,
+};
 
-use super::{Driver, ToWorker, WorkerLink};
+use super::{Driver, WorkerLink};
 
 /// The connected workers.
 pub type ConnectedWorkers = BTreeMap<WorkerId, ConnectedWorker>;

@@ -62,51 +62,8 @@ impl Batch {
 /// What the shell has to do.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
-    /// Send a worker the specification of a job, before its first assignment.
-    SendSpec {
-        /// The worker that it is sent to.
-        worker: WorkerId,
-        /// The job that it specifies.
-        job: JobId,
-        /// As given to [`Engine::on_job_started`](super::Engine::on_job_started).
-        spec: Arc<str>,
-    },
-    /// Send a worker what it draws genotypes of a job's batch from.
-    SendDistribution {
-        /// The worker.
-        worker: WorkerId,
-        /// The job whose batch it is.
-        job: JobId,
-        /// As given to [`Engine::on_batch_requested`](super::Engine::on_batch_requested).
-        distribution: Arc<[u8]>,
-    },
-    /// Send a worker items of one batch.
-    SendAssignments {
-        /// The worker that computes them.
-        worker: WorkerId,
-        /// The job whose batch it is.
-        job: JobId,
-        /// Which worlds and noise the trials meet.
-        trial_set: TrialSet,
-        /// What the worker returns for a trial.
-        output: Output,
-        /// At least one.
-        assignments: Vec<Assignment>,
-    },
-    /// Tell a worker that the results of assignments are not wanted any more.
-    SendDrop {
-        /// The worker that has them.
-        worker: WorkerId,
-        /// The assignments, at least one.
-        assignments: Vec<AssignmentId>,
-    },
-    /// Tell a worker that a job is over, or paused.
-    SendEnd {
-        /// The worker that knows its specification.
-        worker: WorkerId,
-        /// The job.
-        job: JobId,
-    },
+    /// Send a worker a message.
+    Send(WorkerId, ToWorker),
     /// Close a worker's stream; the engine has forgotten the worker already.
     Disconnect {
         /// The worker whose stream it is.
@@ -159,6 +116,55 @@ pub enum Command {
         /// For its owner.
         reason: String,
     },
+}
+
+/// What a worker is told.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ToWorker {
+    /// It is welcome under this id; from the shell.
+    Welcome(WorkerId),
+    /// A job's specification, as given to
+    /// [`Engine::on_job_started`](super::Engine::on_job_started), before its first assignment.
+    Spec(JobId, Arc<str>),
+    /// What a worker draws genotypes of a job's batch from, as given to
+    /// [`Engine::on_batch_requested`](super::Engine::on_batch_requested).
+    Distribution(JobId, Arc<[u8]>),
+    /// Items of a job's batch.
+    Assignments(Assignments),
+    /// Assignments whose results are not wanted any more, at least one.
+    Drop(Vec<AssignmentId>),
+    /// A job that the worker knows is over, or paused.
+    End(JobId),
+    /// It is dropped; the text says why. From the shell.
+    Dropped(String),
+}
+
+impl ToWorker {
+    /// Bytes of what makes it long: a specification, or genes.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Spec(_, spec) => spec.len(),
+            Self::Distribution(_, distribution) => distribution.len(),
+            Self::Assignments(Assignments { items, .. }) => {
+                let sent = items.iter().filter(|item| !item.is_drawn);
+                sent.map(|item| size_of_val(item.genotype.as_slice())).sum()
+            }
+            Self::Welcome(_) | Self::Drop(_) | Self::End(_) | Self::Dropped(_) => 0,
+        }
+    }
+}
+
+/// Items of one batch that a worker computes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignments {
+    /// The job whose batch it is.
+    pub job: JobId,
+    /// Which worlds and noise the trials meet.
+    pub trial_set: TrialSet,
+    /// What the worker returns for a trial.
+    pub output: Output,
+    /// At least one.
+    pub items: Vec<Assignment>,
 }
 
 /// An item given to a worker: one genotype and the trials to run it on.

@@ -76,8 +76,8 @@ use fleet_time::FleetTime;
 use job::JobWork;
 use load_index::WorkerLoadIndex;
 pub use messages::{
-    Assignment, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
-    SharedGenotype, WorkerStatus,
+    Assignment, Assignments, Batch, Command, EvaluatedBatch, FleetSize, Introduction, ItemResult,
+    SharedGenotype, ToWorker, WorkerStatus,
 };
 pub use name_pattern::NamePattern;
 use outgoing::Outgoing;
@@ -426,7 +426,7 @@ impl Engine {
                 // Nothing is left that it could answer.
                 worker.obstacles.is_stalled &= !worker.written_off.is_empty();
                 self.load_index.add(worker_id, worker);
-                self.commands.push_back(Command::SendEnd { worker: worker_id, job: id });
+                self.commands.push_back(Command::Send(worker_id, ToWorker::End(id)));
             }
         }
         if let Some(batch) = self.batch_mut(id) {

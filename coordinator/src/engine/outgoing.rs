@@ -2,11 +2,9 @@
 
 use std::{collections::BTreeMap, mem, sync::Arc};
 
-use sim_core::{Output, TrialSet};
-
 use crate::ids::{AssignmentId, JobId, WorkerId};
 
-use super::{Assignment, Batch, Command, Engine};
+use super::{Assignment, Assignments, Batch, Command, Engine, ToWorker};
 
 /// Bytes of a distribution that fit into a message with room to spare.
 const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
@@ -19,16 +17,7 @@ pub struct Outgoing {
     /// oldest: a loss is blamed on that.
     ///
     /// [`InFlight`]: super::in_flight::InFlight
-    assignments: BTreeMap<WorkerId, Vec<AssignmentsOfBatch>>,
-}
-
-/// What one message has room for: items of one batch.
-#[derive(Debug)]
-struct AssignmentsOfBatch {
-    job: JobId,
-    trial_set: TrialSet,
-    output: Output,
-    assignments: Vec<Assignment>,
+    assignments: BTreeMap<WorkerId, Vec<Assignments>>,
 }
 
 impl Outgoing {
@@ -43,16 +32,14 @@ impl Outgoing {
     }
 
     /// A worker computes an item of a job's batch.
-    pub fn assign(&mut self, worker: WorkerId, job: JobId, batch: &Batch, assignment: Assignment) {
+    pub fn assign(&mut self, worker: WorkerId, job: JobId, batch: &Batch, item: Assignment) {
         let messages = self.assignments.entry(worker).or_default();
         match messages.last_mut() {
-            Some(last) if last.job == job => last.assignments.push(assignment),
-            _ => messages.push(AssignmentsOfBatch {
-                job,
-                trial_set: batch.trial_set,
-                output: batch.output,
-                assignments: vec![assignment],
-            }),
+            Some(last) if last.job == job => last.items.push(item),
+            _ => {
+                let Batch { trial_set, output, .. } = *batch;
+                messages.push(Assignments { job, trial_set, output, items: vec![item] });
+            }
         }
     }
 }
@@ -63,23 +50,28 @@ impl Engine {
         let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
         for (worker, assignments) in recalled {
             if self.workers.contains_key(&worker) {
-                self.commands.push_back(Command::SendDrop { worker, assignments });
+                self.tell(worker, ToWorker::Drop(assignments));
             }
         }
         let messages = assignments.into_iter().flat_map(|(worker, messages)| {
             messages.into_iter().map(move |message| (worker, message))
         });
-        for (worker, AssignmentsOfBatch { job, trial_set, output, mut assignments }) in messages {
+        for (worker, mut message) in messages {
+            let job = message.job;
             let known = self.workers.get_mut(&worker).map(|worker| &mut worker.known_jobs);
             if let Some(known) = known.filter(|known| !known.contains_key(&job)) {
                 known.insert(job, None);
                 let spec = Arc::clone(&self.jobs[&job].spec);
-                self.commands.push_back(Command::SendSpec { worker, job, spec });
+                self.tell(worker, ToWorker::Spec(job, spec));
             }
-            self.choose_way(worker, job, &mut assignments);
-            let send = Command::SendAssignments { worker, job, trial_set, output, assignments };
-            self.commands.push_back(send);
+            self.choose_way(worker, job, &mut message.items);
+            self.tell(worker, ToWorker::Assignments(message));
         }
+    }
+
+    /// Has the shell send a worker a message.
+    pub(super) fn tell(&mut self, worker: WorkerId, message: ToWorker) {
+        self.commands.push_back(Command::Send(worker, message));
     }
 
     /// Has a worker draw the genotypes of its assignments where that is possible, if it has
@@ -104,7 +96,7 @@ impl Engine {
         if is_shorter {
             worker.known_jobs.insert(job, trial_set);
             let distribution = Arc::clone(distribution);
-            self.commands.push_back(Command::SendDistribution { worker: id, job, distribution });
+            self.tell(id, ToWorker::Distribution(job, distribution));
         } else {
             drawn.into_iter().for_each(|assignment| assignment.is_drawn = false);
         }

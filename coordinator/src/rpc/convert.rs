@@ -9,8 +9,10 @@ use swarm_proto::v1::{
 use tonic::Status;
 
 use crate::{
-    driver::ToWorker,
-    engine::{Assignment, BatchActivity, EvaluationActivity, ItemResult, WorkerStatus},
+    engine::{
+        Assignment, Assignments, BatchActivity, EvaluationActivity, ItemResult, ToWorker,
+        WorkerStatus,
+    },
     ids::{AssignmentId, JobId},
     priority::Priority,
     queries::{Address, DynamicsPage, Individuals, Lineage, Page},
@@ -46,12 +48,12 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
             job: job(id),
             distribution: distribution.to_vec(),
         }),
-        ToWorker::Assignments { job: id, trial_set: set, output: wanted, assignments } => {
+        ToWorker::Assignments(Assignments { job: id, trial_set: set, output: wanted, items }) => {
             Message::Assignments(v1::Assignments {
                 job: job(id),
                 trial_set: trial_set(set),
                 output: output(wanted).into(),
-                assignments: assignments.iter().map(assignment).collect(),
+                assignments: items.iter().map(assignment).collect(),
             })
         }
         ToWorker::End(id) => Message::EndJob(v1::EndJob { job: job(id) }),

@@ -23,8 +23,8 @@ use tracing::warn;
 
 use crate::{
     clock,
-    driver::{DriverEvent, EventSender, ToWorker, WorkerLink, WorkerMessage},
-    engine::{Introduction, NamePattern},
+    driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
+    engine::{Introduction, NamePattern, ToWorker},
     ids::WorkerId,
     limits::{
         HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, SHORT_LEN, WORKER_OUTBOX_SLACK,

@@ -44,18 +44,18 @@ impl SimulatedFleet {
         }
     }
 
-    fn arrive(&mut self, id: WorkerId, message: Command) {
+    fn arrive(&mut self, id: WorkerId, message: ToWorker) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         match message {
-            Command::SendDistribution { job, distribution, .. } => {
+            ToWorker::Distribution(job, distribution) => {
                 worker.distributions.insert(job, distribution);
             }
-            Command::SendAssignments { job, trial_set, assignments, .. } => {
-                if assignments.iter().any(|assignment| assignment.is_drawn) {
+            ToWorker::Assignments(Assignments { job, trial_set, items, .. }) => {
+                if items.iter().any(|assignment| assignment.is_drawn) {
                     let known = worker.distributions.get(&job);
                     assert_eq!(known, Some(&distribution(trial_set)), "what it draws from");
                 }
-                for assignment in assignments {
+                for assignment in items {
                     // The engine blames a loss on what it gave first.
                     let is_next = assignment.id > worker.last_assignment;
                     assert!(is_next, "sent in the order given: {:?}", assignment.id);
@@ -63,7 +63,7 @@ impl SimulatedFleet {
                     worker.queue.push_back((job, assignment));
                 }
             }
-            Command::SendDrop { assignments, .. } => {
+            ToWorker::Drop(assignments) => {
                 let assignments = BTreeSet::from_iter(assignments);
                 worker.queue.retain(|(_, assignment)| !assignments.contains(&assignment.id));
                 let running: Vec<AssignmentId> =
@@ -75,7 +75,7 @@ impl SimulatedFleet {
                     }
                 }
             }
-            Command::SendEnd { job, .. } => {
+            ToWorker::End(job) => {
                 worker.distributions.remove(&job);
                 worker.queue.retain(|(of, _)| *of != job);
                 if self.model.stops {
@@ -151,22 +151,17 @@ impl SimulatedFleet {
     pub(super) fn carry_out(&mut self) {
         while let Some(command) = self.engine.poll_command() {
             match command {
-                Command::SendAssignments { worker, ref assignments, .. } => {
-                    self.n_items_sent += assignments.len();
-                    self.n_items_drawn +=
-                        assignments.iter().filter(|assignment| assignment.is_drawn).count();
-                    self.post(worker, command);
-                }
-                Command::SendDrop { worker, ref assignments } => {
-                    self.n_items_dropped += assignments.len();
-                    self.post(worker, command);
-                }
-                Command::SendDistribution { worker, .. } => {
-                    self.n_distributions_sent += 1;
-                    self.post(worker, command);
-                }
-                Command::SendEnd { worker, .. } | Command::SendSpec { worker, .. } => {
-                    self.post(worker, command);
+                Command::Send(worker, message) => {
+                    match &message {
+                        ToWorker::Assignments(Assignments { items, .. }) => {
+                            self.n_items_sent += items.len();
+                            self.n_items_drawn += items.iter().filter(|item| item.is_drawn).count();
+                        }
+                        ToWorker::Drop(assignments) => self.n_items_dropped += assignments.len(),
+                        ToWorker::Distribution(..) => self.n_distributions_sent += 1,
+                        _ => {}
+                    }
+                    self.post(worker, message);
                 }
                 Command::Disconnect { worker, .. } => {
                     self.workers.remove(&worker);
@@ -208,7 +203,7 @@ impl SimulatedFleet {
         }
     }
 
-    fn post(&mut self, worker: WorkerId, message: Command) {
+    fn post(&mut self, worker: WorkerId, message: ToWorker) {
         if self.workers.get(&worker).is_some_and(|worker| worker.is_by_hand) {
             return self.arrive(worker, message);
         }

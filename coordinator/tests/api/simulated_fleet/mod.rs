@@ -17,8 +17,8 @@ use std::{
 
 use coordinator::{
     engine::{
-        Assignment, Batch, Command, Engine, EngineConfig, EvaluatedBatch, Introduction, ItemResult,
-        JobActivity, NamePattern, TimelineEntry, WorkerStatus,
+        Assignment, Assignments, Batch, Command, Engine, EngineConfig, EvaluatedBatch,
+        Introduction, ItemResult, JobActivity, NamePattern, TimelineEntry, ToWorker, WorkerStatus,
     },
     ids::{AssignmentId, JobId, QuestionId, WorkerId},
     priority::Priority,
@@ -133,7 +133,7 @@ pub struct SimulatedFleet {
     now: Duration,
     n_happenings: u64,
     agenda: BinaryHeap<Reverse<(Duration, u64, Happening)>>,
-    messages: BTreeMap<usize, Command>,
+    messages: BTreeMap<usize, ToWorker>,
     results: BTreeMap<AssignmentId, ItemResult>,
     n_messages: usize,
     workers: BTreeMap<WorkerId, Worker>,
