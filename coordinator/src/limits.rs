@@ -21,6 +21,10 @@ pub const INDIVIDUALS_LEN_MAX: usize = 8 << 20;
 
 /// Generations in one answer that says how evolution moved.
 pub const DYNAMICS_PAGE_LEN_MAX: u64 = 100;
+/// Generations that are gone through for one answer with parents and children.
+pub const FAMILIES_PAGE_LEN_MAX: u64 = 100;
+/// Children in one answer, after which no further generation is taken.
+pub const CHILDREN_MAX: usize = 50_000;
 /// Genes of the individuals of all generations that one lineage goes through; a byte each.
 pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
 /// Ancestors in one answer.

@@ -32,6 +32,25 @@ export function path(points) {
   return points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 }
 
+/** Lines and labels of both axes. `inner`: the edges of what is between them; `x` and `y`: the pixel of a
+ *  value; `x0` to `x1` and `y0` to `y1`: the values that are seen. */
+export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {
+  const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
+  const heights = ticks(y0, y1, 5);
+  const places = ticks(x0, x1, Math.min(8, (inner.right - inner.left) / 90));
+  // As many as tell one from the next.
+  const digits = Math.max(0, Math.ceil(-Math.log10(heights[1] - heights[0] || 1) - 1e-9));
+  const middle = (inner.top + inner.bottom) / 2;
+  return [
+    ...heights.flatMap((tick) => [
+      shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }),
+      text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" })]),
+    ...places.map((tick) => text([x(tick), inner.bottom + 16], String(Number(tick.toPrecision(6))).replace("-", "−"), { "text-anchor": "middle" })),
+    text([(inner.left + inner.right) / 2, height - 6], xLabel, { "text-anchor": "middle" }),
+    text([14, middle], yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }),
+  ];
+}
+
 /** A chart. `show({ lines, bands, marks, xLabel, yLabel })`: a line is
  *  `{ name, color, dash, points: [[x, y], ...] }`, a band the same with `[x, low, high]`, a mark a
  *  height with an interval. Dragging zooms along x, a double click shows all again; with the
@@ -77,23 +96,6 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
     svg.replaceChildren(...axes(frame, y0, y1, y, height, xLabel, yLabel), curves(frame, y, { lines, bands, marks }), shape("g", { class: "cursor" }));
     drawLegend([...lines, ...marks]);
     drawCursor();
-  };
-
-  const axes = ({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) => {
-    const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
-    const heights = ticks(y0, y1, 5);
-    // As many as tell one from the next.
-    const digits = Math.max(0, Math.ceil(-Math.log10(heights[1] - heights[0] || 1) - 1e-9));
-    const middle = (inner.top + inner.bottom) / 2;
-    return [
-      ...heights.flatMap((tick) => [
-        shape("line", { x1: inner.left, x2: inner.right, y1: y(tick), y2: y(tick), class: "grid" }),
-        text([inner.left - 6, y(tick) + 4], decimals(tick, digits), { "text-anchor": "end" })]),
-      ...ticks(x0, x1, Math.min(8, (inner.right - inner.left) / 90)).map((tick) =>
-        text([x(tick), inner.bottom + 16], String(Math.round(tick * 1000) / 1000), { "text-anchor": "middle" })),
-      text([(inner.left + inner.right) / 2, height - 6], xLabel, { "text-anchor": "middle" }),
-      text([14, middle], yLabel, { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }),
-    ];
   };
 
   const curves = ({ inner, x0, x1, x }, y, { lines, bands, marks }) => {

@@ -4,6 +4,7 @@ import { decimals, element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
 import { whatItDoes } from "swarm/doing.js";
 import { dynamicsPanel } from "swarm/dynamics.js";
+import { familiesPanel } from "swarm/families.js";
 import { heatMap } from "swarm/heat-map.js";
 import { askJson, bar, complain, endPage, listen, main, oneByOne, order, remaining, resolve, span, stateMark } from "swarm/page.js";
 
@@ -15,6 +16,9 @@ bar(`Experiment ${id}`, "");
 
 const generations = [];
 let experiment = null;
+/** Populations of the experiment, each of which descends on its own; and whether its individuals have parents. */
+let n_populations = 1;
+let hasParents = false;
 let champion = null;
 
 const title = element("h1", {});
@@ -22,15 +26,16 @@ const state = element("span", {});
 const facts = element("p", { className: "muted" });
 const actions = element("div", { className: "row actions" });
 /** All figures over generations show the same ones. */
-const onZoom = (range) => [fitness, spread, map].forEach((it) => it.zoom(range));
+const onZoom = (range) => [fitness, spread, map, families].forEach((it) => it.zoom(range));
 const fitness = chart("fitness by generation", { onZoom });
 const spread = chart("standard deviation of fitness by generation", { onZoom });
 const map = heatMap(id, onZoom);
 const championBox = element("section", { className: "panel" });
 const dynamics = dynamicsPanel(id);
+const families = familiesPanel(id);
 const doing = element("section", { className: "panel" });
-const eventList = element("ol", { className: "events" });
-const file = element("pre", { className: "file" });
+const eventList = element("ol", { className: "events", tabIndex: 0, "aria-label": "events, the latest first" });
+const file = element("pre", { className: "file", tabIndex: 0, "aria-label": "experiment file" });
 /** Why there is nothing to see, or no more. */
 const standing = element("section", { className: "panel standing", hidden: true });
 const diversity = element("section", { className: "panel" }, element("h2", {}, "Diversity"),
@@ -43,7 +48,7 @@ main.replaceChildren(
   results[0], map,
   element("div", { className: "columns" }, championBox, doing, diversity,
     element("section", { className: "panel" }, element("h2", {}, "Events"), eventList)),
-  dynamics,
+  dynamics, families,
   element("details", { className: "panel" }, element("summary", {}, "Experiment file"), file));
 
 /** What to do next with an experiment that does not go on, and what there is of it. */
@@ -60,6 +65,7 @@ function drawStanding() {
   const it = experiment;
   const isEmpty = it.generations_done === 0;
   for (const part of results) part.hidden = isEmpty;
+  families.hidden = isEmpty || !hasParents;
   const says = NEXT[it.state];
   standing.hidden = !says || (!isEmpty && ["running", "unfinished"].includes(it.state));
   if (standing.hidden) return;
@@ -93,6 +99,7 @@ function draw() {
   spread.show({ xLabel: "generation", yLabel: "standard deviation", lines: [{ name: "standard deviation", color: "var(--line)", points: points(4) }] });
   map.update(it.generations_done);
   dynamics.update(it.generations_done);
+  families.update(it.generations_done, it.generations * it.population_size * n_populations);
 }
 
 let offered = "";
@@ -181,6 +188,8 @@ let hasCoordinator = false;
 async function load() {
   const answer = await askJson(`/api/experiments/${id}`);
   ({ experiment, champion } = answer);
+  n_populations = Object.keys(answer.config.algorithm?.populations ?? {}).length || 1;
+  hasParents = answer.has_parents;
   const text = JSON.stringify(answer.config, null, 2);
   if (file.textContent !== text) file.textContent = text;
   draw();

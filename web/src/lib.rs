@@ -20,5 +20,5 @@ mod what_if;
 pub use replay::{Episode, Replay, ReplayError};
 pub use replay_file::replay_file;
 pub use server::Site;
-pub use source::{Action, Archive, Assignment, Control, Fate};
+pub use source::{Action, Archive, Assignment, Control, Families, Fate};
 pub use trials::Trials;

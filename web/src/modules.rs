@@ -30,6 +30,7 @@ modules!(
     "episode.js",
     "experiment-list.js",
     "export.js",
+    "families.js",
     "fitness-pages.js",
     "fleet-timeline.js",
     "hearing.js",

@@ -1,6 +1,6 @@
 //! What pages are made of: the same queries, in the same messages, as clients have.
 
-use std::{collections::BTreeMap, ops::Range, time::Duration};
+use std::{collections::BTreeMap, num::NonZeroU64, ops::Range, time::Duration};
 
 use serde::Serialize;
 use swarm_proto::v1::{
@@ -37,11 +37,26 @@ pub trait Archive: Send + Sync + 'static {
     /// How a page of generations from `from` on moved the distribution: work for a processor.
     async fn dynamics(&self, id: u64, from: u64) -> Result<ListDynamicsResponse, Status>;
 
+    /// Parents and children of a page of generations from `from` on, of those whose number `every`
+    /// divides: work for a processor. Refused where individuals have no parents.
+    async fn families(&self, id: u64, from: u64, every: NonZeroU64) -> Result<Families, Status>;
+
     /// The genotype at an address that names a single one.
     async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status>;
 
     /// Changes when something may have been stored.
     fn news(&self) -> watch::Receiver<u64>;
+}
+
+/// Parents and children of some generations.
+#[derive(Debug, Clone, Default)]
+pub struct Families {
+    /// The names of the populations.
+    pub populations: Vec<String>,
+    /// The generations by their numbers.
+    pub generations: Vec<(u64, evolution::Families)>,
+    /// The generation from which on to ask next.
+    pub next: u64,
 }
 
 /// The coordinator that runs now; a data directory alone has none.

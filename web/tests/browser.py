@@ -189,7 +189,7 @@ class Live(BrowserTest):
     """Pages while something happens."""
 
     def test_a_page_follows_through_a_kill_of_the_coordinator_without_a_gap(self):
-        self.expected_complaints = ["ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "Failed to fetch", "ERR_CONNECTION_RESET"]
+        self.expected_complaints = ["ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "Failed to fetch", "ERR_CONNECTION_RESET", "ERR_SOCKET_NOT_CONNECTED"]
         fleet = Fleet()
         self.addCleanup(fleet.stop)
         fleet.start_worker()

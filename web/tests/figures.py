@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import json
+import pathlib
 import re
 import statistics
 import unittest
@@ -111,6 +112,89 @@ class Figures(BrowserTest):
         self.wait_for_text(".heat-map .scale", "fitness ≤")
         self.assertIn("data:image/png", self.saved(".heat-map .save"))
 
+    def genetic(self, n_generations):
+        """The number of a run whose individuals have parents."""
+        config = json.loads(CONFIG.read_text())
+        config["algorithm"]["name"] = "GA"
+        config["algorithm"]["populations"]["network"]["params"].update(crossover_operator="uniform", num_elite=2)
+        file = pathlib.Path(self.fleet.directory.name) / "genetic.json"
+        file.write_text(json.dumps(config))
+        self.fleet.swarmctl("submit", str(file), "--generations", str(n_generations), "--watch")
+        return max(it["id"] for it in json.loads(self.fleet.swarmctl("list")))
+
+    def test_children_are_seen_beside_their_parents(self):
+        n_generations = 8
+        run = self.genetic(n_generations)
+        n_children = (n_generations - 1) * N_INDIVIDUALS
+        self.open(f"/experiment/{run}")
+        panel = self.find("details.families")
+        self.wait(panel.is_displayed, "there is no panel")
+        panel.find_element(By.TAG_NAME, "summary").click()
+        self.wait(lambda: panel.get_attribute("data-children") == str(n_children), "children are missing")
+        for label in ["mean fitness of the parents", "fitness of the child"]:
+            self.assertIn(label, self.text(".families .cells svg"))
+        self.find(".families .diagonal")
+        self.assertIn(f"elite: {2 * (n_generations - 1)}, ", self.text(".families .keys"))
+        self.script("document.querySelector('.families').scrollIntoView()")
+        self.picture("families")
+        # As the client tells of the same births.
+        told = json.loads(self.fleet.swarmctl("lineage", f"{run}@5/9", "--depth", "1"))["populations"][0]["ancestors"]
+        rows = list(csv.DictReader(io.StringIO(self.saved(".families .save:last-child"))))
+        self.assertEqual(len(rows), n_children)
+        row = next(it for it in rows if (it["generation"], it["individual"]) == ("5", "9"))
+        self.assertEqual((row["operator"], float(row["fitness"])), (told[0]["operator"], told[0]["fitness"]))
+        parents = {int(row[name]): float(row[f"fitness of {name}"]) for name in ["parent", "other parent"] if row[name]}
+        self.assertEqual(parents, {it["individual"]: it["fitness"] for it in told[1:]})
+        svg = xml.etree.ElementTree.fromstring(self.saved(".families .save"))
+        points = [it.get("d").count("M") for it in svg.iter() if it.get("stroke-linecap") == "round"]
+        self.assertEqual(sum(points), n_children)
+        # A zoom of the curve chooses generations.
+        self.press(".chart > svg", Keys.HOME, "+", "+")
+        self.wait(lambda: 0 < int(panel.get_attribute("data-children")) < n_children / 2, "it does not follow the curve")
+        self.press(".chart > svg", Keys.ESCAPE)
+        self.narrow()
+        self.assertLessEqual(self.width(), NARROW)
+        self.script("document.querySelector('.families').scrollIntoView()")
+        self.picture("narrow-families")
+        self.press(".families .cells", Keys.HOME, Keys.ARROW_DOWN, Keys.ARROW_RIGHT)
+        self.wait_for_text(".families .readout", "generation 2, individual 1:")
+        self.press(".families .cells", Keys.ENTER)
+        self.wait(lambda: f"/replay/{run}@2/1" in self.browser.current_url, "it does not play")
+
+    def test_a_click_on_a_child_plays_it(self):
+        run = self.genetic(3)
+        self.open(f"/experiment/{run}")
+        self.wait_for_text(".state", "completed")
+        self.script("document.querySelector('.families').open = true")
+        self.find(".families[data-children='64']")
+        self.press(".families .cells", Keys.END)
+        said = self.text(".families .readout")
+        # The highest point in its row of pixels, to which the pointer goes.
+        canvas = self.find(".families canvas")
+        self.script("document.querySelector('.families').scrollIntoView()")
+        at = self.script("""
+            const canvas = document.querySelector('.families canvas');
+            const { left, top, width, height } = canvas.getBoundingClientRect();
+            for (let y = 0; y < height; y++) for (let x = 0; x < width; x += 2) {
+                canvas.dispatchEvent(new PointerEvent('pointermove', { clientX: left + x, clientY: top + y }));
+                if (document.querySelector('.families .readout').textContent) return [x - width / 2, y - height / 2 + 8];
+            }
+        """)
+        self.assertIn("generation 2, individual 31", said)
+        webdriver.ActionChains(self.browser).move_to_element_with_offset(canvas, *map(int, at)).perform()
+        generation, individual = re.match(r"generation (\d+), individual (\d+)", self.text(".families .readout")).groups()
+        webdriver.ActionChains(self.browser).click().perform()
+        self.wait(lambda: f"/replay/{run}@{generation}/{individual}" in self.browser.current_url, "it does not play")
+
+    def test_a_distribution_has_no_parents(self):
+        self.expected_complaints = ["400 (Bad Request)"]
+        self.open("/experiment/1")
+        self.wait_for_text(".chart figcaption", "champion, 95 %")
+        self.assertFalse(self.find(".families").is_displayed())
+        status, said = self.script("return fetch('/api/experiments/1/families').then(async (it) => [it.status, await it.text()])")
+        self.assertEqual(status, 400)
+        self.assertIn("individuals have no parents", said)
+
     def test_thirty_runs_have_thirty_looks(self):
         self.open("/compare")
         self.find(".chart")
@@ -122,12 +206,14 @@ class Figures(BrowserTest):
             self.assertEqual(len(set(looks)), n)
 
     def test_groups_are_compared_as_the_client_does_and_files_by_their_keys(self):
+        first = 1 + len(json.loads(self.fleet.swarmctl("list")))
         self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "sizes", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
         self.fleet.swarmctl("wait", "sizes")
-        self.open("/compare?runs=2,3,4,5,6,7&as=groups")
+        runs = [",".join(str(first + i) for i in part) for part in (range(3), range(3, 6))]
+        self.open(f"/compare?runs={','.join(runs)}&as=groups")
         self.wait_for_text(".differences", "algorithm.population_size")
         self.wait_for_text(".chart figcaption", "3 runs, median and quartiles")
-        answer = self.script("return fetch('/api/compare?samples=2,3,4;5,6,7').then((it) => it.json())")
+        answer = self.script(f"return fetch('/api/compare?samples={';'.join(runs)}').then((it) => it.json())")
         ours = answer["quantities"][0]
         told = json.loads(self.fleet.swarmctl("compare", "sizes"))["quantities"][0]
         self.assertEqual([it["median"] for it in ours["samples"]], [it["median"] for it in told["samples"]])

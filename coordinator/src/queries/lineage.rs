@@ -68,13 +68,7 @@ impl StoredLineage {
         let mut evolution =
             Evolution::restore(&checkpoint).map_err(|error| other(error.to_string()))?;
         for (of, entry) in &log {
-            let births = evolution.births().ok_or_else(|| {
-                QueryError::NoLineage(format!(
-                    "experiment {id} evolves a distribution, by {}: its individuals have no \
-                     parents",
-                    config.algorithm.name
-                ))
-            })?;
+            let births = evolution.births().ok_or_else(|| no_parents(&experiment, &config))?;
             let told = Told::from_bytes(entry).map_err(|error| other(error.to_string()))?;
             let n_individuals = told.trial_fitness.len() as u32;
             if of.generation == generation && individual >= n_individuals {
@@ -103,6 +97,14 @@ impl StoredLineage {
         }
         Ok(Lineage(populations))
     }
+}
+
+/// The algorithm draws individuals from a distribution.
+pub fn no_parents(experiment: &StoredExperiment, config: &ExperimentConfig) -> QueryError {
+    QueryError::NoLineage(format!(
+        "experiment {} evolves a distribution, by {}: its individuals have no parents",
+        experiment.id, config.algorithm.name
+    ))
 }
 
 fn too_deep() -> QueryError {

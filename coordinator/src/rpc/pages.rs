@@ -1,6 +1,6 @@
 //! What pages ask, answered as clients are.
 
-use std::{path::Path, time::Duration};
+use std::{num::NonZeroU64, path::Path, time::Duration};
 
 use swarm_proto::v1::{
     Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
@@ -8,7 +8,7 @@ use swarm_proto::v1::{
     ListGenerationsResponse, SubmitExperimentRequest, Worker,
     experiment_service_server::ExperimentService as _,
 };
-use swarm_web::{Action, Archive, Assignment, Control as WebControl};
+use swarm_web::{Action, Archive, Assignment, Control as WebControl, Families};
 use tokio::{
     sync::{Semaphore, watch},
     task,
@@ -21,7 +21,7 @@ use crate::{
     engine::{Fate, TimelineEntry},
     ids::ExperimentId,
     limits::RECONSTRUCTIONS_OF_PAGES_MAX,
-    queries::{self, QueryError, Several, StoredDynamics, StoredIndividuals},
+    queries::{self, QueryError, Several, StoredDynamics, StoredFamilies, StoredIndividuals},
     shared_store::SharedStore,
     store::{Filter, Store, StoreError},
 };
@@ -97,6 +97,17 @@ impl Archive for PagesArchive {
             .await
             .map_err(|_| ControlError::Panicked("evolution"))??;
         Ok(convert::dynamics(found))
+    }
+
+    async fn families(&self, id: u64, from: u64, every: NonZeroU64) -> Result<Families, Status> {
+        let _permit = self.reconstructions.acquire().await.map_err(|_| status::shutting_down())?;
+        let read =
+            move |store: &Store| StoredFamilies::read(store, ExperimentId(id), from, every.get());
+        let stored = self.store.read(read).await?;
+        let (populations, generations, next) = task::spawn_blocking(move || stored.replay())
+            .await
+            .map_err(|_| ControlError::Panicked("evolution"))??;
+        Ok(Families { populations, generations, next })
     }
 
     async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status> {

@@ -80,7 +80,7 @@ pub use dynamics::Dynamics;
 pub use experiment_file::AlgorithmParams;
 pub use fork::{Fork, ForkError};
 pub use judgement::Judgement;
-pub use lineage::{Ancestor, Birth, BirthOf, GeneSource, Operator, Parents, Pedigree};
+pub use lineage::{Ancestor, Birth, BirthOf, Families, GeneSource, Operator, Parents, Pedigree};
 pub use real::{NotANumber, Real};
 pub use reevaluation::Reevaluation;
 pub use replay::{Outcome, Replay, Round};

@@ -104,6 +104,17 @@ pub enum Operator {
     Crossover,
 }
 
+/// The children of a generation beside their parents.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Families {
+    /// Mean fitness of each individual of the generation before.
+    pub parents: Vec<f64>,
+    /// Mean fitness of each child.
+    pub children: Vec<f64>,
+    /// Per population the birth of each child: populations descend on their own.
+    pub births: Vec<Vec<BirthOf>>,
+}
+
 /// The births of some generations in one population, from which lineages are traced.
 #[derive(Debug, Clone, Default)]
 pub struct Pedigree {
@@ -122,6 +133,18 @@ impl Evolution {
         });
         births.collect()
     }
+
+    /// The next generation beside the one before it; none where [`births`](Self::births) has
+    /// none. `before` and `told` say how fit both were.
+    pub fn families(&self, before: &Told, told: &Told) -> Option<Families> {
+        let parents = mean_fitness(before);
+        let individual_of = ranked(&parents);
+        let by_index = |births: Vec<Birth>| {
+            births.iter().map(|birth| birth_of(birth, parents_of(birth, &individual_of))).collect()
+        };
+        let births = self.births()?.into_iter().map(by_index).collect();
+        Some(Families { parents, children: mean_fitness(told), births })
+    }
 }
 
 impl Pedigree {
@@ -132,8 +155,7 @@ impl Pedigree {
 
     /// Adds the next generation: its births, and what was told of it.
     pub fn push(&mut self, births: Vec<Birth>, told: &Told) {
-        let fitness = told.trial_fitness.iter().map(|trials| mean(trials)).collect();
-        self.generations.push((births, fitness));
+        self.generations.push((births, mean_fitness(told)));
     }
 
     /// The lineage of an individual of the latest generation: itself first, then its ancestors,
@@ -178,6 +200,11 @@ impl Pedigree {
         }
         ancestors
     }
+}
+
+/// Per individual its mean fitness over the trials.
+fn mean_fitness(told: &Told) -> Vec<f64> {
+    told.trial_fitness.iter().map(|trials| mean(trials)).collect()
 }
 
 /// The individuals whose fitness is finite, best first: only they have children.

@@ -1,6 +1,6 @@
 //! What is stored of experiments.
 
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU64, NonZeroUsize};
 
 use axum::{
     Json,
@@ -8,6 +8,8 @@ use axum::{
     http::header::CONTENT_TYPE,
     response::{IntoResponse, Response},
 };
+use evolution::{ALGORITHMS, Operator};
+use experiment_file::{AlgorithmDescription, Keeps};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{ListEventsRequest, ListGenerationsRequest};
@@ -30,7 +32,8 @@ pub struct From {
     from: u64,
 }
 
-/// One experiment, its file, and its champion as far as there is one.
+/// One experiment, its file, its champion as far as there is one, and whether its individuals have
+/// parents.
 pub async fn one(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -48,7 +51,12 @@ pub async fn one(
             "selection": champion.held_out.map(|selection| selection.mean),
         })
     });
+    let has_parents = found.experiment.as_ref().is_some_and(|experiment| {
+        let algorithm = AlgorithmDescription::find(ALGORITHMS, &experiment.algorithm);
+        algorithm.is_some_and(|algorithm| algorithm.keeps == Keeps::Population)
+    });
     Ok(Json(json!({
+        "has_parents": has_parents,
         "experiment": found.experiment.map(|experiment| {
             ExperimentAnswer::new(experiment, shared.control.is_some())
         }),
@@ -88,6 +96,62 @@ pub async fn dynamics(
         ])
     });
     Ok(Json(json!({ "generations": rows.collect::<Vec<_>>(), "next": page.next_generation })))
+}
+
+/// From which generation on children are wanted, and of which generations.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WantedFamilies {
+    #[serde(default)]
+    from: u64,
+    /// Those whose number it divides.
+    #[serde(default = "all")]
+    every: NonZeroU64,
+}
+
+fn all() -> NonZeroU64 {
+    NonZeroU64::MIN
+}
+
+/// Children of a page of generations beside their parents, the names of the populations, and where
+/// the next page begins. A row is a child in one population: generation, individual, population,
+/// operator, fitness, and for each parent its individual and its fitness; null is a fitness that
+/// is not finite.
+pub async fn families(
+    State(shared): State<Shared>,
+    Path(id): Path<u64>,
+    Query(WantedFamilies { from, every }): Query<WantedFamilies>,
+) -> Result<Json<Value>, Problem> {
+    let page = shared.archive.families(id, from, every).await?;
+    let mut rows = Vec::new();
+    for (generation, families) in &page.generations {
+        for (population, births) in families.births.iter().enumerate() {
+            for (individual, birth) in births.iter().enumerate() {
+                let mut row = vec![
+                    json!(generation),
+                    json!(individual),
+                    json!(population),
+                    json!(operator(birth.operator)),
+                    json!(families.children[individual]),
+                ];
+                row.extend(birth.parents.iter().flat_map(|&(parent, _)| {
+                    [json!(parent), json!(families.parents[parent as usize])]
+                }));
+                rows.push(Value::Array(row));
+            }
+        }
+    }
+    Ok(Json(json!({ "populations": page.populations, "children": rows, "next": page.next })))
+}
+
+/// The name of an operator, as `swarmctl lineage` has it.
+fn operator(operator: Operator) -> &'static str {
+    match operator {
+        Operator::First => "first",
+        Operator::Elite => "elite",
+        Operator::Copy => "copy",
+        Operator::Crossover => "crossover",
+    }
 }
 
 /// The latest events that are no generations.

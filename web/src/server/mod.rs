@@ -116,6 +116,7 @@ impl Site {
             .route("/experiments/{id}/events", get(experiments::events))
             .route("/experiments/{id}/fitness", get(experiments::fitness))
             .route("/experiments/{id}/dynamics", get(experiments::dynamics))
+            .route("/experiments/{id}/families", get(experiments::families))
             .route("/experiments/{id}/live", get(live::generations))
             .route("/experiments/{id}/explain", get(fleet::explain))
             .route("/experiments/{id}/{action}", post(fleet::steer))

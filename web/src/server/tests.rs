@@ -1,11 +1,12 @@
 //! Who is let in, and what browsers are told.
 
-use std::time::Duration;
+use std::{num::NonZeroU64, time::Duration};
 
 use axum::{
     body::{Body, to_bytes},
     http::{Request, Response, StatusCode},
 };
+use evolution::Operator;
 use serde_json::json;
 use swarm_proto::v1::{
     Experiment, ExperimentState, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
@@ -20,6 +21,7 @@ use tonic::{Status, async_trait};
 use tower::ServiceExt as _;
 
 use super::*;
+use crate::source::Families;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
@@ -58,6 +60,17 @@ impl Archive for OneExperiment {
 
     async fn dynamics(&self, _: u64, _: u64) -> Result<ListDynamicsResponse, Status> {
         Ok(ListDynamicsResponse::default())
+    }
+
+    async fn families(&self, _: u64, _: u64, _: NonZeroU64) -> Result<Families, Status> {
+        let birth = |operator, parents| evolution::BirthOf { operator, parents, n_new: 1 };
+        let births = vec![
+            birth(Operator::Crossover, vec![(1, 2), (0, 3)]),
+            birth(Operator::Copy, vec![(1, 5)]),
+        ];
+        let children = vec![0.5, f64::NAN];
+        let of = evolution::Families { parents: vec![0.25, 1.5], children, births: vec![births] };
+        Ok(Families { populations: vec!["p".into()], generations: vec![(4, of)], next: 5 })
     }
 
     async fn individual(&self, _: &str) -> Result<GetChampionResponse, Status> {
@@ -177,6 +190,7 @@ async fn what_went_wrong_is_said_in_one_line() {
         ("/api/experiments/x", StatusCode::BAD_REQUEST, "an experiment has a number"),
         ("/api/experiments/-1/events", StatusCode::BAD_REQUEST, "an experiment has a number"),
         ("/api/experiments/1/live?from=x", StatusCode::BAD_REQUEST, "from"),
+        ("/api/experiments/1/families?every=0", StatusCode::BAD_REQUEST, "every"),
         ("/api/replay/1?robots=many", StatusCode::BAD_REQUEST, "robots"),
         ("/api/replay/1?colour=red", StatusCode::BAD_REQUEST, "colour"),
         ("/api/nothing", StatusCode::NOT_FOUND, "there is nothing at /nothing"),
@@ -231,6 +245,15 @@ async fn generations_of_different_sizes_share_a_map() {
     let values: Vec<f32> = words[3..].iter().map(|word| f32::from_le_bytes(*word)).collect();
     assert_eq!(values[..3], [0.5, 1.0, 2.0]);
     assert!(values[3].is_nan());
+}
+
+#[tokio::test]
+async fn children_are_beside_their_parents() {
+    let families = answer(HERE, None, get("/api/experiments/1/families?every=2", HERE, "")).await;
+    let families: serde_json::Value = serde_json::from_str(&text(families).await).unwrap();
+    let children =
+        json!([[4, 0, 0, "crossover", 0.5, 1, 1.5, 0, 0.25], [4, 1, 0, "copy", null, 1, 1.5]]);
+    assert_eq!(families, json!({ "populations": ["p"], "children": children, "next": 5 }));
 }
 
 /// Whatever they leave open, others see the pages.

@@ -67,6 +67,39 @@ fn genes_are_from_the_parents_that_are_named() {
 }
 
 #[test]
+fn families_have_the_parents_of_the_pedigree_and_the_fitness_of_both() {
+    let setup = Setup { population_size: 15, params: params("uniform"), ..Setup::new("GA", D) };
+    let mut evolution = setup.start().unwrap();
+    let mut pedigree = Pedigree::starting_at(0);
+    let mut before: Option<Told> = None;
+    for _ in 0..4 {
+        let asked = evolution.ask();
+        let fitness = asked.genotypes.iter().map(|genes| vec![genes[0], genes[1]]);
+        let mut told = Told::from_fitness(fitness.collect());
+        told.trial_fitness[4][0] = f64::NAN;
+        let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
+        pedigree.push(births, &told);
+        if let Some(before) = &before {
+            let families = evolution.families(before, &told).unwrap();
+            for (i, birth) in families.births[0].iter().enumerate() {
+                let traced = &pedigree.trace(i as u32)[0];
+                assert_eq!(traced.birth.as_ref(), Some(birth));
+                assert_eq!(traced.fitness.to_bits(), families.children[i].to_bits());
+                for &(parent, _) in &birth.parents {
+                    let trials = &before.trial_fitness[parent as usize];
+                    let mean = (trials[0] + trials[1]) / 2.0;
+                    assert_eq!(families.parents[parent as usize].to_bits(), mean.to_bits());
+                }
+            }
+        }
+        evolution.replay(&told).unwrap();
+        before = Some(told);
+    }
+    let distribution = Setup::new("SNES", D).start().unwrap();
+    assert!(distribution.families(&Told::default(), &Told::default()).is_none());
+}
+
+#[test]
 fn a_lineage_ends_where_its_pedigree_begins_and_a_distribution_has_none() {
     let (_, whole) = bred("uniform", 3);
     let first = whole.trace(0).last().unwrap().clone();

@@ -1,0 +1,232 @@
+// Each child beside its parents: how fit it is against how fit they were. Generations are gone
+// through again for it, so only when somebody wants to see it.
+
+import { axes, shape } from "swarm/charts.js";
+import { canvas, decimals, element } from "swarm/dom.js";
+import { palette } from "swarm/drawing.js";
+import { exports } from "swarm/export.js";
+import { askJson } from "swarm/page.js";
+import { extremes } from "swarm/scales.js";
+
+/** Children that are shown at most; of longer runs, one generation in so many is asked for. */
+const CHILDREN_MAX = 100_000;
+/** Around the points, pixels: as those of the map of individuals. */
+const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
+/** How far a pointer may be from a point that it is meant for, pixels. */
+const NEAR = 14;
+/** How a child came about: a name, what it means, and its colour of the style. */
+const KINDS = [
+  { name: "crossover", title: "from two parents, then mutated", color: "line" },
+  { name: "copy", title: "from one parent, then mutated", color: "good" },
+  { name: "elite", title: "its parent, unchanged: only trials differ", color: "relay" },
+];
+
+/** A child as a row of the server has it. `x`: the mean fitness of its parents. */
+function child([generation, individual, population, operator, fitness, ...of]) {
+  const parents = of.length > 2 ? [[of[0], of[1]], [of[2], of[3]]] : [[of[0], of[1]]];
+  const x = parents.reduce((sum, [, its]) => sum + its, 0) / parents.length;
+  return { generation, individual, population, operator, fitness, parents, x };
+}
+
+/** A part of the page that is closed at first. `update(n_generations, every)`: how many there are, and of
+ *  which one in so many is shown; `zoom(range)` shows the children of some generations, null: of all. */
+export function familiesPanel(id) {
+  const children = [];
+  let populations = [];
+  let next = 0;
+  let n_generations = 0;
+  let every = 1;
+  let isAsking = false;
+  let range = null;
+  /** The kind that stands out; null: none. */
+  let marked = null;
+  /** Those that are seen, and where; by which one is read out. */
+  let shown = [];
+  let scale = null;
+  let cursor = null;
+
+  const note = element("span", { className: "muted small" });
+  const readout = element("span", { className: "readout muted", role: "status" });
+  const legend = element("div", { className: "keys small" });
+  const picture = canvas((context, width, height) => paint(context, width, height), "");
+  const frame = shape("svg", { "aria-hidden": "true" });
+  const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "scatter plot", "aria-label": "fitness of each child against the mean of its parents; arrow keys go through children and generations, Enter plays one" }, frame, picture);
+  const files = exports({ svg: () => whole(), table: () => table(), name: () => `families-${id}` });
+  const node = element("details", { className: "panel families", hidden: true, ontoggle: () => ask() },
+    element("summary", {}, "Parents and children"),
+    element("p", { className: "muted small" }, "Above the dashed line a child is fitter than its parents were on average. An elite is its own parent: its distance from the line is that between trials. A zoom of the curve chooses generations; a click plays a child."),
+    legend, stage, element("p", { className: "row small" }, note, readout, files));
+
+  const isSeen = ({ generation }) => !range || (generation >= Math.round(range[0]) && generation <= Math.round(range[1]));
+
+  const draw = () => {
+    shown = children.filter(isSeen);
+    cursor = null;
+    files.hidden = shown.length === 0;
+    node.dataset.children = shown.length;
+    note.textContent = [`${shown.length.toLocaleString("en")} children`, every > 1 && `of one generation in ${every}`, next < n_generations && `generation ${next} of ${n_generations} is gone through`].filter(Boolean).join(", ");
+    drawLegend();
+    drawFrame();
+    drawReadout();
+    picture.redraw();
+  };
+
+  const drawLegend = () => {
+    const held = legend.contains(document.activeElement) ? document.activeElement.dataset.name : null;
+    const keys = KINDS.map(({ name, title, color }) => {
+      const its = shown.filter((it) => it.operator === name);
+      if (its.length === 0) return null;
+      const fitter = its.filter((it) => it.fitness > it.x).length;
+      const dot = element("i", {});
+      dot.style.background = `var(--${color})`;
+      const key = element("button", { type: "button", className: "key", title: `${title}; click to let them stand out`, "aria-pressed": String(marked === name), onclick: () => {
+        marked = marked === name ? null : name;
+        draw();
+      } }, dot, `${name}: ${its.length.toLocaleString("en")}, ${Math.round((100 * fitter) / its.length)} % fitter than their parents`);
+      key.dataset.name = name;
+      return key;
+    });
+    legend.replaceChildren(...keys.filter(Boolean));
+    if (held) [...legend.children].find((it) => it.dataset.name === held)?.focus();
+  };
+
+  const drawFrame = () => {
+    const [width, height] = [stage.clientWidth, stage.clientHeight];
+    scale = null;
+    if (!width || shown.length === 0) return frame.replaceChildren();
+    const wider = ([low, high]) => (high - low < 1e-12 ? [low - 0.5, high + 0.5] : [low - 0.03 * (high - low), high + 0.03 * (high - low)]);
+    const [[x0, x1], [y0, y1]] = [wider(extremes(shown.map((it) => it.x))), wider(extremes(shown.map((it) => it.fitness)))];
+    const inner = { left: EDGE.left, right: width - EDGE.right, top: EDGE.top, bottom: height - EDGE.bottom };
+    const x = (value) => inner.left + ((value - x0) / (x1 - x0)) * (inner.right - inner.left);
+    const y = (value) => inner.bottom - ((value - y0) / (y1 - y0)) * (inner.bottom - inner.top);
+    scale = { x, y };
+    frame.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    const [from, to] = [Math.max(x0, y0), Math.min(x1, y1)];
+    const diagonal = from < to ? [shape("line", { x1: x(from), y1: y(from), x2: x(to), y2: y(to), class: "diagonal" })] : [];
+    frame.replaceChildren(...axes({ inner, x0, x1, x }, y0, y1, y, height, "mean fitness of the parents", "fitness of the child"), ...diagonal);
+  };
+
+  /** How opaque a point of a kind is: many that lie on one another are seen as a cloud. */
+  const opacity = (name) => (marked !== null && marked !== name ? 0.06 : Math.max(0.25, Math.min(0.85, 30 / Math.sqrt(shown.length))));
+  const radius = () => (shown.length > 5000 ? 1.5 : 2.5);
+
+  const paint = (context, width, height) => {
+    context.clearRect(0, 0, width, height);
+    if (!scale) return;
+    const colors = palette();
+    const side = 2 * radius();
+    for (const { name, color } of KINDS) {
+      context.globalAlpha = opacity(name);
+      context.fillStyle = colors[color];
+      for (const it of shown) if (it.operator === name) context.fillRect(scale.x(it.x) - EDGE.left - side / 2, scale.y(it.fitness) - EDGE.top - side / 2, side, side);
+    }
+    context.globalAlpha = 1;
+    if (cursor === null) return;
+    const it = shown[cursor];
+    context.strokeStyle = colors.ink;
+    context.lineWidth = 2;
+    context.beginPath();
+    context.arc(scale.x(it.x) - EDGE.left, scale.y(it.fitness) - EDGE.top, 7, 0, 2 * Math.PI);
+    context.stroke();
+  };
+
+  const drawReadout = () => {
+    if (cursor === null) return void (readout.textContent = "");
+    const { generation, individual, population, operator, fitness, parents } = shown[cursor];
+    const from = parents.map(([parent, its]) => `${parent} (${decimals(its, 3)})`).join(" and ");
+    readout.textContent = `generation ${generation}, individual ${individual}${populations.length > 1 ? `, ${populations[population]}` : ""}: ${decimals(fitness, 3)}, ${operator} from ${from}`;
+  };
+
+  const look = (at) => {
+    cursor = at;
+    drawReadout();
+    picture.redraw();
+  };
+
+  const play = () => cursor !== null && location.assign(`/replay/${id}@${shown[cursor].generation}/${shown[cursor].individual}`);
+
+  /** The point next to a pointer; null if none is near. */
+  const nearest = (event) => {
+    if (!scale) return null;
+    const box = picture.getBoundingClientRect();
+    const [px, py] = [event.clientX - box.left + EDGE.left, event.clientY - box.top + EDGE.top];
+    let [found, least] = [null, NEAR];
+    shown.forEach((it, i) => {
+      const away = Math.hypot(scale.x(it.x) - px, scale.y(it.fitness) - py);
+      if (away < least) [found, least] = [i, away];
+    });
+    return found;
+  };
+  picture.addEventListener("pointermove", (event) => look(nearest(event)));
+  picture.addEventListener("pointerleave", () => look(null));
+  picture.addEventListener("click", (event) => {
+    look(nearest(event));
+    play();
+  });
+  stage.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || shown.length === 0) return;
+    const last = shown.length - 1;
+    const by = event.shiftKey ? 10 : 1;
+    const at = (to) => look(Math.max(0, Math.min(last, to)));
+    /** The same individual in the generation before or after, if it is there. */
+    const beside = (sign) => {
+      const it = shown[cursor ?? 0];
+      const isOf = (other) => sign * (other.generation - it.generation) > 0 && other.individual === it.individual && other.population === it.population;
+      const found = sign > 0 ? shown.findIndex(isOf) : shown.findLastIndex(isOf);
+      at(found < 0 ? cursor ?? 0 : found);
+    };
+    const actions = {
+      ArrowRight: () => beside(1), ArrowLeft: () => beside(-1), ArrowDown: () => at((cursor ?? -1) + by), ArrowUp: () => at((cursor ?? 1) - by),
+      Home: () => at(0), End: () => at(last), Enter: play, Escape: () => look(null),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  });
+  new ResizeObserver(draw).observe(stage);
+
+  /** Axes and points as one figure: a path for each kind, whose points are the round ends of lines without length. */
+  const whole = () => {
+    const points = KINDS.map(({ name, color }) => shape("path", {
+      d: shown.filter((it) => it.operator === name).map((it) => `M${scale.x(it.x).toFixed(1)} ${scale.y(it.fitness).toFixed(1)}h0`).join(""),
+      fill: "none", stroke: palette()[color], opacity: opacity(name), "stroke-width": 2 * radius(), "stroke-linecap": "round", "data-name": name,
+    }));
+    frame.append(...points);
+    queueMicrotask(() => points.forEach((it) => it.remove()));
+    return frame;
+  };
+
+  const table = () => [
+    ["generation", "individual", "population", "operator", "fitness", "parent", "fitness of parent", "other parent", "fitness of other parent"],
+    ...shown.map((it) => [it.generation, it.individual, populations[it.population], it.operator, it.fitness, ...it.parents.flat()])];
+
+  const ask = async () => {
+    if (!node.open || isAsking) return;
+    isAsking = true;
+    try {
+      while (next < n_generations && node.open) {
+        const page = await askJson(`/api/experiments/${id}/families?from=${next}&every=${every}`);
+        ({ populations } = page);
+        // Those that were drawn at random have no parents, and who failed has no fitness.
+        children.push(...page.children.filter((row) => row.length > 5 && row[4] !== null).map(child));
+        if (page.next <= next) break;
+        next = page.next;
+        draw();
+      }
+    } catch (error) {
+      note.textContent = error.message;
+    }
+    isAsking = false;
+  };
+
+  node.update = (n, n_children) => {
+    n_generations = n;
+    if (next === 0) every = Math.max(1, Math.ceil(n_children / CHILDREN_MAX));
+    ask();
+  };
+  node.zoom = (to) => {
+    range = to;
+    draw();
+  };
+  return node;
+}
