@@ -24,7 +24,6 @@ export class RobotPictures {
     const madeFor = `${size} ${ratio} ${colors.ground} ${colors.robot}`;
     if (madeFor !== this.madeFor || this.pictures.size > KEPT_MAX) this.pictures.clear();
     this.madeFor = madeFor;
-    const side = 2 * REACH * size;
     const hasNumbers = view.numbers && size >= NUMBERED_FROM;
     context.strokeStyle = colors.ink;
     // A line of one pixel is drawn several times as fast as any wider one.
@@ -45,8 +44,11 @@ export class RobotPictures {
         isTarget: whole("target") > 0, isFollowed: robot === view.robot, number: hasNumbers ? robot : null,
       };
       const picture = this.of(look, size, ratio, colors);
+      const side = picture.width / ratio;
       const { x, y } = poses[robot];
-      camera.eachImage(x, y, 3 * size, (sx, sy) => context.drawImage(picture, sx - side / 2, sy - side / 2, side, side));
+      // At whole pixels of the device and in its own size, a picture is copied; elsewhere it is computed anew.
+      const place = (at) => Math.round((at - side / 2) * ratio) / ratio;
+      camera.eachImage(x, y, 3 * size, (sx, sy) => context.drawImage(picture, place(sx), place(sy), side, side));
     }
   }
 
@@ -64,7 +66,7 @@ function paint({ led, relays, carries, failed, isTarget, isFollowed, number }, r
   const side = Math.ceil(2 * REACH * radius * ratio);
   const picture = new OffscreenCanvas(side, side);
   const context = picture.getContext("2d");
-  context.setTransform(side / (2 * REACH * radius), 0, 0, side / (2 * REACH * radius), side / 2, side / 2);
+  context.setTransform(ratio, 0, 0, ratio, side / 2, side / 2);
   if (led > 0) {
     context.globalAlpha = 0.22;
     context.fillStyle = colors.led(led);

@@ -4,9 +4,6 @@
 const TRAIL = 60;
 /** What is nearer than this to the point before is not drawn, pixels. */
 const NEAR = 2.5;
-/** Robots whose trails are one path: to stroke each of 500 takes longer than a frame may, and so
- *  does one path of all. */
-const TOGETHER = 40;
 /** Who goes farther than this in a step was placed elsewhere, cm. */
 const JUMP = 50;
 
@@ -16,26 +13,16 @@ export function drawTrails(context, { camera, colors, episode, poses, view }) {
   // A wider line takes several times as long to draw.
   context.lineWidth = 1;
   context.strokeStyle = colors.trail;
-  let n_waiting = 0;
-  const stroke = (alpha) => {
+  /** One path of several robots: to stroke each of 500 takes longer than a frame may. */
+  const stroke = (alpha, robots) => {
     context.globalAlpha = alpha;
-    if (n_waiting > 0) context.stroke();
-    n_waiting = 0;
     context.beginPath();
+    for (const robot of robots) if (episode.moves[robot]) addTrail(context, camera, episode, robot, poses[robot], view.step, first);
+    context.stroke();
   };
-  const others = view.robot === null ? 1 : 0.3;
-  context.beginPath();
-  for (let robot = 0; robot < episode.n_robots; robot++) {
-    if (!episode.moves[robot] || robot === view.robot) continue;
-    addTrail(context, camera, episode, robot, poses[robot], view.step, first);
-    if (++n_waiting === TOGETHER) stroke(others);
-  }
-  stroke(others);
-  if (view.robot !== null && episode.moves[view.robot]) {
-    addTrail(context, camera, episode, view.robot, poses[view.robot], view.step, first);
-    n_waiting = 1;
-    stroke(1);
-  }
+  const others = [...poses.keys()].filter((robot) => robot !== view.robot);
+  stroke(view.robot === null ? 1 : 0.3, others);
+  if (view.robot !== null) stroke(1, [view.robot]);
   context.globalAlpha = 1;
 }
 

@@ -20,6 +20,8 @@ export class World {
     this.robots = new RobotPictures();
     this.node = canvas((context, width, height) => this.draw(context, width, height), "the world");
     this.node.className = "world";
+    // All of it is painted: what is below need not be mixed in.
+    this.node.getContext("2d", { alpha: false });
     this.listen(onRobot);
   }
 
@@ -103,8 +105,11 @@ export class World {
       context.fillStyle = colors.page;
       context.fillRect(0, 0, width, height);
     }
+    // Along whole pixels of the device: within other edges, everything takes twice as long to draw.
+    const ratio = context.getTransform().a;
+    const [left, right, top, bottom] = [width / 2 - halfX, width / 2 + halfX, height / 2 - halfY, height / 2 + halfY].map((edge) => Math.round(edge * ratio) / ratio);
     context.beginPath();
-    context.rect(width / 2 - halfX, height / 2 - halfY, 2 * halfX, 2 * halfY);
+    context.rect(left, top, right - left, bottom - top);
     context.clip();
     context.fillStyle = colors.ground;
     context.fillRect(0, 0, width, height);
