@@ -5,9 +5,9 @@ import { element } from "swarm/dom.js";
 /** Properties that the style of the pages gives to shapes, and a file has to have itself. */
 const STYLED = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity", "paint-order", "font-size", "font-family", "font-weight", "text-anchor"];
 
-/** Has a browser save a text. */
-export function save(name, kind, text) {
-  const url = URL.createObjectURL(new Blob([text], { type: kind }));
+/** Has a browser save a text, or what is recorded. */
+export function save(name, kind, content) {
+  const url = URL.createObjectURL(new Blob([content], { type: kind }));
   element("a", { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }

@@ -20,14 +20,15 @@ const strip = element("div");
 const formPlace = element("div");
 main.replaceChildren(neighbours, loading, stage, strip, formPlace);
 
-if (at?.includes("/") && !at.endsWith("mean")) {
+/** Links to those before and after an individual, as far as there are any. */
+function drawNeighbours({ population_size: n_individuals, generations_done: n_generations }) {
+  if (!at?.includes("/") || at.endsWith("mean")) return;
   const [generation, individual] = at.split("/").map(Number);
-  const link = (g, i, text) => element("a", { href: `/replay/${id}@${g}/${i}` }, text);
-  if (individual > 0) neighbours.append(link(generation, individual - 1, "‹ individual"));
-  neighbours.append(link(generation, individual + 1, "individual ›"));
-  if (generation > 0) neighbours.append(link(generation - 1, individual, "‹ generation"));
-  neighbours.append(link(generation + 1, individual, "generation ›"));
-  neighbours.append(element("a", { href: `/replay/${id}` }, "champion"));
+  const link = (g, i, text) => (g >= 0 && g < n_generations && i >= 0 && i < n_individuals ? [element("a", { href: `/replay/${id}@${g}/${i}` }, text)] : []);
+  neighbours.append(
+    ...link(generation, individual - 1, "‹ individual"), ...link(generation, individual + 1, "individual ›"),
+    ...link(generation - 1, individual, "‹ generation"), ...link(generation + 1, individual, "generation ›"),
+    element("a", { href: `/replay/${id}` }, "champion"));
 }
 
 /** Says what is waited for, if that takes longer than a moment. */
@@ -125,6 +126,7 @@ async function start() {
   const answers = Promise.all([askJson(`/api/experiments/${id}`), askJson(`/api/trials/${where}`)]);
   const [experiment, known] = await waitingFor("simulating the trials by which it is known …", answers);
   config = experiment.config;
+  drawNeighbours(experiment.experiment);
   trials = known;
   const played = trials.is_judgement ? { trial_set: "judgement" } : { trial_set: "generation", generation: trials.generation, trial: 0 };
   form = whatIf({ config, words, played, go });

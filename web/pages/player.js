@@ -2,6 +2,7 @@
 
 import { Clock, clamp } from "swarm/clock.js";
 import { decimals, element } from "swarm/dom.js";
+import { recordButton } from "swarm/recording.js";
 import { robotPanel } from "swarm/robot-panel.js";
 import { timeline } from "swarm/timeline.js";
 import { worthOf } from "swarm/trials.js";
@@ -76,12 +77,14 @@ export class Player {
       element("span", { className: "speed" },
         button("−", "slower (↓)", () => clock.changeSpeed(-1)), this.speedText,
         button("+", "faster (↑)", () => clock.changeSpeed(1))));
+    this.recordButton = recordButton(this.world.node, clock, { id: id("record"), className: "record" });
     const options = element("div", { className: "options" },
       toggle("trails", "trails", "where robots were in the last 60 steps (T)"),
       episode.has_radio ? toggle("radio", "who hears whom", "frames of the last steps; a colour per symbol (R)") : null,
       episode.has_radio ? toggle("reach", "reach", "how far each robot is heard (A)") : null,
       toggle("numbers", "numbers", "of robots and symbols (N)"),
       button("world", "whole world, or the swarm (W)", () => this.toggleWorld(), "camera"),
+      this.recordButton,
       element("span", { className: "space" }),
       this.legend(), this.help());
     this.node = element("div", { className: "player", tabIndex: 0, role: "group", "aria-label": episode.name },
@@ -175,6 +178,7 @@ export class Player {
       playButton.setAttribute("aria-label", title);
     }
     this.speedText.textContent = `${clock.speed}/s`;
+    this.recordButton?.update();
     if (!clock.isPlaying) this.remember();
     this.redraw();
   }
@@ -192,9 +196,13 @@ export class Player {
 
   redraw() {
     const { steps } = this.episode;
-    this.slider.value = this.view.step;
-    this.stepText.textContent = `step ${this.view.step} of ${steps - 1}`;
+    const { step, robot } = this.view;
     this.world.node.redraw();
+    // Between two steps only the world moves.
+    if (this.drawn?.step === step && this.drawn.robot === robot) return;
+    this.drawn = { step, robot };
+    this.slider.value = step;
+    this.stepText.textContent = `step ${step} of ${steps - 1}`;
     this.panel.redraw();
     this.timeline.redraw();
   }

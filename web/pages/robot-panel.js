@@ -72,9 +72,10 @@ export function robotPanel(episode, view, seek, choose, id) {
     const symbol = episode.symbol(robot, values);
     const text = `(${values.map((value) => decimals(value, 2)).join(", ")})`;
     if (symbol === null) return text;
-    const mark = element("b", {}, `symbol ${symbol} `);
-    mark.style.color = symbolColor(symbol, episode.n_symbols, palette().isDark);
-    return [mark, text];
+    // Not all of these colours can be read as text.
+    const mark = element("i", { className: "symbol" });
+    mark.style.background = symbolColor(symbol, episode.n_symbols, palette().isDark);
+    return [mark, element("b", {}, `symbol ${symbol} `), text];
   };
 
   const hears = () => {

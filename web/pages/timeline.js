@@ -3,6 +3,7 @@
 
 import { canvas, decimals, element } from "swarm/dom.js";
 import { palette, pixels, rgb } from "swarm/drawing.js";
+import { exports } from "swarm/export.js";
 import { extremes } from "swarm/scales.js";
 
 /** A picture over all steps with a mark at the current one. `paint(context, width, height)`
@@ -96,6 +97,10 @@ export function timeline(episode, view, seek) {
     const { node: line, low, high } = curve(numbers, view, seek, name);
     add(name, line, (step) => decimals(numbers[step], 3), `from ${decimals(low, 2)} to ${decimals(high, 2)}`);
   }
+  const sums = ["led", "relays"].filter(has);
+  const table = () => [["step", ...sums.map((name) => ({ led: "LEDs on", relays: "relaying" })[name]), ...series.map(([name]) => name)],
+    ...Array.from({ length: episode.steps }, (_, step) => [step, ...sums.map((name) => parseInt(count(name)(step))), ...series.map(([, numbers]) => numbers[step])])];
+  node.append(exports({ table, name: () => "steps" }));
   const redraw = () => {
     for (const track of tracks) track.redraw();
     for (const [value, valueAt] of values) value.textContent = valueAt(view.step);

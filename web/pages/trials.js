@@ -2,6 +2,7 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { shape } from "swarm/charts.js";
+import { exports } from "swarm/export.js";
 
 /** Height of the strip, and room around its bars, pixels. */
 const [HEIGHT, EDGE] = [64, 3];
@@ -54,9 +55,10 @@ export function trialStrip(trials, shown, pick = null) {
       mark(at);
     });
   }
+  const files = exports({ svg: () => svg, table: () => [["trial", "fitness"], ...order.map((trial) => [trial, fitness[trial]])], name: () => "trials" });
   const button = (name, trial) => element("button", { type: "button", id: `trial-${name}`, "aria-pressed": String(trial === shown), onclick: () => pick(trial) }, `${name} ${decimals(fitness[trial], 3)}`);
   return element("section", { className: "panel trials" },
-    element("div", { className: "row" }, element("h2", {}, trials.is_judgement ? "Trials of the judgement" : "Trials of its generation"), readout, element("span", { className: "space" }),
+    element("div", { className: "row" }, element("h2", {}, trials.is_judgement ? "Trials of the judgement" : "Trials of its generation"), readout, files, element("span", { className: "space" }),
       ...(pick ? [button("worst", worst), button("median", median), button("best", best)] : [])),
     svg,
     element("p", { className: "row muted small" }, element("span", {}, "worst"), element("span", { className: "space" }),

@@ -47,6 +47,7 @@ modules!(
     "page-missing.js",
     "page-replay.js",
     "player.js",
+    "recording.js",
     "replay-file.js",
     "robot-panel.js",
     "robot-pictures.js",

@@ -34,16 +34,6 @@ class Figures(BrowserTest):
         self.script(f"document.querySelector('{selector}').focus()")
         webdriver.ActionChains(self.browser).send_keys(*keys).perform()
 
-    def saved(self, selector):
-        """What a button saves."""
-        return self.browser.execute_async_script("""
-            const [selector, done] = arguments;
-            const make = URL.createObjectURL;
-            URL.createObjectURL = (blob) => (blob.text().then(done), make(blob));
-            HTMLAnchorElement.prototype.click = () => {};
-            document.querySelector(selector).click();
-        """, selector)
-
     def test_keys_go_through_a_curve_and_zoom_it(self):
         self.open("/experiment/1")
         self.wait_for_text(".chart figcaption", "champion, 95 %")

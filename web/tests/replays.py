@@ -1,5 +1,7 @@
 """The player in a real browser, in every form in which it is shown; called as `browser.py` is."""
 
+import csv
+import io
 import json
 import pathlib
 import re
@@ -7,6 +9,7 @@ import subprocess
 import tempfile
 import unittest
 import urllib.request
+import xml.etree.ElementTree
 
 from harness import CONFIG, NARROW, PROGRAMS, BrowserTest, Fleet
 
@@ -80,6 +83,46 @@ class Replays(BrowserTest):
         self.wait_for_text(".episode", f"trial {second} of its judgement")
         # What is simulated is one of them, to the same bits.
         self.assertIn(f"this trial {fitness[second]:.4f}", self.text("#result"))
+
+    def test_trials_and_steps_are_saved(self):
+        self.open("/replay/1#step=5")
+        self.find(".strip")
+        known = self.script("return fetch('/api/trials/1').then((it) => it.json())")["fitness"]
+        rows = list(csv.DictReader(io.StringIO(self.saved(".trials .save:last-child"))))
+        self.assertEqual({int(it["trial"]): float(it["fitness"]) for it in rows}, dict(enumerate(known)))
+        self.assertEqual([float(it["fitness"]) for it in rows], sorted(known))
+        svg = xml.etree.ElementTree.fromstring(self.saved(".trials .save"))
+        # Bars, the interval, and the ground.
+        self.assertEqual(len([it for it in svg if it.tag.endswith("rect")]), len(known) + 2)
+        rows = list(csv.DictReader(io.StringIO(self.saved(".timeline .save"))))
+        self.assertEqual([int(it["step"]) for it in rows], list(range(100)))
+        self.assertEqual(f"{float(rows[5]['fitness']):.3f}".replace("-", "−"), self.script("return [...document.querySelectorAll('.timeline .value')][1].textContent"))
+        self.assertIn("LEDs on", rows[0])
+
+    def test_a_hundred_steps_are_recorded_in_less_than_a_megabyte(self):
+        self.open("/replay/1#step=0")
+        self.find("#play")
+        self.script("""
+            window.saved = null;
+            const make = URL.createObjectURL;
+            URL.createObjectURL = (blob) => (blob.arrayBuffer().then((it) => (saved = it)), make(blob));
+            HTMLAnchorElement.prototype.click = () => {};
+        """)
+        self.find("#record").click()
+        self.wait(lambda: self.text("#record") == "■ save", "it does not record")
+        self.wait_for_text("#step", "step 99 of 99")
+        self.wait(lambda: self.script("return saved?.byteLength ?? 0"), "nothing is saved")
+        self.assertLess(self.script("return saved.byteLength"), 1_000_000)
+        self.assertGreater(self.script("return saved.byteLength"), 10_000)
+        # As Matroska files, which WebM ones are, begin.
+        self.assertEqual(self.script("return [...new Uint8Array(saved, 0, 4)]"), [0x1A, 0x45, 0xDF, 0xA3])
+        self.assertEqual(self.text("#record"), "● video")
+
+    def test_neighbours_are_those_that_there_are(self):
+        self.open("/replay/1@0/0#step=1")
+        self.wait(lambda: self.texts("main > p a") == ["experiment 1", "individual ›", "generation ›", "champion"], "before the first one")
+        self.open("/replay/1@5/31#step=1")
+        self.wait(lambda: self.texts("main > p a") == ["experiment 1", "‹ individual", "‹ generation", "champion"], "after the last one")
 
     def test_a_file_of_a_champion_says_which_trial_it_plays_and_what_it_is_worth(self):
         html = pathlib.Path(self.fleet.directory.name) / "champion.html"
