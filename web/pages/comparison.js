@@ -2,14 +2,14 @@
 
 import { decimals, element } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
-import { askJson } from "swarm/page.js";
+import { askJson, counted } from "swarm/page.js";
 import { sweptValues } from "swarm/swept-values.js";
 
 /** Files that are compared at most. */
 const FILES_MAX = 60;
 
 const span = ({ ci95 }) => (ci95 ? `${decimals(ci95[0], 3)}–${decimals(ci95[1], 3)}` : "–");
-const table = (head, rows) => element("div", { className: "scroll" }, element("table", { className: "list" },
+const table = (head, rows) => element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": head.join(", ") }, element("table", { className: "list" },
   element("thead", {}, element("tr", {}, ...head.map((name) => element("th", { scope: "col" }, name)))),
   element("tbody", {}, ...rows.map((cells) => element("tr", {}, ...cells.map((cell, i) => element("td", { "data-label": head[i] }, cell)))))));
 
@@ -54,10 +54,10 @@ export async function differences(runs) {
   const head = ["run", "seed", "champion", ...keys.map(title)];
   const texts = shown.map((it, i) => [`${it.id} ${it.name}`, String(it.seed), it.champion === null ? "–" : decimals(it.champion, 3), ...keys.map((key) => configs[i].get(key) ?? "–")]);
   const rows = texts.map(([name, ...rest], i) => [element("a", { href: `/experiment/${shown[i].id}` }, name), ...rest]);
-  const save = exports({ svg: null, table: () => [["id", "seed", "champion", ...keys], ...shown.map((it, i) => [it.id, it.seed, it.champion, ...texts[i].slice(3)])], name: () => "runs" });
+  const save = exports({ table: () => [["id", "seed", "champion", ...keys], ...shown.map((it, i) => [it.id, it.seed, it.champion, ...texts[i].slice(3)])], name: () => "runs" });
   const swept = keys.map((key, k) => ({ key, title: head[k + 3], values: configs.map((it) => it.get(key) ?? "–") })).filter(({ key }) => key !== "name");
   const figures = sweptValues(shown, swept, runs.length);
   return element("div", {}, figures, element("section", { className: "panel differences" },
-    element("div", { className: "row" }, element("h2", {}, "Where their files differ"), element("span", { className: "muted small" }, keys.length ? `${keys.length} keys beside the seed` : "in nothing but the seed"), save),
+    element("div", { className: "row" }, element("h2", {}, "Where their files differ"), element("span", { className: "muted small" }, keys.length ? `${counted(keys.length, "key")} beside the seed` : "in nothing but the seed"), save),
     table(head, rows)));
 }

@@ -31,9 +31,10 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 
 /** A canvas that fills its parent, in pixels of the device; draws whenever its size changes.
  *  While it has no size, as in a hidden frame or after it was removed, nothing is drawn: `draw`
- *  is called with a width and a height of at least one pixel. */
+ *  is called with a width and a height of at least one pixel. Without a label, what is around it
+ *  says what it shows. */
 export function canvas(draw, label) {
-  const node = element("canvas", { "aria-label": label, role: "img" });
+  const node = element("canvas", label ? { "aria-label": label, role: "img" } : { "aria-hidden": "true" });
   let size = null;
   node.redraw = () => {
     if (size) draw(node.getContext("2d"), ...size);

@@ -201,7 +201,7 @@ export function familiesPanel(id) {
     ...shown.map((it) => [it.generation, it.individual, populations[it.population], it.operator, it.fitness, ...it.parents.flat()])];
 
   const ask = async () => {
-    if (!node.open || isAsking) return;
+    if (!node.open || node.hidden || isAsking) return;
     isAsking = true;
     try {
       while (next < n_generations && node.open) {

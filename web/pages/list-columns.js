@@ -27,17 +27,17 @@ function progress(it) {
 }
 
 /** Each has a name, a title, a width, what it shows of an experiment, and a value that sorts (null: none).
- *  `says`: of what the cell is made, if that is more than the value. */
+ *  `says`: of what the cell is made, and `saved`: what a table has of it, if that is not the value. */
 export const COLUMNS = [
   { name: "champion", title: "Champion", width: "5.5rem", isUsual: true, isGreatFirst: true, value: (it) => it.champion ?? it.selection, says: (it) => [it.champion, it.selection, it.generations_done > 0], cell: worth },
   { name: "state", title: "State", width: "7.5rem", isUsual: true, value: (it) => it.state, says: (it) => [it.state, it.reason], cell: (it) => [stateMark(it)] },
   { name: "progress", title: "Progress", width: "11rem", isUsual: true, isGreatFirst: true, value: (it) => it.generations_done / (it.generations || 1), says: (it) => [it.generations_done, it.generations, left(it)], cell: progress },
   { name: "left", title: "Time left", width: "5.5rem", value: left, cell: (it) => [left(it) === null ? "–" : span(left(it))] },
-  { name: "recent", title: "Recent best", width: "8.5rem", isUsual: true, value: null, says: (it) => it.recent, cell: (it) => [sparkline(it.recent)] },
+  { name: "recent", title: "Recent best", width: "8.5rem", isUsual: true, value: null, says: (it) => it.recent, saved: (it) => it.recent.join(" "), cell: (it) => [sparkline(it.recent)] },
   { name: "best", title: "Best of last", width: "6.5rem", isGreatFirst: true, value: (it) => it.best, cell: (it) => [number(it.best)] },
   { name: "mean", title: "Mean of last", width: "6.5rem", isUsual: true, isGreatFirst: true, value: (it) => it.mean, cell: (it) => [number(it.mean)] },
   { name: "selection", title: "Selection", width: "6rem", isGreatFirst: true, value: (it) => it.selection, cell: (it) => [number(it.selection)] },
-  { name: "labels", title: "Labels", width: "minmax(6rem, 1fr)", isUsual: true, value: (it) => Object.keys(it.labels).sort().join(" ") || null, says: (it) => it.labels, cell: labelMarks },
+  { name: "labels", title: "Labels", width: "minmax(6rem, 1fr)", isUsual: true, value: (it) => Object.keys(it.labels).sort().join(" ") || null, says: (it) => it.labels, saved: (it) => Object.entries(it.labels).map((pair) => pair.join("=")).join(" "), cell: labelMarks },
   { name: "group", title: "Group", width: "minmax(6rem, 1fr)", value: (it) => it.group || null, cell: (it) => [it.group || "–"] },
   { name: "variant", title: "Variant", width: "minmax(6rem, 1fr)", value: (it) => it.variant || null, cell: (it) => [it.variant || "–"] },
   { name: "algorithm", title: "Algorithm", width: "6rem", value: (it) => it.algorithm, cell: (it) => [it.algorithm] },
@@ -45,5 +45,5 @@ export const COLUMNS = [
   { name: "population", title: "Population", width: "6.5rem", isGreatFirst: true, value: (it) => it.population_size, cell: (it) => [String(it.population_size)] },
   { name: "genes", title: "Genes", width: "4.5rem", isGreatFirst: true, value: (it) => it.genotype_len, cell: (it) => [String(it.genotype_len)] },
   { name: "share", title: "Share", width: "4.5rem", isGreatFirst: true, value: (it) => (it.state === "running" ? it.priority : null), says: (it, weights) => (it.state === "running" ? Math.round((100 * it.priority) / weights) : null), cell: (it, weights) => [it.state === "running" ? `${Math.round((100 * it.priority) / weights)} %` : "–"] },
-  { name: "submitted", title: "Submitted", width: "11rem", isGreatFirst: true, value: (it) => it.submitted_at_ms, cell: (it) => [new Date(it.submitted_at_ms).toLocaleString()] },
+  { name: "submitted", title: "Submitted", width: "11rem", isGreatFirst: true, value: (it) => it.submitted_at_ms, saved: (it) => new Date(it.submitted_at_ms).toISOString(), cell: (it) => [new Date(it.submitted_at_ms).toLocaleString()] },
 ];

@@ -175,7 +175,14 @@ export function listTable(view, chosen, onChoose) {
   // What has another place by now goes there when nobody is on it any more.
   rows.addEventListener("pointerleave", () => draw(false));
 
-  return { node, update, redraw: () => draw(true), count: () => found.length };
+  /** What is listed, in its order: what each run is known by, and the columns that are shown. */
+  const rowsToSave = () => {
+    const names = ["id", "name", "group", "variant", "seed"];
+    const columns = shown.filter((it) => !names.includes(it.name));
+    return [[...names, ...columns.map((it) => it.name)], ...found.map((it) => [...names.map((name) => it[name]), ...columns.map((column) => (column.saved ?? column.value)(it))])];
+  };
+
+  return { node, update, redraw: () => draw(true), count: () => found.length, rowsToSave };
 }
 
 /** Has exactly these children in this order, and moves no more than it has to. */

@@ -62,6 +62,7 @@ async function explain(groups, runs) {
   const asked = JSON.stringify(groups.map((it) => [it.name, it.runs.map((run) => run.id)]));
   if (asked === explained) return;
   explained = asked;
+  if (found.childElementCount === 0) found.replaceChildren(element("p", { className: "loading muted", role: "status" }, "comparing …"));
   const answers = await Promise.all([groups.length ? statistics(groups) : [], runs.length ? differences(runs) : ""]);
   if (asked !== explained) return;
   found.replaceChildren(...answers[0]);
@@ -107,7 +108,9 @@ async function show() {
 try {
   experiments = await allExperiments();
   if (chosen.size === 0) for (const it of experiments.slice(-5)) chosen.add(it.id);
-  list.replaceChildren(...experiments.toReversed().map((it) => {
+  // Those that are compared are at hand, however many others there are.
+  const ordered = experiments.toReversed().sort((a, b) => chosen.has(b.id) - chosen.has(a.id));
+  list.replaceChildren(...ordered.map((it) => {
     const box = element("input", { type: "checkbox", checked: chosen.has(it.id), onchange: () => {
       if (box.checked) chosen.add(it.id);
       else chosen.delete(it.id);

@@ -2,6 +2,7 @@
 
 import { element } from "swarm/dom.js";
 import { followExperiments } from "swarm/experiment-list.js";
+import { exports } from "swarm/export.js";
 import { COLUMNS } from "swarm/list-columns.js";
 import { listTable } from "swarm/list-table.js";
 import { ListView, groupings } from "swarm/list-view.js";
@@ -30,7 +31,7 @@ const actions = element("div", { className: "row actions" });
 main.replaceChildren(
   element("header", { className: "row" }, element("h1", {}, "Experiments"), states, element("span", { className: "space" }), search,
     element("label", {}, "by ", grouping), columns, element("label", {}, archived, archivedText)),
-  element("div", { className: "row bar" }, count, element("span", { className: "space" }), actions),
+  element("div", { className: "row bar" }, count, exports({ table: () => table.rowsToSave(), name: () => "experiments" }), element("span", { className: "space" }), actions),
   element("div", { className: "panel scroll" }, table.node));
 
 /** Texts and choices around the table; what says the same as before is left alone. */

@@ -20,6 +20,7 @@ import urllib.request
 
 from harness import CLIENT_TOKEN, CONFIG, DEADLINE, NARROW, PROGRAMS, WORKER_TOKEN, BrowserTest, Fleet
 
+from axe_core_python.selenium import Axe
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -170,6 +171,19 @@ class Pages(BrowserTest):
         self.wait_for_text("tbody", "w")
         self.wait_for_text("main", "1 worker with 1 slot")
         self.picture("fleet")
+
+    def test_pages_keep_the_rules_for_those_who_do_not_see_them(self):
+        self.browser.set_script_timeout(DEADLINE)
+        for narrow in [False, True]:
+            if narrow:
+                self.narrow()
+                self.prefer("dark")
+            for path, ready in [("/", "tr[data-id='1']"), ("/experiment/1", ".heat-map .ramp"), ("/compare?as=groups", ".differences"), ("/fleet", "tr[data-id]"), ("/replay/1#step=5&robot=1", ".strip"), ("/login", "#token")]:
+                self.open(path)
+                self.find(ready)
+                self.script("document.querySelectorAll('details').forEach((it) => (it.open = true))")
+                found = [(it["id"], [node["target"] for node in it["nodes"]]) for it in Axe().run(self.browser)["violations"]]
+                self.assertEqual(found, [], f"{path}{', narrow' if narrow else ''}")
 
     def test_a_narrow_screen_has_room_and_both_themes_differ(self):
         self.narrow()

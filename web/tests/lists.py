@@ -1,6 +1,8 @@
 """The list of experiments of people with many runs; called as `browser.py` is."""
 
+import csv
 import gzip
+import io
 import json
 import statistics
 import unittest
@@ -125,6 +127,19 @@ class Lists(BrowserTest):
         self.wait(lambda: self.ids() == [3], "the address does not keep the filter")
         self.assertEqual(self.texts("td.genes"), ["424"])
         self.assertEqual(self.texts("td.mean"), [])
+
+    def test_what_is_listed_is_saved_as_a_table(self):
+        self.open("?q=group%3Djudged&sort=-champion&show=champion,recent,labels")
+        shown = self.ids()
+        rows = list(csv.DictReader(io.StringIO(self.saved(".save"))))
+        self.assertEqual([int(it["id"]) for it in rows], shown)
+        self.assertEqual(list(rows[0]), ["id", "name", "group", "variant", "seed", "champion", "recent", "labels"])
+        its = {it["id"]: it for it in json.loads(self.asked("/api/experiments")[1])["experiments"]}
+        for row in rows:
+            it = its[int(row["id"])]
+            self.assertEqual(float(row["champion"]), it["champion"])
+            self.assertEqual([float(value) for value in row["recent"].split()], it["recent"])
+            self.assertEqual(dict(label.split("=") for label in row["labels"].split()), it["labels"])
 
     def test_runs_are_grouped_labelled_and_archived(self):
         self.open()
