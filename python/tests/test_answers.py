@@ -1,4 +1,4 @@
-"""What docs/analysis.md says of how the champions do it, sentence by sentence, in their episodes."""
+"""The statements of docs/notebook/2026-11-four-answers.md, one by one, in episodes of the champions."""
 
 import functools
 from types import SimpleNamespace
