@@ -31,7 +31,7 @@ use crate::{
     engine::{self, Assignments, Engine, EngineConfig, EvaluatedBatch, ToWorker},
     failpoint,
     ids::{EvaluationId, ExperimentId, JobId, QuestionId},
-    referee::{Referee, RefereeRequest, Verdict},
+    referee::{Referee, Verdict},
     runs::{self, Evaluation, Request, RequestId, Runnable, Runs},
     shared_store::SharedStore,
     store::{ExperimentState, QuarantinedWorker},
@@ -40,7 +40,7 @@ use crate::{
 pub use events::{
     DriverEvent, EvaluationReply, EventSender, ReadmissionReply, WorkerLink, WorkerMessage, channel,
 };
-use questions::{Question, Questions};
+use questions::Questions;
 pub use stats::StatsSnapshot;
 use tasks::{Disk, Done};
 use workers::ConnectedWorkers;
@@ -364,12 +364,7 @@ impl Driver {
             Command::FinishBatch { job: JobId::Evaluation(id), evaluated } => {
                 self.runs.on_evaluation_finished(id, Ok(evaluated.values));
             }
-            Command::AskReferee { question: id, spec, trial_set, output, genotype, trials } => {
-                let specification = spec;
-                let request =
-                    RefereeRequest { specification, genotype: vec![], trial_set, trials, output };
-                self.questions.ask(Question { id, genotype, request });
-            }
+            Command::AskReferee { question, request } => self.questions.ask(question, request),
             Command::WithdrawQuestion { question } => self.questions.withdraw(question),
             Command::Quarantine { name, reason } => {
                 error!(

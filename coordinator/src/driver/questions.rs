@@ -5,29 +5,17 @@ use std::{collections::VecDeque, future::pending};
 use tokio::{task::JoinSet, time::timeout};
 
 use crate::{
-    engine::SharedGenotype,
     ids::QuestionId,
     limits::REFEREE_TIMEOUT,
     referee::{Referee, RefereeRequest, Verdict},
     text::printable,
 };
 
-/// A question, without a copy of the genotype.
-#[derive(Debug)]
-pub struct Question {
-    /// Names it.
-    pub id: QuestionId,
-    /// The genotype.
-    pub genotype: SharedGenotype,
-    /// Everything else.
-    pub request: RefereeRequest,
-}
-
 /// The questions that wait, and the one that is asked.
 #[derive(Debug)]
 pub struct Questions {
     referee: Referee,
-    waiting: VecDeque<Question>,
+    waiting: VecDeque<(QuestionId, RefereeRequest)>,
     asked: Option<QuestionId>,
     task: JoinSet<(QuestionId, Verdict)>,
 }
@@ -39,14 +27,14 @@ impl Questions {
     }
 
     /// Asks a question after those that wait.
-    pub fn ask(&mut self, question: Question) {
-        self.waiting.push_back(question);
+    pub fn ask(&mut self, id: QuestionId, request: RefereeRequest) {
+        self.waiting.push_back((id, request));
         self.go_on();
     }
 
     /// Forgets a question.
     pub fn withdraw(&mut self, id: QuestionId) {
-        self.waiting.retain(|question| question.id != id);
+        self.waiting.retain(|(waiting, _)| *waiting != id);
         if self.asked == Some(id) {
             self.task.abort_all();
             self.asked = None;
@@ -84,8 +72,7 @@ impl Questions {
         if self.asked.is_some() {
             return;
         }
-        let Some(Question { id, genotype, mut request }) = self.waiting.pop_front() else { return };
-        request.genotype = genotype.to_vec();
+        let Some((id, request)) = self.waiting.pop_front() else { return };
         let referee = self.referee.clone();
         self.asked = Some(id);
         self.task.spawn(async move {

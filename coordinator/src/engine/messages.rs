@@ -10,7 +10,10 @@ use std::{
 
 use sim_core::{Output, TrialSet};
 
-use crate::ids::{AssignmentId, JobId, QuestionId, WorkerId};
+use crate::{
+    ids::{AssignmentId, JobId, QuestionId, WorkerId},
+    referee::RefereeRequest,
+};
 use evolution::{Genotype, Population};
 
 use super::NamePattern;
@@ -85,16 +88,8 @@ pub enum Command {
     AskReferee {
         /// Names this in the report.
         question: QuestionId,
-        /// As given to [`Engine::on_job_started`](super::Engine::on_job_started).
-        spec: Arc<str>,
-        /// Which worlds and noise the trials meet.
-        trial_set: TrialSet,
-        /// What is computed for a trial.
-        output: Output,
-        /// The genotype.
-        genotype: SharedGenotype,
-        /// At least one.
-        trials: Range<u32>,
+        /// The item, with the specification of its job.
+        request: RefereeRequest,
     },
     /// An answer of the referee is not needed any more.
     WithdrawQuestion {
@@ -187,6 +182,12 @@ pub struct SharedGenotype {
     pub population: Population,
     /// Index of the individual among them.
     pub individual: u32,
+}
+
+impl From<Genotype> for SharedGenotype {
+    fn from(genotype: Genotype) -> Self {
+        Self { population: [genotype].into(), individual: 0 }
+    }
 }
 
 impl Deref for SharedGenotype {

@@ -103,7 +103,7 @@ impl Request {
             id,
             slot,
             specification,
-            genotype: genotype.clone(),
+            genotype: genotype.to_vec(),
             trials_start: trials.start,
             trials_end: trials.end,
             measures: *output == Output::Measures,

@@ -28,6 +28,8 @@ pub use child::serve_stdio;
 use sim_core::{Output, TrialSet};
 pub use supervisor::Referee;
 
+use crate::engine::SharedGenotype;
+
 /// The program that a referee process runs: [`serve_stdio`] has to be behind it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RefereeProgram {
@@ -53,7 +55,7 @@ pub struct RefereeRequest {
     /// compiled once, as long as the process lives.
     pub specification: Arc<str>,
     /// Genes; reach the simulation bit by bit as they are here.
-    pub genotype: Vec<f64>,
+    pub genotype: SharedGenotype,
     /// Which worlds and noise.
     pub trial_set: TrialSet,
     /// Which trials of the set.

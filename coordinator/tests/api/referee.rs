@@ -39,7 +39,7 @@ fn request(config: &ExperimentConfig) -> RefereeRequest {
     let n_genes = Simulation::compile(config).unwrap().genotype_len();
     RefereeRequest {
         specification: config.to_canonical_json().into(),
-        genotype: (0..n_genes).map(|i| (i * 37 % 101) as f64 / 101.0).collect(),
+        genotype: (0..n_genes).map(|i| (i * 37 % 101) as f64 / 101.0).collect::<Vec<_>>().into(),
         trial_set: TrialSet::Generation(3),
         trials: 1..3,
         output: Output::Fitness,
@@ -183,13 +183,14 @@ async fn failures_have_their_words() {
         Verdict::Failed(failure) => failure,
         other => panic!("{other:?}"),
     };
-    let genotype = vec![0.5; 3];
+    let genotype = vec![0.5; 3].into();
     assert_eq!(
         failure(RefereeRequest { genotype, ..short() }).await,
         "the genotype has 3 genes, the experiment's have 424"
     );
-    let mut genotype = short().genotype;
+    let mut genotype = short().genotype.to_vec();
     genotype[7] = f64::NAN;
+    let genotype = genotype.into();
     let outside = "gene 7 is NaN, outside [0, 1]";
     assert_eq!(failure(RefereeRequest { genotype, ..short() }).await, outside);
     let none = "trials 5..5 are not within 0..1000";

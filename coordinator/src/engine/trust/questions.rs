@@ -10,11 +10,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sim_core::{Output, TrialSet};
+use crate::{
+    ids::{JobId, QuestionId, WorkerId},
+    referee::RefereeRequest,
+};
 
-use crate::ids::{JobId, QuestionId, WorkerId};
-
-use super::super::{Command, OpenQuestion, SharedGenotype, item::Item};
+use super::super::{Command, OpenQuestion, item::Item};
 
 /// Processes that an item must take down before it is to blame: one may be killed by
 /// chance, or by a system that is short of memory.
@@ -31,16 +32,10 @@ const DELAY_MAX: Duration = Duration::from_secs(60);
 pub struct Question {
     /// The job that it is about.
     pub job: JobId,
-    /// Opaque: the job's specification.
-    pub spec: Arc<str>,
-    /// Of the batch.
-    pub trial_set: TrialSet,
-    /// Of the batch.
-    pub output: Output,
-    /// The item's genotype.
-    pub genotype: SharedGenotype,
     /// The item.
     pub item: Item,
+    /// What the referee evaluates.
+    pub request: RefereeRequest,
     /// What it is about.
     pub doubt: Doubt,
     /// When the referee is to be asked again, if it could not answer.
@@ -84,26 +79,8 @@ pub struct Party {
 
 impl Question {
     /// A question that has not been asked.
-    pub fn new(
-        job: JobId,
-        spec: Arc<str>,
-        (trial_set, output, genotype): (TrialSet, Output, SharedGenotype),
-        item: Item,
-        doubt: Doubt,
-    ) -> Self {
-        Self {
-            job,
-            spec,
-            trial_set,
-            output,
-            genotype,
-            item,
-            doubt,
-            ask_again: None,
-            trouble: None,
-            n_delays: 0,
-            n_deaths: 0,
-        }
+    pub fn new(job: JobId, item: Item, request: RefereeRequest, doubt: Doubt) -> Self {
+        Self { job, item, request, doubt, ask_again: None, trouble: None, n_delays: 0, n_deaths: 0 }
     }
 
     /// The workers whose word is in doubt.
@@ -155,14 +132,7 @@ impl Question {
     }
 
     fn command(&self, id: QuestionId) -> Command {
-        Command::AskReferee {
-            question: id,
-            spec: Arc::clone(&self.spec),
-            trial_set: self.trial_set,
-            output: self.output,
-            genotype: self.genotype.clone(),
-            trials: self.item.trials.clone(),
-        }
+        Command::AskReferee { question: id, request: self.request.clone() }
     }
 }
 

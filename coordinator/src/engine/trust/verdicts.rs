@@ -9,12 +9,12 @@ use std::{
 
 use crate::{
     ids::{JobId, QuestionId, WorkerId},
-    referee::Verdict,
+    referee::{RefereeRequest, Verdict},
 };
 
 use super::{
     super::{
-        Batch, Command, Engine,
+        Command, Engine,
         batch::{BatchInProgress, name_of},
         item::Item,
         known_results::{REFEREE, same_bits},
@@ -58,11 +58,15 @@ impl Engine {
     /// meanwhile. Those whose word is in doubt get nothing.
     pub(in crate::engine) fn ask_referee(&mut self, job: JobId, item: Item, doubt: Doubt) {
         let Some(work) = self.jobs.get_mut(&job) else { return };
-        let spec = Arc::clone(&work.spec);
         let Some(batch) = &mut work.batch else { return };
-        let Batch { trial_set, output, .. } = batch.request;
-        let what = (trial_set, output, batch.genotype(item.individual));
-        let question = Question::new(job, spec, what, item.clone(), doubt);
+        let request = RefereeRequest {
+            specification: Arc::clone(&work.spec),
+            genotype: batch.genotype(item.individual),
+            trial_set: batch.request.trial_set,
+            trials: item.trials.clone(),
+            output: batch.request.output,
+        };
+        let question = Question::new(job, item.clone(), request, doubt);
         match question.doubt {
             Doubt::Disagreement { .. } => batch.n_disagreements += 1,
             Doubt::NoFitness => {}
@@ -101,7 +105,7 @@ impl Engine {
         let others = questions.filter_map(|question| match &question.doubt {
             Doubt::Failure { reporter, message: same }
                 if question.trouble.is_some()
-                    && self.batch_with(job, question.trial_set).is_some()
+                    && self.batch_with(job, question.request.trial_set).is_some()
                     && same == message
                     && question.item.overlaps(item) =>
             {
@@ -149,7 +153,7 @@ impl Engine {
                     "it returned {} for {} of {}, which fails: {failure}",
                     first(values),
                     place(&question.item),
-                    name_of(question.trial_set),
+                    name_of(question.request.trial_set),
                 );
                 self.put_in_quarantine(now, party, &reason);
             }
@@ -163,7 +167,7 @@ impl Engine {
     fn settle_values(&mut self, now: Instant, id: QuestionId, question: &Question, values: &[f64]) {
         self.end_doubt(id, question);
         let place = place(&question.item);
-        let batch = name_of(question.trial_set);
+        let batch = name_of(question.request.trial_set);
         match &question.doubt {
             Doubt::Losses | Doubt::NoFitness => {}
             Doubt::Failure { reporter, message } => {
@@ -206,7 +210,7 @@ impl Engine {
 
     /// The batch that a question is about, if it is still being computed.
     fn batch_of(&mut self, question: &Question) -> Option<&mut BatchInProgress> {
-        self.batch_with_mut(question.job, question.trial_set)
+        self.batch_with_mut(question.job, question.request.trial_set)
     }
 
     /// Whoever was in doubt because of a question is not any more.

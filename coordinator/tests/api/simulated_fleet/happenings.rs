@@ -169,7 +169,8 @@ impl SimulatedFleet {
                 Command::FinishBatch { job, evaluated } => {
                     self.evaluated.push((job, evaluated));
                 }
-                Command::AskReferee { question, genotype, trials, .. } => {
+                Command::AskReferee { question, request } => {
+                    let RefereeRequest { genotype, trials, .. } = request;
                     self.n_questions += 1;
                     let individual = genotype[0] as u64;
                     let verdict = if !self.has_referee {

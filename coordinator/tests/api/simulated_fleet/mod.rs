@@ -22,7 +22,7 @@ use coordinator::{
     },
     ids::{AssignmentId, JobId, QuestionId, WorkerId},
     priority::Priority,
-    referee::Verdict,
+    referee::{RefereeRequest, Verdict},
 };
 use evolution::Population;
 use sim_core::{Output, TrialSet};
