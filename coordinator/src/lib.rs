@@ -22,6 +22,7 @@
 //! - [`program`]: the command line of the program
 
 mod clock;
+mod codec;
 mod control;
 mod driver;
 pub mod engine;

@@ -9,7 +9,7 @@
 //!   starts it again after a death, and ends it after a time without items;
 //! - [`serve_stdio`] is the process itself: `coordinator referee` and
 //!   `swarmctl referee`, which nobody types;
-//! - `messages` and `framing` are what goes through its standard input and output,
+//! - the two speak the workers' protocol through its standard input and output (`stream`);
 //!   `process` is one process as its supervisor sees it.
 //!
 //! The process reads nothing but its standard input, writes nothing but its standard
@@ -17,9 +17,8 @@
 //! error goes to the coordinator's log.
 
 mod child;
-mod framing;
-mod messages;
 mod process;
+mod stream;
 mod supervisor;
 
 use std::{ffi::OsString, ops::Range, path::PathBuf, sync::Arc, time::Duration};
@@ -80,7 +79,7 @@ pub enum Verdict {
     /// Nothing is known about the item, and it is not to blame; the text says why and
     /// what to do. Either the process cannot be started, or does not behave like a
     /// referee, or was told to stop (SIGTERM, SIGINT or SIGHUP, as when the machine shuts
-    /// down), or the result is too large for a message.
+    /// down).
     Unavailable(String),
 }
 

@@ -9,6 +9,8 @@ use std::{
     time::Duration,
 };
 
+use prost::Message as _;
+use swarm_proto::v1::{self, item_result::Outcome, work_request, work_response::Message};
 use tokio::{
     io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader},
     process::{Child, ChildStderr, ChildStdin, ChildStdout, Command},
@@ -18,11 +20,14 @@ use tokio::{
 };
 use tracing::warn;
 
-use super::{
-    RefereeProgram, RefereeRequest, Verdict, framing,
-    messages::{Answer, Outcome, Request, SLOTS, Values},
+use super::{RefereeProgram, RefereeRequest, Verdict, stream::Arrived};
+use crate::{
+    codec,
+    ids::{EvaluationId, JobId},
 };
 
+/// Compiled specifications that a process keeps.
+const SPECIFICATIONS_MAX: usize = 4;
 /// Time for a new process to say that it is ready. Only a machine without memory or
 /// processors needs seconds.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
@@ -40,11 +45,13 @@ const LINES_MAX: usize = 100;
 pub(super) struct Process {
     child: Child,
     input: ChildStdin,
-    output: BufReader<ChildStdout>,
-    /// The specifications in the process's slots; the one used last is the last.
-    specifications: VecDeque<(u32, Arc<str>)>,
-    /// Id of the latest request.
-    request_id: u64,
+    output: ChildStdout,
+    arrived: Arrived,
+    /// The specifications that the process has, by the job that stands for each; the one used
+    /// last is the last.
+    specifications: VecDeque<(JobId, Arc<str>)>,
+    n_specifications_sent: u64,
+    n_items_sent: u64,
     /// One task, that logs what it writes to standard error.
     log: JoinSet<()>,
 }
@@ -81,9 +88,16 @@ impl Process {
         };
         let mut log = JoinSet::new();
         log.spawn(log_lines(errors));
-        let output = BufReader::new(output);
-        let specifications = VecDeque::new();
-        let mut process = Self { child, input, output, specifications, request_id: 0, log };
+        let mut process = Self {
+            child,
+            input,
+            output,
+            arrived: Arrived::default(),
+            specifications: VecDeque::new(),
+            n_specifications_sent: 0,
+            n_items_sent: 0,
+            log,
+        };
         process.await_ready().await.map_err(|problem| {
             format!(
                 "the referee process {name} {problem}; it has to be the coordinator or swarmctl \
@@ -94,17 +108,14 @@ impl Process {
     }
 
     async fn await_ready(&mut self) -> Result<(), String> {
-        let said = timeout(START_TIMEOUT, framing::read_async::<Answer>(&mut self.output)).await;
-        match said {
+        match timeout(START_TIMEOUT, self.next_message()).await {
             Err(_) => Err(format!("was not ready within {} s", START_TIMEOUT.as_secs())),
-            Ok(Ok(Some(Answer { outcome: Some(Outcome::Ready(fingerprint)), .. }))) => {
-                if fingerprint == sim_core::FINGERPRINT {
+            Ok(Ok(Some(work_request::Message::Hello(hello)))) => {
+                let (theirs, ours) = (hello.sim_core_fingerprint, sim_core::FINGERPRINT);
+                if theirs == ours {
                     return Ok(());
                 }
-                Err(format!(
-                    "simulates with \"{fingerprint}\", not with \"{}\"",
-                    sim_core::FINGERPRINT
-                ))
+                Err(format!("simulates with \"{theirs}\", not with \"{ours}\""))
             }
             Ok(Ok(None)) => Err(match self.exit_status().await {
                 Some(status) => format!("ended before it was ready ({status})"),
@@ -121,17 +132,11 @@ impl Process {
 
     /// Has an item evaluated. The process is given back if it can take another one.
     pub(super) async fn evaluate(mut self, request: &RefereeRequest) -> (Verdict, Option<Self>) {
-        let message = self.next_message(request);
-        let Ok(frame) = framing::encode(&message) else {
-            let reason = "the item is too large for a message to the referee process; \
-                          please report this";
-            return (Verdict::Unavailable(reason.into()), None);
-        };
+        let messages = self.messages(request);
         // A process that has gone does not read; what it leaves behind says how it went.
-        let _ = self.input.write_all(&frame).await;
-        let said: io::Result<Option<Answer>> = framing::read_async(&mut self.output).await;
-        let outcome = match said {
-            Ok(Some(Answer { id, outcome: Some(outcome) })) if id == message.id => outcome,
+        let _ = self.input.write_all(&messages).await;
+        let results = match self.next_message().await {
+            Ok(Some(work_request::Message::Results(v1::ItemResults { results }))) => results,
             Ok(None) => return (self.death().await, None),
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 return (self.death().await, None);
@@ -139,35 +144,69 @@ impl Process {
             Ok(_) => return (nonsense("it does not answer what it was asked"), None),
             Err(error) => return (nonsense(&error.to_string()), None),
         };
-        let verdict = match outcome {
-            Outcome::Values(Values { values }) => Verdict::Values(values),
-            Outcome::Failure(failure) => Verdict::Failed(failure),
-            Outcome::TooLarge(n_values) => Verdict::Unavailable(format!(
-                "the item has {n_values} values, more than a message from the referee process \
-                 holds; ask for fewer trials"
-            )),
-            Outcome::Ready(_) => return (nonsense("it starts twice"), None),
+        let result = results.into_iter().find(|result| result.assignment_id == self.n_items_sent);
+        let verdict = match result.and_then(|result| result.outcome) {
+            Some(Outcome::Fitness(v1::TrialFitness { values })) => Verdict::Values(values),
+            Some(Outcome::Measures(v1::TrialMeasures { values })) => Verdict::Values(values),
+            Some(Outcome::Failure(v1::ItemFailure { message })) => Verdict::Failed(message),
+            None => return (nonsense("it does not answer what it was asked"), None),
         };
         (verdict, Some(self))
     }
 
-    /// The request as a message, with the specification if no slot has it.
-    fn next_message(&mut self, request: &RefereeRequest) -> Request {
-        let RefereeRequest { specification, .. } = request;
-        self.request_id += 1;
-        let known = self.specifications.iter().position(|(_, known)| known == specification);
-        let (slot, text) = match known.and_then(|known| self.specifications.remove(known)) {
-            Some((slot, _)) => (slot, None),
-            None if self.specifications.len() < SLOTS => {
-                (self.specifications.len() as u32, Some(specification.to_string()))
+    /// What the process says next; none if its output has ended.
+    async fn next_message(&mut self) -> io::Result<Option<work_request::Message>> {
+        loop {
+            if let Some(v1::WorkRequest { message }) = self.arrived.take()? {
+                return message
+                    .map_or_else(|| Err(io::ErrorKind::InvalidData.into()), |m| Ok(Some(m)));
             }
+            if self.output.read_buf(&mut self.arrived.0).await? == 0 {
+                return self.arrived.end().map(|()| None);
+            }
+        }
+    }
+
+    /// The messages by which an item is computed: with its specification if the process does not
+    /// have it, in place of the one that was used least recently.
+    fn messages(&mut self, request: &RefereeRequest) -> Vec<u8> {
+        let RefereeRequest { specification, genotype, trial_set, trials, output } = request;
+        let mut bytes = Vec::new();
+        let mut say = |message| {
+            let message = v1::WorkResponse { message: Some(message) };
+            bytes.extend(message.encode_length_delimited_to_vec());
+        };
+        let known = self.specifications.iter().position(|(_, known)| known == specification);
+        let job = match known.and_then(|index| self.specifications.remove(index)) {
+            Some((job, _)) => job,
             None => {
-                let (slot, _) = self.specifications.pop_front().expect("all slots are in use");
-                (slot, Some(specification.to_string()))
+                if self.specifications.len() == SPECIFICATIONS_MAX
+                    && let Some((oldest, _)) = self.specifications.pop_front()
+                {
+                    say(Message::EndJob(v1::EndJob { job: Some(codec::job(oldest)) }));
+                }
+                self.n_specifications_sent += 1;
+                let new = EvaluationId(self.n_specifications_sent).into();
+                let (job, config_json) = (Some(codec::job(new)), specification.to_string());
+                say(Message::Spec(v1::JobSpec { job, config_json }));
+                new
             }
         };
-        self.specifications.push_back((slot, Arc::clone(specification)));
-        Request::new(self.request_id, slot, text, request)
+        self.specifications.push_back((job, Arc::clone(specification)));
+        self.n_items_sent += 1;
+        say(Message::Assignments(v1::Assignments {
+            job: Some(codec::job(job)),
+            trial_set: Some(codec::trial_set(*trial_set)),
+            output: codec::output(*output).into(),
+            assignments: vec![v1::Assignment {
+                assignment_id: self.n_items_sent,
+                first_trial: trials.start,
+                trial_count: trials.end - trials.start,
+                genotype: genotype.to_vec(),
+                individual: None,
+            }],
+        }));
+        bytes
     }
 
     /// What it means that the output has ended within an item.

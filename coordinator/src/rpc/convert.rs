@@ -2,18 +2,19 @@
 
 use std::time::Duration;
 
-use sim_core::{Output, TrialSet};
+use sim_core::Output;
 use swarm_proto::v1::{
     self, WorkResponse, event::Kind, item_result::Outcome, work_response::Message,
 };
 use tonic::Status;
 
 use crate::{
+    codec,
     engine::{
         Assignment, Assignments, BatchActivity, EvaluationActivity, ItemResult, ToWorker,
         WorkerStatus,
     },
-    ids::{AssignmentId, JobId},
+    ids::AssignmentId,
     priority::Priority,
     queries::{Address, DynamicsPage, Individuals, Lineage, Page},
     store::{
@@ -41,22 +42,23 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
             heartbeat_interval_ms: times.heartbeat_interval.as_millis() as u32,
             lease_ms: times.lease.as_millis() as u32,
         }),
-        ToWorker::Spec(id, config_json) => {
-            Message::Spec(v1::JobSpec { job: job(id), config_json: config_json.to_string() })
-        }
+        ToWorker::Spec(id, config_json) => Message::Spec(v1::JobSpec {
+            job: Some(codec::job(id)),
+            config_json: config_json.to_string(),
+        }),
         ToWorker::Distribution(id, distribution) => Message::Distribution(v1::Distribution {
-            job: job(id),
+            job: Some(codec::job(id)),
             distribution: distribution.to_vec(),
         }),
         ToWorker::Assignments(Assignments { job: id, trial_set: set, output: wanted, items }) => {
             Message::Assignments(v1::Assignments {
-                job: job(id),
-                trial_set: trial_set(set),
-                output: output(wanted).into(),
+                job: Some(codec::job(id)),
+                trial_set: Some(codec::trial_set(set)),
+                output: codec::output(wanted).into(),
                 assignments: items.iter().map(assignment).collect(),
             })
         }
-        ToWorker::End(id) => Message::EndJob(v1::EndJob { job: job(id) }),
+        ToWorker::End(id) => Message::EndJob(v1::EndJob { job: Some(codec::job(id)) }),
         ToWorker::Drop(assignments) => {
             let assignment_ids = assignments.iter().map(|id| id.0).collect();
             Message::DropAssignments(v1::DropAssignments { assignment_ids })
@@ -66,34 +68,6 @@ pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, S
         }
     };
     Ok(WorkResponse { message: Some(message) })
-}
-
-fn job(id: JobId) -> Option<v1::JobId> {
-    let job = match id {
-        JobId::Experiment(id) => v1::job_id::Job::Experiment(id.0),
-        JobId::Evaluation(id) => v1::job_id::Job::Evaluation(id.0),
-    };
-    Some(v1::JobId { job: Some(job) })
-}
-
-fn trial_set(trial_set: TrialSet) -> Option<v1::TrialSet> {
-    let trial_set = match trial_set {
-        TrialSet::Generation(generation) => v1::trial_set::TrialSet::Generation(generation),
-        TrialSet::HeldOut { generation, block } => {
-            let trials = v1::HeldOutTrials { generation, block: block.into() };
-            v1::trial_set::TrialSet::HeldOut(trials)
-        }
-        TrialSet::Judgement(generation) => v1::trial_set::TrialSet::Judgement(generation),
-        TrialSet::Evaluation => v1::trial_set::TrialSet::Evaluation(v1::EvaluationTrials {}),
-    };
-    Some(v1::TrialSet { trial_set: Some(trial_set) })
-}
-
-fn output(output: Output) -> v1::Output {
-    match output {
-        Output::Fitness => v1::Output::Fitness,
-        Output::Measures => v1::Output::Measures,
-    }
 }
 
 fn assignment(assignment: &Assignment) -> v1::Assignment {

@@ -328,8 +328,8 @@ async fn items_wait_for_each_other() {
 #[tokio::test]
 async fn programs_that_are_no_referee_are_unavailable_with_a_reason() {
     let missing = RefereeProgram { path: "/nowhere/coordinator".into(), args: Vec::new() };
-    // A message of 7 bytes: ready, with the simulation "other".
-    let other = shell(r"printf '\007\000\000\000\022\005other'; cat > /dev/null");
+    // A message of 9 bytes: a `Hello` of 7 with the simulation "other".
+    let other = shell(r"printf '\011\012\007\022\005other'; cat > /dev/null");
     for (program, expected) in [
         (missing, "cannot be started (No such file or directory"),
         (shell("exit 3"), "ended before it was ready (exit status: 3)"),
