@@ -21,7 +21,7 @@ const POINTS: f64 = 800.0;
 const RADIUS: f64 = 5.5;
 const RADII: (f64, f64) = (5.0, 20.0);
 /// Rings of a glow, from its reach inwards: share of the reach, and opacity.
-const GLOW: [(f64, f64); 5] = [(1.0, 0.05), (0.8, 0.06), (0.6, 0.08), (0.4, 0.1), (0.2, 0.14)];
+const GLOW: [(f64, f64); 5] = [(1.0, 0.03), (0.8, 0.035), (0.6, 0.04), (0.4, 0.05), (0.2, 0.08)];
 /// Length of an arrow's head, points, and half its angle.
 const HEAD: (f64, f64) = (9.0, 0.45);
 /// Lengths that a scale bar may have, cm; it is the longest of them that fits a quarter of the side.
@@ -150,15 +150,17 @@ impl<B: DrawingBackend> Pen<'_, B> {
 
     fn places(&self, discs: &Discs, now: &StepRecord) -> Drawn<B> {
         let pixels = |cm: f64| (cm * self.camera.scale).round() as i32;
-        for ((reach, color), center) in discs.areas.iter().zip(&now.areas) {
-            self.disc(self.camera.place(*center), pixels(*reach), color.mix(0.25))?;
-        }
         for ((reach, color), center) in discs.lights.iter().zip(&now.lights) {
-            let at = self.camera.place(*center);
             for (share, opacity) in GLOW {
-                self.disc(at, pixels(share * reach), color.mix(opacity))?;
+                self.disc(self.camera.place(*center), pixels(share * reach), color.mix(opacity))?;
             }
-            self.disc(at, self.px(6.0), color.mix(1.0))?;
+        }
+        // Over the glow, they keep their colours.
+        for ((reach, color), center) in discs.areas.iter().zip(&now.areas) {
+            self.disc(self.camera.place(*center), pixels(*reach), color.mix(0.3))?;
+        }
+        for ((_, color), center) in discs.lights.iter().zip(&now.lights) {
+            self.disc(self.camera.place(*center), self.px(6.0), color.mix(1.0))?;
         }
         Ok(())
     }
