@@ -1,10 +1,11 @@
-"""The pictures of docs/web.md: pages and replays as they are now, in docs/figures.
+"""The pictures of docs/web.md and docs/gallery.md: pages and replays as they are now, in docs/figures.
 
     target/python/bin/python web/tests/screenshots.py target/debug
 
 Called as `browser.py` is, and not a test: it writes the files anew.
 """
 
+import json
 import pathlib
 import subprocess
 import tempfile
@@ -23,9 +24,16 @@ REPLAYS = {
 }
 
 
-def champion(name):
-    genotype = ROOT / f"results/champions/{name}-0.json"
-    return ["--config", ROOT / f"configs/{name}.json", "--genotype", genotype, "--generation", "1000"]
+# Tasks of docs/gallery.md: the trial that is seen.
+TASKS = {
+    "foraging": 0, "division_of_labour": 0, "flocking": 0, "synchronisation": 0,
+    "aggregation": 0, "dispersion": 0, "chain": 0, "predator": 1,
+}
+
+
+def champion(name, generation=1000):
+    genotype = ROOT / f"results/champions/{name.split('/')[-1]}-0.json"
+    return ["--config", ROOT / f"configs/{name}.json", "--genotype", genotype, "--generation", str(generation)]
 
 
 def replay(*args):
@@ -33,11 +41,13 @@ def replay(*args):
 
 
 class Screenshots(BrowserTest):
-    def shoot(self, name, width, height, theme="light"):
-        self.prefer(theme)
+    def shoot(self, name, width, height, part="body"):
+        """`part`: what is at the top."""
+        self.prefer("light")
         self.browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self.script(f"document.querySelector('{part}').scrollIntoView()")
         # Two frames: one that is asked for now, and one that shows what it has drawn.
         self.browser.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 300)))")
         self.browser.save_screenshot(str(FIGURES / f"{name}.png"))
@@ -52,6 +62,12 @@ class Screenshots(BrowserTest):
                 self.shoot(f"replay-{name}", 1200, 900)
             replay(*champion("light_follower_snes"), "--to", FIGURES / "picture-light.svg", "--at", "300", "--size", "600")
 
+    def test_last_steps_of_the_tasks(self):
+        for name, trial in TASKS.items():
+            last = json.loads((ROOT / f"configs/tasks/{name}.json").read_text())["algorithm"]["evaluation_steps"] - 1
+            picture = ["--at", str(last), "--size", "780", "--to", FIGURES / f"task-{name}.png"]
+            replay(*champion(f"tasks/{name}", 1_000_000), "--trial", str(trial), *picture)
+
     def test_pages_of_a_fleet(self):
         fleet = Fleet()
         self.addCleanup(fleet.stop)
@@ -62,23 +78,38 @@ class Screenshots(BrowserTest):
         self.browser.get(fleet.pages + "/experiment/1")
         self.wait_for_text(".chart figcaption", "champion, 95 %")
         self.wait_for_text(".heat-map .scale", "fitness ≤")
-        self.shoot("pages-experiment", 1250, 860)
+        self.shoot("pages-experiment", 1250, 885)
         self.browser.get(fleet.pages + "/?by=variant&open=sizes%2520%25C2%25B7%2520algorithm.population_size%253D48")
         self.wait_for_text("tbody", "median worth of 4 champions")
         self.shoot("pages-experiments", 1250, 620)
         self.browser.get(fleet.pages + "/compare?runs=" + ",".join(map(str, range(2, 10))) + "&as=groups")
         self.wait_for_text(".chart figcaption", "4 runs")
         self.find(".differences")
-        self.shoot("pages-compare", 1250, 1250)
+        self.shoot("pages-compare", 1250, 1005)
         self.browser.get(fleet.pages + "/replay/1#step=40&robot=1")
         self.wait_for_text("#result", "judged")
         self.find(".strip")
-        self.shoot("pages-trials", 1250, 1440)
+        self.shoot("pages-trials", 1250, 1425)
+        config = json.loads(CONFIG.read_text())
+        config.update(name="quickstart with a genetic algorithm")
+        config["algorithm"]["name"] = "GA"
+        config["algorithm"]["populations"]["network"]["params"].update(crossover_operator="uniform", num_elite=4)
+        genetic = pathlib.Path(fleet.directory.name) / "genetic.json"
+        genetic.write_text(json.dumps(config))
+        fleet.swarmctl("submit", str(genetic), "--set", "algorithm.population_size=64", "--watch")
+        self.browser.get(fleet.pages + "/experiment/10")
+        self.wait_for_text(".state", "completed")
+        self.script("document.querySelector('.families').open = true")
+        self.wait_for_text(".families", f"{64 * 59:,} children")
+        self.shoot("pages-families", 1100, 640, ".families")
         fleet.swarmctl("submit", str(CONFIG), "--generations", "100000")
         self.browser.get(fleet.pages + "/fleet")
-        self.find(".fleet-timeline[data-assignments]")
+        # Until the timeline has nothing else.
+        done = "return fetch('/api/experiments/11').then((it) => it.json()).then((it) => it.experiment.generations_done)"
+        self.wait(lambda: self.script(done) > 70, "it does not go on")
         workers[3].kill()
         self.wait_for_text(".broken", "worker-3: lost with its worker")
+        self.wait_for_text("main", "episodes, since")
         self.shoot("pages-fleet", 1400, 620)
 
 
