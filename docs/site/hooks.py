@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HELP = "client/src/commands/snapshots/swarmctl__commands__tests__the_manual.snap"
 PROTOCOL = "proto/swarm/v1"
 PAGES = {"README.md": "start.md", "CHANGELOG.md": "CHANGELOG.md", "CONTRIBUTING.md": "CONTRIBUTING.md"}
-PYTHON = "python/swarmevo/__init__.py"
+PYTHON = ["python/swarmevo/__init__.py", "python/swarmevo/analysis/__init__.py"]
 
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)(?P<path>[^)\s#]+)(?P<anchor>#[^)\s]*)?(?=[)\s])")
 FENCE = re.compile(r"^(```+|~~~+).*?^\1", re.MULTILINE | re.DOTALL)
@@ -46,7 +46,7 @@ def on_files(files, config):
     _pages.clear()
     made = {"commands.md": commands(), "protocol.md": protocol(), "python-api.md": python_api()}
     _pages[HELP] = "commands.md"
-    _pages[PYTHON] = "python-api.md"
+    _pages.update(dict.fromkeys(PYTHON, "python-api.md"))
     _pages[PROTOCOL] = "protocol.md"
     for file in (ROOT / PROTOCOL).glob("*.proto"):
         _pages[f"{PROTOCOL}/{file.name}"] = "protocol.md"
@@ -178,11 +178,11 @@ def protocol():
 
 def python_api():
     """What the package exports, by its docstrings."""
-    tree = ast.parse((ROOT / PYTHON).read_text(encoding="utf-8"))
-    parts = [
-        "# Python API\n\nThe docstrings of the package `swarmevo`. [How to use it](python.md).",
-    ]
-    for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and node.module != "_core":
-            parts += [f"::: swarmevo.{node.module}.{alias.name}" for alias in node.names]
+    parts = ["# Python API\n\nThe docstrings of the package `swarmevo`. [How to use it](python.md)."]
+    for source in PYTHON:
+        module = source.removeprefix("python/").removesuffix("/__init__.py").replace("/", ".")
+        parts.append(f"## {module}")
+        for node in ast.parse((ROOT / source).read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom) and node.module != "_core":
+                parts += [f"::: {module}.{node.module}.{alias.name}" for alias in node.names]
     return "\n\n".join(parts) + "\n"
