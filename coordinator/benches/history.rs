@@ -11,7 +11,7 @@ use coordinator::{
     priority::Priority,
     store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
-use evolution::{ALGORITHMS, AlgorithmParams, Digest, Evolution, Told};
+use evolution::{ALGORITHMS, Digest, Evolution, Params, Told};
 use experiment_file::{ExperimentConfig, Keeps};
 use prost::Message as _;
 use swarm_proto::v1::{GetIndividualsRequest, GetIndividualsResponse};
@@ -41,7 +41,7 @@ fn config(algorithm: &str) -> ExperimentConfig {
         ExperimentConfig::from_json(&text, "", ALGORITHMS).expect("the file is right");
     config.algorithm.name = algorithm.to_owned();
     for population in config.algorithm.populations.values_mut() {
-        population.params = AlgorithmParams::default();
+        population.params = Params::default();
     }
     config
 }

@@ -5,8 +5,7 @@ use evolution::{
     ALGORITHMS, Champion, ChampionSource, EvolutionError, Generation, Learnt, Setup, SetupError,
 };
 use experiment_file::{
-    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, ExperimentConfig, Parameter,
-    ParameterValue,
+    AlgorithmDescription, DefaultValue, Domain, ExperimentConfig, Parameter, ParameterValue, Params,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::{
@@ -331,8 +330,8 @@ pub fn rows(array: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
 
 /// Parameters from Python. A number is of the kind that the parameter has, if it fits;
 /// otherwise `Setup` says what would.
-fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<AlgorithmParams> {
-    let mut params = AlgorithmParams::default();
+fn read_params(algorithm: &str, given: &Bound<'_, PyDict>) -> PyResult<Params> {
+    let mut params = Params::default();
     let described = AlgorithmDescription::find(ALGORITHMS, algorithm);
     let parameters = described.map_or(&[][..], |described| described.parameters);
     for (key, value) in given {

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_4;
 
 use crate::torus::{Torus, Vec2, wrap_angle};
 use determinism::random::Stream;
-use experiment_file::{LightController, OrbitConfig, Pace, RandomTargetsConfig};
+use experiment_file::{LightController, OrbitConfig, RandomTargetsConfig};
 
 /// Probability per step that an orbiting light turns back.
 const FLIP_PROBABILITY: f64 = 0.01;
@@ -102,10 +102,10 @@ impl LightPath {
                     *target = torus.wrap(Vec2 { x, y: coordinate(torus.center().y) });
                 }
                 let way = torus.displacement(position, *target);
-                let share = match (config.pace, way.norm()) {
-                    (Pace::Step(share), _) => share,
-                    (Pace::Speed(_), 0.0) => 0.0,
-                    (Pace::Speed(speed), distance) => speed / distance,
+                let share = match (config.step, config.speed, way.norm()) {
+                    (Some(share), _, _) => share,
+                    (None, Some(speed), distance) if distance > 0.0 => speed / distance,
+                    _ => 0.0,
                 };
                 torus.wrap(Vec2 { x: position.x + share * way.x, y: position.y + share * way.y })
             }
@@ -213,8 +213,11 @@ mod tests {
     const START: Vec2 = Vec2::new(500.0, 400.0);
 
     /// The path of a light, and its targets.
-    fn random_targets(pace: Pace) -> (impl FnMut(u32) -> Vec2, impl FnMut(u32) -> Vec2) {
-        let config = RandomTargetsConfig { pace, ..Default::default() };
+    fn random_targets(
+        speed: Option<f64>,
+        step: Option<f64>,
+    ) -> (impl FnMut(u32) -> Vec2, impl FnMut(u32) -> Vec2) {
+        let config = RandomTargetsConfig { speed, step, ..Default::default() };
         let mut draws = Stream::new(0, 0, 0, Purpose::LightMovement, 0);
         let mut target = START;
         let targets = move |step| {
@@ -229,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_light_at_a_share_of_the_way_per_step_slows_down() {
-        let (mut path, mut targets) = random_targets(Pace::Step(0.1));
+        let (mut path, mut targets) = random_targets(None, Some(0.1));
         let mut position = START;
         for step in 0..200 {
             let target = targets(step);
@@ -243,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_light_of_constant_speed_goes_straight_to_its_target_and_oscillates_there() {
-        let (mut path, mut targets) = random_targets(Pace::Speed(3.0));
+        let (mut path, mut targets) = random_targets(Some(3.0), None);
         let mut position = START;
         let mut n_at_target = 0;
         for step in 0..200 {
@@ -263,7 +266,7 @@ mod tests {
         let mut path_of_orbit = orbit(OrbitConfig { radius: 50.0, ..OrbitConfig::default() });
         let settled = (0..1000).map(&mut path_of_orbit).last().unwrap();
         assert!((TORUS.distance(settled, TORUS.center()) - 50.0).abs() < 1e-3);
-        let config = RandomTargetsConfig { square: 20.0, pace: Pace::Step(1.0), every: 1 };
+        let config = RandomTargetsConfig { every: 1, square: 20.0, speed: None, step: Some(1.0) };
         let mut path = path(LightController::LightRndPosController(config), START);
         let away = (0..500).map(|step| {
             let way = TORUS.displacement(TORUS.center(), path(step));

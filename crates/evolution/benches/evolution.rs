@@ -2,7 +2,7 @@
 //! ask and tell of 100 individuals with 445 genes, the size of experiment A.
 
 use divan::{Bencher, counter::ItemsCount};
-use evolution::{AlgorithmParams, Evolution, Generation, Setup};
+use evolution::{Evolution, Generation, Params, Setup};
 
 const POPULATION_SIZE: u32 = 100;
 const N_GENES: usize = 445;
@@ -14,36 +14,36 @@ fn main() {
 
 #[divan::bench]
 fn ga(bencher: Bencher) {
-    generation(bencher, "GA", AlgorithmParams::default().with("mutation_sigma", 0.5));
+    generation(bencher, "GA", Params::default().with("mutation_sigma", 0.5));
 }
 
 #[divan::bench]
 fn snes(bencher: Bencher) {
-    generation(bencher, "SNES", AlgorithmParams::default());
+    generation(bencher, "SNES", Params::default());
 }
 
 #[divan::bench]
 fn openai_es(bencher: Bencher) {
-    generation(bencher, "openaiES", AlgorithmParams::default());
+    generation(bencher, "openaiES", Params::default());
 }
 
 #[divan::bench]
 fn sep_cma_es(bencher: Bencher) {
-    generation(bencher, "sep-CMA-ES", AlgorithmParams::default());
+    generation(bencher, "sep-CMA-ES", Params::default());
 }
 
 #[divan::bench(sample_count = 10)]
 fn cma_es(bencher: Bencher) {
-    generation(bencher, "CMA-ES", AlgorithmParams::default());
+    generation(bencher, "CMA-ES", Params::default());
 }
 
 #[divan::bench(sample_count = 10)]
 fn xnes(bencher: Bencher) {
-    generation(bencher, "xNES", AlgorithmParams::default());
+    generation(bencher, "xNES", Params::default());
 }
 
 /// Tells a generation and asks the next.
-fn generation(bencher: Bencher, algorithm: &str, params: AlgorithmParams) {
+fn generation(bencher: Bencher, algorithm: &str, params: Params) {
     let setup = Setup {
         params,
         population_size: POPULATION_SIZE,

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use evolution::{AlgorithmParams, Setup};
+use evolution::{Params, Setup};
 
 const N_GENES: usize = 20;
 const SEEDS: [u64; 5] = [0, 1, 2, 3, 4];
@@ -33,12 +33,12 @@ const FUNCTIONS: [(&str, Function); 4] = [
     }),
 ];
 
-fn params(values: &[(&str, f64)]) -> AlgorithmParams {
-    values.iter().fold(AlgorithmParams::default(), |params, (key, value)| params.with(key, *value))
+fn params(values: &[(&str, f64)]) -> Params {
+    values.iter().fold(Params::default(), |params, (key, value)| params.with(key, *value))
 }
 
 /// The algorithms with their defaults, and with other parameters.
-fn variants() -> Vec<(String, AlgorithmParams)> {
+fn variants() -> Vec<(String, Params)> {
     let d = N_GENES as f64;
     let snes = (3.0 + libm::log(d)) / (5.0 * d.sqrt());
     let xnes = 3.0 * snes / d;

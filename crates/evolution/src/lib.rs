@@ -77,7 +77,7 @@ pub use checkpoint::{Checkpoint, CheckpointError};
 pub use digest::Digest;
 pub use distribution::Distribution;
 pub use dynamics::Dynamics;
-pub use experiment_file::AlgorithmParams;
+pub use experiment_file::Params;
 pub use fork::{Fork, ForkError};
 pub use judgement::Judgement;
 pub use lineage::{Ancestor, Birth, BirthOf, Families, GeneSource, Operator, Parents, Pedigree};

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use experiment_file::{AlgorithmDescription, AlgorithmParams};
+use experiment_file::{AlgorithmDescription, Params};
 
 use super::{ALGORITHMS, Algorithm, Digest, Evolution};
 
@@ -13,7 +13,7 @@ pub struct Setup {
     /// Name of the algorithm, as in experiment files.
     pub algorithm: String,
     /// Its parameters; those that are absent have their defaults.
-    pub params: AlgorithmParams,
+    pub params: Params,
     /// Genes of a genotype, at least 1.
     pub n_genes: usize,
     /// Genotypes per generation.
@@ -36,7 +36,7 @@ impl Setup {
     pub fn new(algorithm: &str, n_genes: usize) -> Self {
         Self {
             algorithm: algorithm.to_owned(),
-            params: AlgorithmParams::default(),
+            params: Params::default(),
             n_genes,
             population_size: 20,
             seed: 0,
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_setup_is_refused_with_everything_that_is_wrong() {
-        let params = AlgorithmParams::default().with("sigma_init", 2.0).with("eta_mu", 1.0);
+        let params = Params::default().with("sigma_init", 2.0).with("eta_mu", 1.0);
         let setup = Setup { params, population_size: 1, ..Setup::new("CMA-ES", 1001) };
         let expected = [
             "CMA-ES takes at most 1000 genes, not 1001",
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn an_elite_leaves_room_for_children() {
-        let params = AlgorithmParams::default().with("num_elite", 4_u32);
+        let params = Params::default().with("num_elite", 4_u32);
         let setup = Setup { params, population_size: 4, ..Setup::new("GA", 2) };
         let expected = "`num_elite` must be a whole number below the population size, is 4";
         assert_eq!(problems(&setup), [expected]);
@@ -155,7 +155,7 @@ mod tests {
     fn what_a_setup_says_enters_the_digest() {
         let digest = |setup: Setup| setup.start().unwrap().digest();
         let base = || Setup::new("SNES", 2);
-        let eta = AlgorithmParams::default().with("eta_mu", 0.5);
+        let eta = Params::default().with("eta_mu", 0.5);
         assert_eq!(digest(base()), digest(base()));
         assert_ne!(digest(base()), digest(Setup { seed: 1, ..base() }));
         assert_ne!(digest(base()), digest(Setup { params: eta, ..base() }));

@@ -1,29 +1,20 @@
 //! What robots act with.
 
-use std::ops::Not;
+use crate::DefaultValue::{Switch, Whole};
+use crate::parameters::{Also, parameters};
+use crate::{ActuatorQuery, Parameter, limits};
 
-use schemars::JsonSchema;
-use serde::Serialize;
-use serde_json::json;
-
-use super::{ActuatorQuery, limits, schema};
-
-/// Actuators; absent ones are not mounted.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct ActuatorsConfig {
-    /// Differential drive.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "WheelActuatorConfig")]
-    pub wheel_actuator: Option<WheelActuatorConfig>,
-    /// LED.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "LedActuatorConfig")]
-    pub led_actuator: Option<LedActuatorConfig>,
-    /// Emitter of the wireless link.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "WirelessTransmitterConfig")]
-    pub wireless_transmitter: Option<WirelessTransmitterConfig>,
+parameters! {
+    /// Actuators; absent ones are not mounted.
+    pub struct ActuatorsConfig: Default {
+        /// Differential drive.
+        wheel_actuator: Option<WheelActuatorConfig> = optional(WheelActuatorConfig::OBJECT),
+        /// LED.
+        led_actuator: Option<LedActuatorConfig> = optional(LedActuatorConfig::OBJECT),
+        /// Emitter of the wireless link.
+        wireless_transmitter: Option<WirelessTransmitterConfig> =
+            optional(WirelessTransmitterConfig::OBJECT),
+    }
 }
 
 impl ActuatorsConfig {
@@ -37,84 +28,49 @@ impl ActuatorsConfig {
     }
 }
 
-/// Differential drive (section 3.2.1).
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    default,
-    deny_unknown_fields,
-    transform = schema::property("dt", schema::amount("A fifth of it is `step_duration`.")),
-    transform = schema::property("min_thresh", json!({"const": 0}))
-)]
-pub struct WheelActuatorConfig {
-    /// Wheel speed at action 1, cm/s; default 10.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub max_speed: f64,
-    /// Distance between the wheels L_w, cm; default 11.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub axle_length: f64,
-    /// Duration of an environment step dk, s; default 0.33.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub step_duration: f64,
-}
+/// The original moves by `dt` times the sum of the actions, in cm; the same
+/// as a step of `dt / 5` seconds at 10 cm/s.
+const DT: Also = Also {
+    key: "dt",
+    max: limits::MAGNITUDE,
+    meaning: "A fifth of it is `step_duration`.",
+    value: |dt| dt / 5.0,
+};
 
-impl Default for WheelActuatorConfig {
-    fn default() -> Self {
-        Self { max_speed: 10.0, axle_length: 11.0, step_duration: 0.33 }
+parameters! {
+    /// Differential drive (section 3.2.1).
+    pub struct WheelActuatorConfig: Default {
+        /// Wheel speed at action 1, cm/s.
+        max_speed: f64 = positive(10.0),
+        /// Distance between the wheels L_w, cm.
+        axle_length: f64 = positive(11.0),
+        /// Duration of an environment step dk, s.
+        step_duration: f64 = positive(0.33).also(DT),
     }
-}
+    // A dead zone of no width; the original has others, too.
+    checked { Parameter::between("min_thresh", [0.0; 2], 0.0, "") }
 
-/// LED.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub struct LedActuatorConfig {}
+    /// LED.
+    pub struct LedActuatorConfig {}
 
-/// Emitter of the wireless link (section 3.3).
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct WirelessTransmitterConfig {
-    /// Reach, cm; default 100. A frame is heard within the smaller of the
-    /// emitter's and the receiver's reach.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub range: f64,
-    /// Components of a message, M; default 2. Equals the receiver's.
-    #[schemars(range(min = 1, max = limits::MESSAGE_LENGTH))]
-    pub msg_length: u32,
-    /// Whether messages are quantised; default true.
-    pub quantize: bool,
-    /// Number of lattice points K^M of the quantiser, M*; default 16.
-    #[schemars(range(min = 2, max = limits::LATTICE_POINTS))]
-    pub n_symbols: u32,
-    /// Inverse temperature of the quantiser; default 100.
-    #[schemars(range(min = 0))]
-    pub beta: f64,
-    /// Steps at the start of an episode in which the robot sends, whatever its network
-    /// says; default 10.
-    #[serde(skip_serializing_if = "is_ten")]
-    #[schemars(range(max = limits::STEPS))]
-    pub sending_steps: u32,
-    /// Whether a frame with the message 0 is on the air before the first step; default
-    /// false.
-    #[serde(skip_serializing_if = "Not::not")]
-    pub initial_frame: bool,
-}
-
-/// Whether the canonical form leaves `sending_steps` out.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_ten(sending_steps: &u32) -> bool {
-    *sending_steps == 10
-}
-
-impl Default for WirelessTransmitterConfig {
-    fn default() -> Self {
-        Self {
-            range: 100.0,
-            msg_length: 2,
-            quantize: true,
-            n_symbols: 16,
-            beta: 100.0,
-            sending_steps: 10,
-            initial_frame: false,
-        }
+    /// Emitter of the wireless link (section 3.3).
+    pub struct WirelessTransmitterConfig: Default {
+        /// Reach, cm. A frame is heard within the smaller of the emitter's and the receiver's
+        /// reach.
+        range: f64 = positive(100.0),
+        /// Components of a message, M. Equals the receiver's.
+        msg_length: u32 = whole([1, limits::MESSAGE_LENGTH], 2),
+        /// Whether messages are quantised.
+        quantize: bool = switch(true),
+        /// Number of lattice points K^M of the quantiser, M*.
+        n_symbols: u32 = whole([2, limits::LATTICE_POINTS], 16),
+        /// Inverse temperature of the quantiser.
+        beta: f64 = amount(100.0),
+        /// Steps at the start of an episode in which the robot sends, whatever its network
+        /// says.
+        sending_steps: u32 = whole([0, limits::STEPS], 10).original(Whole(11)).recent(),
+        /// Whether a frame with the message 0 is on the air before the first step.
+        initial_frame: bool = switch(false).original(Switch(true)).recent(),
     }
 }
 

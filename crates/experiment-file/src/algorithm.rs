@@ -3,9 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{
-    AlgorithmParams, FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, limits, schema,
-};
+use super::{FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params, limits, schema};
 
 /// Evolution and evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -81,7 +79,7 @@ pub struct PopulationConfig {
     pub min_vals: Vec<f64>,
     /// Parameters of the algorithm that `algorithm.name` names.
     #[schemars(schema_with = "schema::filled_in")]
-    pub params: AlgorithmParams,
+    pub params: Params,
 }
 
 /// Keys of the genetic algorithm that files of the original simulator may have

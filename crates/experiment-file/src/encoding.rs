@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::{limits, schema};
+use crate::parameters::{kinds, parameters};
+use crate::{DefaultValue, Domain};
 
 /// How a stimulus becomes spikes: each of its values passes a receptive field, whose nodes
 /// spike. Of spiking neurons only.
@@ -33,96 +35,80 @@ pub enum EncodingScheme {
     RankOrder,
 }
 
-/// How the values s of a stimulus become values of nodes. All but the identity and the
-/// linear field have `n_neurons` nodes per value; d is from s to the node's centre.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[serde(tag = "name", content = "params")]
-#[schemars(deny_unknown_fields, transform = receptive_fields)]
-pub enum ReceptiveField {
-    /// s itself, one node per value.
-    #[serde(rename = "identity_receptive_field")]
-    Identity {},
-    /// exp(-sigma d^2)
-    #[serde(rename = "gaussian_receptive_field")]
-    Gaussian(GaussianField),
-    /// 1 - slope |d|, at least 0
-    #[serde(rename = "triangular_receptive_field")]
-    Triangular(SlopedField),
-    /// 1 - slope |d|, at least 0
-    #[serde(rename = "conic_receptive_field")]
-    Conic(SlopedField),
-    /// 1 - slope d^2, at least 0
-    #[serde(rename = "parabolic_receptive_field")]
-    Parabolic(SlopedField),
-    /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values; weights
-    /// can evolve (`encoders:weights`).
-    #[serde(rename = "linear_receptive_field")]
-    Linear(LinearField),
+kinds! {
+    /// How the values s of a stimulus become values of nodes. All but the identity and the
+    /// linear field have `n_neurons` nodes per value; d is from s to the node's centre.
+    #[derive(Copy)]
+    pub enum ReceptiveField by "name" then receptive_fields {
+        /// s itself, one node per value.
+        Identity {} = "identity_receptive_field",
+        /// exp(-sigma d^2)
+        Gaussian(GaussianField) = "gaussian_receptive_field",
+        /// 1 - slope |d|, at least 0
+        Triangular(SlopedField) = "triangular_receptive_field",
+        /// 1 - slope |d|, at least 0
+        Conic(SlopedField) = "conic_receptive_field",
+        /// 1 - slope d^2, at least 0
+        Parabolic(SlopedField) = "parabolic_receptive_field",
+        /// `n_neurons` nodes for the whole stimulus, each a weighted sum of its values; weights
+        /// can evolve (`encoders:weights`).
+        Linear(LinearField) = "linear_receptive_field",
+    }
 }
 
-macro_rules! radial_field {
-    ($(#[$about:meta])* $name:ident, $(#[$meta:meta])* $steepness:ident = $default:literal,
-     $keys:literal) => {
-        $(#[$about])*
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-        #[schemars(deny_unknown_fields, transform = schema::optional($keys))]
-        pub struct $name {
-            $(#[$meta])*
-            #[schemars(range(min = 0, max = limits::STEEPNESS), extend("default" = $default))]
-            pub $steepness: f64,
-            /// Nodes per value; default 1.
-            #[schemars(range(min = 1, max = limits::FIELD_NODES), extend("default" = 1))]
-            pub n_neurons: u32,
-            /// Centre of the first node; default 0.
-            #[schemars(
-                range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE),
-                extend("default" = 0)
-            )]
-            pub min_stim: f64,
-            /// Centre of the last node, if there are two or more; the others are evenly
-            /// between; default 1.
-            #[schemars(
-                range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE),
-                extend("default" = 1)
-            )]
-            pub max_stim: f64,
-            /// Value of a node far from its centre; default 0, of `RankOrderCoding` 1.
-            #[schemars(range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE))]
-            pub min_val: f64,
-            /// Value of a node at its centre; default 1, of `RankOrderCoding` `time_scale`.
-            #[schemars(range(min = -limits::FIELD_VALUE, max = limits::FIELD_VALUE))]
-            pub max_val: f64,
-            /// Whether `min_val` is at the centre and `max_val` far from it; default false.
-            #[schemars(extend("default" = false))]
-            pub inverted: bool,
-        }
-    };
-}
+/// The field of a file that names none.
+pub(super) const DEFAULT_FIELD: &str = "gaussian_receptive_field";
 
-radial_field!(
+const VALUE: [f64; 2] = [-limits::FIELD_VALUE, limits::FIELD_VALUE];
+const MIN_VAL: DefaultValue = DefaultValue::Depends("0, of `RankOrderCoding` 1");
+const MAX_VAL: DefaultValue = DefaultValue::Depends("1, of `RankOrderCoding` `time_scale`");
+
+parameters! {
     /// A field that falls like a bell.
-    GaussianField,
-    /// Factor of d^2; default 6.
-    sigma = 6.0,
-    "sigma, n_neurons, min_stim, max_stim, min_val, max_val, inverted"
-);
+    #[derive(Copy)]
+    pub struct GaussianField {
+        /// Factor of d^2.
+        sigma: f64 = between([0.0, limits::STEEPNESS], 6.0),
+        /// Nodes per value.
+        n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
+        /// Centre of the first node.
+        min_stim: f64 = between(VALUE, 0.0),
+        /// Centre of the last node, if there are two or more; the others are evenly between.
+        max_stim: f64 = between(VALUE, 1.0),
+        /// Value of a node far from its centre.
+        min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
+        /// Value of a node at its centre.
+        max_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MAX_VAL),
+        /// Whether `min_val` is at the centre and `max_val` far from it.
+        inverted: bool = switch(false),
+    }
 
-radial_field!(
     /// A field that falls to zero at a finite distance.
-    SlopedField,
-    /// Factor of the distance, or of its square; default 5.
-    slope = 5.0,
-    "slope, n_neurons, min_stim, max_stim, min_val, max_val, inverted"
-);
+    #[derive(Copy)]
+    pub struct SlopedField {
+        /// Factor of the distance, or of its square.
+        slope: f64 = between([0.0, limits::STEEPNESS], 5.0),
+        /// Nodes per value.
+        n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
+        /// Centre of the first node.
+        min_stim: f64 = between(VALUE, 0.0),
+        /// Centre of the last node, if there are two or more; the others are evenly between.
+        max_stim: f64 = between(VALUE, 1.0),
+        /// Value of a node far from its centre.
+        min_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MIN_VAL),
+        /// Value of a node at its centre.
+        max_val: f64 = of(Domain::Between(VALUE[0], VALUE[1]), MAX_VAL),
+        /// Whether `min_val` is at the centre and `max_val` far from it.
+        inverted: bool = switch(false),
+    }
 
-/// A field whose weights can evolve. A weight that no query covers is exp(-|i - c|), with i
-/// the number of the value, and centres c evenly from 0 to their number.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, transform = schema::optional("n_neurons"))]
-pub struct LinearField {
-    /// Nodes of the stimulus; default 1.
-    #[schemars(range(min = 1, max = limits::FIELD_NODES), extend("default" = 1))]
-    pub n_neurons: u32,
+    /// A field whose weights can evolve. A weight that no query covers is exp(-|i - c|), with i
+    /// the number of the value, and centres c evenly from 0 to their number.
+    #[derive(Copy)]
+    pub struct LinearField {
+        /// Nodes of the stimulus.
+        n_neurons: u32 = whole([1, limits::FIELD_NODES], 1),
+    }
 }
 
 /// What fields with centres have in common.
@@ -229,12 +215,13 @@ impl LinearField {
     }
 }
 
-/// Every parameter has a default, and so has the name: the Gaussian field.
+/// The name has a default, too.
 fn receptive_fields(schema: &mut Schema) {
     let variants = schema.get_mut("oneOf").and_then(Value::as_array_mut);
     for variant in variants.into_iter().flatten() {
-        let is_default = variant["properties"]["name"]["const"] == "gaussian_receptive_field";
-        variant["required"] = if is_default { json!([]) } else { json!(["name"]) };
+        if variant["properties"]["name"]["const"] == DEFAULT_FIELD {
+            variant["required"] = json!([]);
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ActuatorQuery;
+use crate::parameters::parameters;
 
 /// What an experiment must have for a fitness function to make sense of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,25 +21,15 @@ pub(crate) enum Need {
     StepsBeyond(u32),
 }
 
-/// Constants of fitness functions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct FitnessParams {
-    /// alpha of the alpha shape whose border `identify_borderline` asks for, and
-    /// `world.border()` of scripts: circumradii are below the world's width / alpha;
-    /// default 15.
-    #[serde(skip_serializing_if = "is_default_alpha")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub alpha: f64,
-    /// Distance to a light that counts as near in `goto_light`, cm; default 80.
-    #[serde(skip_serializing_if = "is_default_near")]
-    #[schemars(range(min = 0))]
-    pub near: f64,
-}
-
-impl Default for FitnessParams {
-    fn default() -> Self {
-        Self { alpha: 15.0, near: 80.0 }
+parameters! {
+    /// Constants of fitness functions.
+    #[derive(Copy)]
+    pub struct FitnessParams: Default {
+        /// alpha of the alpha shape whose border `identify_borderline` asks for, and
+        /// `world.border()` of scripts: circumradii are below the world's width / alpha.
+        alpha: f64 = positive(15.0).recent(),
+        /// Distance to a light that counts as near in `goto_light`, cm.
+        near: f64 = amount(80.0).recent(),
     }
 }
 
@@ -47,16 +38,6 @@ impl FitnessParams {
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_default_alpha(alpha: &f64) -> bool {
-    *alpha == FitnessParams::default().alpha
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_default_near(near: &f64) -> bool {
-    *near == FitnessParams::default().near
 }
 
 /// Steps at the start of an episode that `alignment` does not count.

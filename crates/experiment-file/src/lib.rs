@@ -72,6 +72,7 @@ mod learning;
 pub mod limits;
 mod neuron;
 mod node;
+mod parameters;
 mod problem;
 mod query;
 mod read;
@@ -93,14 +94,15 @@ use serde_json::json;
 
 pub use actuators::*;
 pub use algorithm::*;
-pub use description::{
-    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, LearnsFrom, Parameter,
-    ParameterValue,
-};
+pub use description::{AlgorithmDescription, Keeps, LearnsFrom};
 pub use encoding::*;
 pub use fitness::*;
 pub use learning::*;
 pub use neuron::*;
+pub use parameters::{
+    DefaultValue, Domain, Kind, Kinds, Nested, Parameter, ParameterValue, Parameters, Params,
+    Table, Variants,
+};
 pub use problem::{ConfigError, Problem};
 pub use query::*;
 pub use read::plain;

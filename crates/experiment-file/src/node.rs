@@ -197,11 +197,6 @@ impl<'a> Node<'a> {
         self.number(QUANTITY)
     }
 
-    /// A quantity >= 0.
-    pub(crate) fn amount(self) -> f64 {
-        self.number(0.0..=limits::MAGNITUDE)
-    }
-
     pub(crate) fn probability(self) -> f64 {
         self.number(0.0..=1.0)
     }
@@ -269,14 +264,6 @@ impl<'a> Node<'a> {
         }
         let elements = array.elements.iter().enumerate();
         elements.map(|(i, element)| self.inner(self.path.index(i), Some(element))).collect()
-    }
-
-    /// A point or vector.
-    pub(crate) fn pair(self) -> [f64; 2] {
-        match <[Node<'a>; 2]>::try_from(self.list(2..=2)) {
-            Ok(elements) => elements.map(Node::quantity),
-            Err(_) => [0.0; 2],
-        }
     }
 
     /// An object with known keys. Keys that `read` asks for are known; what is

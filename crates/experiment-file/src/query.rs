@@ -208,8 +208,8 @@ impl FromStr for GenotypeQuery {
             }
             ("neurons", name) => {
                 let known = evolvable_parameters();
-                let named = known.iter().find(|p| p.name == name || p.aliases.contains(&name));
-                named.ok_or(ParseQueryError::Malformed)?.name
+                let named = known.iter().find(|p| p.name() == name || p.aliases.contains(&name));
+                named.ok_or(ParseQueryError::Malformed)?.name()
             }
             _ => return Err(ParseQueryError::Malformed),
         };
@@ -237,7 +237,7 @@ impl JsonSchema for GenotypeQuery {
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         let parameters = evolvable_parameters();
-        let names = parameters.iter().flat_map(|p| [&p.name].into_iter().chain(p.aliases)).copied();
+        let names = parameters.iter().flat_map(|p| [&[p.name()], p.aliases].concat());
         let names = names.collect::<Vec<_>>().join("|");
         json_schema!({
             "description": "Names a part of the network's parameters (Table 4.1).",

@@ -1,9 +1,12 @@
 //! A robot: its controller, where it starts, and what goes wrong.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 use super::{ActuatorsConfig, Initializer, SensorQuery, SensorsConfig, limits, schema};
+use crate::DefaultValue::{Depends, Name, Null, Number, Numbers, Whole};
+use crate::parameters::{Variants, parameters};
+use crate::{Domain, ParameterValue};
 
 /// A swarm of equal robots.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -44,17 +47,12 @@ pub enum RobotController {
     ScriptController,
 }
 
-/// Switches of a robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct RobotParams {
-    /// Whether its controller may evolve; default true.
-    pub trainable: bool,
-}
-
-impl Default for RobotParams {
-    fn default() -> Self {
-        Self { trainable: true }
+parameters! {
+    /// Switches of a robot.
+    #[derive(Copy)]
+    pub struct RobotParams: Default {
+        /// Whether its controller may evolve.
+        trainable: bool = switch(true),
     }
 }
 
@@ -68,64 +66,64 @@ pub struct RobotInitializers {
     pub orientations: Initializer,
 }
 
-/// Perturbations of a swarm; absent ones do not happen.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct PerturbationsConfig {
-    /// Fault of a long-standing leader.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "LeaderFailureConfig")]
-    pub leader_failure: Option<LeaderFailureConfig>,
-    /// Zeroed stimuli; the robots of each are drawn by themselves. One alone is
-    /// written without a list around it.
-    #[serde(skip_serializing_if = "Vec::is_empty", serialize_with = "one_or_list")]
-    #[schemars(schema_with = "schema::one_or_list::<StimuliInhibitionConfig>")]
-    pub stimuli_inhibition: Vec<StimuliInhibitionConfig>,
-    /// Redrawn positions.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "TopologySwitchConfig")]
-    pub topology_switch: Option<TopologySwitchConfig>,
-    /// Robots that turn by themselves.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "UncontrollableRotationConfig")]
-    pub uncontrollable_rotation: Option<UncontrollableRotationConfig>,
-}
+parameters! {
+    /// Perturbations of a swarm; absent ones do not happen.
+    pub struct PerturbationsConfig: Default {
+        /// Fault of a long-standing leader.
+        leader_failure: Option<LeaderFailureConfig> = optional(LeaderFailureConfig::OBJECT),
+        /// Zeroed stimuli; the robots of each are drawn by themselves. One alone is written
+        /// without a list around it.
+        stimuli_inhibition: Vec<StimuliInhibitionConfig> =
+            of(Domain::Objects(StimuliInhibitionConfig::OBJECT, limits::INHIBITIONS), Null),
+        /// Redrawn positions.
+        topology_switch: Option<TopologySwitchConfig> = optional(TopologySwitchConfig::OBJECT),
+        /// Robots that turn by themselves.
+        uncontrollable_rotation: Option<UncontrollableRotationConfig> =
+            optional(UncontrollableRotationConfig::OBJECT),
+    }
 
-fn one_or_list<S: Serializer>(
-    inhibitions: &[StimuliInhibitionConfig],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    match inhibitions {
-        [one] => one.serialize(serializer),
-        list => list.serialize(serializer),
+    /// A robot that has been sole leader too long becomes faulty.
+    pub struct LeaderFailureConfig: Default {
+        /// Consecutive steps of sole leadership.
+        time_to_failure: u32 = whole(STEPS, 50),
+    }
+    ignored { "affected_robots": "any robot may become the leader"; }
+
+    /// Some robots, drawn anew each trial, lose a stimulus.
+    pub struct StimuliInhibitionConfig {
+        /// Which reading becomes zero.
+        stimuli: InhibitedStimulus = of(Domain::Variant(INHIBITED), Name("light_sensor")),
+        /// How many robots.
+        affected_robots: u32 = of(Domain::WholeOrAll(limits::ROBOTS), Depends("all")),
+    }
+
+    /// Positions are redrawn while neural state is kept.
+    pub struct TopologySwitchConfig: Default {
+        /// Period, steps.
+        every: u32 = whole(STEPS, 200),
+    }
+
+    /// Some robots turn to a target heading and hold it.
+    pub struct UncontrollableRotationConfig {
+        /// How many robots, drawn anew each trial.
+        affected_robots: u32 = of(Domain::WholeOrAll(limits::ROBOTS), Depends("all")),
+        /// First affected step.
+        start: u32 = whole([0, limits::STEPS], 200).original(Whole(101)),
+        /// Target headings, radians, in order.
+        targets: Vec<f64> = of(Domain::Numbers(1, limits::TARGETS), Numbers(TARGETS))
+            .shown("270, 90, 15 and 180 degrees"),
+        /// Step at which the next target applies.
+        switch_at: u32 = whole(STEPS, 600),
+        /// Action of the right wheel while they turn, that of the left being its negative.
+        /// With 0.1 and the default wheels, half a turn takes 50 steps.
+        speed: f64 = unit(0.1).original(Number(0.3)),
     }
 }
 
-/// A robot that has been sole leader too long becomes faulty.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields, transform = schema::ignored("affected_robots"))]
-pub struct LeaderFailureConfig {
-    /// Consecutive steps of sole leadership; default 50.
-    #[schemars(range(min = 1, max = limits::STEPS))]
-    pub time_to_failure: u32,
-}
+const STEPS: [u32; 2] = [1, limits::STEPS];
 
-impl Default for LeaderFailureConfig {
-    fn default() -> Self {
-        Self { time_to_failure: 50 }
-    }
-}
-
-/// Some robots, drawn anew each trial, lose a stimulus.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, transform = schema::optional("stimuli, affected_robots"))]
-pub struct StimuliInhibitionConfig {
-    /// Which reading becomes zero.
-    pub stimuli: InhibitedStimulus,
-    /// How many robots.
-    #[schemars(schema_with = "schema::affected_robots")]
-    pub affected_robots: u32,
-}
+const TARGETS: &[f64] =
+    &[270.0_f64.to_radians(), 90.0_f64.to_radians(), 15.0_f64.to_radians(), 180.0_f64.to_radians()];
 
 /// What `stimuli_inhibition` zeroes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -145,41 +143,34 @@ pub enum WholeReceiver {
     WirelessReceiver,
 }
 
-/// Positions are redrawn while neural state is kept.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct TopologySwitchConfig {
-    /// Period, steps; default 200.
-    #[schemars(range(min = 1, max = limits::STEPS))]
-    pub every: u32,
-}
+/// `stimuli_inhibition.stimuli`
+const INHIBITED: &Variants = &Variants {
+    names: SensorQuery::VARIANTS.names,
+    read: |node| {
+        let is_receiver = node.is("wireless_receiver");
+        if is_receiver {
+            Some("wireless_receiver".into())
+        } else {
+            (SensorQuery::VARIANTS.read)(node)
+        }
+    },
+    schema: |generator| generator.subschema_for::<InhibitedStimulus>(),
+};
 
-impl Default for TopologySwitchConfig {
-    fn default() -> Self {
-        Self { every: 200 }
+impl From<InhibitedStimulus> for ParameterValue {
+    fn from(stimulus: InhibitedStimulus) -> Self {
+        match stimulus {
+            InhibitedStimulus::Reading(reading) => reading.into(),
+            InhibitedStimulus::Receiver(_) => "wireless_receiver".into(),
+        }
     }
 }
 
-/// Some robots turn to a target heading and hold it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional("affected_robots, start, targets, switch_at, speed")
-)]
-pub struct UncontrollableRotationConfig {
-    /// How many robots, drawn anew each trial.
-    #[schemars(schema_with = "schema::affected_robots")]
-    pub affected_robots: u32,
-    /// First affected step; default 200.
-    pub start: u32,
-    /// Target headings, radians, in order; default: 270, 90, 15 and 180 degrees.
-    #[schemars(length(min = 1, max = limits::TARGETS))]
-    pub targets: Vec<f64>,
-    /// Step at which the next target applies; default 600.
-    #[schemars(range(min = 1, max = limits::STEPS))]
-    pub switch_at: u32,
-    /// Action of the right wheel while they turn, that of the left being its negative;
-    /// default 0.1: half a turn takes 50 steps with the default wheels.
-    #[schemars(range(min = 0, max = 1))]
-    pub speed: f64,
+impl TryFrom<ParameterValue> for InhibitedStimulus {
+    type Error = ParameterValue;
+
+    fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
+        let receiver = Self::Receiver(WholeReceiver::WirelessReceiver);
+        Ok(SensorQuery::try_from(value).map_or(receiver, Self::Reading))
+    }
 }

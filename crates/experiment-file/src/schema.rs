@@ -4,11 +4,14 @@
 //! may say beyond that (keys left out, other forms, keys of the original
 //! simulator) is added by the attributes on them, in the words defined here.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
+use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use super::description::describe_algorithms;
-use super::{AlgorithmDescription, ExperimentConfig, NeuronModel, limits};
+use super::{
+    AlgorithmDescription, ExperimentConfig, NamedAreaParams, NeuronModel, Parameters as _, limits,
+    parameters,
+};
 
 /// Describes the format that [`ExperimentConfig::from_json`] reads (JSON Schema,
 /// draft 2020-12). What it cannot express (names that resolve, sizes that agree,
@@ -73,20 +76,6 @@ fn add_property(schema: &mut Schema, key: &str, value: Value) {
     }
 }
 
-/// Optional objects are absent, never null.
-pub(super) fn without_null(schema: &mut Schema) {
-    let properties = schema.get_mut("properties").and_then(Value::as_object_mut);
-    for property in
-        properties.into_iter().flat_map(Map::values_mut).filter_map(Value::as_object_mut)
-    {
-        if let Some(Value::Array(variants)) = property.remove("anyOf") {
-            for variant in variants.into_iter().filter(|variant| variant["type"] != "null") {
-                property.extend(variant.as_object().cloned().unwrap_or_default());
-            }
-        }
-    }
-}
-
 /// Another name of a variant.
 pub(super) fn also(name: &str) -> impl Fn(&mut Schema) {
     move |schema| {
@@ -120,31 +109,10 @@ pub(super) fn food_areas_and_nests(schema: &mut Schema) {
         let mut variant = area.clone();
         variant["properties"]["type"]["const"] = json!(name);
         variant["description"] = json!(description);
-        variant["properties"]["params"] = json!({
-            "type": "object",
-            "properties": {"range": {
-                "type": "number", "exclusiveMinimum": 0, "default": 150,
-                "description": "Radius, cm; default 150.",
-            }},
-            "additionalProperties": false,
-        });
+        let table = &NamedAreaParams::TABLE;
+        variant["properties"]["params"] =
+            parameters::object(table, "", &mut SchemaGenerator::default()).to_value();
         variants.push(variant);
-    }
-}
-
-/// Every decoding may say `is_cat`, and has no parameter that it must state.
-pub(super) fn decodings(schema: &mut Schema) {
-    if let Some(Value::Array(variants)) = schema.get_mut("oneOf") {
-        for variant in variants {
-            if let Some(Value::Object(params)) = variant.pointer_mut("/properties/params") {
-                params.remove("required");
-                let properties = params.entry("properties").or_insert_with(|| json!({}));
-                properties["is_cat"] = json!({"type": "boolean"});
-            }
-            if let Value::Object(variant) = variant {
-                not_required(variant, "params");
-            }
-        }
     }
 }
 
@@ -163,34 +131,12 @@ pub(super) fn number_or_numbers(_: &mut SchemaGenerator) -> Schema {
     json_schema!({"anyOf": [number, {"type": "array", "items": number}]})
 }
 
-/// One of a kind, or a list of them.
-pub(super) fn one_or_list<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
-    let one = generator.subschema_for::<T>();
-    json_schema!({"anyOf": [
-        one,
-        {"type": "array", "items": one, "minItems": 1, "maxItems": limits::INHIBITIONS},
-    ]})
-}
-
-/// A number of robots, or all.
-pub(super) fn affected_robots(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({"anyOf": [
-        {"type": "integer", "minimum": 0, "maximum": limits::ROBOTS},
-        {"const": "all"},
-    ], "default": "all"})
-}
-
 /// A whole number of 64 bits, or a text of its digits.
 pub(super) fn seed(_: &mut SchemaGenerator) -> Schema {
     json_schema!({"anyOf": [
         {"type": "integer", "format": "uint64", "minimum": 0},
         {"type": "string", "pattern": "^[0-9]+$"},
     ]})
-}
-
-/// A quantity >= 0.
-pub(super) fn amount(description: &str) -> Value {
-    json!({"type": "number", "minimum": 0, "description": description})
 }
 
 /// A quantity > 0, or null for none.
@@ -212,11 +158,6 @@ pub(super) fn script(_: &mut SchemaGenerator) -> Schema {
             "additionalProperties": false,
         },
     ]})
-}
-
-/// A number in \[0, 1\].
-pub(super) fn share(description: &str) -> Value {
-    json!({"type": "number", "minimum": 0, "maximum": 1, "description": description})
 }
 
 /// Whose defaults a file has.

@@ -4,7 +4,9 @@ use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{limits, schema};
+use super::limits;
+use crate::neuron::{TIME, VOLTAGE};
+use crate::parameters::parameters;
 
 /// How spikes become currents.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -56,82 +58,46 @@ pub struct SynapseParams {
     pub nmda: NmdaParams,
 }
 
-/// AMPA receptors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, transform = schema::optional("gain, tau, E"))]
-pub struct AmpaParams {
-    /// Factor of the current; default 0.6.
-    #[schemars(range(min = 0, max = limits::SYNAPSE_GAIN), extend("default" = 0.6))]
-    pub gain: f64,
-    /// Time constant of the decay, ms; default 5.
-    #[schemars(range(min = 0.01, max = 10_000), extend("default" = 5.0))]
-    pub tau: f64,
-    /// Reversal potential, mV, or null: the current does not depend on v; default 0.
-    #[serde(rename = "E")]
-    #[schemars(range(min = -200, max = 200), extend("default" = 0.0))]
-    pub reversal: Option<f64>,
-}
+parameters! {
+    /// AMPA receptors.
+    #[derive(Copy)]
+    pub struct AmpaParams: Default {
+        /// Factor of the current.
+        gain: f64 = between(GAIN, 0.6),
+        /// Time constant of the decay, ms.
+        tau: f64 = between(TIME, 5.0),
+        /// Reversal potential, mV. With null, the current does not depend on v.
+        reversal as "E": Option<f64> = between(VOLTAGE, 0.0).or_null(),
+    }
 
-/// GABA receptors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, transform = schema::optional("gain, tau, E"))]
-pub struct GabaParams {
-    /// Factor of the current; default 1.
-    #[schemars(range(min = 0, max = limits::SYNAPSE_GAIN), extend("default" = 1.0))]
-    pub gain: f64,
-    /// Time constant of the decay, ms; default 10.
-    #[schemars(range(min = 0.01, max = 10_000), extend("default" = 10.0))]
-    pub tau: f64,
-    /// Reversal potential, mV, or null: the current is negative whatever v; default -70.
-    #[serde(rename = "E")]
-    #[schemars(range(min = -200, max = 200), extend("default" = -70.0))]
-    pub reversal: Option<f64>,
-}
+    /// GABA receptors.
+    #[derive(Copy)]
+    pub struct GabaParams: Default {
+        /// Factor of the current.
+        gain: f64 = between(GAIN, 1.0),
+        /// Time constant of the decay, ms.
+        tau: f64 = between(TIME, 10.0),
+        /// Reversal potential, mV. With null, the current is negative whatever v.
+        reversal as "E": Option<f64> = between(VOLTAGE, -70.0).or_null(),
+    }
 
-/// NMDA receptors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional("gain, tau_rise, tau_decay, Mg2, E")
-)]
-pub struct NmdaParams {
-    /// Factor of the current; default 0.1.
-    #[schemars(range(min = 0, max = limits::SYNAPSE_GAIN), extend("default" = 0.1))]
-    pub gain: f64,
-    /// Time constant of the rise, ms; default 6.
-    #[schemars(range(min = 0.01, max = 10_000), extend("default" = 6.0))]
-    pub tau_rise: f64,
-    /// Time constant of the decay, ms; default 100.
-    #[schemars(range(min = 0.01, max = 10_000), extend("default" = 100.0))]
-    pub tau_decay: f64,
-    /// Concentration of magnesium, mM, which blocks them at low v; default 0.5.
-    #[serde(rename = "Mg2")]
-    #[schemars(range(min = 0, max = 1_000), extend("default" = 0.5))]
-    pub magnesium: f64,
-    /// Reversal potential, mV, or null: the current depends on v by the block only;
-    /// default 0.
-    #[serde(rename = "E")]
-    #[schemars(range(min = -200, max = 200), extend("default" = 0.0))]
-    pub reversal: Option<f64>,
-}
-
-impl Default for AmpaParams {
-    fn default() -> Self {
-        Self { gain: 0.6, tau: 5.0, reversal: Some(0.0) }
+    /// NMDA receptors.
+    #[derive(Copy)]
+    pub struct NmdaParams: Default {
+        /// Factor of the current.
+        gain: f64 = between(GAIN, 0.1),
+        /// Time constant of the rise, ms.
+        tau_rise: f64 = between(TIME, 6.0),
+        /// Time constant of the decay, ms.
+        tau_decay: f64 = between(TIME, 100.0),
+        /// Concentration of magnesium, mM, which blocks them at low v.
+        magnesium as "Mg2": f64 = between([0.0, 1_000.0], 0.5),
+        /// Reversal potential, mV. With null, the current depends on v by the block only.
+        reversal as "E": Option<f64> = between(VOLTAGE, 0.0).or_null(),
     }
 }
 
-impl Default for GabaParams {
-    fn default() -> Self {
-        Self { gain: 1.0, tau: 10.0, reversal: Some(-70.0) }
-    }
-}
-
-impl Default for NmdaParams {
-    fn default() -> Self {
-        Self { gain: 0.1, tau_rise: 6.0, tau_decay: 100.0, magnesium: 0.5, reversal: Some(0.0) }
-    }
-}
+const GAIN: [f64; 2] = [0.0, limits::SYNAPSE_GAIN];
 
 /// All may be left out, and the original spells NMDA `NDMA`.
 fn receptors(schema: &mut Schema) {

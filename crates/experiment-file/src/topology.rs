@@ -8,6 +8,9 @@ use super::{
     EncodingConfig, LearningConfig, NamedMap, NeuronModel, Neurotransmitter, SensorQuery,
     SynapseModel, SynapseParams, encoding, limits, neuron, schema,
 };
+use crate::DefaultValue::Required;
+use crate::parameters::{kinds, parameters, variants};
+use crate::{Domain, Parameter};
 
 /// Of [`TopologyConfig::dt`], s.
 pub(super) const DEFAULT_DT: f64 = 0.1;
@@ -114,15 +117,28 @@ impl InitialRates {
     }
 }
 
-/// One named input of the network.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields)]
-pub struct StimulusConfig {
-    /// Number of values; equals the length of the reading.
-    #[schemars(range(min = 1, max = limits::INPUTS))]
-    pub n: u32,
-    /// Where the values come from.
-    pub sensor: SensorQuery,
+parameters! {
+    /// One named input of the network.
+    pub struct StimulusConfig {
+        /// Number of values; equals the length of the reading.
+        n: u32 = of(Domain::Whole(1, limits::INPUTS), Required),
+        /// Where the values come from.
+        sensor: SensorQuery = of(Domain::Variant(SensorQuery::VARIANTS), Required),
+    }
+
+    /// Connects an ensemble to an actuator.
+    pub struct OutputConfig {
+        /// Name of the ensemble.
+        ensemble: String = of(Domain::Text, Required),
+        /// What it drives.
+        actuator: ActuatorQuery = of(Domain::Variant(ActuatorQuery::VARIANTS), Required),
+    }
+    // Says what the decoding says, too; nothing depends on it.
+    checked { Parameter::one_of("enc", &["real", "cat"], &[], "") }
+}
+
+variants! {
+    ActuatorQuery, unsupported: &["wireless_transmitter:priority"];
 }
 
 /// One group of neurons.
@@ -151,19 +167,6 @@ pub enum Activation {
     Sigmoid,
     /// Hyperbolic tangent, range (-1, 1).
     Tanh,
-}
-
-/// Connects an ensemble to an actuator.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::property("enc", json!({"enum": ["real", "cat"]}))
-)]
-pub struct OutputConfig {
-    /// Name of the ensemble.
-    pub ensemble: String,
-    /// What it drives.
-    pub actuator: ActuatorQuery,
 }
 
 /// An actuator, by the name that config files use.
@@ -229,41 +232,40 @@ pub struct SynapseGroupConfig {
     pub transmitter: Option<Neurotransmitter>,
 }
 
-/// How what an output's ensemble does becomes an action: the first three for rate neurons,
-/// from activities u; the others for spiking ones, from the spikes of the environment step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[serde(tag = "scheme", content = "params")]
-#[schemars(deny_unknown_fields, transform = schema::decodings)]
-pub enum DecodingConfig {
-    /// The activities themselves.
-    IdentityDecoding {},
-    /// One bit per neuron.
-    ThresholdDecoding {
-        /// false: u >= 0.5. true: Bernoulli(u).
-        stochastic: bool,
-    },
-    /// One category, drawn from softmax(u).
-    SoftmaxDecoding {},
-    /// The index of the neuron that spiked first: the lowest of those that did at once, 0
-    /// if none has.
-    FirstToSpike {},
-    /// Sum over neurons of weight * spikes * 0.25^rank; the rank is how many neurons of
-    /// the ensemble spiked before it for the first time.
-    RankOrderDecoding {
-        /// Values that it yields, each with weights of its own; default 1.
-        #[schemars(range(min = 1, max = limits::MESSAGE_LENGTH), extend("default" = 1))]
-        num_outputs: u32,
-    },
-    /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises
-    /// within 5 ms of one and decays with 30 ms.
-    LinearPopulationDecoding {
-        /// Values that it yields, each with weights of its own; default 1.
-        #[schemars(range(min = 1, max = limits::MESSAGE_LENGTH), extend("default" = 1))]
-        num_outputs: u32,
-        /// What it yields where W a = 0; default 0.5.
-        #[schemars(range(min = -1, max = 1), extend("default" = 0.5))]
-        rest_value: f64,
-    },
+kinds! {
+    /// How what an output's ensemble does becomes an action: the first three for rate neurons,
+    /// from activities u; the others for spiking ones, from the spikes of the environment step.
+    #[derive(Copy)]
+    pub enum DecodingConfig by "scheme" {
+        /// The activities themselves.
+        IdentityDecoding {} = "IdentityDecoding",
+        /// One bit per neuron.
+        ThresholdDecoding {
+            /// false: u >= 0.5. true: Bernoulli(u).
+            stochastic: bool = switch(false),
+        } = "ThresholdDecoding",
+        /// One category, drawn from softmax(u).
+        SoftmaxDecoding {} = "SoftmaxDecoding",
+        /// The index of the neuron that spiked first: the lowest of those that did at once, 0
+        /// if none has.
+        FirstToSpike {} ignored("num_outputs": "there are as many as neurons") = "FirstToSpike",
+        /// Sum over neurons of weight * spikes * 0.25^rank; the rank is how many neurons of
+        /// the ensemble spiked before it for the first time.
+        RankOrderDecoding {
+            /// Values that it yields, each with weights of its own.
+            num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
+        } = "RankOrderDecoding",
+        /// sigmoid(3 W a) + rest_value - 0.5, where a follows each neuron's spikes: it rises
+        /// within 5 ms of one and decays with 30 ms.
+        LinearPopulationDecoding {
+            /// Values that it yields, each with weights of its own.
+            num_outputs: u32 = whole([1, limits::MESSAGE_LENGTH], 1),
+            /// What it yields where W a = 0.
+            rest_value: f64 = between([-1.0, 1.0], 0.5),
+        } = "LinearPopulationDecoding",
+    }
+    // Says what the scheme says, too; nothing depends on it.
+    checked { Parameter::switch("is_cat", false, "") }
 }
 
 impl DecodingConfig {

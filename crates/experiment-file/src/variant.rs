@@ -5,12 +5,17 @@ use std::fmt;
 
 use serde::Deserialize;
 use serde::de::value::StrDeserializer;
-use serde::de::{self, IntoDeserializer as _};
+use serde::de::{self, DeserializeOwned, IntoDeserializer as _};
 
 /// The variant of this name.
 pub(crate) fn variant<'a, T: Deserialize<'a>>(name: &'a str) -> Result<T, UnknownVariant> {
     let deserializer: StrDeserializer<'a, UnknownVariant> = name.into_deserializer();
     T::deserialize(deserializer)
+}
+
+/// The names of all variants.
+pub(crate) fn names<T: DeserializeOwned>() -> &'static [&'static str] {
+    variant::<T>("").err().map_or(&[], |error| error.expected)
 }
 
 /// The name belongs to no variant.

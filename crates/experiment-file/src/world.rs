@@ -4,6 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{NamedMap, RobotConfig, limits, schema};
+use crate::DefaultValue::{Depends, Null, Number, Required};
+use crate::parameters::{kinds, parameters};
+use crate::{DefaultValue, Domain};
 
 /// Of [`WorldConfig::height`] and [`WorldConfig::width`].
 pub(super) const DEFAULT_WORLD_SIZE: f64 = 1000.0;
@@ -52,44 +55,42 @@ impl ObjectConfig {
     }
 }
 
-/// Draws start values (section 5 of the simulation's specification).
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(tag = "name", content = "params", rename_all = "snake_case")]
-#[schemars(deny_unknown_fields)]
-pub enum Initializer {
-    /// Given values, one per object; a single one serves all.
-    Fixed {
-        /// Positions `[x, y]`, or headings `[theta]`.
-        values: Vec<Vec<f64>>,
-    },
-    /// Independent uniform components.
-    #[schemars(transform = schema::optional("low, high, size"))]
-    RandomUniform {
-        /// Lower bound, inclusive.
-        low: f64,
-        /// Upper bound, exclusive.
-        high: f64,
-        /// Components: 2 for positions, 1 for headings.
-        size: u32,
-    },
-    /// Uniform on a circle.
-    #[schemars(transform = schema::optional("radius, center"))]
-    RandomCircumference {
-        /// Radius, cm.
-        radius: f64,
-        /// Centre, cm.
-        center: [f64; 2],
-    },
-    /// A connected, compact random geometric graph.
-    #[schemars(transform = schema::optional("max_rad, initial_pos"))]
-    RandomGraph {
-        /// Scale of the graph, cm: beyond half of it from the centre, steps turn
-        /// tangential.
-        max_rad: f64,
-        /// First robot, and centre, cm.
-        initial_pos: [f64; 2],
-    },
+kinds! {
+    /// Draws start values (section 5 of the simulation's specification).
+    pub enum Initializer by "name" {
+        /// Given values, one per object; a single one serves all.
+        Fixed {
+            /// Positions `[x, y]`, or headings `[theta]`.
+            values: Vec<Vec<f64>> = of(Domain::Vectors(limits::ROBOTS as usize), Required),
+        } = "fixed",
+        /// Independent uniform components.
+        RandomUniform {
+            /// Lower bound, inclusive.
+            low: f64 = of(Domain::QUANTITY, Depends("100, of headings 0")),
+            /// Upper bound, exclusive.
+            high: f64 = of(Domain::QUANTITY, Depends("900, of headings 2 pi")),
+            /// Components: 2 for positions, 1 for headings.
+            size: u32 = of(Domain::Certain, DefaultValue::Certain),
+        } = "random_uniform",
+        /// Uniform on a circle.
+        RandomCircumference {
+            /// Radius, cm.
+            radius: f64 = amount(130.0),
+            /// Centre, cm.
+            center: [f64; 2] = of(Domain::Numbers(2, 2), Depends(CENTRE)),
+        } = "random_circumference",
+        /// A connected, compact random geometric graph.
+        RandomGraph {
+            /// Scale of the graph, cm: beyond half of it from the centre, steps turn
+            /// tangential.
+            max_rad: f64 = positive(300.0),
+            /// First robot, and centre, cm.
+            initial_pos: [f64; 2] = of(Domain::Numbers(2, 2), Depends(CENTRE)),
+        } = "random_graph",
+    }
 }
+
+const CENTRE: &str = "the centre of the world";
 
 /// Point lights.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -110,110 +111,73 @@ pub struct LightSourceConfig {
     pub params: LightParams,
 }
 
-/// How a light moves.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(tag = "name", content = "params", rename_all = "snake_case")]
-#[schemars(deny_unknown_fields, transform = schema::or_name_or_null)]
-pub enum LightController {
-    /// Stands still.
-    #[schemars(transform = schema::optional(""))]
-    Static {},
-    /// Circles the centre of the world (Eq. 5.7-5.8).
-    #[schemars(transform = schema::optional(""))]
-    LightOrbitController(OrbitConfig),
-    /// Flees from robots within 150 cm, 3 cm per step, until one is within 30 cm.
-    #[schemars(transform = schema::optional(""))]
-    LightPreyController {},
-    /// Goes to random targets (section 6.4).
-    #[schemars(transform = schema::optional(""))]
-    LightRndPosController(RandomTargetsConfig),
-    /// As the function `move` of the script of `task` says.
-    #[schemars(transform = schema::optional(""))]
-    ScriptController {},
-}
-
-/// A light's orbit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct OrbitConfig {
-    /// Angle per step, radians; default 0.01.
-    #[serde(skip_serializing_if = "is_angle_of_thesis")]
-    #[schemars(range(min = 0))]
-    pub angle_step: f64,
-    /// What the radius grows by per step, cm; default null: a fiftieth of what it lacks
-    /// (Eq. 5.7).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::positive_or_null")]
-    pub radius_step: Option<f64>,
-    /// Radius in the end, cm; default 200.
-    #[serde(skip_serializing_if = "is_radius_of_thesis")]
-    #[schemars(range(min = 0))]
-    pub radius: f64,
-}
-
-impl Default for OrbitConfig {
-    fn default() -> Self {
-        Self { angle_step: 0.01, radius_step: None, radius: 200.0 }
+kinds! {
+    /// How a light moves.
+    pub enum LightController by "name" then schema::or_name_or_null {
+        /// Stands still.
+        Static {} = "static",
+        /// Circles the centre of the world (Eq. 5.7-5.8).
+        LightOrbitController(OrbitConfig) = "light_orbit_controller",
+        /// Flees from robots within 150 cm, 3 cm per step, until one is within 30 cm.
+        LightPreyController {} = "light_prey_controller",
+        /// Goes to random targets (section 6.4).
+        LightRndPosController(RandomTargetsConfig) = "light_rnd_pos_controller",
+        /// As the function `move` of the script of `task` says.
+        ScriptController {} = "script_controller",
     }
 }
 
-/// Whether the canonical form leaves `angle_step` out.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_angle_of_thesis(angle_step: &f64) -> bool {
-    *angle_step == OrbitConfig::default().angle_step
-}
-
-/// Whether the canonical form leaves `radius` out.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_radius_of_thesis(radius: &f64) -> bool {
-    *radius == OrbitConfig::default().radius
-}
-
-/// A light's way to random targets.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    default,
-    deny_unknown_fields,
-    transform = schema::property("speed", schema::amount("Way per step, cm; default 3.")),
-    transform = schema::property("step", schema::share(
-        "alpha of Eq. 6.4: share of the remaining way covered per step, instead of `speed`."
-    ))
-)]
-pub struct RandomTargetsConfig {
-    /// Period at which the target is redrawn, steps; default 50.
-    #[schemars(range(min = 1, max = limits::STEPS))]
-    pub every: u32,
-    /// Side of the square around the centre of the world that targets are drawn from, cm;
-    /// default 200.
-    #[serde(skip_serializing_if = "is_default_square")]
-    #[schemars(range(min = 0))]
-    pub square: f64,
-    /// How fast it goes.
-    #[serde(flatten)]
-    #[schemars(skip)]
-    pub pace: Pace,
-}
-
-/// How far a light goes in a step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Pace {
-    /// So far, cm: it passes its target and turns back.
-    Speed(f64),
-    /// This share of the way that is left (alpha of Eq. 6.4).
-    Step(f64),
-}
-
-impl Default for RandomTargetsConfig {
-    fn default() -> Self {
-        Self { every: 50, square: 200.0, pace: Pace::Speed(3.0) }
+parameters! {
+    /// A light's orbit.
+    #[derive(Copy)]
+    pub struct OrbitConfig: Default {
+        /// Angle per step, radians.
+        angle_step: f64 = amount(0.01).original(Number(0.013)).recent(),
+        /// What the radius grows by per step, cm.
+        radius_step: Option<f64> = positive(0.0)
+            .null()
+            .shown("null: a fiftieth of what it lacks (Eq. 5.7)")
+            .original(Number(1.0))
+            .recent(),
+        /// Radius in the end, cm.
+        radius: f64 = amount(200.0).recent(),
     }
-}
 
-/// Whether the canonical form leaves `square` out.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_default_square(square: &f64) -> bool {
-    *square == RandomTargetsConfig::default().square
+    /// A light's way to random targets.
+    #[derive(Copy)]
+    pub struct RandomTargetsConfig: Default {
+        /// Period at which the target is redrawn, steps.
+        every: u32 = whole([1, limits::STEPS], 50),
+        /// Side of the square around the centre of the world that targets are drawn from, cm.
+        square: f64 = amount(200.0).recent(),
+        /// Way per step, cm: it passes its target and turns back.
+        speed: Option<f64> = amount(3.0),
+        /// alpha of Eq. 6.4: share of the remaining way covered per step, instead of `speed`.
+        step: Option<f64> = of(Domain::Between(0.0, 1.0), Null).instead_of("speed"),
+    }
+
+    /// Physical properties of a light.
+    pub struct LightParams: Default {
+        /// Reach, cm.
+        range: f64 = positive(80.0).original(Number(150.0)),
+        /// Colour.
+        color: String = text("red"),
+    }
+    ignored { "static": "`controller` says how a light moves"; }
+
+    /// Physical properties of a ground area.
+    pub struct GroundAreaParams: Default {
+        /// Radius, cm.
+        range: f64 = positive(100.0),
+        /// Colour.
+        color: String = text("black"),
+    }
+
+    /// Physical properties of a food area or a nest of the original.
+    pub struct NamedAreaParams {
+        /// Radius, cm.
+        range: f64 = positive(150.0),
+    }
 }
 
 /// Start of a light or ground area.
@@ -222,23 +186,6 @@ fn is_default_square(square: &f64) -> bool {
 pub struct PositionInitializers {
     /// Positions.
     pub positions: Initializer,
-}
-
-/// Physical properties of a light.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields, transform = schema::ignored("static"))]
-pub struct LightParams {
-    /// Reach, cm; default 80.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub range: f64,
-    /// Colour; default "red".
-    pub color: String,
-}
-
-impl Default for LightParams {
-    fn default() -> Self {
-        Self { range: 80.0, color: "red".to_owned() }
-    }
 }
 
 /// Coloured discs on the ground.
@@ -267,21 +214,4 @@ pub struct GroundAreaConfig {
 pub enum AreaController {
     /// As the function `move` of the script of `task` says.
     ScriptController,
-}
-
-/// Physical properties of a ground area.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(default, deny_unknown_fields)]
-pub struct GroundAreaParams {
-    /// Radius, cm; default 100.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub range: f64,
-    /// Colour; default "black".
-    pub color: String,
-}
-
-impl Default for GroundAreaParams {
-    fn default() -> Self {
-        Self { range: 100.0, color: "black".to_owned() }
-    }
 }

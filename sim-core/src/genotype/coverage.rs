@@ -41,12 +41,12 @@ pub(super) fn defaults(
             if parameter.is_time_constant && network.dt > 2.0 * value && is_used {
                 let value = parameter.with_unit(value);
                 let message = format!("{value} is less than half of topology.dt: unstable");
-                let path = format!("topology.ensembles.{name}.params.{}", parameter.name);
+                let path = format!("topology.ensembles.{name}.params.{}", parameter.name());
                 problems.add(path, message);
             }
             values.extend(ensemble.neurons.clone().map(|_| value));
         }
-        neurons.insert(parameter.name, values);
+        neurons.insert(parameter.name(), values);
     }
     let decoders = network.outputs.iter().enumerate().map(|(index, output)| {
         let number = DECODERS + index as u64;
@@ -156,7 +156,7 @@ impl ParameterCoverage {
             for (name, ensemble) in &network.ensembles {
                 if covered[ensemble.neurons.clone()].iter().any(|covered| !covered) {
                     let value = ensemble.default_of(parameter);
-                    lines.push(format!("neurons:{}:{name} stays {value}", parameter.name));
+                    lines.push(format!("neurons:{}:{name} stays {value}", parameter.name()));
                 }
             }
         }

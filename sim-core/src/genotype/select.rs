@@ -20,7 +20,7 @@ pub(super) fn select(
         GenotypeQuery::Weights(selector) => (select_weights(selector, network), GeneScale::Linear),
         GenotypeQuery::Neurons(name, selector) => {
             let mut parameters = network.model.spec().parameters.iter().enumerate();
-            let named = parameters.find(|(_, parameter)| parameter.name == *name);
+            let named = parameters.find(|(_, parameter)| parameter.name() == *name);
             let Some((parameter, scale)) = named.and_then(|(i, p)| Some((i, p.gene?))) else {
                 return (Vec::new(), GeneScale::Linear);
             };

@@ -93,7 +93,7 @@ pub(crate) struct Ensemble {
 impl Ensemble {
     /// Value of a parameter that the genotype does not cover.
     pub fn default_of(&self, parameter: &NeuronParameter) -> f64 {
-        self.defaults.get(parameter.name).copied().unwrap_or(parameter.default)
+        self.defaults.get(parameter.name()).copied().unwrap_or(parameter.default())
     }
 }
 

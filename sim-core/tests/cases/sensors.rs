@@ -3,9 +3,9 @@
 use experiment_file::{
     DistanceSensorConfig, ExperimentConfig, FitnessFunction, GroundAreaConfig, GroundAreaParams,
     GroundSensorConfig, InhibitedStimulus, Initializer, LightController, LightParams,
-    LightSourceConfig, NeighborhoodSensorConfig, ObjectConfig, OrbitConfig, Pace,
-    PlainSensorConfig, PositionInitializers, RandomTargetsConfig, SensorQuery,
-    StimuliInhibitionConfig, StimulusConfig, SynapseGroupConfig, WholeReceiver,
+    LightSourceConfig, NeighborhoodSensorConfig, ObjectConfig, OrbitConfig, PlainSensorConfig,
+    PositionInitializers, RandomTargetsConfig, SensorQuery, StimuliInhibitionConfig,
+    StimulusConfig, SynapseGroupConfig, WholeReceiver,
 };
 
 use crate::assert_varied_agreement;
@@ -78,10 +78,11 @@ fn light(
     })
 }
 
-fn random_targets(every: u32, pace: Pace) -> LightController {
+fn random_targets(every: u32, speed: Option<f64>, step: Option<f64>) -> LightController {
     LightController::LightRndPosController(RandomTargetsConfig {
         every,
-        pace,
+        speed,
+        step,
         ..Default::default()
     })
 }
@@ -154,7 +155,7 @@ fn lights_on_every_path_agree() {
     let alone = fitness(&assert_varied_agreement(&config));
     let lights = [
         ("still", LightController::Static {}, "blue", 90.0),
-        ("wanderers", random_targets(20, Pace::Speed(3.0)), "red", 70.0),
+        ("wanderers", random_targets(20, Some(3.0), None), "red", 70.0),
         ("orbiters", LightController::LightOrbitController(OrbitConfig::default()), "red", 40.0),
     ];
     for (name, controller, color, range) in lights {
@@ -171,8 +172,8 @@ fn robots_near_a_light_on_every_path_agree() {
         LightController::Static {},
         LightController::LightPreyController {},
         LightController::LightOrbitController(OrbitConfig::default()),
-        random_targets(30, Pace::Step(0.05)),
-        random_targets(30, Pace::Speed(4.0)),
+        random_targets(30, None, Some(0.05)),
+        random_targets(30, Some(4.0), None),
     ] {
         let mut config = experiment_d();
         config.algorithm.evaluation_steps = 200;

@@ -268,7 +268,7 @@ fn algorithm(fitness_function: FitnessFunction, evaluation_steps: u32) -> Algori
                 ],
                 max_vals: vec![3.0, 1.5, 0.75, 5.0],
                 min_vals: vec![-3.0, -1.5, -1.0, 0.05],
-                params: AlgorithmParams::default(),
+                params: Params::default(),
             },
         )]),
     }

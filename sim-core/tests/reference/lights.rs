@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use determinism::random::Stream;
-use experiment_file::{LightController, LightParams, LightSourceConfig, Pace};
+use experiment_file::{LightController, LightParams, LightSourceConfig};
 
 use super::torus::{Torus, Vector, norm};
 
@@ -93,9 +93,10 @@ impl<'a> Light<'a> {
                     self.target = torus.wrap([x, y]);
                 }
                 let way = torus.displacement(self.position, self.target);
-                let (length, distance) = match config.pace {
-                    Pace::Step(share) => (share * norm(way), norm(way)),
-                    Pace::Speed(speed) => (speed, norm(way)),
+                let distance = norm(way);
+                let length = match config.step {
+                    Some(share) => share * distance,
+                    None => config.speed.expect("one of the two is there"),
                 };
                 if distance > 0.0 {
                     self.position = torus.wrap([

@@ -5,7 +5,7 @@
 //! revised 2023); equation numbers are its own.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, limits};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Params, limits};
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -49,11 +49,11 @@ impl Described for CmaEs {
     };
 
     /// C = I.
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
+    fn start(params: &Params, d: usize) -> Self {
         Self {
-            mean: vec![params.number(&MU_INIT); d],
+            mean: vec![params.of(&MU_INIT); d],
             covariance: Symmetric::identity(d),
-            cumulation: Cumulation::new(params.number(&SIGMA_INIT), d),
+            cumulation: Cumulation::new(params.of(&SIGMA_INIT), d),
         }
     }
 }

@@ -19,7 +19,7 @@ mod xnes;
 use std::iter;
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps};
+use experiment_file::{AlgorithmDescription, Keeps, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{Birth, Genotype, Population};
@@ -40,7 +40,7 @@ macro_rules! registry {
         impl Algorithm {
             /// The algorithm of this name at its start; none if there is none.
             /// `d`: genes of the population, at least 1.
-            pub fn new(name: &str, params: &AlgorithmParams, d: usize) -> Option<Self> {
+            pub fn new(name: &str, params: &Params, d: usize) -> Option<Self> {
                 $(if name == <$module::$name as Described>::DESCRIPTION.name {
                     return Some(Self::$name(Described::start(params, d)));
                 })*
@@ -164,7 +164,7 @@ pub trait Described: Strategy {
 
     /// Its state before the first generation, over `d` genes (at least 1).
     /// `params` lie in the domains of the description.
-    fn start(params: &AlgorithmParams, d: usize) -> Self;
+    fn start(params: &Params, d: usize) -> Self;
 }
 
 impl Algorithm {

@@ -6,7 +6,7 @@
 //! Algorithm 1) on the estimated gradient.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Parameter, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{Described, Sample, Strategy, draw_normal, draw_normals, parameters::MU_INIT};
@@ -58,16 +58,16 @@ impl Described for OpenAiEs {
         parameters: &[MU_INIT, SIGMA, LEARNING_RATE, BETA1, BETA2, WEIGHT_DECAY],
     };
 
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
-        let mu_init = params.number(&MU_INIT);
+    fn start(params: &Params, d: usize) -> Self {
+        let mu_init = params.of(&MU_INIT);
         Self {
             mu: vec![mu_init; d],
             mu_init,
-            sigma: params.number(&SIGMA),
-            learning_rate: params.number(&LEARNING_RATE),
-            beta1: params.number(&BETA1),
-            beta2: params.number(&BETA2),
-            weight_decay: params.number(&WEIGHT_DECAY),
+            sigma: params.of(&SIGMA),
+            learning_rate: params.of(&LEARNING_RATE),
+            beta1: params.of(&BETA1),
+            beta2: params.of(&BETA2),
+            weight_decay: params.of(&WEIGHT_DECAY),
             first_moment: vec![0.0; d],
             second_moment: vec![0.0; d],
             n_updates: 0,

@@ -5,7 +5,7 @@
 //! complexity", PPSN X (2008).
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -40,11 +40,11 @@ impl Described for SepCmaEs {
     };
 
     /// C = I.
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
+    fn start(params: &Params, d: usize) -> Self {
         Self {
-            mean: vec![params.number(&MU_INIT); d],
+            mean: vec![params.of(&MU_INIT); d],
             variances: vec![1.0; d],
-            cumulation: Cumulation::new(params.number(&SIGMA_INIT), d),
+            cumulation: Cumulation::new(params.of(&SIGMA_INIT), d),
         }
     }
 }

@@ -5,7 +5,7 @@
 //! evolution strategies", JMLR 15 (2014); the thesis's Algorithm 3.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Parameter, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -40,13 +40,13 @@ impl Described for Snes {
         parameters: &[ETA_MU, ETA_SIGMA, MU_INIT, SIGMA_INIT],
     };
 
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
+    fn start(params: &Params, d: usize) -> Self {
         let default_eta_sigma = (3.0 + libm::log(d as f64)) / (5.0 * (d as f64).sqrt());
         Self {
-            mu: vec![params.number(&MU_INIT); d],
-            sigma: vec![params.number(&SIGMA_INIT); d],
-            eta_mu: params.number(&ETA_MU),
-            eta_sigma: params.optional_number(&ETA_SIGMA).unwrap_or(default_eta_sigma),
+            mu: vec![params.of(&MU_INIT); d],
+            sigma: vec![params.of(&SIGMA_INIT); d],
+            eta_mu: params.of(&ETA_MU),
+            eta_sigma: params.of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_eta_sigma),
         }
     }
 }

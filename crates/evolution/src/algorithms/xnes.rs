@@ -6,8 +6,7 @@
 
 use determinism::random::Stream;
 use experiment_file::{
-    AlgorithmDescription, AlgorithmParams, DefaultValue, Domain, Keeps, LearnsFrom, Parameter,
-    limits,
+    AlgorithmDescription, DefaultValue, Domain, Keeps, LearnsFrom, Parameter, Params, limits,
 };
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -53,12 +52,12 @@ const FAST: &str = "fast";
 /// Rates that the paper states for both; a step size that learns as fast as SNES's deviations,
 /// and a shape twice as fast as the paper's. It came later than files without it, so the
 /// canonical form leaves it out where it is absent.
-const RATES: Parameter = Parameter {
-    key: "rates",
-    domain: Domain::OneOf { names: &["paper", FAST], unsupported: &[] },
-    default: DefaultValue::Formula("`paper`"),
-    meaning: "Which learning rates are the defaults",
-};
+const RATES: Parameter = Parameter::of(
+    "rates",
+    Domain::OneOf { names: &["paper", FAST], unsupported: &[] },
+    DefaultValue::Formula("`paper`"),
+    "Which learning rates are the defaults",
+);
 
 impl Described for Xnes {
     const DESCRIPTION: AlgorithmDescription = AlgorithmDescription {
@@ -74,20 +73,20 @@ impl Described for Xnes {
     };
 
     /// B = I.
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
+    fn start(params: &Params, d: usize) -> Self {
         let size = d as f64;
         let default_eta = (9.0 + 3.0 * libm::log(size)) / (5.0 * size * size.sqrt());
         let is_fast = params.get(&RATES) == Some(FAST.into());
         let default_sigma = if is_fast { default_eta * size / 3.0 } else { default_eta };
-        let eta_sigma = params.optional_number(&ETA_SIGMA).unwrap_or(default_sigma);
+        let eta_sigma = params.of::<Option<f64>>(&ETA_SIGMA).unwrap_or(default_sigma);
         let default_b = if is_fast { 2.0 * default_eta } else { eta_sigma };
         Self {
-            mu: vec![params.number(&MU_INIT); d],
-            sigma: params.number(&SIGMA_INIT),
+            mu: vec![params.of(&MU_INIT); d],
+            sigma: params.of(&SIGMA_INIT),
             shape: DMatrix::<f64>::identity(d, d).as_slice().to_vec(),
-            eta_mu: params.number(&ETA_MU),
+            eta_mu: params.of(&ETA_MU),
             eta_sigma,
-            eta_b: params.optional_number(&ETA_B).unwrap_or(default_b),
+            eta_b: params.of::<Option<f64>>(&ETA_B).unwrap_or(default_b),
         }
     }
 }

@@ -98,7 +98,7 @@ fn n_evaluations(case: &Case, start: &Evolution, seed: u64) -> usize {
     n_evaluations
 }
 
-fn assert_converges(name: &str, params: &AlgorithmParams, cases: &[Case]) {
+fn assert_converges(name: &str, params: &Params, cases: &[Case]) {
     for case in cases {
         let algorithm = Algorithm::new(name, params, case.d).unwrap();
         let start = evolution_of(vec![algorithm], case.population_size);
@@ -218,7 +218,7 @@ fn openai_es() {
 #[test]
 fn fast_rates_of_xnes_solve_in_8000_evaluations_what_those_of_the_paper_do_not() {
     let missing = |rates: &str| {
-        let params = AlgorithmParams::default().with("rates", rates);
+        let params = Params::default().with("rates", rates);
         let mut evolution = Setup { params, ..Setup::new("xNES", 20) }.start().unwrap();
         for _ in 0..400 {
             let asked = evolution.ask();

@@ -25,7 +25,7 @@ fn algorithms() -> String {
     } in ALGORITHMS
     {
         let genes = genes_max.map_or("any".to_owned(), |max| format!("up to {max}"));
-        let elite = parameters.iter().find(|p| p.domain == Domain::BelowPopulationSize);
+        let elite = parameters.iter().find(|p| matches!(p.domain, Domain::BelowPopulationSize));
         let individuals = elite.map_or(format!("{individuals_min} or more"), |parameter| {
             format!("more than `{}`", parameter.key)
         });
@@ -55,12 +55,14 @@ fn parameters() -> String {
                 Domain::Whole(min, max) => format!("whole, {min} to {max}"),
                 Domain::BelowPopulationSize => "whole, below `population_size`".to_owned(),
                 Domain::OneOf { names, .. } => format!("`{}`", names.join("`, `")),
+                other => other.to_string(),
             };
             let default = match parameter.default {
                 DefaultValue::Number(number) => number.to_string(),
                 DefaultValue::Whole(number) => number.to_string(),
                 DefaultValue::Name(name) => format!("`{name}`"),
                 DefaultValue::Formula(formula) => formula.to_owned(),
+                other => panic!("no algorithm has {other:?}"),
             };
             let (name, key, meaning) = (algorithm.name, parameter.key, parameter.meaning);
             let _ = writeln!(table, "| `{name}` | `{key}` | {values} | {default} | {meaning} |");

@@ -76,7 +76,7 @@ fn what_a_state_cannot_carry_is_refused_by_name_and_all_at_once() {
     let parent = parent("SNES");
     let mut child = config("xNES", 6, &["a", "b"]);
     child.algorithm.generations = 4;
-    let params = AlgorithmParams::default().with("eta_mu", 0.5);
+    let params = Params::default().with("eta_mu", 0.5);
     child.algorithm.populations.get_mut("b").unwrap().params = params;
     let segments = segments(&[2, 4]);
     let (parent_simulation, simulation) = (SIMULATION, SIMULATION);

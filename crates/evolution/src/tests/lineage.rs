@@ -5,8 +5,8 @@ use crate::{Operator, Pedigree, Setup};
 
 const D: usize = 12;
 
-fn params(crossover: &str) -> AlgorithmParams {
-    AlgorithmParams::default().with("crossover_operator", crossover).with("num_elite", 2u32)
+fn params(crossover: &str) -> Params {
+    Params::default().with("crossover_operator", crossover).with("num_elite", 2u32)
 }
 
 /// Some generations of a GA: their genotypes, and the births of those after the first.

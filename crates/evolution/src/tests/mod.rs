@@ -11,15 +11,15 @@ mod reference;
 mod suite;
 
 use experiment_file::{
-    AlgorithmConfig, AlgorithmDescription, AlgorithmParams, Domain, FitnessFunction, InitialRates,
-    NamedMap, NeuronModel, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
+    AlgorithmConfig, AlgorithmDescription, Domain, FitnessFunction, InitialRates, NamedMap,
+    NeuronModel, Params, PopulationConfig, SynapseModel, TopologyConfig, WorldConfig,
 };
 
 use super::*;
 
 /// An evolution by SNES.
 fn evolution(population_size: usize, segment_lens: &[usize]) -> Evolution {
-    let params = AlgorithmParams::default();
+    let params = Params::default();
     let algorithm = |&d: &usize| Algorithm::new("SNES", &params, d).unwrap();
     evolution_of(segment_lens.iter().map(algorithm).collect(), population_size)
 }
@@ -211,7 +211,7 @@ fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentC
         objects: Vec::new(),
         max_vals: Vec::new(),
         min_vals: Vec::new(),
-        params: AlgorithmParams::default(),
+        params: Params::default(),
     };
     ExperimentConfig {
         name: "test".to_owned(),
@@ -373,7 +373,7 @@ fn what_is_no_checkpoint_is_an_error() {
 #[test]
 fn keyframes_are_as_far_apart_as_time_and_room_allow() {
     let interval = |algorithm: &str, population_size: usize, d: usize, n_trials: usize| {
-        let population = Algorithm::new(algorithm, &AlgorithmParams::default(), d).unwrap();
+        let population = Algorithm::new(algorithm, &Params::default(), d).unwrap();
         let mut evolution = evolution_of(vec![population], population_size);
         let entry_len = population_size * (1 + 8 * n_trials);
         let is_due = |evolution: &Evolution| evolution.is_keyframe_due(entry_len);

@@ -6,18 +6,18 @@ use sha2::{Digest as _, Sha256};
 use super::*;
 
 /// The genetic algorithm's parameters in these tests.
-pub fn ga() -> AlgorithmParams {
-    AlgorithmParams::default().with("mutation_sigma", 0.1)
+pub fn ga() -> Params {
+    Params::default().with("mutation_sigma", 0.1)
 }
 
 /// Parameters that differ from the defaults by these numbers.
-pub fn params(numbers: &[(&str, f64)]) -> AlgorithmParams {
-    let with = |params: AlgorithmParams, &(key, value): &(&str, f64)| params.with(key, value);
-    numbers.iter().fold(AlgorithmParams::default(), with)
+pub fn params(numbers: &[(&str, f64)]) -> Params {
+    let with = |params: Params, &(key, value): &(&str, f64)| params.with(key, value);
+    numbers.iter().fold(Params::default(), with)
 }
 
 /// An algorithm's name and parameters.
-type Variant = (&'static str, AlgorithmParams);
+type Variant = (&'static str, Params);
 
 fn evolution_strategies() -> Vec<Variant> {
     ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"].map(|name| (name, params(&[]))).to_vec()

@@ -63,7 +63,7 @@ impl<'a> ParameterCoverage<'a> {
         });
         let neurons = topology.ensembles.keys().flat_map(|ensemble| {
             let parameters = topology.neuron_model.spec().evolvable();
-            parameters.map(move |p| PartKind::Neurons { parameter: p.name, ensemble })
+            parameters.map(move |p| PartKind::Neurons { parameter: p.name(), ensemble })
         });
         let weighted = topology.decoding.iter().filter(|(_, decoding)| decoding.n_weights(1) > 0);
         let decoders = weighted.map(|(output, _)| PartKind::Decoder { output });

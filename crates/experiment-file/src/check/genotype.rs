@@ -92,7 +92,7 @@ fn bounds(
         let Some(scale) = parameter.gene else { continue };
         let shown = |bound: f64| parameter.with_unit(format!("{name} = {}", scale.formula(bound)));
         let (lowest, highest) = (scale.value(min), scale.value(max));
-        let (low, high) = (*parameter.range.start(), *parameter.range.end());
+        let (low, high) = (*parameter.range().start(), *parameter.range().end());
         if parameter.is_time_constant && lowest < topology.dt / 2.0 {
             report.conflict(&min_path, &[&dt, &model, &neurons, &query_path], || {
                 format!("{} is below dt / 2: the network would be unstable", shown(min))

@@ -1,10 +1,11 @@
 //! The JSON Schema of the algorithms, from their descriptions.
 
+use schemars::SchemaGenerator;
 use serde_json::{Map, Value, json};
 
-use super::{AlgorithmDescription, DefaultValue, Domain, Parameter};
+use super::AlgorithmDescription;
 use crate::algorithm::GENETIC_KEYS;
-use crate::limits;
+use crate::parameters;
 
 /// Adds the names and parameters of `algorithms` to the schema of experiment
 /// files, which has only their places.
@@ -39,36 +40,11 @@ pub(crate) fn describe_algorithms(schema: &mut Value, algorithms: &[AlgorithmDes
 }
 
 fn properties(algorithm: &AlgorithmDescription) -> Map<String, Value> {
-    let own = algorithm.parameters.iter();
-    let mut properties: Map<String, Value> =
-        own.map(|parameter| (parameter.key.to_owned(), property(parameter))).collect();
+    let mut properties =
+        parameters::properties(algorithm.parameters, &mut SchemaGenerator::default());
     properties.insert("encoding".to_owned(), json!({"const": "real"}));
     for key in GENETIC_KEYS {
         properties.entry(key).or_insert_with(|| json!({"description": "Accepted and ignored."}));
     }
     properties
-}
-
-fn property(parameter: &Parameter) -> Value {
-    let mut property = match parameter.domain {
-        Domain::Positive => json!({"type": "number", "exclusiveMinimum": 0}),
-        Domain::Between(min, max) => json!({"type": "number", "minimum": min, "maximum": max}),
-        Domain::Whole(min, max) => json!({"type": "integer", "minimum": min, "maximum": max}),
-        Domain::BelowPopulationSize => {
-            json!({"type": "integer", "minimum": 0, "maximum": limits::POPULATION})
-        }
-        Domain::OneOf { names, .. } => json!({"enum": names}),
-    };
-    let meaning = parameter.meaning;
-    match parameter.default {
-        DefaultValue::Number(number) => property["default"] = json!(number),
-        DefaultValue::Whole(number) => property["default"] = json!(number),
-        DefaultValue::Name(name) => property["default"] = json!(name),
-        DefaultValue::Formula(_) => {}
-    }
-    property["description"] = match parameter.default {
-        DefaultValue::Formula(formula) => json!(format!("{meaning}; default {formula}.")),
-        _ => json!(format!("{meaning}.")),
-    };
-    property
 }

@@ -19,9 +19,9 @@ use std::ops::RangeInclusive;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
-use serde_json::{Map, Value, json};
 
 use super::{Activation, NamedMap};
+use crate::{Domain, Parameter, parameters};
 
 /// How the neurons of a network work: one model for all of them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -42,9 +42,9 @@ pub enum NeuronModel {
 }
 
 /// Voltages of spiking neurons, mV.
-pub(super) const VOLTAGE: RangeInclusive<f64> = -200.0..=200.0;
+pub(super) const VOLTAGE: [f64; 2] = [-200.0, 200.0];
 /// Time constants of spiking neurons, ms.
-pub(super) const TIME: RangeInclusive<f64> = 0.01..=10_000.0;
+pub(super) const TIME: [f64; 2] = [0.01, 10_000.0];
 
 /// What an experiment file can say of the neurons of a model, and what they cost.
 #[derive(Debug)]
@@ -66,26 +66,16 @@ pub struct NeuronModelSpec {
 }
 
 /// A parameter of a model's neurons.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct NeuronParameter {
-    /// Its name in `params` and in queries.
-    pub name: &'static str,
+    /// What files say of it.
+    pub parameter: Parameter,
     /// Other names in queries.
     pub aliases: &'static [&'static str],
-    /// One sentence for the schema, with its unit and its default.
-    pub description: &'static str,
-    /// Its unit, empty if it has none.
-    pub unit: &'static str,
-    /// Its value where neither the file nor a gene gives one.
-    pub default: f64,
-    /// Values that a neuron can have, from a file or from a gene.
-    pub range: RangeInclusive<f64>,
     /// What a gene's bounds mean; none if the parameter cannot evolve.
     pub gene: Option<GeneScale>,
     /// Whether an Euler step longer than twice its value makes the network diverge.
     pub is_time_constant: bool,
-    /// Whether its values are whole numbers.
-    pub is_whole: bool,
 }
 
 /// From a number between a query's `min_vals` and `max_vals` to a value.
@@ -130,7 +120,7 @@ impl NeuronModel {
     /// The `params` of an ensemble that sets none: every parameter with its default.
     pub fn default_params(self) -> NamedMap<f64> {
         let parameters = self.spec().parameters.iter();
-        parameters.map(|parameter| (parameter.name.to_owned(), parameter.default)).collect()
+        parameters.map(|parameter| (parameter.name().to_owned(), parameter.default())).collect()
     }
 
     /// The names of all models.
@@ -154,7 +144,12 @@ impl NeuronModel {
 impl NeuronModelSpec {
     /// The parameter of this name.
     pub fn parameter(&self, name: &str) -> Option<&NeuronParameter> {
-        self.parameters.iter().find(|parameter| parameter.name == name)
+        self.parameters.iter().find(|parameter| parameter.name() == name)
+    }
+
+    /// What files say of the parameters.
+    pub(super) fn table(&self) -> Vec<Parameter> {
+        self.parameters.iter().map(|parameter| parameter.parameter).collect()
     }
 
     /// The parameters that a query can name.
@@ -168,7 +163,7 @@ impl NeuronModelSpec {
 pub(super) fn evolvable_parameters() -> Vec<&'static NeuronParameter> {
     let mut found: Vec<&NeuronParameter> = Vec::new();
     for parameter in NeuronModel::ALL.iter().flat_map(|model| model.spec().evolvable()) {
-        if found.iter().all(|other| other.name != parameter.name) {
+        if found.iter().all(|other| other.name() != parameter.name()) {
             found.push(parameter);
         }
     }
@@ -217,9 +212,7 @@ pub(super) fn params_schema(generator: &mut SchemaGenerator) -> Schema {
     let activation = generator.subschema_for::<Activation>();
     let of_model = |model: NeuronModel| {
         let spec = model.spec();
-        let parameters = spec.parameters.iter();
-        let mut properties: Map<String, Value> =
-            parameters.map(|parameter| (parameter.name.to_owned(), parameter.schema())).collect();
+        let mut properties = parameters::properties(&spec.table(), &mut SchemaGenerator::default());
         if spec.activation.is_some() {
             properties.insert("activation".to_owned(), activation.clone().to_value());
         }
@@ -234,47 +227,57 @@ impl NeuronParameter {
         name: &'static str,
         unit: &'static str,
         default: f64,
-        range: RangeInclusive<f64>,
-        description: &'static str,
+        range: [f64; 2],
+        meaning: &'static str,
     ) -> Self {
         Self {
-            name,
+            parameter: Parameter::between(name, range, default, meaning).measured(unit),
             aliases: &[],
-            description,
-            unit,
-            default,
-            range,
             gene: Some(GeneScale::Linear),
             is_time_constant: false,
-            is_whole: false,
         }
     }
 
     /// A time constant that evolves, ms.
-    const fn time_constant(name: &'static str, default: f64, description: &'static str) -> Self {
-        let linear = Self::linear(name, "ms", default, TIME, description);
+    const fn time_constant(name: &'static str, default: f64, meaning: &'static str) -> Self {
+        let linear = Self::linear(name, "ms", default, TIME, meaning);
         Self { is_time_constant: true, ..linear }
     }
 
     /// The substeps after a spike in which a neuron takes no current.
-    const fn refractory_substeps(default: f64, description: &'static str) -> Self {
-        let linear = Self::linear("time_refrac", "", default, 0.0..=1_000.0, description);
-        Self { gene: None, is_whole: true, ..linear }
+    const fn refractory_substeps(default: u32) -> Self {
+        let meaning = "Substeps after a spike without current";
+        let parameter = Parameter::whole("time_refrac", [0, 1_000], default, meaning);
+        Self { parameter, aliases: &[], gene: None, is_time_constant: false }
+    }
+
+    /// Its name in `params` and in queries.
+    pub fn name(&self) -> &'static str {
+        self.parameter.key
+    }
+
+    /// Its value where neither the file nor a gene gives one.
+    pub fn default(&self) -> f64 {
+        self.parameter.default.value().and_then(|value| value.number()).unwrap_or_default()
+    }
+
+    /// Values that a neuron can have, from a file or from a gene.
+    pub fn range(&self) -> RangeInclusive<f64> {
+        match self.parameter.domain {
+            Domain::Between(min, max) => min..=max,
+            Domain::Whole(min, max) => min.into()..=max.into(),
+            _ => f64::MIN..=f64::MAX,
+        }
+    }
+
+    /// Whether its values are whole numbers.
+    pub fn is_whole(&self) -> bool {
+        matches!(self.parameter.domain, Domain::Whole(..))
     }
 
     /// A value with its unit.
     pub fn with_unit(&self, value: impl fmt::Display) -> String {
-        if self.unit.is_empty() { value.to_string() } else { format!("{value} {}", self.unit) }
-    }
-
-    fn schema(&self) -> Value {
-        let (min, max) = (self.range.start(), self.range.end());
-        json!({
-            "description": self.description,
-            "type": if self.is_whole { "integer" } else { "number" },
-            "minimum": min,
-            "maximum": max,
-            "default": self.default,
-        })
+        let unit = self.parameter.unit;
+        if unit.is_empty() { value.to_string() } else { format!("{value} {unit}") }
     }
 }

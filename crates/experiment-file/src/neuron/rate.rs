@@ -3,47 +3,28 @@
 
 use super::{GeneScale, NeuronModelSpec, NeuronParameter};
 use crate::Activation;
-use crate::limits::{POSITIVE, QUANTITY};
+use crate::limits::MAGNITUDE;
+
+const POSITIVE: [f64; 2] = [1.0 / MAGNITUDE, MAGNITUDE];
+const QUANTITY: [f64; 2] = [-MAGNITUDE, MAGNITUDE];
+const TAU: &str = "Time constant. The default is 2 * 10^0 on the scale of Table 3.3. A gene is an \
+                   exponent x: tau = 2 * 10^x.";
 
 pub(super) static SPEC: NeuronModelSpec = NeuronModelSpec {
     names: &["rate_model", "ctrnn"],
     is_spiking: false,
     parameters: &[
         NeuronParameter {
-            name: "tau",
-            aliases: &[],
-            description: "Time constant, seconds; default 2, which is 2 * 10^0 on the scale of \
-                          Table 3.3. A gene is an exponent x: tau = 2 * 10^x.",
-            unit: "s",
-            default: 2.0,
-            range: POSITIVE,
             gene: Some(GeneScale::PowerOfTen { factor: 2.0 }),
             is_time_constant: true,
-            is_whole: false,
+            ..NeuronParameter::linear("tau", "s", 2.0, POSITIVE, TAU)
         },
+        // As in section 4.3.
         NeuronParameter {
-            name: "gain",
-            // As in section 4.3.
             aliases: &["gains"],
-            description: "Gain g; default 1.",
-            unit: "",
-            default: 1.0,
-            range: QUANTITY,
-            gene: Some(GeneScale::Linear),
-            is_time_constant: false,
-            is_whole: false,
+            ..NeuronParameter::linear("gain", "", 1.0, QUANTITY, "Gain g")
         },
-        NeuronParameter {
-            name: "bias",
-            aliases: &[],
-            description: "Bias beta; default 0.",
-            unit: "",
-            default: 0.0,
-            range: QUANTITY,
-            gene: Some(GeneScale::Linear),
-            is_time_constant: false,
-            is_whole: false,
-        },
+        NeuronParameter::linear("bias", "", 0.0, QUANTITY, "Bias beta"),
     ],
     activation: Some(Activation::Sigmoid),
     states_per_neuron: 1,

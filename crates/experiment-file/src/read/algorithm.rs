@@ -3,7 +3,8 @@
 use super::Algorithms;
 use super::node::{Node, Object};
 use super::population::{ParamsReader, population};
-use crate::{AlgorithmConfig, FitnessFunction, FitnessParams, limits};
+use crate::semantics::Semantics;
+use crate::{AlgorithmConfig, FitnessFunction, limits, parameters};
 
 /// `has_task`: whether the file has a task of its own, which computes the fitness unless a
 /// function is named.
@@ -34,7 +35,7 @@ pub(super) fn algorithm(
         } else {
             fitness_function(o.required("fitness_function"))
         },
-        fitness_params: o.inner("fitness_params", fitness_params),
+        fitness_params: parameters::inner(o, "fitness_params", Semantics::Thesis, &[]),
         target_fitness: o.optional("target_fitness").map(Node::quantity),
         champion_every: o.or("champion_every", 10, |node| node.u64(1..=limits::GENERATIONS)),
         champion_trials: o.or("champion_trials", 50, |node| node.u32(1..=limits::TRIALS)),
@@ -42,14 +43,6 @@ pub(super) fn algorithm(
         populations: o
             .required("populations")
             .map(1, |_, node| node.object(|o| population(o, params))),
-    }
-}
-
-fn fitness_params(o: &mut Object<'_>) -> FitnessParams {
-    let default = FitnessParams::default();
-    FitnessParams {
-        alpha: o.or("alpha", default.alpha, Node::positive),
-        near: o.or("near", default.near, Node::amount),
     }
 }
 

@@ -1,23 +1,14 @@
 //! Reads `topology.encoding`.
 
-use super::node::{Node, Object};
+use super::node::Object;
+use crate::encoding::DEFAULT_FIELD;
+use crate::parameters::{self, Choice};
 use crate::report::suggestion;
-use crate::{
-    EncodingConfig, EncodingScheme, GaussianField, LinearField, NamedMap, ReceptiveField,
-    SlopedField, StimulusConfig, limits,
-};
+use crate::semantics::Semantics;
+use crate::{EncodingConfig, EncodingScheme, NamedMap, ReceptiveField, StimulusConfig};
 
 const IDENTITY: &str = "IdentityEncoding";
 const SCHEMES: [&str; 4] = [IDENTITY, "LIF_Encoding", "PoissonRateCoding", "RankOrderCoding"];
-const FIELDS: [&str; 6] = [
-    "identity_receptive_field",
-    "gaussian_receptive_field",
-    "triangular_receptive_field",
-    "conic_receptive_field",
-    "parabolic_receptive_field",
-    "linear_receptive_field",
-];
-
 /// The encoders; stimuli that act as they are have none.
 pub(super) fn encodings(
     o: &mut Object<'_>,
@@ -55,55 +46,10 @@ fn encoding(o: &mut Object<'_>, time_scale: u32) -> Option<EncodingConfig> {
         EncodingScheme::RankOrder => [1.0, f64::from(time_scale)],
         EncodingScheme::Lif | EncodingScheme::PoissonRate => [0.0, 1.0],
     };
-    let receptive_field = o.inner("receptive_field", |o| receptive_field(o, values));
-    Some(EncodingConfig { scheme, receptive_field })
-}
-
-fn receptive_field(o: &mut Object<'_>, values: [f64; 2]) -> ReceptiveField {
-    let name = o.or("name", Some("gaussian_receptive_field"), |node| node.one_of(&FIELDS, &[]));
-    let Some(name) = name else {
-        o.accept_rest();
-        return ReceptiveField::Identity {};
-    };
-    o.inner("params", |o| match name {
-        "identity_receptive_field" => ReceptiveField::Identity {},
-        "linear_receptive_field" => ReceptiveField::Linear(LinearField { n_neurons: n_neurons(o) }),
-        "gaussian_receptive_field" => ReceptiveField::Gaussian(GaussianField {
-            sigma: o.or("sigma", 6.0, steepness),
-            n_neurons: n_neurons(o),
-            min_stim: o.or("min_stim", 0.0, value),
-            max_stim: o.or("max_stim", 1.0, value),
-            min_val: o.or("min_val", values[0], value),
-            max_val: o.or("max_val", values[1], value),
-            inverted: o.or("inverted", false, Node::bool),
-        }),
-        name => {
-            let field = SlopedField {
-                slope: o.or("slope", 5.0, steepness),
-                n_neurons: n_neurons(o),
-                min_stim: o.or("min_stim", 0.0, value),
-                max_stim: o.or("max_stim", 1.0, value),
-                min_val: o.or("min_val", values[0], value),
-                max_val: o.or("max_val", values[1], value),
-                inverted: o.or("inverted", false, Node::bool),
-            };
-            match name {
-                "triangular_receptive_field" => ReceptiveField::Triangular(field),
-                "conic_receptive_field" => ReceptiveField::Conic(field),
-                _ => ReceptiveField::Parabolic(field),
-            }
-        }
-    })
-}
-
-fn n_neurons(o: &mut Object<'_>) -> u32 {
-    o.or("n_neurons", 1, |node| node.u32(1..=limits::FIELD_NODES))
-}
-
-fn steepness(node: Node<'_>) -> f64 {
-    node.number(0.0..=limits::STEEPNESS)
-}
-
-fn value(node: Node<'_>) -> f64 {
-    node.number(-limits::FIELD_VALUE..=limits::FIELD_VALUE)
+    let [min_val, max_val] = values;
+    let given = [("min_val", min_val.into()), ("max_val", max_val.into())];
+    let choice = Choice { default: Some(DEFAULT_FIELD), ..Choice::any::<ReceptiveField>(&[]) };
+    let field = |o: &mut Object<'_>| parameters::read_kind(o, &choice, Semantics::Thesis, &given);
+    let field = o.inner("receptive_field", field);
+    Some(EncodingConfig { scheme, receptive_field: field.unwrap_or(ReceptiveField::Identity {}) })
 }

@@ -4,7 +4,6 @@
 
 mod algorithm;
 mod encoding;
-mod learning;
 mod parse;
 mod plain;
 mod population;

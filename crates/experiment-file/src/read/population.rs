@@ -2,9 +2,10 @@
 
 use super::node::{Node, Object};
 use crate::algorithm::GENETIC_KEYS;
+use crate::parameters::{self, Keys};
+use crate::semantics::Semantics;
 use crate::{
-    AlgorithmDescription, AlgorithmParams, Domain, GenotypeQuery, ParameterValue, PopulationConfig,
-    SynapseSelector, limits,
+    AlgorithmDescription, GenotypeQuery, Params, PopulationConfig, SynapseSelector, limits,
 };
 
 /// How the parameters of a population are read.
@@ -30,7 +31,7 @@ pub(super) fn population(o: &mut Object<'_>, params: ParamsReader) -> Population
             ParamsReader::Unchecked => unchecked(o.required("params")),
             ParamsReader::Skip => {
                 o.accept_rest();
-                AlgorithmParams::default()
+                Params::default()
             }
         },
         objects,
@@ -51,15 +52,15 @@ fn bounds(node: Node<'_>, n_queries: usize) -> Vec<f64> {
     }
 }
 
-fn unchecked(node: Node<'_>) -> AlgorithmParams {
-    let mut params = AlgorithmParams::default();
+fn unchecked(node: Node<'_>) -> Params {
+    let mut params = Params::default();
     for (key, value) in node.map(0, |_, node| node.parameter()) {
         params.set(&key, value);
     }
     params
 }
 
-fn described(o: &mut Object<'_>, algorithm: &'static AlgorithmDescription) -> AlgorithmParams {
+fn described(o: &mut Object<'_>, algorithm: &'static AlgorithmDescription) -> Params {
     match o.optional("params") {
         None => params_of(&mut Places { inner: None, outer: o }, algorithm),
         Some(node) => {
@@ -68,7 +69,7 @@ fn described(o: &mut Object<'_>, algorithm: &'static AlgorithmDescription) -> Al
     }
 }
 
-fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -> AlgorithmParams {
+fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -> Params {
     if let Some(encoding) = o.optional("encoding") {
         encoding.one_of(&["real"], &[]);
     }
@@ -76,27 +77,8 @@ fn params_of(o: &mut Places<'_, '_>, algorithm: &'static AlgorithmDescription) -
     for key in GENETIC_KEYS.into_iter().filter(|key| !algorithm.has(key)) {
         o.ignored(key, "only the genetic algorithm has it");
     }
-    let mut params = AlgorithmParams::default();
-    for parameter in algorithm.parameters {
-        let value = o.optional(parameter.key).map(|node| value(node, parameter.domain));
-        if let Some(value) = value.or_else(|| parameter.default.value()) {
-            params.set(parameter.key, value);
-        }
-    }
-    params
-}
-
-fn value(node: Node<'_>, domain: Domain) -> ParameterValue {
-    match domain {
-        Domain::Positive => node.positive().into(),
-        Domain::Between(min, max) => node.number(min..=max).into(),
-        Domain::Whole(min, max) => node.u32(min..=max).into(),
-        // How large it may be is a relation between two keys.
-        Domain::BelowPopulationSize => node.u32(0..=limits::POPULATION).into(),
-        Domain::OneOf { names, unsupported } => {
-            node.one_of(names, unsupported).unwrap_or(names[0]).into()
-        }
-    }
+    // The canonical form leaves what the algorithm computes to it.
+    parameters::params(o, algorithm.parameters, Semantics::Thesis, &[])
 }
 
 /// The two places of an algorithm's parameters: `params`, or the population
@@ -106,7 +88,7 @@ struct Places<'o, 'a> {
     outer: &'o mut Object<'a>,
 }
 
-impl<'a> Places<'_, 'a> {
+impl<'a> Keys<'a> for Places<'_, 'a> {
     fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
         let inner = self.inner.as_mut().and_then(|inner| inner.optional(key));
         let outer = self.outer.optional(key);
@@ -116,6 +98,19 @@ impl<'a> Places<'_, 'a> {
         inner.or(outer)
     }
 
+    fn required(&mut self, key: &'static str) -> Node<'a> {
+        self.optional(key).unwrap_or_else(|| match &mut self.inner {
+            Some(inner) => inner.required(key),
+            None => self.outer.required(key),
+        })
+    }
+
+    fn problem(&self, key: &str, message: String) {
+        self.inner.as_deref().unwrap_or(self.outer).problem(key, message);
+    }
+}
+
+impl Places<'_, '_> {
     fn ignored(&mut self, key: &'static str, why: &str) {
         if let Some(inner) = &mut self.inner {
             inner.ignored(key, why);

@@ -1,22 +1,21 @@
 //! Reads `topology`.
 
+use super::encoding;
 use super::node::{Node, Object};
-use super::{encoding, learning};
+use crate::parameters::{self, Choice};
 use crate::semantics::Semantics;
-use crate::sensors::{UNSUPPORTED, UNSUPPORTED_READINGS};
 use crate::topology::{
     DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_SPIKING_DT, DEFAULT_TIME_SCALE,
 };
 use crate::{
-    Activation, ActuatorQuery, AmpaParams, DecodingConfig, EnsembleConfig, GabaParams,
-    InitialRates, NamedMap, NeuronModel, Neurotransmitter, NmdaParams, OutputConfig, SensorQuery,
-    StimulusConfig, SynapseGroupConfig, SynapseModel, SynapseParams, TopologyConfig, limits,
-    neuron,
+    Activation, DecodingConfig, EnsembleConfig, InitialRates, NamedMap, NeuronModel,
+    Neurotransmitter, Parameters, SynapseGroupConfig, SynapseModel, SynapseParams, TopologyConfig,
+    limits,
 };
 
 pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
     let model = neuron_model(o);
-    let stimuli = o.required("stimuli").map(1, |_, node| node.object(stimulus));
+    let stimuli = o.required("stimuli").map(1, |_, node| node.object(plain));
     let time_scale = o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE));
     let encoding = encoding::encodings(o, &stimuli, time_scale);
     let is_spiking = model.is_some_and(NeuronModel::is_spiking);
@@ -35,8 +34,10 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
     let synapses: NamedMap<_> =
         o.required("synapses").map(1, |_, node| node.object(|o| synapse_group(o, synapse_model)));
     let learning = o.optional("learning").and_then(|node| {
-        let groups = synapses.keys().cloned();
-        node.or_null(|node| node.object(|o| learning::learning(o, is_spiking, groups)))
+        let groups: Vec<String> = synapses.keys().cloned().collect();
+        let max_weight = if is_spiking { 1_000.0 } else { 10.0 };
+        let given = [("max_weight", max_weight.into()), ("synapses", groups.into())];
+        node.or_null(|node| node.object(|o| parameters::read(o, semantics, &given)))
     });
     TopologyConfig {
         dt,
@@ -51,7 +52,7 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
         stimuli,
         encoding,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
-        outputs: o.required("outputs").map(1, |_, node| node.object(output)),
+        outputs: o.required("outputs").map(1, |_, node| node.object(plain)),
         synapses,
         learning,
         decoding: o.required("decoding").map(1, |_, node| node.object(decoding)),
@@ -92,12 +93,9 @@ fn neuron_model(o: &mut Object<'_>) -> Option<NeuronModel> {
     outer.or(inner).unwrap_or(Some(NeuronModel::default()))
 }
 
-fn stimulus(o: &mut Object<'_>) -> StimulusConfig {
-    let unsupported = [&UNSUPPORTED[..], &UNSUPPORTED_READINGS[..]].concat();
-    StimulusConfig {
-        n: o.required("n").u32(1..=limits::INPUTS),
-        sensor: o.required("sensor").variant(&unsupported).unwrap_or(SensorQuery::Ground),
-    }
+/// What depends on nothing else.
+fn plain<T: Parameters>(o: &mut Object<'_>) -> T {
+    parameters::read(o, Semantics::Thesis, &[])
 }
 
 /// `model`: none if it is unreadable; then nobody can tell which parameters are
@@ -116,18 +114,10 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     };
     let outer = activation(o);
     let (params, inner) = o.inner("params", |o| {
-        let parameters = spec.parameters.iter().map(|parameter| {
-            let (min, max) = (*parameter.range.start(), *parameter.range.end());
-            let read = |node: Node<'_>| {
-                if parameter.is_whole {
-                    f64::from(node.u32(min as u32..=max as u32))
-                } else {
-                    node.number(min..=max)
-                }
-            };
-            (parameter.name.to_owned(), o.or(parameter.name, parameter.default, read))
-        });
-        (parameters.collect(), activation(o))
+        let params = parameters::params(o, &spec.table(), Semantics::Thesis, &[]);
+        let params =
+            params.iter().filter_map(|(key, value)| Some((key.to_owned(), value.number()?)));
+        (params.collect(), activation(o))
     });
     if let (Some(outer), Some(inner)) = (outer, inner)
         && outer != inner
@@ -137,58 +127,20 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     EnsembleConfig { n, activation: outer.or(inner).or(spec.activation), params }
 }
 
-fn output(o: &mut Object<'_>) -> OutputConfig {
-    const UNSUPPORTED: [&str; 1] = ["wireless_transmitter:priority"];
-    // Says what the decoding says, too; nothing depends on it.
-    if let Some(enc) = o.optional("enc") {
-        enc.one_of(&["real", "cat"], &[]);
-    }
-    OutputConfig {
-        ensemble: o.required("ensemble").name(),
-        actuator: o.required("actuator").variant(&UNSUPPORTED).unwrap_or(ActuatorQuery::Led),
-    }
-}
-
 /// None of static synapses.
 fn synapse_params(o: &mut Object<'_>, model: SynapseModel) -> Option<SynapseParams> {
     if model == SynapseModel::Static {
         o.ignored("synapse_params", "static synapses have no parameters");
         return None;
     }
-    let gain = |o: &mut Object<'_>, default: f64| {
-        o.or("gain", default, |node| node.number(0.0..=limits::SYNAPSE_GAIN))
-    };
-    let tau = |o: &mut Object<'_>, key: &'static str, default: f64| {
-        o.or(key, default, |node| node.number(neuron::TIME))
-    };
-    let reversal = |o: &mut Object<'_>, default: Option<f64>| {
-        o.or("E", default, |node| node.or_null(|node| node.number(neuron::VOLTAGE)))
-    };
-    Some(o.inner("synapse_params", |o| {
-        let SynapseParams { ampa, gaba, nmda } = SynapseParams::default();
-        let nmda_params = |o: &mut Object<'_>| NmdaParams {
-            gain: gain(o, nmda.gain),
-            tau_rise: tau(o, "tau_rise", nmda.tau_rise),
-            tau_decay: tau(o, "tau_decay", nmda.tau_decay),
-            magnesium: o.or("Mg2", nmda.magnesium, |node| node.number(0.0..=1_000.0)),
-            reversal: reversal(o, nmda.reversal),
-        };
-        SynapseParams {
-            ampa: o.inner("AMPA", |o| AmpaParams {
-                gain: gain(o, ampa.gain),
-                tau: tau(o, "tau", ampa.tau),
-                reversal: reversal(o, ampa.reversal),
-            }),
-            gaba: o.inner("GABA", |o| GabaParams {
-                gain: gain(o, gaba.gain),
-                tau: tau(o, "tau", gaba.tau),
-                reversal: reversal(o, gaba.reversal),
-            }),
-            nmda: match o.optional("NDMA") {
-                Some(node) => node.object(nmda_params),
-                None => o.inner("NMDA", nmda_params),
-            },
-        }
+    let thesis = Semantics::Thesis;
+    Some(o.inner("synapse_params", |o| SynapseParams {
+        ampa: parameters::inner(o, "AMPA", thesis, &[]),
+        gaba: parameters::inner(o, "GABA", thesis, &[]),
+        nmda: match parameters::optional(o, "NDMA", thesis, &[]) {
+            Some(nmda) => nmda,
+            None => parameters::inner(o, "NMDA", thesis, &[]),
+        },
     }))
 }
 
@@ -219,40 +171,7 @@ fn synapse_group(o: &mut Object<'_>, model: SynapseModel) -> SynapseGroupConfig 
 }
 
 fn decoding(o: &mut Object<'_>) -> DecodingConfig {
-    const KNOWN: [&str; 6] = [
-        "IdentityDecoding",
-        "ThresholdDecoding",
-        "SoftmaxDecoding",
-        "FirstToSpike",
-        "RankOrderDecoding",
-        "LinearPopulationDecoding",
-    ];
-    let Some(scheme) = o.required("scheme").one_of(&KNOWN, &["ArgmaxDecoding"]) else {
-        o.accept_rest();
-        return DecodingConfig::IdentityDecoding {};
-    };
-    let num_outputs =
-        |o: &mut Object<'_>| o.or("num_outputs", 1, |node| node.u32(1..=limits::MESSAGE_LENGTH));
-    o.inner("params", |o| {
-        // Says what the scheme says, too; nothing depends on it.
-        o.or("is_cat", false, Node::bool);
-        match scheme {
-            "ThresholdDecoding" => DecodingConfig::ThresholdDecoding {
-                stochastic: o.or("stochastic", false, Node::bool),
-            },
-            "SoftmaxDecoding" => DecodingConfig::SoftmaxDecoding {},
-            "FirstToSpike" => {
-                o.ignored("num_outputs", "there are as many as neurons");
-                DecodingConfig::FirstToSpike {}
-            }
-            "RankOrderDecoding" => {
-                DecodingConfig::RankOrderDecoding { num_outputs: num_outputs(o) }
-            }
-            "LinearPopulationDecoding" => DecodingConfig::LinearPopulationDecoding {
-                num_outputs: num_outputs(o),
-                rest_value: o.or("rest_value", 0.5, |node| node.number(-1.0..=1.0)),
-            },
-            _ => DecodingConfig::IdentityDecoding {},
-        }
-    })
+    let choice = Choice::any::<DecodingConfig>(&["ArgmaxDecoding"]);
+    let decoding = parameters::read_kind(o, &choice, Semantics::Thesis, &[]);
+    decoding.unwrap_or(DecodingConfig::IdentityDecoding {})
 }

@@ -2,12 +2,12 @@
 
 use super::node::{Node, Object};
 use super::robot::robot;
+use crate::parameters::{self, Choice};
 use crate::semantics::Semantics;
 use crate::world::DEFAULT_WORLD_SIZE;
 use crate::{
-    GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightParams,
-    LightSourceConfig, ObjectConfig, OrbitConfig, Pace, PositionInitializers, RandomTargetsConfig,
-    WorldConfig, limits,
+    GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightSourceConfig,
+    NamedAreaParams, ObjectConfig, ParameterValue, PositionInitializers, WorldConfig, limits,
 };
 
 pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
@@ -49,83 +49,24 @@ fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectC
 }
 
 fn light_source(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> LightSourceConfig {
-    let default: LightParams = semantics.defaults();
     LightSourceConfig {
         num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
         controller: o
             .or("controller", LightController::Static {}, |node| light_controller(node, semantics)),
         initializers: position_initializers(o, center),
-        params: o.inner("params", |o| {
-            o.ignored("static", "`controller` says how a light moves");
-            LightParams {
-                range: o.or("range", default.range, Node::positive),
-                color: o.or("color", default.color, Node::name),
-            }
-        }),
+        params: parameters::inner(o, "params", semantics, &[]),
     }
 }
 
 /// A name, an object of `name` and `params`, or null for none.
 fn light_controller(node: Node<'_>, semantics: Semantics) -> LightController {
-    const KNOWN: [&str; 5] = [
-        "static",
-        "light_orbit_controller",
-        "light_prey_controller",
-        "light_rnd_pos_controller",
-        "script_controller",
-    ];
-    if node.is_null() {
-        return LightController::Static {};
-    }
-    node.object_or_name(|o| {
-        let Some(name) = o.required("name").one_of(&KNOWN, &[]) else {
-            o.accept_rest();
-            return LightController::Static {};
-        };
-        o.inner("params", |o| match name {
-            "light_orbit_controller" => {
-                LightController::LightOrbitController(orbit(o, semantics.defaults()))
-            }
-            "light_rnd_pos_controller" => LightController::LightRndPosController(random_targets(o)),
-            "light_prey_controller" => LightController::LightPreyController {},
-            "script_controller" => LightController::ScriptController {},
-            _ => LightController::Static {},
-        })
-    })
-}
-
-fn orbit(o: &mut Object<'_>, default: OrbitConfig) -> OrbitConfig {
-    OrbitConfig {
-        angle_step: o.or("angle_step", default.angle_step, Node::amount),
-        radius_step: o.or("radius_step", default.radius_step, |node| node.or_null(Node::positive)),
-        radius: o.or("radius", default.radius, Node::amount),
-    }
-}
-
-fn random_targets(o: &mut Object<'_>) -> RandomTargetsConfig {
-    let default = RandomTargetsConfig::default();
-    let speed = o.optional("speed");
-    let step = o.optional("step");
-    if let (Some(_), Some(step)) = (&speed, &step) {
-        step.problem("`speed` says the same");
-    }
-    let speed = speed.map(|node| Pace::Speed(node.amount()));
-    let step = step.map(|node| Pace::Step(node.probability()));
-    RandomTargetsConfig {
-        every: o.or("every", default.every, |node| node.u32(1..=limits::STEPS)),
-        square: o.or("square", default.square, Node::amount),
-        pace: speed.or(step).unwrap_or(default.pace),
-    }
+    let choice = Choice::any::<LightController>(&[]);
+    let read = |o: &mut Object<'_>| parameters::read_kind(o, &choice, semantics, &[]);
+    node.or_null(|node| node.object_or_name(read)).flatten().unwrap_or(LightController::Static {})
 }
 
 /// `color`: of food areas and nests, which have no other one.
 fn ground_area(o: &mut Object<'_>, center: [f64; 2], color: Option<&str>) -> GroundAreaConfig {
-    /// Radius of the original's areas, cm.
-    const RANGE: f64 = 150.0;
-    let default = match color {
-        Some(color) => GroundAreaParams { range: RANGE, color: color.to_owned() },
-        None => GroundAreaParams::default(),
-    };
     GroundAreaConfig {
         num_instances: o.required("num_instances").u32(1..=limits::STATIC_OBJECTS),
         controller: o.or("controller", None, |node| {
@@ -133,13 +74,14 @@ fn ground_area(o: &mut Object<'_>, center: [f64; 2], color: Option<&str>) -> Gro
             if node.is_null() { None } else { node.object_or_name(read) }
         }),
         initializers: position_initializers(o, center),
-        params: o.inner("params", |o| GroundAreaParams {
-            range: o.or("range", default.range, Node::positive),
-            color: match color {
-                Some(color) => color.to_owned(),
-                None => o.or("color", default.color, Node::name),
-            },
-        }),
+        params: match color {
+            None => parameters::inner(o, "params", Semantics::Thesis, &[]),
+            Some(color) => {
+                let NamedAreaParams { range } =
+                    parameters::inner(o, "params", Semantics::Thesis, &[]);
+                GroundAreaParams { range, color: color.to_owned() }
+            }
+        },
     }
 }
 
@@ -152,25 +94,11 @@ fn position_initializers(o: &mut Object<'_>, center: [f64; 2]) -> PositionInitia
 
 /// `center`: of the world, the default centre of arrangements.
 pub(super) fn positions(node: Node<'_>, center: [f64; 2]) -> Initializer {
-    const KNOWN: [&str; 4] = ["fixed", "random_uniform", "random_circumference", "random_graph"];
-    node.object(|o| {
-        let Some(name) = o.required("name").one_of(&KNOWN, &["grid_graph"]) else {
-            o.accept_rest();
-            return Initializer::Fixed { values: vec![vec![0.0; 2]] };
-        };
-        o.inner("params", |o| match name {
-            "fixed" => fixed(o, 2),
-            "random_uniform" => random_uniform(o, 2, 100.0, 900.0),
-            "random_circumference" => Initializer::RandomCircumference {
-                radius: o.or("radius", 130.0, Node::amount),
-                center: o.or("center", center, Node::pair),
-            },
-            _ => Initializer::RandomGraph {
-                max_rad: o.or("max_rad", 300.0, Node::positive),
-                initial_pos: o.or("initial_pos", center, Node::pair),
-            },
-        })
-    })
+    let choice = Choice::any::<Initializer>(&["grid_graph"]);
+    let centers = [("center", center.into()), ("initial_pos", center.into())];
+    let given = [&of_components(2, 100.0, 900.0)[..], &centers].concat();
+    let read = |o: &mut Object<'_>| parameters::read_kind(o, &choice, Semantics::Thesis, &given);
+    node.object(read).unwrap_or(Initializer::Fixed { values: vec![vec![0.0; 2]] })
 }
 
 /// Headings; by default uniform on the circle.
@@ -179,31 +107,15 @@ pub(super) fn orientations(node: Option<Node<'_>>) -> Initializer {
     let Some(node) = node else {
         return Initializer::RandomUniform { low: 0.0, high: FULL_TURN, size: 1 };
     };
-    node.object(|o| {
-        let Some(name) = o.required("name").one_of(&["fixed", "random_uniform"], &[]) else {
-            o.accept_rest();
-            return Initializer::Fixed { values: vec![vec![0.0]] };
-        };
-        o.inner("params", |o| match name {
-            "fixed" => fixed(o, 1),
-            _ => random_uniform(o, 1, 0.0, FULL_TURN),
-        })
-    })
+    let names = vec!["fixed", "random_uniform"];
+    let choice = Choice { names, unsupported: &[], default: None };
+    let given = of_components(1, 0.0, FULL_TURN);
+    let read = |o: &mut Object<'_>| parameters::read_kind(o, &choice, Semantics::Thesis, &given);
+    node.object(read).unwrap_or(Initializer::Fixed { values: vec![vec![0.0]] })
 }
 
-fn fixed(o: &mut Object<'_>, n_components: usize) -> Initializer {
-    const MAX: usize = limits::ROBOTS as usize;
-    let vector = |node: Node<'_>| -> Vec<f64> {
-        node.list(n_components..=n_components).into_iter().map(Node::quantity).collect()
-    };
-    let values = o.required("values").list(1..=MAX);
-    Initializer::Fixed { values: values.into_iter().map(vector).collect() }
-}
-
-fn random_uniform(o: &mut Object<'_>, n_components: u32, low: f64, high: f64) -> Initializer {
-    Initializer::RandomUniform {
-        low: o.or("low", low, Node::quantity),
-        high: o.or("high", high, Node::quantity),
-        size: o.or("size", n_components, |node| node.u32(n_components..=n_components)),
-    }
+/// Defaults of values of so many components.
+fn of_components(n: u32, low: f64, high: f64) -> [(&'static str, ParameterValue); 4] {
+    let values = vec![vec![0.0; n as usize]];
+    [("values", values.into()), ("low", low.into()), ("high", high.into()), ("size", n.into())]
 }

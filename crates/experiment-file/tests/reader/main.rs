@@ -5,6 +5,7 @@ mod documentation;
 mod generated;
 mod generator;
 mod hostile;
+mod parameters;
 mod problems;
 mod reference;
 mod schema;
@@ -15,9 +16,7 @@ mod validator;
 mod values;
 
 use evolution::ALGORITHMS;
-use experiment_file::{
-    AlgorithmDescription, AlgorithmParams, ConfigError, ExperimentConfig, Problem,
-};
+use experiment_file::{AlgorithmDescription, ConfigError, ExperimentConfig, Params, Problem};
 
 /// A small experiment that uses a bit of everything; lines count from 1.
 const BASE: &str = r#"{
@@ -123,9 +122,9 @@ fn refuse(text: &str) -> String {
 }
 
 /// The parameters of an algorithm as the reader fills them in.
-fn defaults(algorithm: &str) -> AlgorithmParams {
+fn defaults(algorithm: &str) -> Params {
     let description = AlgorithmDescription::find(ALGORITHMS, algorithm).unwrap();
-    let mut params = AlgorithmParams::default();
+    let mut params = Params::default();
     for parameter in description.parameters {
         if let Some(value) = parameter.default.value() {
             params.set(parameter.key, value);

@@ -16,6 +16,11 @@ pub fn is_valid(root: &Value, value: &Value) -> bool {
     problems(root, value).is_empty()
 }
 
+/// Whether a value fits a part of a schema.
+pub fn fits(root: &Value, part: &Value, value: &Value) -> bool {
+    Validator { root }.problems(part, value, "").is_empty()
+}
+
 struct Validator<'a> {
     root: &'a Value,
 }

@@ -7,7 +7,7 @@ use super::{BASE, accept, defaults, edited, read, refuse};
 use evolution::ALGORITHMS;
 use experiment_file::{
     Activation, AreaController, ExperimentConfig, GaussianField, InitialRates, Initializer,
-    LightController, LightSourceConfig, NeuronModel, ObjectConfig, OrbitConfig, Pace,
+    LightController, LightSourceConfig, NeuronModel, ObjectConfig, OrbitConfig,
     RandomTargetsConfig, ReceptiveField, RewardConfig, RobotController, Seed, SendingDirection,
     TopologyConfig, UncontrollableRotationConfig, WirelessReceiverConfig, json_schema,
 };
@@ -173,20 +173,21 @@ fn light_controllers_have_three_forms() {
         }
     };
     assert_eq!(controller("null"), LightController::Static {});
-    let random = |every, pace| {
+    let random = |every, speed, step| {
         LightController::LightRndPosController(RandomTargetsConfig {
             every,
-            pace,
+            speed,
+            step,
             ..Default::default()
         })
     };
-    assert_eq!(controller(r#""light_rnd_pos_controller""#), random(50, Pace::Speed(3.0)));
+    assert_eq!(controller(r#""light_rnd_pos_controller""#), random(50, Some(3.0), None));
     let params = |params: &str| {
         controller(&format!(r#"{{"name": "light_rnd_pos_controller", "params": {params}}}"#))
     };
-    assert_eq!(params(r#"{"every": 90}"#), random(90, Pace::Speed(3.0)));
-    assert_eq!(params(r#"{"speed": 1.5}"#), random(50, Pace::Speed(1.5)));
-    assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, Pace::Step(0.1)));
+    assert_eq!(params(r#"{"every": 90}"#), random(90, Some(3.0), None));
+    assert_eq!(params(r#"{"speed": 1.5}"#), random(50, Some(1.5), None));
+    assert_eq!(params(r#"{"every": 9, "step": 0.1}"#), random(9, None, Some(0.1)));
 }
 
 /// Keys that were fixed constants: what is given, and that the default is left out.

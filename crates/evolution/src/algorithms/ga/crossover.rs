@@ -1,7 +1,7 @@
 //! Crossover: two parents make two children.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmParams, Parameter};
+use experiment_file::{Parameter, Params};
 use serde::{Deserialize, Serialize};
 
 use crate::Genotype;
@@ -44,10 +44,10 @@ pub const ALPHA: Parameter = Parameter::amount("alpha", 0.5, "BLX-alpha's alpha"
 
 impl Crossover {
     /// As configured.
-    pub fn new(params: &AlgorithmParams) -> Self {
-        match params.name(&OPERATOR).as_str() {
+    pub fn new(params: &Params) -> Self {
+        match params.of::<String>(&OPERATOR).as_str() {
             // Two names of one operator in the original.
-            "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.number(&ALPHA) },
+            "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.of(&ALPHA) },
             "uniform" => Self::Uniform,
             "onepoint" => Self::OnePoint,
             "multipoint" => Self::MultiPoint,

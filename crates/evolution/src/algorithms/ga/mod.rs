@@ -9,7 +9,7 @@ mod mutation;
 mod selection;
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmDescription, AlgorithmParams, Keeps, LearnsFrom, Parameter};
+use experiment_file::{AlgorithmDescription, Keeps, LearnsFrom, Parameter, Params};
 use serde::{Deserialize, Serialize};
 
 use super::{Described, Sample, Strategy};
@@ -70,15 +70,15 @@ impl Described for Ga {
         ],
     };
 
-    fn start(params: &AlgorithmParams, d: usize) -> Self {
+    fn start(params: &Params, d: usize) -> Self {
         Self {
             d,
-            n_elite: params.whole(&NUM_ELITE) as usize,
+            n_elite: params.of::<u32>(&NUM_ELITE) as usize,
             selection: Selection::new(params),
             crossover: Crossover::new(params),
-            crossover_prob: params.number(&CROSSOVER_PROB),
+            crossover_prob: params.of(&CROSSOVER_PROB),
             mutation: Mutation::new(params),
-            mutation_prob: params.number(&MUTATION_PROB),
+            mutation_prob: params.of(&MUTATION_PROB),
             ranked: Vec::new(),
             fitness: Vec::new(),
         }

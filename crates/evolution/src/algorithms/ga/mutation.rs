@@ -1,7 +1,7 @@
 //! Mutation: genes change at random.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmParams, DefaultValue, Domain, Parameter, ParameterValue};
+use experiment_file::{DefaultValue, Domain, Parameter, ParameterValue, Params};
 use serde::{Deserialize, Serialize};
 
 /// How a gene mutates.
@@ -39,18 +39,18 @@ pub const SIGMA: Parameter = Parameter::amount(
 
 /// With bounds that are as far apart as there are categories, the values are whole numbers. The
 /// canonical form leaves the default out: it is younger than the digests of runs.
-pub const CATEGORIES: Parameter = Parameter {
-    key: "mutation_categories",
-    domain: Domain::Whole(2, 1_000_000),
-    default: DefaultValue::Formula("2"),
-    meaning: "Values of a gene that `categorical` mutation chooses from",
-};
+pub const CATEGORIES: Parameter = Parameter::of(
+    "mutation_categories",
+    Domain::Whole(2, 1_000_000),
+    DefaultValue::Formula("2"),
+    "Values of a gene that `categorical` mutation chooses from",
+);
 
 impl Mutation {
     /// As configured.
-    pub fn new(params: &AlgorithmParams) -> Self {
-        match params.name(&OPERATOR).as_str() {
-            "gaussian" => Self::Gaussian { sigma: params.number(&SIGMA) },
+    pub fn new(params: &Params) -> Self {
+        match params.of::<String>(&OPERATOR).as_str() {
+            "gaussian" => Self::Gaussian { sigma: params.of(&SIGMA) },
             "uniform" => Self::Uniform,
             "bitflip" => Self::BitFlip,
             "categorical" => Self::Categorical {

@@ -1,7 +1,7 @@
 //! Selection: whose genes get a chance.
 
 use determinism::random::Stream;
-use experiment_file::{AlgorithmParams, Parameter, limits};
+use experiment_file::{Parameter, Params, limits};
 use serde::{Deserialize, Serialize};
 
 /// How parents are drawn.
@@ -46,9 +46,9 @@ pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
 
 impl Selection {
     /// As configured.
-    pub fn new(params: &AlgorithmParams) -> Self {
-        match params.name(&OPERATOR).as_str() {
-            "tournament" => Self::Tournament { size: params.whole(&TOURNAMENT_SIZE) as usize },
+    pub fn new(params: &Params) -> Self {
+        match params.of::<String>(&OPERATOR).as_str() {
+            "tournament" => Self::Tournament { size: params.of::<u32>(&TOURNAMENT_SIZE) as usize },
             "roulette" => Self::Roulette,
             "lin_rank" => Self::LinearRank,
             "nonlin_rank" => Self::NonlinearRank,

@@ -7,8 +7,8 @@ use crate::{Population, ranking::ranking};
 
 /// Parameters that differ from the defaults by these numbers, and a smaller
 /// mutation.
-fn params(numbers: &[(&str, f64)]) -> AlgorithmParams {
-    let params = AlgorithmParams::default().with("mutation_sigma", 0.5);
+fn params(numbers: &[(&str, f64)]) -> Params {
+    let params = Params::default().with("mutation_sigma", 0.5);
     numbers.iter().fold(params, |params, &(key, value)| params.with(key, value))
 }
 
@@ -17,7 +17,7 @@ fn rng(generation: u64) -> Stream {
 }
 
 /// A generation of `n` whose fitness is that of its index, and the next one.
-fn two_generations(params: &AlgorithmParams, n: usize) -> (Population, Population) {
+fn two_generations(params: &Params, n: usize) -> (Population, Population) {
     let mut ga = Ga::start(params, 4);
     let first = ga.sample(n, &mut rng(0));
     let fitness: Vec<f64> = (0..n).map(|i| i as f64).collect();
@@ -117,7 +117,7 @@ fn whoever_has_no_finite_fitness_is_neither_elite_nor_parent() {
 
 #[test]
 fn the_default_deviation_of_mutation_is_the_root_of_three_tenths() {
-    assert_eq!(AlgorithmParams::default().number(&mutation::SIGMA), 0.3_f64.sqrt());
+    assert_eq!(Params::default().of::<f64>(&mutation::SIGMA), 0.3_f64.sqrt());
 }
 
 #[test]

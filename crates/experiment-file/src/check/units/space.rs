@@ -4,9 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Doubts, step};
 use crate::report::Path;
-use crate::{
-    FitnessParams, Initializer, LightController, ObjectConfig, OrbitConfig, Pace, RobotConfig,
-};
+use crate::{FitnessParams, Initializer, LightController, ObjectConfig, OrbitConfig, RobotConfig};
 
 /// Sides of a world that robots of some centimetres live in, cm.
 const SIDE_MIN: f64 = 20.0;
@@ -250,7 +248,7 @@ fn motion(controller: &LightController, path: &Path, doubts: &Doubts<'_>) {
                 let what = format!("a square of {square} cm is more than the world");
                 doubts.add(&path.key("square"), what, SMALLER);
             }
-            if let Pace::Speed(speed) = targets.pace
+            if let Some(speed) = targets.speed
                 && speed > doubts.shorter_side() / 2.0
             {
                 let what = format!("{speed} cm in a step leads around the world");

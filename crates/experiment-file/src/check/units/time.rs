@@ -87,12 +87,12 @@ fn neurons(name: &str, ensemble: &EnsembleConfig, doubts: &Doubts<'_>) {
     let topology = &doubts.config.topology;
     let path = Path::from(["topology", "ensembles", name, "params"]);
     for parameter in topology.neuron_model.spec().parameters {
-        let Some(&value) = ensemble.params.get(parameter.name) else { continue };
-        let is_own = value != parameter.default;
+        let Some(&value) = ensemble.params.get(parameter.name()) else { continue };
+        let is_own = value != parameter.default();
         if !is_own || evolves(parameter, name, doubts) {
             continue;
         }
-        let path = path.key(parameter.name);
+        let path = path.key(parameter.name());
         if parameter.is_time_constant {
             slow(value, value.to_string(), &path, doubts);
         }
@@ -106,9 +106,9 @@ fn neurons(name: &str, ensemble: &EnsembleConfig, doubts: &Doubts<'_>) {
 fn evolves(parameter: &NeuronParameter, ensemble: &str, doubts: &Doubts<'_>) -> bool {
     let populations = doubts.config.algorithm.populations.values();
     populations.flat_map(|population| &population.objects).any(|query| match query {
-        GenotypeQuery::Neurons(name, EnsembleSelector::All) => *name == parameter.name,
+        GenotypeQuery::Neurons(name, EnsembleSelector::All) => *name == parameter.name(),
         GenotypeQuery::Neurons(name, EnsembleSelector::Named(named)) => {
-            *name == parameter.name && named == ensemble
+            *name == parameter.name() && named == ensemble
         }
         _ => false,
     })
@@ -139,7 +139,7 @@ fn genes(doubts: &Doubts<'_>) {
 
 /// Whether values are usually tens of mV.
 fn is_voltage(parameter: &NeuronParameter) -> bool {
-    parameter.unit == "mV" && parameter.default.abs() >= 10.0 * VOLTAGE_MIN
+    parameter.parameter.unit == "mV" && parameter.default().abs() >= 10.0 * VOLTAGE_MIN
 }
 
 fn receptors(topology: &TopologyConfig, doubts: &Doubts<'_>) {

@@ -154,15 +154,15 @@ impl Network {
     fn spiking_params(&self, dice: &mut Dice) -> Value {
         let mut params = json!({});
         for parameter in self.model.spec().parameters {
-            let (low, high) = (*parameter.range.start(), *parameter.range.end());
+            let (low, high) = (*parameter.range().start(), *parameter.range().end());
             let low = if parameter.is_time_constant { 1.0 } else { low };
             if dice.chance(0.5) {
-                let value = if parameter.is_whole {
+                let value = if parameter.is_whole() {
                     json!(dice.below(high as usize + 1))
                 } else {
                     dice.number(low, high)
                 };
-                insert(&mut params, parameter.name, value);
+                insert(&mut params, parameter.name(), value);
             }
         }
         params
@@ -303,9 +303,9 @@ impl Network {
         let rate = [("bias", [-1.5, 1.5]), ("tau", [-1.0, 0.75]), (gain, [0.05, 5.0])];
         let of_model = if self.model.is_spiking() {
             let evolvable = self.model.spec().evolvable().map(|parameter| {
-                let (low, high) = (*parameter.range.start(), *parameter.range.end());
+                let (low, high) = (*parameter.range().start(), *parameter.range().end());
                 let low = if parameter.is_time_constant { 1.0 } else { low };
-                (parameter.name, [low, high])
+                (parameter.name(), [low, high])
             });
             evolvable.collect()
         } else {
@@ -362,10 +362,10 @@ impl Network {
         }
         if queries.is_empty() {
             let parameter = self.model.spec().evolvable().nth(1).unwrap();
-            let bounds = [*parameter.range.start(), *parameter.range.end()];
+            let bounds = [*parameter.range().start(), *parameter.range().end()];
             let bounds = if parameter.is_time_constant { [1.0, bounds[1]] } else { bounds };
-            let bounds = if parameter.name == "gain" { [-1.0, 1.0] } else { bounds };
-            queries.push((format!("neurons:{}:all", parameter.name), bounds));
+            let bounds = if parameter.name() == "gain" { [-1.0, 1.0] } else { bounds };
+            queries.push((format!("neurons:{}:all", parameter.name()), bounds));
         }
         queries
     }

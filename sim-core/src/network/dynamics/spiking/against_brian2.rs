@@ -58,7 +58,7 @@ fn neuron(model: NeuronModel, parameters: &Value) -> (Network, Phenotype) {
         .spec()
         .parameters
         .iter()
-        .map(|parameter| (parameter.name, value(parameter.name)))
+        .map(|parameter| (parameter.name(), value(parameter.name())))
         .collect();
     (
         network,
@@ -139,7 +139,7 @@ fn dynamic_synapses_work_as_in_brian2() {
     let parameters = &fixture["parameters"];
     let value = |name: &'static str| vec![parameters[name].as_f64().unwrap(); 4];
     let specified = NeuronModel::Lif.spec().parameters.iter();
-    let neurons = specified.map(|parameter| (parameter.name, value(parameter.name))).collect();
+    let neurons = specified.map(|parameter| (parameter.name(), value(parameter.name()))).collect();
     let delays = numbers(&fixture["delays"]).collect();
     let decoders = vec![vec![1.0; 2]];
     let phenotype = Phenotype {

@@ -86,7 +86,8 @@ impl Encoders {
         });
         let encoders = encoders.collect();
         let spec = NeuronModel::Lif.spec();
-        let default = |name: &str| spec.parameter(name).map_or(0.0, |parameter| parameter.default);
+        let default =
+            |name: &str| spec.parameter(name).map_or(0.0, |parameter| parameter.default());
         Self {
             encoders,
             n_nodes: network.n_encoded(),
@@ -331,7 +332,7 @@ mod tests {
     ) -> Response {
         let n_nodes = field.n_nodes(stimuli.len() as u32) as usize;
         let spec = NeuronModel::Lif.spec();
-        let default = |name: &str| spec.parameter(name).unwrap().default;
+        let default = |name: &str| spec.parameter(name).unwrap().default();
         let is_drawing = scheme == EncodingScheme::PoissonRate;
         let encoders = Encoders {
             encoders: vec![Encoder {

@@ -1,0 +1,337 @@
+//! One declaration per parameter: its key, the values that it may have, its default and
+//! its meaning stand in one [`Parameter`]. The reader, the refusals, the canonical form,
+//! the JSON Schema and the tables of the documentation follow from tables of them.
+//!
+//! A kind with its own type declares it with `parameters!`, a field per parameter. The
+//! parameters of an algorithm are a plain table, as this crate knows no algorithm.
+
+mod kinds;
+mod read;
+mod schema;
+mod typed;
+mod value;
+
+use std::fmt;
+
+use crate::limits;
+
+pub(crate) use kinds::{Choice, bind, kind_table, kinds, kinds_schema, read_kind, serialize_kind};
+pub use kinds::{Kind, Kinds};
+pub(crate) use read::{Keys, defaults, inner, optional, params, read};
+pub(crate) use schema::{object, properties};
+pub use typed::{Nested, Parameters, Table, Variants};
+pub(crate) use typed::{key, parameters, variants};
+pub use value::{ParameterValue, Params};
+
+/// One key of a file.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    /// Its key in the file.
+    pub key: &'static str,
+    /// The values that it may have.
+    pub domain: Domain,
+    /// Its value where the file has none.
+    pub default: DefaultValue,
+    /// What it is. The first sentence takes the default at its end.
+    pub meaning: &'static str,
+    /// Its unit, where a program needs it, too; else the meaning has it.
+    pub unit: &'static str,
+    /// Its value where a file with the semantics of the original has none, if it differs.
+    pub(crate) original: Option<Original>,
+    /// How people read the default, where that is not the value alone.
+    default_text: &'static str,
+    /// Another key that says the same.
+    also: Option<Also>,
+    /// The key of a parameter that has no value where this one has one.
+    instead_of: Option<&'static str>,
+    /// Whether it may be null, too, which stands for none.
+    is_nullable: bool,
+    /// Whether the canonical form leaves it out where it has its default: the format has
+    /// not always had it, and older files keep their digests.
+    is_recent: bool,
+}
+
+/// The values that a parameter may have.
+#[derive(Debug, Clone, Copy)]
+pub enum Domain {
+    /// A number above 0: from 1 / [`limits::MAGNITUDE`] to [`limits::MAGNITUDE`].
+    Positive,
+    /// A number in this closed interval.
+    Between(f64, f64),
+    /// A whole number in this closed interval.
+    Whole(u32, u32),
+    /// A whole number, at least 0 and below `population_size`.
+    BelowPopulationSize,
+    /// A whole number up to this one, or `"all"`, which is the default.
+    WholeOrAll(u32),
+    /// One of these names.
+    OneOf {
+        /// The names that are accepted.
+        names: &'static [&'static str],
+        /// Names of the original simulator that are refused as not supported.
+        unsupported: &'static [&'static str],
+    },
+    /// The name of a variant of a type.
+    Variant(&'static Variants),
+    /// Any name.
+    Text,
+    /// True or false.
+    Switch,
+    /// A list of so many numbers, at least and at most.
+    Numbers(usize, usize),
+    /// A list of up to so many lists of numbers; each is as long as other parts of the file
+    /// make it.
+    Vectors(usize),
+    /// The one whole number that other parts of the file leave.
+    Certain,
+    /// A name, or a list of them.
+    Names,
+    /// An object of parameters.
+    Object(&'static Nested),
+    /// Such an object, or a list of up to so many.
+    Objects(&'static Nested, usize),
+}
+
+/// The value of a parameter where the file has none.
+#[derive(Debug, Clone, Copy)]
+pub enum DefaultValue {
+    /// This number.
+    Number(f64),
+    /// This whole number.
+    Whole(u32),
+    /// This name.
+    Name(&'static str),
+    /// This truth.
+    Switch(bool),
+    /// These numbers.
+    Numbers(&'static [f64]),
+    /// None: null, of a parameter that may be, or no key.
+    Null,
+    /// The algorithm computes it by this formula, for instance from the number of
+    /// genes d. The canonical form leaves the key out.
+    Formula(&'static str),
+    /// It depends on other parts of the file, in these words.
+    Depends(&'static str),
+    /// It is the one that the rest of the file leaves.
+    Certain,
+    /// There is none: a file must have the key.
+    Required,
+}
+
+/// The default of the original simulator.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Original {
+    /// This value.
+    Value(DefaultValue),
+    /// A number that follows from the parameters before.
+    From(fn(&Params) -> f64),
+}
+
+/// A key that says the same as another one, in a way of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Also {
+    /// Its key.
+    pub key: &'static str,
+    /// Largest number that it may have; the least one is 0 or, of a positive parameter, just
+    /// above.
+    pub max: f64,
+    /// What it is.
+    pub meaning: &'static str,
+    /// The parameter's value.
+    pub value: fn(f64) -> f64,
+}
+
+/// A row per constructor of a [`Parameter`]: its arguments between key and meaning, the domain
+/// and the default.
+macro_rules! constructors {
+    ($(
+        $(#[$doc:meta])*
+        $vis:vis $name:ident($($arg:ident: $type:ty),*) = $domain:expr, $default:expr;
+    )*) => {
+        impl Parameter {$(
+            $(#[$doc])*
+            $vis const fn $name(key: &'static str, $($arg: $type,)* meaning: &'static str) -> Self {
+                Self {
+                    key,
+                    domain: $domain,
+                    default: $default,
+                    meaning,
+                    unit: "",
+                    original: None,
+                    default_text: "",
+                    also: None,
+                    instead_of: None,
+                    is_nullable: false,
+                    is_recent: false,
+                }
+            }
+        )*}
+    };
+}
+
+constructors! {
+    /// A parameter of any domain.
+    pub of(domain: Domain, default: DefaultValue) = domain, default;
+    /// A number above 0.
+    pub positive(default: f64) = Domain::Positive, DefaultValue::Number(default);
+    /// A number above 0 whose default the algorithm computes by `formula`.
+    pub computed(formula: &'static str) = Domain::Positive, DefaultValue::Formula(formula);
+    /// A number from 0 to [`limits::MAGNITUDE`].
+    pub amount(default: f64) =
+        Domain::Between(0.0, limits::MAGNITUDE), DefaultValue::Number(default);
+    /// A number of either sign, up to [`limits::MAGNITUDE`].
+    pub quantity(default: f64) = Domain::QUANTITY, DefaultValue::Number(default);
+    /// A number in \[0, 1\]: a probability or the value of a gene.
+    pub unit(default: f64) = Domain::Between(0.0, 1.0), DefaultValue::Number(default);
+    /// A standard deviation of genes: above 0 and at most 1.
+    pub deviation(default: f64) =
+        Domain::Between(1.0 / limits::MAGNITUDE, 1.0), DefaultValue::Number(default);
+    /// A number in a closed interval.
+    pub between(range: [f64; 2], default: f64) =
+        Domain::Between(range[0], range[1]), DefaultValue::Number(default);
+    /// A whole number in a closed interval.
+    pub whole(range: [u32; 2], default: u32) =
+        Domain::Whole(range[0], range[1]), DefaultValue::Whole(default);
+    /// A whole number below `population_size`.
+    pub below_population_size(default: u32) =
+        Domain::BelowPopulationSize, DefaultValue::Whole(default);
+    /// One of `names`, the first of which is the default; `unsupported` are names
+    /// of the original simulator that are refused as such.
+    pub one_of(names: &'static [&'static str], unsupported: &'static [&'static str]) =
+        Domain::OneOf { names, unsupported }, DefaultValue::Name(names[0]);
+    /// A name, for instance of a colour.
+    pub(crate) text(default: &'static str) = Domain::Text, DefaultValue::Name(default);
+    /// True or false.
+    pub(crate) switch(default: bool) = Domain::Switch, DefaultValue::Switch(default);
+    /// An object of parameters, or none if the file has no such key.
+    pub(crate) optional(object: &'static Nested) = Domain::Object(object), DefaultValue::Null;
+}
+
+/// A row per way to change a [`Parameter`]: the fields that it sets.
+macro_rules! setters {
+    ($(
+        $(#[$doc:meta])*
+        $name:ident($($arg:ident: $type:ty),*) = $($field:ident: $value:expr),*;
+    )*) => {
+        impl Parameter {$(
+            $(#[$doc])*
+            pub(crate) const fn $name(self, $($arg: $type),*) -> Self {
+                Self { $($field: $value,)* ..self }
+            }
+        )*}
+    };
+}
+
+setters! {
+    /// The same with a unit.
+    measured(unit: &'static str) = unit: unit;
+    /// The same with another default where the semantics are the original's.
+    original(default: DefaultValue) = original: Some(Original::Value(default));
+    /// The same with a default that follows from the parameters before, where the semantics are
+    /// the original's.
+    original_from(default: fn(&Params) -> f64) = original: Some(Original::From(default));
+    /// The same with these words for the default.
+    shown(text: &'static str) = default_text: text;
+    /// The same with another key that says it, too.
+    also(also: Also) = also: Some(also);
+    /// The same, taking the place of another parameter.
+    instead_of(key: &'static str) = instead_of: Some(key);
+    /// The same or null.
+    or_null() = is_nullable: true;
+    /// The same or null, which is the default.
+    null() = is_nullable: true, default: DefaultValue::Null;
+    /// The same, left out of the canonical form where it has its default.
+    recent() = is_recent: true;
+}
+
+impl Parameter {
+    /// Whether the canonical form leaves the key out for this value.
+    pub(crate) fn is_left_out(&self, value: &ParameterValue) -> bool {
+        let is_default = || self.default.value().as_ref() == Some(value);
+        let is_none = match value {
+            ParameterValue::Null => !self.is_nullable,
+            ParameterValue::Objects(objects) => objects.is_empty(),
+            _ => false,
+        };
+        self.is_recent && is_default() || is_none
+    }
+
+    /// One or more sentences, with the default at the end of the first.
+    pub fn description(&self) -> String {
+        let text = self.meaning.trim().trim_end_matches('.');
+        let starts = |at: &usize| text[at + 2..].starts_with(char::is_uppercase);
+        let end = text.match_indices(". ").map(|(at, _)| at).find(starts);
+        let (first, rest) = end.map_or((text, ""), |end| text.split_at(end));
+        let unit = if self.unit.is_empty() { "" } else { ", " };
+        let default = self.default_text().map_or(String::new(), |text| format!("; default {text}"));
+        format!("{first}{unit}{}{default}{rest}.", self.unit)
+    }
+
+    fn default_text(&self) -> Option<String> {
+        if !self.default_text.is_empty() {
+            return Some(self.default_text.to_owned());
+        }
+        Some(match self.default {
+            DefaultValue::Number(number) => number.to_string(),
+            DefaultValue::Whole(number) => number.to_string(),
+            DefaultValue::Name(name) if matches!(self.domain, Domain::Text) => format!("{name:?}"),
+            DefaultValue::Name(name) => format!("`{name}`"),
+            DefaultValue::Switch(switch) => switch.to_string(),
+            DefaultValue::Numbers(numbers) => format!("{numbers:?}"),
+            DefaultValue::Null if self.is_nullable => "null".to_owned(),
+            DefaultValue::Formula(text) | DefaultValue::Depends(text) => text.to_owned(),
+            DefaultValue::Null | DefaultValue::Required | DefaultValue::Certain => return None,
+        })
+    }
+}
+
+impl Domain {
+    /// A number of either sign.
+    pub const QUANTITY: Self = Self::Between(-limits::MAGNITUDE, limits::MAGNITUDE);
+
+    /// Whether `value` lies in the domain, which is one that algorithms have, in a population of
+    /// this size.
+    pub fn contains(&self, value: &ParameterValue, population_size: u32) -> bool {
+        match (*self, value) {
+            (Self::Positive, &ParameterValue::Number(x)) => {
+                (limits::MAGNITUDE.recip()..=limits::MAGNITUDE).contains(&x)
+            }
+            (Self::Between(min, max), &ParameterValue::Number(x)) => (min..=max).contains(&x),
+            (Self::Whole(min, max), &ParameterValue::Whole(n)) => (min..=max).contains(&n),
+            (Self::BelowPopulationSize, &ParameterValue::Whole(n)) => n < population_size,
+            (Self::OneOf { names, .. }, ParameterValue::Name(name)) => {
+                names.contains(&name.as_str())
+            }
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for Domain {
+    /// As in "must be ...", of the domains that algorithms have.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Positive => write!(f, "positive and at most {}", limits::MAGNITUDE),
+            Self::Between(min, max) => write!(f, "between {min} and {max}"),
+            Self::Whole(min, max) => write!(f, "a whole number between {min} and {max}"),
+            Self::BelowPopulationSize => f.write_str("a whole number below the population size"),
+            Self::OneOf { names, .. } => write!(f, "one of `{}`", names.join("`, `")),
+            _ => f.write_str("of its kind"),
+        }
+    }
+}
+
+impl DefaultValue {
+    /// The value; none if something else decides it.
+    pub fn value(self) -> Option<ParameterValue> {
+        match self {
+            Self::Number(number) => Some(ParameterValue::Number(number)),
+            Self::Whole(number) => Some(ParameterValue::Whole(number)),
+            Self::Name(name) => Some(ParameterValue::Name(name.to_owned())),
+            Self::Switch(switch) => Some(ParameterValue::Switch(switch)),
+            Self::Numbers(numbers) => Some(ParameterValue::Numbers(numbers.to_vec())),
+            Self::Null => Some(ParameterValue::Null),
+            Self::Formula(_) | Self::Depends(_) | Self::Certain | Self::Required => None,
+        }
+    }
+}

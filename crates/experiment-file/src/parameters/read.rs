@@ -1,0 +1,233 @@
+//! Reads parameters.
+
+use std::ops::RangeInclusive;
+
+use super::{DefaultValue, Domain, Original, Parameter, ParameterValue, Parameters, Params, Table};
+use crate::limits;
+use crate::node::{Node, Object};
+use crate::semantics::Semantics;
+
+/// What a parameter has where the file is silent and its table leaves the value open.
+pub(crate) type Given<'a> = [(&'a str, ParameterValue)];
+
+/// Where the keys of parameters may stand.
+pub(crate) trait Keys<'a> {
+    /// The value of a key, if the file has it.
+    fn optional(&mut self, key: &'static str) -> Option<Node<'a>>;
+
+    /// The value of a key that the file must have.
+    fn required(&mut self, key: &'static str) -> Node<'a>;
+
+    /// Reports a problem of a key.
+    fn problem(&self, key: &str, message: String);
+}
+
+impl<'a> Keys<'a> for Object<'a> {
+    fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
+        self.optional(key)
+    }
+
+    fn required(&mut self, key: &'static str) -> Node<'a> {
+        self.required(key)
+    }
+
+    fn problem(&self, key: &str, message: String) {
+        self.problem(key, message);
+    }
+}
+
+/// The parameters of a type. `given` are defaults that depend on other parts of the file.
+pub(crate) fn read<T: Parameters>(
+    o: &mut Object<'_>,
+    semantics: Semantics,
+    given: &Given<'_>,
+) -> T {
+    T::from_params(&table(o, &T::TABLE, semantics, given))
+}
+
+/// The parameters of a table, and the keys that it accepts beside them.
+pub(super) fn table(
+    o: &mut Object<'_>,
+    table: &Table,
+    semantics: Semantics,
+    given: &Given<'_>,
+) -> Params {
+    for &(keys, why) in table.ignored {
+        keys.iter().for_each(|key| o.ignored(key, why));
+    }
+    for parameter in table.checked {
+        o.optional(parameter.key).map(|node| parameter.value(node, semantics, given));
+    }
+    params(o, table.parameters, semantics, given)
+}
+
+/// An object of parameters, if the file has the key.
+pub(crate) fn optional<T: Parameters>(
+    o: &mut Object<'_>,
+    key: &'static str,
+    semantics: Semantics,
+    given: &Given<'_>,
+) -> Option<T> {
+    o.optional(key).map(|node| node.object(|o| read(o, semantics, given)))
+}
+
+/// An object of parameters; a missing one is read as an empty one.
+pub(crate) fn inner<T: Parameters>(
+    o: &mut Object<'_>,
+    key: &'static str,
+    semantics: Semantics,
+    given: &Given<'_>,
+) -> T {
+    o.inner(key, |o| read(o, semantics, given))
+}
+
+/// The parameters of a list of them, wherever their keys stand.
+pub(crate) fn params<'a>(
+    keys: &mut impl Keys<'a>,
+    parameters: &[Parameter],
+    semantics: Semantics,
+    given: &Given<'_>,
+) -> Params {
+    let mut params = Params::default();
+    let mut stated = Vec::new();
+    for parameter in parameters {
+        let found = parameter.find(keys, semantics, given);
+        if found.is_some() {
+            stated.push(parameter.key);
+            match parameter.instead_of {
+                Some(other) if stated.contains(&other) => {
+                    keys.problem(parameter.key, format!("`{other}` says the same"));
+                }
+                Some(other) => params.set(other, ParameterValue::Null),
+                None => {}
+            }
+        }
+        if let Some(value) = found.or_else(|| parameter.absent(&params, semantics, given)) {
+            params.set(parameter.key, value);
+        }
+    }
+    params
+}
+
+/// The parameters of an empty object.
+pub(crate) fn defaults<T: Parameters>(semantics: Semantics) -> T {
+    let mut params = Params::default();
+    for parameter in T::TABLE.parameters {
+        if let Some(value) = parameter.absent(&params, semantics, &[]) {
+            params.set(parameter.key, value);
+        }
+    }
+    T::from_params(&params)
+}
+
+impl Parameter {
+    /// What the file says, under either key.
+    fn find<'a>(
+        &self,
+        keys: &mut impl Keys<'a>,
+        semantics: Semantics,
+        given: &Given<'_>,
+    ) -> Option<ParameterValue> {
+        let value = |node: Node<'_>| self.value(node, semantics, given);
+        if matches!(self.default, DefaultValue::Required) {
+            return value(keys.required(self.key));
+        }
+        let also = self.also.and_then(|also| Some((also, keys.optional(also.key)?)));
+        let found = keys.optional(self.key);
+        let Some((also, node)) = also else {
+            return found.and_then(value);
+        };
+        if found.is_some() {
+            node.problem(format!("`{}` says the same", self.key));
+        }
+        let number = match self.domain {
+            Domain::Positive => node.positive(),
+            _ => node.number(0.0..=also.max),
+        };
+        match found {
+            Some(found) => value(found),
+            None => Some(ParameterValue::Number((also.value)(number))),
+        }
+    }
+
+    /// What the file means where it says nothing.
+    fn absent(
+        &self,
+        params: &Params,
+        semantics: Semantics,
+        given: &Given<'_>,
+    ) -> Option<ParameterValue> {
+        if let Some((_, value)) = given.iter().find(|(key, _)| *key == self.key) {
+            return Some(value.clone());
+        }
+        match self.original.filter(|_| semantics == Semantics::Original) {
+            Some(Original::Value(default)) => default.value(),
+            Some(Original::From(default)) => Some(ParameterValue::Number(default(params))),
+            None => self.default.value(),
+        }
+    }
+
+    /// The value at a place of the file; none if it stands for the default.
+    fn value(
+        &self,
+        node: Node<'_>,
+        semantics: Semantics,
+        given: &Given<'_>,
+    ) -> Option<ParameterValue> {
+        let own = || given.iter().find(|(key, _)| *key == self.key).map(|(_, value)| value);
+        if self.is_nullable && node.is_null() {
+            return Some(ParameterValue::Null);
+        }
+        Some(match self.domain {
+            Domain::Positive => node.positive().into(),
+            Domain::Between(min, max) => node.number(min..=max).into(),
+            Domain::Whole(min, max) => node.u32(min..=max).into(),
+            // How large it may be is a relation between two keys.
+            Domain::BelowPopulationSize => node.u32(0..=limits::POPULATION).into(),
+            Domain::WholeOrAll(_) if node.is_string() => {
+                node.one_of(&["all"], &[]);
+                return None;
+            }
+            Domain::WholeOrAll(max) => node.u32(0..=max).into(),
+            Domain::OneOf { names, unsupported } => {
+                node.one_of(names, unsupported).unwrap_or(names[0]).into()
+            }
+            Domain::Variant(variants) => {
+                (variants.read)(node).unwrap_or_else(|| (variants.names)()[0].into())
+            }
+            Domain::Text => ParameterValue::Name(node.name()),
+            Domain::Switch => ParameterValue::Switch(node.bool()),
+            Domain::Numbers(min, max) => {
+                let mut numbers = numbers(node, min..=max);
+                numbers.resize(numbers.len().max(min), 0.0);
+                ParameterValue::Numbers(numbers)
+            }
+            Domain::Vectors(max) => {
+                let n = match own() {
+                    Some(ParameterValue::Vectors(vectors)) => vectors.first().map_or(1, Vec::len),
+                    _ => 1,
+                };
+                let vectors = node.list(1..=max).into_iter().map(|node| numbers(node, n..=n));
+                ParameterValue::Vectors(vectors.collect())
+            }
+            Domain::Certain => {
+                let n = match own() {
+                    Some(&ParameterValue::Whole(n)) => n,
+                    _ => 0,
+                };
+                node.u32(n..=n).into()
+            }
+            Domain::Names => ParameterValue::Names(node.names()),
+            Domain::Object(object) => (object.read)(node, semantics, given).into(),
+            Domain::Objects(object, max) => {
+                let nodes = if node.is_list() { node.list(1..=max) } else { vec![node] };
+                let one = |node| (object.read)(node, semantics, given);
+                ParameterValue::Objects(nodes.into_iter().map(one).collect())
+            }
+        })
+    }
+}
+
+fn numbers(node: Node<'_>, lengths: RangeInclusive<usize>) -> Vec<f64> {
+    node.list(lengths).into_iter().map(Node::quantity).collect()
+}

@@ -1,0 +1,297 @@
+//! The sensors of robots: one row per kind of sensor in [`sensors!`] below, from
+//! which the types, the reader, the schema, the readings that stimuli may name,
+//! their checks and the budget follow, and its parameters. What they sense is
+//! `sim-core`'s `sensors`.
+
+use std::f64::consts::PI;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::DefaultValue::{Name, Number, Required, Whole};
+use crate::parameters::{Also, parameters, variants};
+use crate::{Domain, limits};
+
+/// Sensors of the original simulator that this one lacks.
+pub(crate) const UNSUPPORTED: [&str; 1] = ["neighbors_state_sensor"];
+
+/// Readings that are refused by name.
+pub(crate) const UNSUPPORTED_READINGS: &[&str] = &[
+    "neighbors_state_sensor",
+    "wireless_receiver",
+    "wireless_receiver:am_i_sender",
+    "wireless_receiver:am_i_targeted",
+    "wireless_receiver:destination",
+    "wireless_receiver:n_hops",
+    "wireless_receiver:priority",
+    "wireless_receiver:sender",
+];
+
+/// From a row per kind of sensor: its key in `sensors` and the type of its
+/// parameters; the sectors in which every other robot and every light may be, which are
+/// what a robot's sensor costs per step, for the budget of an episode; then its readings,
+/// each with its name in the file and its length.
+macro_rules! sensors {
+    ($(
+        $(#[doc = $sensor_doc:literal])*
+        $key:ident: $config:ident, seen: $n_sectors:expr, {
+            $(
+                $(#[doc = $reading_doc:literal])*
+                $name:literal = $query:ident: $len:expr,
+            )*
+        }
+    )*) => {
+        parameters! {
+            /// Sensors; absent ones are not mounted.
+            pub struct SensorsConfig: Default {
+                $(
+                    $(#[doc = $sensor_doc])*
+                    $key: Option<$config> = optional($config::OBJECT),
+                )*
+            }
+        }
+
+        /// A reading of a robot, by the name that config files use.
+        #[derive(
+            Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+        )]
+        pub enum SensorQuery {
+            $($(
+                $(#[doc = $reading_doc])*
+                #[serde(rename = $name)]
+                $query,
+            )*)*
+        }
+
+        impl SensorsConfig {
+            /// Number of values of a reading; none if its sensor is not mounted.
+            pub fn reading_len(&self, reading: SensorQuery) -> Option<u32> {
+                match reading {
+                    $($(
+                        SensorQuery::$query => {
+                            let len: fn(&$config) -> u32 = $len;
+                            self.$key.as_ref().map(len)
+                        }
+                    )*)*
+                }
+            }
+
+            /// Sectors of all mounted sensors.
+            pub(crate) fn n_sectors(&self) -> u32 {
+                let mut n_sectors = 0;
+                $(
+                    let seen: fn(&$config) -> u32 = $n_sectors;
+                    n_sectors += self.$key.as_ref().map_or(0, seen);
+                )*
+                n_sectors
+            }
+        }
+
+        impl SensorQuery {
+            /// All of them.
+            pub const ALL: &[Self] = &[$($(Self::$query,)*)*];
+
+            /// Its name in the file.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $($(Self::$query => $name,)*)*
+                }
+            }
+
+            /// Key in `sensors` of the sensor that gives the reading.
+            pub(crate) fn sensor_key(self) -> &'static str {
+                match self {
+                    $($(Self::$query => stringify!($key),)*)*
+                }
+            }
+        }
+    };
+}
+
+sensors! {
+    /// Frames of other robots.
+    wireless_receiver: WirelessReceiverConfig, seen: |sensor| sensor.n_sectors, {
+        /// Message of the chosen frame; `msg_length` values.
+        "wireless_receiver:msg" = ReceiverMessage: |receiver| receiver.msg_length,
+        /// Strength of the chosen frame; 1 value.
+        "wireless_receiver:signal" = ReceiverSignal: |_| 1,
+        /// (cos, sin) of the sector that received it; 2 values.
+        "wireless_receiver:receiving_direction" = ReceiverReceivingDirection: |_| 2,
+        /// (cos, sin) of the emitter's sector that faced the receiver; 2 values.
+        "wireless_receiver:sending_direction" = ReceiverSendingDirection: |_| 2,
+        /// Own communication mode, 1 send, 0 relay; 1 value.
+        "wireless_receiver:state" = ReceiverState: |_| 1,
+    }
+    /// Lights.
+    light_sensor: LightSensorConfig, seen: |sensor| sensor.n_sectors, {
+        /// Light per sector; `n_sectors` values.
+        "light_sensor" = Light: |sensor| sensor.n_sectors,
+    }
+    /// Other robots.
+    distance_sensor: DistanceSensorConfig, seen: |sensor| sensor.n_sectors, {
+        /// Nearness of other robots per sector; `n_sectors` values.
+        "distance_sensor" = Distance: |sensor| sensor.n_sectors,
+    }
+    /// Ground areas.
+    ground_sensor: GroundSensorConfig, seen: |_| 0, {
+        /// 1 on a ground area of the sensor's colour; 1 value.
+        "ground_sensor" = Ground: |_| 1,
+    }
+    /// Whether the robot stands on a `food_area`, which is a green ground area.
+    food_area_sensor: PlainSensorConfig, seen: |_| 0, {
+        /// 1 on a food area; 1 value.
+        "food_area_sensor" = FoodArea: |_| 1,
+    }
+    /// Whether the robot stands on a `nest`, which is a black ground area.
+    nest_sensor: PlainSensorConfig, seen: |_| 0, {
+        /// 1 on a nest; 1 value.
+        "nest_sensor" = Nest: |_| 1,
+    }
+    /// Whether the robot carries something, as the function `react` of a script says.
+    food_sensor: PlainSensorConfig, seen: |_| 0, {
+        /// 1 while the robot carries something; 1 value.
+        "food_sensor" = Food: |_| 1,
+    }
+    /// Where the robot is.
+    own_position_sensor: PlainSensorConfig, seen: |_| 0, {
+        /// x and y, cm; 2 values.
+        "own_position_sensor" = OwnPosition: |_| 2,
+    }
+    /// Where the robot looks.
+    own_orientation_sensor: PlainSensorConfig, seen: |_| 0, {
+        /// Heading, in turns from 0 to 1; 1 value.
+        "own_orientation_sensor" = OwnOrientation: |_| 1,
+    }
+    /// Where the nearest robots are and look.
+    neighborhood_pos_sensor: NeighborhoodSensorConfig, seen: |sensor| sensor.n_neighbors, {
+        /// x and y, cm, and heading, radians, of the nearest robots; 3 `n_neighbors` values.
+        "neighborhood_pos_sensor" = NeighborhoodPos: |sensor| 3 * sensor.n_neighbors,
+    }
+    /// What the function `sense` of a script says.
+    // A script may look at everything for each of its numbers.
+    script_sensor: ScriptSensorConfig, seen: |sensor| sensor.n, {
+        /// The numbers that the function `sense` of the script returns; `n` values.
+        "script_sensor" = Script: |sensor| sensor.n,
+    }
+}
+
+/// Numbers of sectors, and of whatever else a sensor has a value for.
+const SECTORS: [u32; 2] = [1, limits::SECTORS];
+
+/// The original states the standard deviation of noise.
+const NOISE_SIGMA: Also = Also {
+    key: "noise_sigma",
+    max: 31_622.776_601_683_792,
+    meaning: "Its square is `noise_variance`.",
+    value: |sigma| sigma * sigma,
+};
+
+parameters! {
+    /// Receiver of the wireless link (section 3.3).
+    pub struct WirelessReceiverConfig: Default {
+        /// Sectors.
+        n_sectors: u32 = whole(SECTORS, 4).original(Whole(2)),
+        /// Reach, cm.
+        range: f64 = positive(100.0),
+        /// Components of a message, M.
+        msg_length: u32 = whole([1, limits::MESSAGE_LENGTH], 2),
+        /// A frame of this many hops is not accepted any more.
+        max_hops: u32 = whole([1, limits::HOPS], 10),
+        /// Decay of the strength per cm.
+        decay_rho: f64 = amount(0.05).original(Number(0.005)),
+        /// Decay of the strength per radian.
+        decay_phi: f64 = amount(1.0),
+        /// Whose sector the sending direction is.
+        sending_direction: SendingDirection =
+            of(Domain::Variant(SendingDirection::VARIANTS), Name("emitter"))
+            .original(Name("originator"))
+            .recent(),
+    }
+    ignored { "noise_sigma": "reception has no noise"; }
+
+    /// Light sensor.
+    pub struct LightSensorConfig: Default {
+        /// Sectors.
+        n_sectors: u32 = whole(SECTORS, 6).original(Whole(2)),
+        /// Reach, cm. The light's own range bounds it too.
+        range: f64 = positive(80.0).original(Number(100.0)),
+        /// Colour it sees.
+        color: String = text("red"),
+        /// Decay per cm.
+        decay_rho: f64 = amount(0.05).original(Number(0.005)),
+        /// Decay per radian.
+        decay_phi: f64 = amount(1.0),
+        /// Variance of the Gaussian noise.
+        noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
+        /// Largest angle between a sector's direction and what it sees, radians.
+        aperture: f64 = between([1.0 / limits::MAGNITUDE, PI], PI)
+            .shown("pi: every sector sees everything")
+            .original_from(|params| {
+                (3.0 * PI / f64::from(params.of_key::<u32>("n_sectors"))).min(PI)
+            })
+            .recent(),
+    }
+
+    /// Distance sensor.
+    pub struct DistanceSensorConfig: Default {
+        /// Sectors.
+        n_sectors: u32 = whole(SECTORS, 4).original(Whole(2)),
+        /// Reach, cm.
+        range: f64 = positive(60.0).original(Number(100.0)),
+        /// Decay per cm.
+        decay_rho: f64 = amount(0.05).original(Number(0.005)),
+        /// Decay per radian.
+        decay_phi: f64 = amount(1.0),
+        /// Variance of the Gaussian noise.
+        noise_variance: f64 = amount(0.1).original(Number(0.0)).also(NOISE_SIGMA),
+        /// Largest angle between a sector's direction and what it sees, radians.
+        aperture: f64 = between([1.0 / limits::MAGNITUDE, PI], PI)
+            .shown("pi: every sector sees everything")
+            .original_from(|params| PI / f64::from(params.of_key::<u32>("n_sectors")))
+            .recent(),
+    }
+
+    /// Ground sensor.
+    pub struct GroundSensorConfig: Default {
+        /// Colour it sees.
+        color: String = text("black"),
+    }
+
+    /// A sensor without parameters.
+    pub struct PlainSensorConfig: Default {}
+    ignored { "range", "noise_sigma": "such a sensor has neither reach nor noise"; }
+
+    /// Absolute positions and headings of the nearest robots.
+    pub struct NeighborhoodSensorConfig: Default {
+        /// Robots in a reading, the nearest first.
+        n_neighbors: u32 = whole(SECTORS, 1),
+    }
+    ignored { "range", "noise_sigma": "the sensor knows all robots, without noise"; }
+
+    /// Numbers that the function `sense` of the script of `task` returns for a robot.
+    pub struct ScriptSensorConfig {
+        /// Numbers that the function returns.
+        n: u32 = of(Domain::Whole(1, limits::SECTORS), Required),
+        /// Smaller numbers become this one.
+        low: f64 = quantity(0.0),
+        /// Larger numbers become this one.
+        high: f64 = quantity(1.0),
+    }
+}
+
+/// Of which robot the reading `wireless_receiver:sending_direction` gives the sector.
+/// The two differ for frames that were relayed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SendingDirection {
+    /// The robot that is heard: its sector that faces the listener (section 3.3.2).
+    Emitter,
+    /// The robot whose message it is: its sector that faced the first robot to hear
+    /// the message.
+    Originator,
+}
+
+variants! {
+    SendingDirection, unsupported: &[];
+    SensorQuery, unsupported: UNSUPPORTED_READINGS;
+}
