@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use coordinator::{Address, NotAnAddress, Who, ids::ExperimentId};
+use model::{Address, NotAnAddress, Who, ids::ExperimentId};
 
 use crate::args::Subject;
 

@@ -6,12 +6,13 @@ use std::{
     ops::RangeInclusive,
     path::PathBuf,
     str::FromStr,
+    thread,
 };
 
 use clap::{ArgAction, Args as ClapArgs, Parser, ValueEnum};
 use clap_complete::ArgValueCompleter;
-use coordinator::{group, labels};
 use experiment_file::limits;
+use model::{group, labels};
 use sim_core::Isa;
 use swarm_telemetry::VERSION;
 
@@ -267,6 +268,11 @@ impl IsaArgs {
     pub fn get(self) -> Isa {
         self.isa.unwrap_or_else(Isa::best)
     }
+}
+
+/// As many threads or workers as this machine has cores.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, Into::into)
 }
 
 /// Reads a whole number of a range, for errors that say what would be right.

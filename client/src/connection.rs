@@ -9,13 +9,14 @@ use std::{
     time::Duration,
 };
 
-use coordinator::{Door, InProcess, store::Holder};
+use model::store::Holder;
 use swarm_proto::v1::{
     Experiment, evaluation_service_client::EvaluationServiceClient,
     experiment_service_client::ExperimentServiceClient, fleet_service_client::FleetServiceClient,
 };
 use swarm_transport::{
-    Banner, Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX, banner,
+    Backoff, Banner, Bearer, Credentials, FROM_COORDINATOR_LEN_MAX, Link, TO_COORDINATOR_LEN_MAX,
+    banner,
 };
 use tokio::time::{Instant, sleep_until};
 use tonic::{
@@ -23,10 +24,10 @@ use tonic::{
     service::interceptor::InterceptedService,
     transport::{Channel, Endpoint},
 };
-use worker::Backoff;
 
 use crate::{
     error::{Error, is_transient, reason},
+    local::services::{self, Door, InProcess},
     place::{DEFAULT_DATA_DIR, Intent, Place},
     progress::Progress,
     settings::Settings,
@@ -104,7 +105,7 @@ impl Connection {
             Intent::Read => InProcess::read(data_dir).await,
             _ => InProcess::write(data_dir).await,
         };
-        let services = services.map_err(Error::from_start)?;
+        let services = services.map_err(services::refused)?;
         Ok(Self::here(data_dir, services.door().clone(), Some(services)))
     }
 

@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use coordinator::{StartError, store::StoreError};
 use experiment_file::ConfigError;
+use model::store::StoreError;
 use swarm_telemetry::EXIT_STARVED;
 use swarm_transport::tls_diagnosis;
 use tonic::{Code, Status};
@@ -30,9 +30,6 @@ pub enum Error {
         /// The problems, one per line.
         problems: String,
     },
-    /// The coordinator of `run` does not start, because of the data directory.
-    #[error(transparent)]
-    Start(#[from] StartError),
     /// Some runs of a group were submitted before this error.
     #[error(
         "{n_submitted} of {n_runs} runs are submitted, the same command again adds the others: \
@@ -168,7 +165,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Write { .. } | Self::Internal(_) => 1,
-            Self::Input(_) | Self::Config { .. } | Self::Start(_) => 2,
+            Self::Input(_) | Self::Config { .. } => 2,
             Self::Incomplete { cause, .. } | Self::Partly { cause, .. } => cause.exit_code(),
             Self::NotFound(_) => 3,
             Self::Unreachable { .. } => 4,
@@ -224,14 +221,6 @@ impl Error {
             Err(other) => format!("{}: {other}", path.display()),
             Ok(()) => text,
         })
-    }
-
-    /// The error of opening a data directory to ask it.
-    pub fn from_start(error: StartError) -> Self {
-        match error {
-            StartError::Store(error) => Self::from_store(&error),
-            error => Self::Start(error),
-        }
     }
 
     /// The error of a failed call to the services on a data directory.

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use coordinator::limits::KEY_LEN_MAX;
 use evolution::ALGORITHMS;
 use experiment_file::{
     ConfigError, ExperimentConfig, Problem, ScriptConfig, inline_script, limits, plain, script_path,
 };
+use model::limits::KEY_LEN_MAX;
 use sim_core::{Simulation, TRYING_TIME_MAX};
 use swarm_proto::v1::SubmitExperimentRequest;
 

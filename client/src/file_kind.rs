@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use coordinator::store;
+use model::store;
 use serde_json::Value;
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Genotypes by their addresses, as a place has them.
 
-use coordinator::{Address, Who};
+use model::{Address, Who};
 use swarm_proto::v1::{
     Experiment, GetChampionResponse, GetExperimentRequest, GetIndividualsRequest,
     GetIndividualsResponse, GetLineageRequest, GetLineageResponse,

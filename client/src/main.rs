@@ -24,7 +24,13 @@ mod help;
 mod input;
 mod interrupt;
 mod json;
+#[cfg(feature = "local")]
+mod local;
+#[cfg(not(feature = "local"))]
+#[path = "without_local.rs"]
+mod local;
 mod output_file;
+mod pages;
 mod place;
 mod progress;
 mod recorded;

@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use coordinator::store;
+use model::store;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 use crate::{error::Error, interrupt::Unfinished};

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use coordinator::store;
+use model::store;
 use tokio::{net::TcpStream, time::timeout};
 
 use crate::{

@@ -15,7 +15,13 @@ use swarm_proto::v1::{
     ComparisonTrials, EvaluateFitnessRequest, EvolutionTrials, Genes, evolution_trials::Trials,
 };
 
-use crate::{args::IsaArgs, connection::Connection, error::Error, settings::Settings, waiting};
+use crate::{
+    args::{IsaArgs, cores},
+    connection::Connection,
+    error::Error,
+    settings::Settings,
+    waiting,
+};
 
 /// Trials of a genotype that a thread simulates at once, side by side.
 const TRIALS_PER_ITEM: u32 = 25;
@@ -51,8 +57,7 @@ impl Resimulation {
                 Box::new(Connection::new(settings.address(), &settings.credentials()?)?);
             return Ok(Self::Fleet { connection, config_json: config_json.to_owned() });
         }
-        let n_threads = n_threads
-            .map_or_else(|| thread::available_parallelism().map_or(1, Into::into), usize::from);
+        let n_threads = n_threads.map_or_else(|| cores(), usize::from);
         Ok(Self::Here { n_threads, isa: isa.get() })
     }
 

@@ -4,8 +4,8 @@ use std::{collections::BTreeSet, str::FromStr};
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use coordinator::group::Membership;
 use experiment_file::{ConfigError, ExperimentConfig};
+use model::group::Membership;
 use sha2::{Digest as _, Sha256};
 use swarm_proto::v1::SubmitExperimentRequest;
 
@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Most runs of one sweep: as many as a coordinator has unfinished.
-const RUNS_MAX: usize = coordinator::limits::UNFINISHED_MAX;
+const RUNS_MAX: usize = model::limits::UNFINISHED_MAX;
 
 /// What makes one experiment file several runs.
 #[derive(Debug, Clone, Default, Args)]

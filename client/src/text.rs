@@ -8,7 +8,7 @@ use swarm_proto::v1::{
 };
 
 use console::truncate_str;
-use coordinator::store::Holder;
+use model::store::Holder;
 use swarm_telemetry::escape;
 pub use swarm_telemetry::number;
 

@@ -7,12 +7,12 @@
 use std::{env, fs, path::Path, time::Instant};
 
 use coordinator::{
-    BlockingReader,
     priority::Priority,
     store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
 use evolution::{ALGORITHMS, Digest, Evolution, Params, Told};
 use experiment_file::{ExperimentConfig, Keeps};
+use model::queries::BlockingReader;
 use prost::Message as _;
 use swarm_proto::v1::{GetIndividualsRequest, GetIndividualsResponse};
 
@@ -134,7 +134,7 @@ fn seconds(directory: &Path, address: &str) -> f64 {
     let started = Instant::now();
     let reader = BlockingReader::open(directory).expect("it is sound");
     let request = GetIndividualsRequest { address: address.to_owned(), ..Default::default() };
-    let answer = reader.call("GetIndividuals", request.encode_to_vec());
+    let answer = reader.call("GetIndividuals", &request.encode_to_vec());
     let answer = GetIndividualsResponse::decode(&*answer.expect("it is in the log"));
     let answer = answer.expect("it is an answer");
     let seconds = started.elapsed().as_secs_f64();

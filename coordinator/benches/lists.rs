@@ -7,12 +7,12 @@
 use std::{env, time::Instant};
 
 use coordinator::{
-    BlockingReader,
     priority::Priority,
     store::{Entry, GenerationCommit, GenerationRecord, NewExperiment, Store},
 };
 use evolution::{ALGORITHMS, Digest, Evolution, Statistics};
 use experiment_file::ExperimentConfig;
+use model::queries::BlockingReader;
 use prost::Message as _;
 use swarm_proto::v1::{ExperimentState, ListExperimentsRequest, ListExperimentsResponse};
 
@@ -47,7 +47,7 @@ fn main() {
         let mut seconds: Vec<f64> = (0..REPETITIONS)
             .map(|_| {
                 let started = Instant::now();
-                let answer = reader.call("ListExperiments", request.encode_to_vec());
+                let answer = reader.call("ListExperiments", &request.encode_to_vec());
                 let answer = ListExperimentsResponse::decode(&*answer.expect("it is sound"));
                 assert_eq!(answer.expect("it is an answer").experiments.len(), expected);
                 started.elapsed().as_secs_f64()

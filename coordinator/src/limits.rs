@@ -6,6 +6,7 @@
 
 use std::time::Duration;
 
+pub use model::limits::*;
 use swarm_transport::listening::{Known, ListenerLimits, Room};
 
 /// Bundles that are sent or received at the same time; more wait. Each takes at most four
@@ -14,21 +15,6 @@ use swarm_transport::listening::{Known, ListenerLimits, Room};
 pub const BUNDLES_MAX: usize = 1;
 /// Generations that are computed again at the same time.
 pub const RECONSTRUCTIONS_MAX: usize = 4;
-/// The same for pages, which share the processor with the coordinator.
-pub const RECONSTRUCTIONS_OF_PAGES_MAX: usize = 1;
-/// Bytes of genes and fitness in one answer with individuals of a generation.
-pub const INDIVIDUALS_LEN_MAX: usize = 8 << 20;
-
-/// Generations in one answer that says how evolution moved.
-pub const DYNAMICS_PAGE_LEN_MAX: u64 = 100;
-/// Generations that are gone through for one answer with parents and children.
-pub const FAMILIES_PAGE_LEN_MAX: u64 = 100;
-/// Children in one answer, after which no further generation is taken.
-pub const CHILDREN_MAX: usize = 50_000;
-/// Genes of the individuals of all generations that one lineage goes through; a byte each.
-pub const LINEAGE_GENES_MAX: u64 = 256 << 20;
-/// Ancestors in one answer.
-pub const ANCESTORS_MAX: usize = 100_000;
 
 /// Connections. Of those who have made a call that was let in: every worker and every call
 /// of a client on one of its own.
@@ -83,15 +69,10 @@ pub const WINDOW_LEN: u32 = 256 << 10;
 /// Results in one message; ours sends fewer. On the wire an empty result takes two bytes,
 /// in memory fifty.
 pub const RESULTS_PER_MESSAGE_MAX: usize = 1 << 16;
-/// Bytes of what a worker says about itself or its failures, where the rest is cut,
-/// and of a client's reason for a pause.
-pub const TEXT_LEN_MAX: usize = 512;
 /// Messages, beyond one per credit, that may wait for a worker to read them; one
 /// that lets more wait is dropped.
 pub const WORKER_OUTBOX_SLACK: usize = 64;
 
-/// Bytes of `request_id` and `default_name`.
-pub const KEY_LEN_MAX: usize = 128;
 /// Bytes of the problems of a configuration: they travel in a header, whose size
 /// clients limit.
 pub const PROBLEMS_LEN_MAX: usize = 4096;
@@ -99,8 +80,6 @@ pub const PROBLEMS_LEN_MAX: usize = 4096;
 /// whoever starts the coordinator chooses another number. It does not depend on the
 /// machine: what one accepts, all accept.
 pub const MEMORY_BUDGET_MIB: u32 = 4096;
-/// Experiments that may be unfinished at the same time.
-pub const UNFINISHED_MAX: usize = 1000;
 /// Time for what a client changes to be stored before the client is told that it
 /// is not yet.
 pub const CHANGE_TIMEOUT: Duration = Duration::from_secs(5);
@@ -116,16 +95,14 @@ pub const CHECKS_MAX: usize = 4;
 pub const EVALUATION_VALUES_MAX: usize = 1 << 21;
 /// Numbers of one of its trials, 2 MiB: a trial travels in one message.
 pub const TRIAL_VALUES_MAX: usize = 1 << 18;
-/// Events read from the store at once.
-pub const EVENT_PAGE_LEN: u32 = 256;
-/// Generations or events in one answer.
-pub const PAGE_LEN_MAX: u32 = 1000;
-/// Events that may wait for a watcher to read them.
-pub const WATCH_QUEUE_LEN: usize = 16;
 /// Pause between two messages that there is news.
 pub const NEWS_PAUSE: Duration = Duration::from_millis(200);
 /// Longest time after which a watcher of explanations is told what time alone has changed.
 pub const SITUATION_INTERVAL: Duration = Duration::from_secs(5);
+/// Events read from the store at once.
+pub const EVENT_PAGE_LEN: u32 = 256;
 /// Time for a watcher to make room for the next event; one that takes longer is
 /// told where to resume.
 pub const WATCH_PATIENCE: Duration = Duration::from_secs(30);
+/// Events that may wait for a watcher to read them.
+pub const WATCH_QUEUE_LEN: usize = 16;

@@ -5,13 +5,14 @@ use std::{path::Path, time::Duration};
 
 use evolution::{Champion, Evolution, Statistics, Told};
 use experiment_file::ConfigError;
+use model::restored::restore_evolution;
 
 use crate::{
     clock,
     control::{Existing, Placement, place},
     ids::ExperimentId,
     limits::UNFINISHED_MAX,
-    runs::{describe, describe_judgement, restore_evolution},
+    runs::{describe, describe_judgement},
     store::{
         Entry, ExperimentRecord, ExperimentState, GenerationCommit, GenerationRecord, Store,
         StoreError,

@@ -6,7 +6,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use coordinator::BlockingReader;
+use model::queries::BlockingReader;
 use pyo3::{exceptions::PyOSError, prelude::*};
 
 use crate::{
@@ -37,7 +37,7 @@ impl Database {
         }
         let answer = guarded(py, || {
             let reader = self.reader.lock().unwrap_or_else(PoisonError::into_inner);
-            reader.call(name, request.to_vec())
+            reader.call(name, request)
         })?;
         answer.map_err(|status| refused(py, &status))
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use coordinator::{ids::ExperimentId, store::Store};
+use model::{ids::ExperimentId, store::Store};
 use evolution::Told;
 use numpy::PyArray2;
 use pyo3::{exceptions::PyOSError, prelude::*};
@@ -26,7 +26,7 @@ pub fn fitness_log<'py>(
         Ok(entries.into_iter().map(|entry| entry.and_then(told)).collect::<Vec<_>>())
     })?;
     let read = read
-        .map_err(|error: coordinator::store::StoreError| PyOSError::new_err(error.to_string()))?;
+        .map_err(|error: model::store::StoreError| PyOSError::new_err(error.to_string()))?;
     let array = |fitness: Vec<Vec<f64>>| PyArray2::from_vec2(py, &fitness);
     read.into_iter().map(|fitness| Ok(fitness.map(array).transpose()?)).collect()
 }

@@ -2,11 +2,9 @@
 
 use std::{path::Path, time::Duration};
 
-use coordinator::{
-    local::{Done, LocalRun, LocalRunError},
-    store::{ExperimentState, StoreError},
-};
+use coordinator::local::{Done, LocalRun, LocalRunError};
 use evolution::{End, Told};
+use model::store::{ExperimentState, StoreError};
 use numpy::PyReadonlyArray2;
 use pyo3::{
     exceptions::{PyOSError, PyValueError},

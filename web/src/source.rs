@@ -1,63 +1,11 @@
-//! What pages are made of: the same queries, in the same messages, as clients have.
+//! What pages ask of a running coordinator, in the messages of clients. They read experiments as
+//! clients do, by [`Reader`](model::queries::Reader).
 
 use std::{collections::BTreeMap, num::NonZeroU64, ops::Range, time::Duration};
 
 use serde::Serialize;
-use swarm_proto::v1::{
-    Experiment, ExplainExperimentResponse, GetChampionResponse, GetExperimentResponse,
-    ListDynamicsResponse, ListEventsRequest, ListEventsResponse, ListGenerationsRequest,
-    ListGenerationsResponse, SubmitExperimentRequest, Worker,
-};
-use tokio::sync::watch;
+use swarm_proto::v1::{Experiment, ExplainExperimentResponse, SubmitExperimentRequest, Worker};
 use tonic::{Status, async_trait};
-
-/// Where experiments are read.
-#[async_trait]
-pub trait Archive: Send + Sync + 'static {
-    /// All experiments, oldest first.
-    async fn experiments(&self) -> Result<Vec<Experiment>, Status>;
-
-    /// One of them, with its file in canonical form.
-    async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status>;
-
-    /// Completed generations, page by page.
-    async fn generations(
-        &self,
-        request: ListGenerationsRequest,
-    ) -> Result<ListGenerationsResponse, Status>;
-
-    /// Events, page by page.
-    async fn events(&self, request: ListEventsRequest) -> Result<ListEventsResponse, Status>;
-
-    /// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations
-    /// from the first one on that the fitness log has, but not before `from`; and the number
-    /// of that one.
-    async fn fitness(&self, id: u64, from: u64, n: u32) -> Result<(u64, Vec<Vec<f32>>), Status>;
-
-    /// How a page of generations from `from` on moved the distribution: work for a processor.
-    async fn dynamics(&self, id: u64, from: u64) -> Result<ListDynamicsResponse, Status>;
-
-    /// Parents and children of a page of generations from `from` on, of those whose number `every`
-    /// divides: work for a processor. Refused where individuals have no parents.
-    async fn families(&self, id: u64, from: u64, every: NonZeroU64) -> Result<Families, Status>;
-
-    /// The genotype at an address that names a single one.
-    async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status>;
-
-    /// Changes when something may have been stored.
-    fn news(&self) -> watch::Receiver<u64>;
-}
-
-/// Parents and children of some generations.
-#[derive(Debug, Clone, Default)]
-pub struct Families {
-    /// The names of the populations.
-    pub populations: Vec<String>,
-    /// The generations by their numbers.
-    pub generations: Vec<(u64, evolution::Families)>,
-    /// The generation from which on to ask next.
-    pub next: u64,
-}
 
 /// The coordinator that runs now; a data directory alone has none.
 #[async_trait]

@@ -1,16 +1,10 @@
 //! What the coordinator asks for, and what becomes of it.
 
-use std::{borrow::Cow, fmt, ops::Range, sync::Arc, time::Duration};
+use std::{borrow::Cow, ops::Range, sync::Arc, time::Duration};
 
 use evolution::Distribution;
+use model::ids::JobId;
 use sim_core::{Output, TrialSet};
-
-/// What an assignment belongs to, under the coordinator's number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum JobId {
-    Experiment(u64),
-    Evaluation(u64),
-}
 
 /// An item given to this worker: one genotype and the trials to run it on.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,13 +54,4 @@ pub(crate) struct ItemResult {
     pub(crate) outcome: Result<Vec<f64>, String>,
     /// Time that the computation took.
     pub(crate) duration: Duration,
-}
-
-impl fmt::Display for JobId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Experiment(id) => write!(f, "experiment {id}"),
-            Self::Evaluation(id) => write!(f, "evaluation {id}"),
-        }
-    }
 }

@@ -4,7 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use evolution::Distribution;
-use experiment_file::limits;
+use model::{codec, ids::JobId};
 use sim_core::{Isa, Output, SpecifiedSimulation, TrialSet};
 use swarm_proto::{
     PROTOCOL_VERSION,
@@ -13,7 +13,7 @@ use swarm_proto::{
 
 use crate::{
     WorkerConfig,
-    assignment::{Assignment, Genotype, ItemResult, JobId},
+    assignment::{Assignment, Genotype, ItemResult},
     pool::Evaluator,
     stats::Stats,
 };
@@ -55,46 +55,13 @@ pub(crate) struct Common {
     output: Output,
 }
 
-/// Reads a job's id; none if it is of a kind that this version does not know.
-pub(crate) fn job(job: Option<v1::JobId>) -> Option<JobId> {
-    Some(match job?.job? {
-        v1::job_id::Job::Experiment(id) => JobId::Experiment(id),
-        v1::job_id::Job::Evaluation(id) => JobId::Evaluation(id),
-    })
-}
-
 /// Reads what assignments have in common, or says what is wrong with it.
 pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
-    let job = job(assignments.job).ok_or("the assignment names no job")?;
-    let trial_set = assignments.trial_set.and_then(|set| set.trial_set);
-    let trial_set = match trial_set.ok_or("the assignment names no trial set")? {
-        v1::trial_set::TrialSet::Generation(generation) => {
-            TrialSet::Generation(checked_generation(generation)?)
-        }
-        v1::trial_set::TrialSet::HeldOut(v1::HeldOutTrials { generation, block }) => {
-            TrialSet::HeldOut {
-                generation: checked_generation(generation)?,
-                block: u8::try_from(block).map_err(|_| format!("there is no block {block}"))?,
-            }
-        }
-        v1::trial_set::TrialSet::Judgement(generation) => {
-            TrialSet::Judgement(checked_generation(generation)?)
-        }
-        v1::trial_set::TrialSet::Evaluation(_) => TrialSet::Evaluation,
-    };
-    let output = match assignments.output() {
-        v1::Output::Fitness => Output::Fitness,
-        v1::Output::Measures => Output::Measures,
-        v1::Output::Unspecified => return Err("the assignment names no output".into()),
-    };
+    let job = codec::read_job(assignments.job).ok_or("the assignment names no job")?;
+    let trial_set = codec::read_trial_set(assignments.trial_set)?;
+    let output = codec::read_output(assignments.output());
+    let output = output.ok_or("the assignment names no output")?;
     Ok(Common { job, trial_set, output })
-}
-
-fn checked_generation(generation: u64) -> Result<u64, String> {
-    if generation > limits::GENERATIONS {
-        return Err(format!("there is no generation {generation}"));
-    }
-    Ok(generation)
 }
 
 /// Reads an assignment, or fails it: the coordinator is not trusted to be right.

@@ -4,7 +4,6 @@
 //! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
 
 mod assignment;
-mod backoff;
 mod convert;
 mod evaluators;
 mod lifetime;
@@ -19,21 +18,20 @@ use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use sim_core::Isa;
 use swarm_proto::{SLOTS_MAX, WORKER_NAME_LEN_MAX};
-use swarm_transport::{Banner, Credentials, Link, LinkError, banner};
+use swarm_transport::{Backoff, Banner, Credentials, Link, LinkError, banner};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-pub use crate::{
-    backoff::Backoff,
-    lifetime::{Expired, Lifetime, Watchdog},
-    session_file::{Unhealthy, health_check},
-    stats::{Stats, StatsSnapshot},
-};
 use crate::{
     evaluators::Evaluators,
     pool::{Evaluator, Pool},
     session::{Ended, OpenError, Session},
     session_file::SessionFile,
+};
+pub use crate::{
+    lifetime::{Expired, Lifetime, Watchdog},
+    session_file::{Unhealthy, health_check},
+    stats::{Stats, StatsSnapshot},
 };
 
 /// How to be a worker, and whose.

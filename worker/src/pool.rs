@@ -238,12 +238,14 @@ mod tests {
     use sim_core::{Output, TrialSet};
 
     use super::*;
-    use crate::assignment::{Genotype, JobId};
+    use model::ids::{ExperimentId, JobId};
+
+    use crate::assignment::Genotype;
 
     fn assignment(id: u64) -> Assignment {
         Assignment {
             id,
-            job: JobId::Experiment(id % 2),
+            job: JobId::Experiment(ExperimentId(id % 2)),
             trial_set: TrialSet::Generation(0),
             output: Output::Fitness,
             trials: 0..1,
@@ -345,7 +347,7 @@ mod tests {
             submit(&pool, queued(id, &evaluator, &reply));
         }
         assert_eq!(
-            pool.cancel(|assignment| assignment.job == JobId::Experiment(0)),
+            pool.cancel(|assignment| assignment.job == JobId::Experiment(ExperimentId(0))),
             2,
             "one runs, one waits"
         );
@@ -368,7 +370,7 @@ mod tests {
         submit(&pool, queued(2, &evaluator, &reply));
         let snapshot = stats.snapshot();
         assert_eq!((snapshot.n_slots_busy, snapshot.n_items_queued), (1, 2));
-        pool.cancel(|assignment| assignment.job == JobId::Experiment(0));
+        pool.cancel(|assignment| assignment.job == JobId::Experiment(ExperimentId(0)));
         let failing: Evaluator = Arc::new(|_, _| Err("no such robot".into()));
         submit(&pool, queued(3, &failing, &reply));
         permit.send(()).unwrap();

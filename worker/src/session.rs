@@ -8,6 +8,7 @@ use std::{
 };
 
 use evolution::Distribution;
+use model::{codec, ids::JobId};
 use swarm_proto::v1::{
     self, WorkRequest, WorkResponse, work_response::Message,
     worker_service_client::WorkerServiceClient,
@@ -28,7 +29,7 @@ use tracing::{debug, info};
 
 use crate::{
     WorkerConfig,
-    assignment::{ItemResult, JobId},
+    assignment::ItemResult,
     convert::{self, RESULTS_PER_MESSAGE_MAX},
     pool::{Evaluator, Pool, Queued, Reply},
 };
@@ -278,14 +279,14 @@ impl SessionState<'_> {
     fn on_message(&mut self, message: Message) {
         match message {
             Message::Spec(v1::JobSpec { job, config_json }) => {
-                if let Some(job) = convert::job(job) {
+                if let Some(job) = codec::read_job(job) {
                     let has_script = convert::has_script(&config_json);
                     let evaluator = (self.evaluator)(config_json);
                     self.jobs.insert(job, Job { evaluator, has_script, distribution: None });
                 }
             }
             Message::Distribution(v1::Distribution { job, distribution }) => {
-                let Some(job) = convert::job(job).and_then(|id| self.jobs.get_mut(&id)) else {
+                let Some(job) = codec::read_job(job).and_then(|id| self.jobs.get_mut(&id)) else {
                     return;
                 };
                 // Without one, the assignments that need it fail.
@@ -293,7 +294,7 @@ impl SessionState<'_> {
             }
             Message::Assignments(assignments) => self.on_assignments(assignments),
             Message::EndJob(v1::EndJob { job }) => {
-                let Some(job) = convert::job(job) else { return };
+                let Some(job) = codec::read_job(job) else { return };
                 self.jobs.remove(&job);
                 let dropped = self.pool.cancel(|assignment| assignment.job == job);
                 debug!(%job, dropped, "job ended");

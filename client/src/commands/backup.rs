@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::Args;
-use coordinator::store::{self, Backup, StoreError};
+use model::store::{self, Backup, StoreError};
 
 use super::doctor::print_inspection;
 use crate::{

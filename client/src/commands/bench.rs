@@ -14,7 +14,7 @@ use serde::Serialize;
 use sim_core::{Isa, Simulation};
 
 use crate::{
-    args::{IsaArgs, whole},
+    args::{IsaArgs, cores, whole},
     clock,
     error::Error,
     experiment_file::{ExperimentFile, Overrides},
@@ -57,7 +57,7 @@ pub fn bench(args: &BenchArgs, progress: &mut Progress) -> Result<(), Error> {
     let experiment = experiment.with_isa(isa);
     let n_cores = match args.cores {
         Some(n) => n.into(),
-        None => thread::available_parallelism().map_or(1, usize::from),
+        None => cores(),
     };
     let duration = Duration::from_secs(args.seconds.into());
     let n_trials = config.algorithm.num_evaluations;

@@ -6,14 +6,11 @@ use std::path::Path;
 use sim_core::Isa;
 use tokio_util::sync::CancellationToken;
 
-use super::{
-    RemoteCommand,
-    run::{
-        fleet::{Fleet, cores},
-        log,
-    },
+use super::{RemoteCommand, run::log};
+use crate::{
+    args::cores, connection::Connection, error::Error, local::fleet::Fleet, progress::Progress,
+    text,
 };
-use crate::{connection::Connection, error::Error, progress::Progress, text};
 
 /// Executes a command with a coordinator and workers of its own, and stops them even if it fails.
 pub async fn compute(

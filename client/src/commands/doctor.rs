@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use coordinator::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
+use model::store::{self, Fate, Finding, Inspection, Recovered, Recovery};
 use serde::Serialize;
 use swarm_telemetry::escape;
 

@@ -17,10 +17,12 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 
 use crate::{
+    args::cores,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
     experiment_file::ExperimentFile,
     json,
+    local::fleet::Fleet,
     place::{Intent, Place},
     progress::{Part, Progress},
     settings::Settings,
@@ -35,13 +37,7 @@ use self::{
     measured::Measured,
     summary::{Subject, Summary},
 };
-use super::{
-    run::{
-        fleet::{Fleet, cores},
-        log,
-    },
-    simulate::genotype::Genotype,
-};
+use super::{run::log, simulate::genotype::Genotype};
 
 /// Most conditions that are evaluated at the same time.
 const CALLS_MAX: usize = 8;

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use coordinator::Who;
 use experiment_file::limits;
+use model::Who;
 use swarm_proto::v1::{ForkPoint, GetExperimentRequest};
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use coordinator::Who;
+use model::Who;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::Remote;

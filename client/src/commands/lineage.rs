@@ -4,7 +4,7 @@ mod draw;
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
-use coordinator::Address;
+use model::Address;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 

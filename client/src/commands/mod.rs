@@ -50,6 +50,7 @@ use crate::{
     connection::Connection,
     error::Error,
     interrupt,
+    local::services::serve_referee,
     place::{Intent, Place, data_dir},
     progress::Progress,
 };
@@ -213,8 +214,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
         Command::Completions(args) => return completions::completions(args.shell, &mut progress),
         Command::Man(args) => return man::man(&args, &mut progress),
         Command::Referee => {
-            return coordinator::referee::serve_stdio()
-                .map_err(|error| Error::Internal(error.to_string()));
+            return serve_referee();
         }
         // These start a coordinator and workers, and stop them when interrupted.
         Command::Run(args) => {
@@ -267,7 +267,7 @@ async fn ask(
     result
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "local"))]
 mod one_world;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use coordinator::group;
+use model::group;
 use serde::Serialize;
 
 use crate::{

@@ -1,6 +1,5 @@
 //! `swarmctl run`: an experiment from file to champion in one process.
 
-pub mod fleet;
 pub mod log;
 
 use std::{
@@ -18,9 +17,10 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    args::{ExperimentArgs, IsaArgs, whole},
+    args::{ExperimentArgs, IsaArgs, cores, whole},
     connection::Connection,
     error::Error,
+    local::fleet::Fleet,
     place::data_dir,
     progress::Progress,
     settings::Settings,
@@ -28,7 +28,6 @@ use crate::{
     text,
 };
 
-use self::fleet::{Fleet, cores};
 use super::{
     submit::{Manner, submit_all},
     watch,

@@ -3,14 +3,19 @@
 use std::{net::SocketAddr, sync::Arc};
 
 use clap::Args;
-use coordinator::PagesArchive;
+use model::queries::Reader;
 use swarm_transport::listen_address;
 use swarm_web::Site;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
-use super::run::fleet::{login_address, random_token};
-use crate::{error::Error, place::data_dir, progress::Progress, settings::Settings};
+use crate::{
+    error::Error,
+    pages::{login_address, random_token},
+    place::data_dir,
+    progress::Progress,
+    settings::Settings,
+};
 
 /// Serve pages of the experiments in a data directory, to be looked at in a browser.
 ///
@@ -46,13 +51,13 @@ pub async fn web(
              `coordinator --web-listen`, which has tokens and TLS"
         )));
     }
-    let archive =
-        PagesArchive::open_alone(&data_dir(settings)).map_err(|error| Error::from_store(&error))?;
+    let reader =
+        Reader::open_alone(&data_dir(settings)).map_err(|error| Error::from_store(&error))?;
     let cannot = |error| Error::Input(format!("cannot listen on {listen}: {error}"));
     let listener = TcpListener::bind(listen).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     let token = random_token();
     progress.print(&login_address(address, &token))?;
-    let site = Site { archive: Arc::new(archive), control: None, token: Some(token), tls: None };
+    let site = Site { reader: Arc::new(reader), control: None, token: Some(token), tls: None };
     site.serve(listener, interrupt).await.map_err(cannot)
 }

@@ -4,6 +4,7 @@
 use std::{sync::Arc, time::Duration};
 
 use experiment_file::ExperimentConfig;
+use model::restored::restore_evolution;
 use swarm_telemetry::Histogram;
 use tokio::task;
 use tokio_util::sync::CancellationToken;
@@ -14,7 +15,7 @@ use crate::{
     engine::EvaluatedBatch,
     failpoint,
     ids::ExperimentId,
-    runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId, restore_evolution},
+    runs::{Change, CommitOutcome, Next, ReadyToCommit, Round, RunId},
     shared_store::{Retry, SharedStore, Written},
     store::{Entry, GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError},
 };

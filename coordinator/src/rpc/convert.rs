@@ -3,27 +3,20 @@
 use std::time::Duration;
 
 use sim_core::Output;
-use swarm_proto::v1::{
-    self, WorkResponse, event::Kind, item_result::Outcome, work_response::Message,
-};
+use swarm_proto::v1::{self, WorkResponse, item_result::Outcome, work_response::Message};
 use tonic::Status;
 
 use crate::{
     codec,
+    control::ControlError,
     engine::{
         Assignment, Assignments, BatchActivity, EvaluationActivity, ItemResult, ToWorker,
         WorkerStatus,
     },
     ids::AssignmentId,
     priority::Priority,
-    queries::{Address, DynamicsPage, Individuals, Lineage, Page},
-    store::{
-        Event, EventKind, ExperimentRecord, ExperimentState, Filter, GenerationRecord,
-        StoredExperiment,
-    },
     text::printable,
 };
-use evolution::{Ancestor, Champion, ChampionSource, Dynamics, HeldOut, Judged, Operator};
 
 /// What a worker is told about time.
 #[derive(Debug, Clone, Copy)]
@@ -134,251 +127,9 @@ pub fn evaluation(evaluation: EvaluationActivity) -> v1::RunningEvaluation {
     }
 }
 
-/// An experiment for clients.
-pub fn experiment(experiment: ExperimentRecord) -> v1::Experiment {
-    let summary = experiment.summary;
-    let (group, variant) = experiment
-        .membership
-        .map_or_else(Default::default, |membership| (membership.group, membership.variant));
-    v1::Experiment {
-        id: experiment.id.0,
-        name: experiment.name,
-        state: state(experiment.state).into(),
-        reason: experiment.reason,
-        generations_done: experiment.latest.as_ref().map_or(0, |latest| latest.generation + 1),
-        generations: summary.generations,
-        seed: summary.seed,
-        algorithm: summary.algorithm,
-        population_size: summary.population_size.try_into().unwrap_or(u32::MAX),
-        genotype_len: experiment.genotype_len as u32,
-        submitted_at_ms: experiment.submitted_at_ms,
-        latest: experiment.latest.map(generation),
-        champion_fitness: experiment.judged_fitness,
-        champion_selection_fitness: experiment.held_out_fitness,
-        config_digest: experiment.config_digest,
-        digest: experiment.digest,
-        priority: experiment.priority.weight(),
-        last_sequence: experiment.last_sequence,
-        simulation: experiment.fingerprint,
-        group,
-        variant,
-        forked_from: experiment.fork.map(|fork| v1::ForkOrigin {
-            experiment_id: fork.parent.0,
-            generation: fork.generation,
-            changes: fork.changes,
-        }),
-        labels: experiment.labels,
-        archived: experiment.is_archived,
-        recent_generation_ms: experiment.recent_generation_ms,
-    }
-}
-
-/// Which experiments a client wants; INVALID_ARGUMENT for a state that there is not.
-pub fn filter(request: v1::ListExperimentsRequest) -> Result<Filter, Status> {
-    let states = request.states().map(stored_state).collect::<Result<_, _>>()?;
-    let v1::ListExperimentsRequest {
-        named,
-        labels,
-        without_archived,
-        config_digest,
-        after,
-        page_size,
-        ..
-    } = request;
-    let some = |text: String| (!text.is_empty()).then_some(text);
-    let label = |label: String| match label.split_once('=') {
-        Some((key, value)) => (key.to_owned(), Some(value.to_owned())),
-        None => (label, None),
-    };
-    Ok(Filter {
-        named: some(named),
-        states,
-        labels: labels.into_iter().map(label).collect(),
-        without_archived,
-        config_digest: some(config_digest),
-        after,
-        limit: (page_size > 0).then_some(page_size),
-    })
-}
-
-/// A priority from a client; INVALID_ARGUMENT beyond its range.
-pub fn priority(weight: u32) -> Result<Priority, Status> {
+/// A priority from a client, which is refused beyond its range.
+pub fn priority(weight: u32) -> Result<Priority, ControlError> {
     Priority::new(weight).ok_or_else(|| {
-        Status::invalid_argument(format!("priority is {weight}, not within 1..={}", Priority::MAX))
+        ControlError::Invalid(format!("priority is {weight}, not within 1..={}", Priority::MAX))
     })
-}
-
-/// An experiment and its file for clients.
-pub fn stored_experiment(stored: StoredExperiment) -> v1::GetExperimentResponse {
-    let StoredExperiment { record, config_json } = stored;
-    v1::GetExperimentResponse { experiment: Some(experiment(record)), config_json }
-}
-
-/// An address from a client; INVALID_ARGUMENT if it is none.
-pub fn address(text: &str) -> Result<Address, Status> {
-    text.parse()
-        .map_err(|error: crate::queries::NotAnAddress| Status::invalid_argument(error.to_string()))
-}
-
-/// Genotypes for clients.
-pub fn individuals(found: Individuals) -> v1::GetIndividualsResponse {
-    let Individuals { experiment, individuals, network_json, next } = found;
-    let network_json = network_json.unwrap_or_default();
-    let individual = |champion| individual(experiment.id.0, champion, network_json.clone());
-    v1::GetIndividualsResponse {
-        individuals: individuals.into_iter().map(individual).collect(),
-        next_individual: next,
-    }
-}
-
-/// How evolution moved, for clients.
-pub fn dynamics((generations, next_generation): DynamicsPage) -> v1::ListDynamicsResponse {
-    let generation = |(generation, of): (u64, Dynamics)| v1::GenerationDynamics {
-        generation,
-        mean_step: of.mean_step,
-        deviations: of.deviations.map_or_else(Vec::new, |deviations| deviations.to_vec()),
-        rank_correlation: of.rank_correlation,
-    };
-    let generations = generations.into_iter().map(generation).collect();
-    v1::ListDynamicsResponse { generations, next_generation }
-}
-
-/// A lineage for clients.
-pub fn lineage(Lineage(populations): Lineage) -> v1::GetLineageResponse {
-    let ancestor = |ancestor: Ancestor| v1::Ancestor {
-        generation: ancestor.generation,
-        individual: ancestor.individual,
-        fitness: ancestor.fitness,
-        operator: match ancestor.birth.as_ref().map(|birth| birth.operator) {
-            None => v1::BirthOperator::Unspecified,
-            Some(Operator::First) => v1::BirthOperator::First,
-            Some(Operator::Elite) => v1::BirthOperator::Elite,
-            Some(Operator::Copy) => v1::BirthOperator::Copy,
-            Some(Operator::Crossover) => v1::BirthOperator::Crossover,
-        }
-        .into(),
-        genes: ancestor.n_surviving as u32,
-        new_genes: ancestor.birth.as_ref().map_or(0, |birth| birth.n_new as u32),
-        parents: ancestor
-            .birth
-            .into_iter()
-            .flat_map(|birth| birth.parents)
-            .map(|(individual, genes)| v1::GenesOfParent { individual, genes: genes as u32 })
-            .collect(),
-    };
-    let population = |(population, ancestors): (String, Vec<Ancestor>)| v1::PopulationLineage {
-        population,
-        ancestors: ancestors.into_iter().map(ancestor).collect(),
-    };
-    v1::GetLineageResponse { populations: populations.into_iter().map(population).collect() }
-}
-
-/// A genotype for clients; `network_json`: empty if it is not decoded.
-pub fn individual(
-    experiment_id: u64,
-    individual: Champion,
-    network_json: String,
-) -> v1::GetChampionResponse {
-    v1::GetChampionResponse {
-        experiment_id,
-        generation: individual.generation,
-        individual: match individual.source {
-            ChampionSource::Individual(index) => Some(index),
-            ChampionSource::Mean => None,
-        },
-        fitness: individual.fitness(),
-        held_out: individual.held_out.map(held_out),
-        judged: individual.judged.map(judged),
-        trial_fitness: individual.trial_fitness,
-        genotype: individual.genotype,
-        network_json,
-    }
-}
-
-fn held_out(held_out: HeldOut) -> v1::HeldOutFitness {
-    v1::HeldOutFitness {
-        mean: held_out.mean.get(),
-        ci95: held_out.ci95.get(),
-        trials: u32::try_from(held_out.n_trials).unwrap_or(u32::MAX),
-        generation: held_out.generation,
-    }
-}
-
-fn judged(judged: Judged) -> v1::JudgedFitness {
-    let Judged { mean, low, high, n_trials, generation } = judged;
-    let [mean, low, high] = [mean, low, high].map(f64::from);
-    v1::JudgedFitness { mean, low, high, trials: n_trials, generation }
-}
-
-/// An event for clients.
-pub fn event(event: Event) -> v1::Event {
-    let kind = match event.kind {
-        EventKind::Generation(completed) => Kind::GenerationCompleted(generation(completed)),
-        EventKind::State { state: new, reason } => {
-            Kind::StateChanged(v1::StateChange { state: state(new).into(), reason })
-        }
-        EventKind::Notice(message) => Kind::Notice(v1::Notice { message }),
-    };
-    v1::Event { sequence: event.sequence, at_ms: event.at_ms, kind: Some(kind) }
-}
-
-/// A page of generations for clients.
-pub fn generations(page: Page<(u64, GenerationRecord)>) -> v1::ListGenerationsResponse {
-    v1::ListGenerationsResponse {
-        generations: page.items.into_iter().map(completed_generation).collect(),
-        next_generation: page.next.map(|(_, generation)| generation.generation),
-    }
-}
-
-/// A page of events for clients.
-pub fn events(page: Page<Event>) -> v1::ListEventsResponse {
-    v1::ListEventsResponse {
-        events: page.items.into_iter().map(event).collect(),
-        next_sequence: page.next.map(|event| event.sequence),
-    }
-}
-
-/// A completed generation for clients.
-fn completed_generation(
-    (completed_at_ms, completed): (u64, GenerationRecord),
-) -> v1::CompletedGeneration {
-    v1::CompletedGeneration { summary: Some(generation(completed)), completed_at_ms }
-}
-
-fn generation(generation: GenerationRecord) -> v1::GenerationSummary {
-    v1::GenerationSummary {
-        generation: generation.generation,
-        best: generation.statistics.best.get(),
-        mean: generation.statistics.mean.get(),
-        min: generation.statistics.min.get(),
-        standard_deviation: generation.statistics.standard_deviation.get(),
-        digest: generation.digest,
-        duration_ms: generation.duration_ms,
-        episodes: generation.episodes,
-        workers: generation.workers as u32,
-        idle_share: generation.idle_share,
-    }
-}
-
-fn stored_state(state: v1::ExperimentState) -> Result<ExperimentState, Status> {
-    Ok(match state {
-        v1::ExperimentState::Running => ExperimentState::Running,
-        v1::ExperimentState::Paused => ExperimentState::Paused,
-        v1::ExperimentState::Completed => ExperimentState::Completed,
-        v1::ExperimentState::Failed => ExperimentState::Failed,
-        v1::ExperimentState::Cancelled => ExperimentState::Cancelled,
-        v1::ExperimentState::Unspecified => {
-            return Err(Status::invalid_argument("no experiment is in the unspecified state"));
-        }
-    })
-}
-
-fn state(state: ExperimentState) -> v1::ExperimentState {
-    match state {
-        ExperimentState::Running => v1::ExperimentState::Running,
-        ExperimentState::Paused => v1::ExperimentState::Paused,
-        ExperimentState::Completed => v1::ExperimentState::Completed,
-        ExperimentState::Failed => v1::ExperimentState::Failed,
-        ExperimentState::Cancelled => v1::ExperimentState::Cancelled,
-    }
 }

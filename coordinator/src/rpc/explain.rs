@@ -13,15 +13,13 @@ use crate::{
     ids::JobId,
 };
 
-use super::convert;
-
 /// An explanation for clients.
 pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
     let Explanation { experiment, activity, shortage, notices, store_trouble, incompatible } =
         explanation;
     let rivals = activity.rivals.into_iter().filter_map(JobId::experiment);
     ExplainExperimentResponse {
-        experiment: Some(convert::experiment(experiment)),
+        experiment: Some(experiment.into()),
         round: activity.batch.and_then(round),
         workers: activity.n_workers as u32,
         workers_available: activity.n_workers_available as u32,
@@ -29,7 +27,7 @@ pub fn explanation(explanation: Explanation) -> ExplainExperimentResponse {
         withheld: activity.withheld.into_iter().map(withheld).collect(),
         questions: activity.questions.into_iter().map(question).collect(),
         rivals: rivals.map(|id| id.0).collect(),
-        notices: notices.into_iter().map(convert::event).collect(),
+        notices: notices.into_iter().map(Into::into).collect(),
         store_trouble: store_trouble.unwrap_or_default(),
         incompatible: incompatible.unwrap_or_default(),
         shortage: shortage.map(|shortage| shortage.to_string()).unwrap_or_default(),

@@ -15,7 +15,6 @@ pub use convert::WelcomeTimes;
 pub use evaluation_service::Evaluations;
 pub use experiment_service::Experiments;
 pub use fleet_service::Fleet;
-pub use pages::PagesArchive;
 pub use worker_service::{WorkerOutflow, Workers};
 
 use status::shutting_down;

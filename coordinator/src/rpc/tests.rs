@@ -2,6 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
+use model::queries::Reader;
 use rusqlite::params;
 use swarm_proto::v1::{
     ExperimentState, ListExperimentsRequest, SubmitExperimentRequest, WatchExperimentRequest,
@@ -41,7 +42,7 @@ async fn service(directory: &tempfile::TempDir) -> Experiments {
     let driver = Driver::new(store.clone(), queue, config, shutdown.clone());
     tokio::spawn(driver.run());
     let service = Experiments {
-        reconstructions: Semaphore::new(1),
+        reader: Reader::new(store.clone(), 1),
         bundles: Arc::new(Semaphore::new(1)),
         control: Control::new(events, store.clone(), u64::MAX, shutdown.clone()),
         store,

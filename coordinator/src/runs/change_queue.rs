@@ -30,6 +30,21 @@ pub struct PendingChange {
     pub requests: Vec<RequestId>,
 }
 
+/// What a client may want of an unfinished experiment.
+#[derive(Debug, Clone)]
+pub enum Request {
+    /// That it ends.
+    Cancel,
+    /// That it waits to be resumed; the text says why.
+    Pause(String),
+    /// That it goes on.
+    Resume,
+    /// That its share of the fleet is another.
+    SetPriority(Priority),
+    /// Nothing but an answer, once everything that was wanted before is stored.
+    Settle,
+}
+
 /// A change of an unfinished experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Change {

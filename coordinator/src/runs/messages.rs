@@ -141,21 +141,6 @@ pub struct RunId {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RequestId(pub u64);
 
-/// What a client may want of an unfinished experiment.
-#[derive(Debug, Clone)]
-pub enum Request {
-    /// That it ends.
-    Cancel,
-    /// That it waits to be resumed; the text says why.
-    Pause(String),
-    /// That it goes on.
-    Resume,
-    /// That its share of the fleet is another.
-    SetPriority(Priority),
-    /// Nothing but an answer, once everything that was wanted before is stored.
-    Settle,
-}
-
 /// What became of a commit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CommitOutcome {

@@ -52,11 +52,11 @@ use crate::{
     store::ExperimentState,
 };
 
-pub use change_queue::{Change, PendingChange};
+pub use change_queue::{Change, PendingChange, Request};
 pub use evaluations::Evaluation;
-pub use messages::{Command, CommitOutcome, Request, RequestId, RunId};
+pub use messages::{Command, CommitOutcome, RequestId, RunId};
 pub use round::{Next, ReadyToCommit, Round, completion, describe, describe_judgement};
-pub use runnable::{Runnable, restore_evolution};
+pub use runnable::Runnable;
 pub use stats::RunStats;
 
 use change_queue::ChangeQueue;

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use evolution::{ALGORITHMS, Checkpoint, Digest, Evolution};
+use evolution::Checkpoint;
 use experiment_file::ExperimentConfig;
+use model::restored::restore;
 
 use crate::{
     ids::ExperimentId,
     memory,
     priority::Priority,
-    store::{ExperimentRecord, ExperimentState, GenerationRecord, StoredExperiment, Summary},
+    store::{ExperimentState, GenerationRecord, StoredExperiment, Summary},
 };
 
 /// An experiment that can run. Its evolution is read from the store once there is
@@ -47,53 +48,12 @@ impl Runnable {
 
     /// An experiment as the store has it, or what contradicts what.
     pub fn restore(experiment: &StoredExperiment, checkpoint: &Checkpoint) -> Result<Self, String> {
-        let (id, config) = (experiment.id, config(experiment)?);
-        evolution(experiment, &config, checkpoint)?;
+        let (id, (config, _)) = (experiment.id, restore(experiment, checkpoint)?);
         let is_paused = experiment.state == ExperimentState::Paused;
         let latest = experiment.latest.clone();
         let new = Self::new(id, config, experiment.genotype_len, experiment.priority);
         Ok(Self { is_paused, latest, ..new })
     }
-}
-
-/// Evolution of an experiment as the store has it, or what contradicts what.
-pub fn restore_evolution(
-    experiment: &StoredExperiment,
-    checkpoint: &Checkpoint,
-) -> Result<Evolution, String> {
-    evolution(experiment, &config(experiment)?, checkpoint)
-}
-
-fn config(experiment: &StoredExperiment) -> Result<ExperimentConfig, String> {
-    let (config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)
-        .map_err(|error| format!("its configuration is not valid: {error}"))?;
-    Ok(config)
-}
-
-fn evolution(
-    experiment: &ExperimentRecord,
-    config: &ExperimentConfig,
-    checkpoint: &Checkpoint,
-) -> Result<Evolution, String> {
-    let config_digest = Digest::of_config(config, &experiment.fingerprint).to_string();
-    if config_digest != experiment.config_digest {
-        return Err(format!(
-            "its configuration has the digest {config_digest}, and not {}",
-            experiment.config_digest
-        ));
-    }
-    let evolution = Evolution::restore(checkpoint)
-        .map_err(|error| format!("its checkpoint is not valid: {error}"))?;
-    let (n_generations, link) = (experiment.n_generations(), experiment.last_link());
-    if evolution.n_generations() != n_generations || evolution.digest().to_string() != link {
-        return Err(format!(
-            "its history has {n_generations} generations and digest {link}, its checkpoint {} and \
-             {}",
-            evolution.n_generations(),
-            evolution.digest()
-        ));
-    }
-    Ok(evolution)
 }
 
 #[cfg(test)]
@@ -103,7 +63,11 @@ mod tests {
     use evolution::Statistics;
 
     use super::*;
-    use crate::{labels::Labels, store::LogGap, submission::Submission};
+    use crate::{
+        labels::Labels,
+        store::{ExperimentRecord, LogGap},
+        submission::Submission,
+    };
 
     /// A new experiment and its checkpoint.
     fn stored() -> (StoredExperiment, Checkpoint) {

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use model::queries::Reader;
 use tokio::{sync::Semaphore, task::JoinSet, time::timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::error;
@@ -102,7 +103,7 @@ impl Core {
             control: self.control.clone(),
             store: self.store.clone(),
             shutdown: self.shutdown.clone(),
-            reconstructions: Semaphore::new(RECONSTRUCTIONS_MAX),
+            reader: Reader::new(self.store.clone(), RECONSTRUCTIONS_MAX),
             bundles: Arc::new(Semaphore::new(BUNDLES_MAX)),
         }
     }

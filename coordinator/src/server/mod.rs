@@ -1,7 +1,6 @@
 //! A running coordinator: store, driver and gRPC server together.
 
 mod access;
-mod blocking;
 mod call_layer;
 pub mod calls;
 mod config;
@@ -33,7 +32,6 @@ use crate::{
 };
 
 pub use access::{Access, AccessError, Role, Tls, Tokens};
-pub use blocking::BlockingReader;
 pub use config::{CoordinatorConfig, RunError, StartError};
 pub use door::Door;
 pub use in_process::InProcess;

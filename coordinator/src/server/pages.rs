@@ -2,6 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
+use model::queries::Reader;
 use swarm_transport::{Token, server_tls};
 use swarm_web::Site;
 use tokio::{net::TcpListener, sync::watch};
@@ -9,7 +10,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::error;
 
 use super::{Access, StartError, Tls, Tokens};
-use crate::rpc::{Experiments, PagesArchive};
+use crate::rpc::Experiments;
 
 /// What is known before the database is open.
 pub struct Builder {
@@ -35,7 +36,7 @@ impl Builder {
         experiments: Experiments,
     ) -> Result<Site, StartError> {
         Ok(Site {
-            archive: Arc::new(PagesArchive::open(data_dir, news)?),
+            reader: Arc::new(Reader::open(data_dir, news)?),
             control: Some(Arc::new(experiments)),
             token: self.token,
             tls: self.tls,

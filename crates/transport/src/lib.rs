@@ -6,6 +6,7 @@
 //! model.
 
 mod address;
+mod backoff;
 mod banner;
 mod credentials;
 mod expiry;
@@ -19,6 +20,7 @@ mod tls_diagnosis;
 mod token;
 
 pub use address::listen_address;
+pub use backoff::Backoff;
 pub use banner::{Banner, banner};
 pub use credentials::{CredentialArgs, CredentialError, Credentials};
 pub use expiry::{Expiries, Expiry};

@@ -70,7 +70,7 @@ pub async fn compare(
         let why = format!("at most {SAMPLES_MAX} samples with {RUNS_MAX} runs are compared here");
         return Err(Problem::bad(why));
     }
-    let known = shared.archive.experiments().await?;
+    let known = shared.experiments().await?;
     let mut judged = Vec::new();
     let mut means = Vec::new();
     for sample in &samples {
@@ -98,7 +98,7 @@ async fn mean_of_last(shared: &Shared, run: &Experiment) -> Result<Option<f64>, 
         from_generation: run.generations_done.saturating_sub(LAST),
         page_size: LAST as u32,
     };
-    let page = shared.archive.generations(request).await?;
+    let page = shared.reader.list_generations(request).await?;
     let means = page
         .generations
         .iter()

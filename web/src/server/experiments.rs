@@ -10,9 +10,10 @@ use axum::{
 };
 use evolution::{ALGORITHMS, Operator};
 use experiment_file::{AlgorithmDescription, Keeps};
+use model::queries::Families;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use swarm_proto::v1::{ListEventsRequest, ListGenerationsRequest};
+use swarm_proto::v1::{ListDynamicsRequest, ListEventsRequest, ListGenerationsRequest};
 
 use super::{
     Shared,
@@ -38,8 +39,8 @@ pub async fn one(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
 ) -> Result<Json<Value>, Problem> {
-    let found = shared.archive.experiment(id).await?;
-    let champion = shared.archive.individual(&id.to_string()).await.ok();
+    let found = shared.experiment(id).await?;
+    let champion = shared.reader.individual(&id.to_string()).await.ok();
     let champion = champion.map(|champion| {
         let judged = champion.judged.map(|judgement| {
             json!([judgement.mean, judgement.low, judgement.high, judgement.trials])
@@ -72,7 +73,7 @@ pub async fn generations(
     Query(From { from }): Query<From>,
 ) -> Result<Json<Value>, Problem> {
     let request = ListGenerationsRequest { experiment_id: id, from_generation: from, page_size: 0 };
-    let page = shared.archive.generations(request).await?;
+    let page = shared.reader.list_generations(request).await?;
     let rows: Vec<_> = page.generations.iter().filter_map(answers::generation_row).collect();
     Ok(Json(json!({ "generations": rows, "next": page.next_generation })))
 }
@@ -85,7 +86,8 @@ pub async fn dynamics(
     Path(id): Path<u64>,
     Query(From { from }): Query<From>,
 ) -> Result<Json<Value>, Problem> {
-    let page = shared.archive.dynamics(id, from).await?;
+    let request = ListDynamicsRequest { experiment_id: id, from_generation: from };
+    let page = shared.reader.list_dynamics(request).await?;
     let rows = page.generations.iter();
     let rows = rows.map(|generation| {
         json!([
@@ -122,7 +124,11 @@ pub async fn families(
     Path(id): Path<u64>,
     Query(WantedFamilies { from, every }): Query<WantedFamilies>,
 ) -> Result<Json<Value>, Problem> {
-    let page = shared.archive.families(id, from, every).await?;
+    Ok(Json(children(&shared.reader.families(id, from, every).await?)))
+}
+
+/// Children beside their parents.
+pub fn children(page: &Families) -> Value {
     let mut rows = Vec::new();
     for (generation, families) in &page.generations {
         for (population, births) in families.births.iter().enumerate() {
@@ -141,7 +147,7 @@ pub async fn families(
             }
         }
     }
-    Ok(Json(json!({ "populations": page.populations, "children": rows, "next": page.next })))
+    json!({ "populations": page.populations, "children": rows, "next": page.next })
 }
 
 /// The name of an operator, as `swarmctl lineage` has it.
@@ -159,13 +165,13 @@ pub async fn events(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
 ) -> Result<Json<Value>, Problem> {
-    let found = shared.archive.experiment(id).await?.experiment.unwrap_or_default();
+    let found = shared.experiment(id).await?.experiment.unwrap_or_default();
     let request = ListEventsRequest {
         experiment_id: id,
         from_sequence: (found.last_sequence + 1).saturating_sub(EVENTS),
         page_size: 0,
     };
-    let events = shared.archive.events(request).await?.events;
+    let events = shared.reader.list_events(request).await?.events;
     let events: Vec<_> = events.into_iter().filter_map(answers::event).collect();
     Ok(Json(json!({ "events": events })))
 }
@@ -195,14 +201,19 @@ pub async fn fitness(
     Path(id): Path<u64>,
     Query(Wanted { from, n, every }): Query<Wanted>,
 ) -> Result<Response, Problem> {
-    let (first, fitness) = shared.archive.fitness(id, from, n.min(FITNESS_MAX)).await?;
+    let (first, fitness) = shared.reader.fitness(id, from, n.min(FITNESS_MAX)).await?;
     let fitness: Vec<Vec<f32>> = fitness.into_iter().step_by(every.get()).collect();
+    Ok(([(CONTENT_TYPE, "application/octet-stream")], packed(first, &fitness)).into_response())
+}
+
+/// Fitness in the bytes that a page reads.
+pub fn packed(first: u64, fitness: &[Vec<f32>]) -> Vec<u8> {
     let n_individuals = fitness.iter().map(Vec::len).max().unwrap_or_default();
     let head = [first as u32, fitness.len() as u32, n_individuals as u32];
     let mut body: Vec<u8> = head.iter().flat_map(|number| number.to_le_bytes()).collect();
-    for generation in &fitness {
+    for generation in fitness {
         let padding = std::iter::repeat_n(&f32::NAN, n_individuals - generation.len());
         body.extend(generation.iter().chain(padding).flat_map(|value| value.to_le_bytes()));
     }
-    Ok(([(CONTENT_TYPE, "application/octet-stream")], body).into_response())
+    body
 }

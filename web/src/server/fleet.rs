@@ -181,7 +181,7 @@ async fn fork(
     order: &Order,
 ) -> Result<Json<ExperimentAnswer>, Problem> {
     let generation = order.generation.ok_or_else(|| Problem::bad("fork needs a generation"))?;
-    let parent = shared.archive.experiment(id).await?;
+    let parent = shared.experiment(id).await?;
     let forked = control.submit(SubmitExperimentRequest {
         config_json: parent.config_json,
         seed: order.seed.map(|Seed(seed)| seed),

@@ -96,7 +96,7 @@ impl List {
     /// What is newer than the version that `mark` names; everything for one that says nothing
     /// here.
     async fn since(&self, shared: &Shared, mark: &str) -> Result<Changes, Problem> {
-        let count = *shared.archive.news().borrow();
+        let count = *shared.reader.news().borrow();
         let mut known = self.known.lock().await;
         if known.count != Some(count) {
             known.update(shared).await?;
@@ -118,7 +118,7 @@ impl List {
 
 impl Known {
     async fn update(&mut self, shared: &Shared) -> Result<(), Problem> {
-        let experiments = shared.archive.experiments().await?;
+        let experiments = shared.experiments().await?;
         let version = self.version + 1;
         for (id, row) in &mut self.rows {
             let is_there = experiments.binary_search_by_key(id, |experiment| experiment.id).is_ok();
@@ -164,7 +164,7 @@ async fn recent(shared: &Shared, id: u64, done: u64) -> Result<Vec<f32>, Problem
         from_generation: done.saturating_sub(RECENT),
         page_size: RECENT as u32,
     };
-    let page = shared.archive.generations(request).await?;
+    let page = shared.reader.list_generations(request).await?;
     let summaries = page.generations.iter().filter_map(|generation| generation.summary.as_ref());
     Ok(summaries.map(|summary| summary.best as f32).collect())
 }
@@ -193,7 +193,7 @@ pub async fn live(
     headers: HeaderMap,
 ) -> Response {
     let again = headers.get("last-event-id").and_then(|id| id.to_str().ok()).map(str::to_owned);
-    let news = shared.archive.news();
+    let news = shared.reader.news();
     let state = (shared, news, again.unwrap_or(since), Duration::ZERO);
     live::stream(futures_util::stream::unfold(state, |(shared, mut news, mark, rest)| async move {
         live::rest(&shared, rest).await?;

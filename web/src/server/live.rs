@@ -62,8 +62,8 @@ impl Latest {
         }
         let request =
             ListGenerationsRequest { experiment_id: id, from_generation: from, page_size: 0 };
-        let page = shared.archive.generations(request).await.ok()?;
-        let found = shared.archive.experiment(id).await.ok()?.experiment?;
+        let page = shared.reader.list_generations(request).await.ok()?;
+        let found = shared.experiment(id).await.ok()?.experiment?;
         let rows: Vec<_> = page.generations.iter().filter_map(answers::generation_row).collect();
         let news = Arc::new(News {
             experiment: json!(ExperimentAnswer::new(found, shared.control.is_some())).to_string(),
@@ -95,8 +95,8 @@ pub async fn generations(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let again = headers.get("last-event-id").and_then(|id| id.to_str().ok()?.parse().ok());
-    shared.archive.experiment(id).await?;
-    let news = shared.archive.news();
+    shared.experiment(id).await?;
+    let news = shared.reader.news();
     let state = (shared, news, again.unwrap_or(from), Step::Read, String::new());
     let events = futures_util::stream::unfold(state, move |state| async move {
         let (shared, mut news, mut from, mut step, mut before) = state;

@@ -24,16 +24,21 @@ use axum::{
     routing::{get, post},
 };
 use hyper::body::Incoming;
+use model::queries::Reader;
 use rustls::ServerConfig;
+use swarm_proto::v1::{
+    Experiment, GetExperimentRequest, GetExperimentResponse, ListExperimentsRequest,
+};
 use swarm_transport::{
     Token,
     listening::{Peer, serve_http},
 };
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
+use tonic::Status;
 use tower::ServiceExt as _;
 
-use crate::source::{Archive, Control};
+use crate::source::Control;
 
 use self::{
     access::Access,
@@ -49,7 +54,7 @@ use self::{
 #[derive(Clone)]
 pub struct Site {
     /// Where experiments are read.
-    pub archive: Arc<dyn Archive>,
+    pub reader: Arc<Reader>,
     /// The coordinator, if one runs.
     pub control: Option<Arc<dyn Control>>,
     /// What people have to know, if anything.
@@ -61,7 +66,7 @@ pub struct Site {
 /// What all handlers share.
 #[derive(Clone)]
 struct Shared {
-    archive: Arc<dyn Archive>,
+    reader: Arc<Reader>,
     control: Option<Arc<dyn Control>>,
     workers: Arc<LatestAnswer>,
     timeline: Arc<LatestAnswer>,
@@ -71,6 +76,18 @@ struct Shared {
     judgements: Arc<Judgements>,
     replays: Arc<Semaphore>,
     shutdown: CancellationToken,
+}
+
+impl Shared {
+    /// One experiment, with its file in canonical form.
+    async fn experiment(&self, experiment_id: u64) -> Result<GetExperimentResponse, Status> {
+        self.reader.get_experiment(GetExperimentRequest { experiment_id }).await
+    }
+
+    /// All experiments, oldest first.
+    async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
+        Ok(self.reader.list_experiments(ListExperimentsRequest::default()).await?.experiments)
+    }
 }
 
 impl Site {
@@ -90,10 +107,10 @@ impl Site {
     }
 
     fn router(self, address: SocketAddr, shutdown: CancellationToken) -> Router {
-        let Self { archive, control, token, tls } = self;
+        let Self { reader, control, token, tls } = self;
         let access = Arc::new(Access::new(token, tls.is_some(), address));
         let shared = Shared {
-            archive,
+            reader,
             control,
             workers: Arc::default(),
             timeline: Arc::default(),

@@ -58,8 +58,8 @@ impl Subject {
         let experiment = address.split('@').next().and_then(|id| id.parse().ok());
         let experiment =
             experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
-        let individual = shared.archive.individual(address).await?;
-        let found = shared.archive.experiment(experiment).await?;
+        let individual = shared.reader.individual(address).await?;
+        let found = shared.experiment(experiment).await?;
         let simulation =
             found.experiment.map(|experiment| experiment.simulation).unwrap_or_default();
         if simulation != FINGERPRINT {

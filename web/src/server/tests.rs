@@ -1,27 +1,23 @@
 //! Who is let in, and what browsers are told.
 
-use std::{num::NonZeroU64, time::Duration};
+use std::time::Duration;
 
 use axum::{
     body::{Body, to_bytes},
     http::{Request, Response, StatusCode},
 };
 use evolution::Operator;
+use model::{queries::Families, store::Store, submission::Submission};
 use serde_json::json;
-use swarm_proto::v1::{
-    Experiment, ExperimentState, GetChampionResponse, GetExperimentResponse, ListDynamicsResponse,
-    ListEventsRequest, ListEventsResponse, ListGenerationsRequest, ListGenerationsResponse,
-};
+use swarm_proto::v1::{Experiment, ExperimentState};
+use tempfile::TempDir;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpStream,
-    sync::watch,
 };
-use tonic::{Status, async_trait};
 use tower::ServiceExt as _;
 
 use super::*;
-use crate::source::Families;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
@@ -30,69 +26,25 @@ fn running() -> Experiment {
     Experiment { id: 1, name: "first".into(), state, ..Experiment::default() }
 }
 
-/// One experiment, of which nothing is known but its name and its state.
-struct OneExperiment(watch::Sender<u64>);
-
-#[async_trait]
-impl Archive for OneExperiment {
-    async fn experiments(&self) -> Result<Vec<Experiment>, Status> {
-        Ok(vec![running()])
-    }
-
-    async fn experiment(&self, id: u64) -> Result<GetExperimentResponse, Status> {
-        Err(Status::not_found(format!("there is no experiment {id}")))
-    }
-
-    async fn generations(
-        &self,
-        _: ListGenerationsRequest,
-    ) -> Result<ListGenerationsResponse, Status> {
-        Ok(ListGenerationsResponse::default())
-    }
-
-    async fn events(&self, _: ListEventsRequest) -> Result<ListEventsResponse, Status> {
-        Ok(ListEventsResponse::default())
-    }
-
-    async fn fitness(&self, _: u64, from: u64, _: u32) -> Result<(u64, Vec<Vec<f32>>), Status> {
-        Ok((from, vec![vec![0.5, 1.0], vec![2.0]]))
-    }
-
-    async fn dynamics(&self, _: u64, _: u64) -> Result<ListDynamicsResponse, Status> {
-        Ok(ListDynamicsResponse::default())
-    }
-
-    async fn families(&self, _: u64, _: u64, _: NonZeroU64) -> Result<Families, Status> {
-        let birth = |operator, parents| evolution::BirthOf { operator, parents, n_new: 1 };
-        let births = vec![
-            birth(Operator::Crossover, vec![(1, 2), (0, 3)]),
-            birth(Operator::Copy, vec![(1, 5)]),
-        ];
-        let children = vec![0.5, f64::NAN];
-        let of = evolution::Families { parents: vec![0.25, 1.5], children, births: vec![births] };
-        Ok(Families { populations: vec!["p".into()], generations: vec![(4, of)], next: 5 })
-    }
-
-    async fn individual(&self, _: &str) -> Result<GetChampionResponse, Status> {
-        Err(Status::failed_precondition("nobody yet"))
-    }
-
-    fn news(&self) -> watch::Receiver<u64> {
-        self.0.subscribe()
-    }
-}
-
-fn site(token: Option<&str>) -> Site {
-    Site {
-        archive: Arc::new(OneExperiment(watch::Sender::new(0))),
+/// Pages of a data directory with one experiment, which has no generation yet.
+fn site(token: Option<&str>) -> (TempDir, Site) {
+    let directory = tempfile::tempdir().unwrap();
+    let config_json = include_str!("../../../configs/quickstart.json").to_owned();
+    let mut new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
+    new.config.name = "first".to_owned();
+    Store::open(directory.path()).unwrap().create(&new, 0).unwrap();
+    let site = Site {
+        reader: Arc::new(Reader::open_alone(directory.path()).unwrap()),
         control: None,
         token: token.map(|token| Token::parse(token).unwrap()),
         tls: None,
-    }
+    };
+    (directory, site)
 }
 
 async fn answer(listen: &str, token: Option<&str>, request: Request<Body>) -> Response<Body> {
-    let router = site(token).router(listen.parse().unwrap(), CancellationToken::new());
+    let (_directory, site) = site(token);
+    let router = site.router(listen.parse().unwrap(), CancellationToken::new());
     router.oneshot(request).await.unwrap()
 }
 
@@ -184,7 +136,7 @@ async fn browsers_load_nothing_from_elsewhere() {
 async fn what_went_wrong_is_said_in_one_line() {
     for (path, status, part) in [
         ("/api/experiments/9", StatusCode::NOT_FOUND, "there is no experiment 9"),
-        ("/api/replay/1", StatusCode::CONFLICT, "nobody yet"),
+        ("/api/replay/1", StatusCode::CONFLICT, "has no champion yet"),
         ("/api/replay/x", StatusCode::BAD_REQUEST, "names nobody"),
         ("/api/workers", StatusCode::CONFLICT, "only a coordinator"),
         ("/api/experiments/x", StatusCode::BAD_REQUEST, "an experiment has a number"),
@@ -236,10 +188,9 @@ async fn only_where_a_coordinator_is_something_runs() {
     assert_eq!(beside_a_coordinator["state"], "running");
 }
 
-#[tokio::test]
-async fn generations_of_different_sizes_share_a_map() {
-    let map = answer(HERE, None, get("/api/experiments/1/fitness?from=7", HERE, "")).await;
-    let bytes = to_bytes(map.into_body(), 1 << 10).await.unwrap();
+#[test]
+fn generations_of_different_sizes_share_a_map() {
+    let bytes = experiments::packed(7, &[vec![0.5, 1.0], vec![2.0]]);
     let words: Vec<[u8; 4]> = bytes.chunks(4).map(|four| four.try_into().unwrap()).collect();
     assert_eq!([words[0], words[1], words[2]].map(u32::from_le_bytes), [7, 2, 2]);
     let values: Vec<f32> = words[3..].iter().map(|word| f32::from_le_bytes(*word)).collect();
@@ -247,10 +198,17 @@ async fn generations_of_different_sizes_share_a_map() {
     assert!(values[3].is_nan());
 }
 
-#[tokio::test]
-async fn children_are_beside_their_parents() {
-    let families = answer(HERE, None, get("/api/experiments/1/families?every=2", HERE, "")).await;
-    let families: serde_json::Value = serde_json::from_str(&text(families).await).unwrap();
+#[test]
+fn children_are_beside_their_parents() {
+    let birth = |operator, parents| evolution::BirthOf { operator, parents, n_new: 1 };
+    let births = vec![
+        birth(Operator::Crossover, vec![(1, 2), (0, 3)]),
+        birth(Operator::Copy, vec![(1, 5)]),
+    ];
+    let children = vec![0.5, f64::NAN];
+    let of = evolution::Families { parents: vec![0.25, 1.5], children, births: vec![births] };
+    let page = Families { populations: vec!["p".into()], generations: vec![(4, of)], next: 5 };
+    let families = experiments::children(&page);
     let children =
         json!([[4, 0, 0, "crossover", 0.5, 1, 1.5, 0, 0.25], [4, 1, 0, "copy", null, 1, 1.5]]);
     assert_eq!(families, json!({ "populations": ["p"], "children": children, "next": 5 }));
@@ -272,7 +230,8 @@ async fn idle_connections_slow_ones_and_streams_keep_nobody_out() {
     ] {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
-        let served = tokio::spawn(site(token).serve(listener, CancellationToken::new()));
+        let (_directory, site) = site(token);
+        let served = tokio::spawn(site.serve(listener, CancellationToken::new()));
         let mut open = Vec::new();
         for _ in 0..600 {
             let mut stream = TcpStream::connect(address).await.unwrap();

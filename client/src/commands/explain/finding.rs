@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt, path::Path};
 
-use coordinator::store::Holder;
+use model::store::Holder;
 use serde::Serialize;
 use swarm_proto::v1::{
     Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,

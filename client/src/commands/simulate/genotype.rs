@@ -2,8 +2,8 @@
 
 use std::{fmt, path::Path};
 
-use coordinator::Address;
 use determinism::random::{Purpose, Stream};
+use model::Address;
 use serde_json::Value;
 
 use super::{SimulateArgs, champion::Origin};

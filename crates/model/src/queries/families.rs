@@ -1,7 +1,10 @@
 //! Parents and their children, found by going through generations again.
 
-use evolution::{Checkpoint, Evolution, Families, Told};
+use std::num::NonZeroU64;
+
+use evolution::{Checkpoint, Evolution, Told};
 use experiment_file::ExperimentConfig;
+use tonic::Status;
 
 use crate::{
     ids::ExperimentId,
@@ -9,32 +12,53 @@ use crate::{
     store::{LogEntry, Store, StoredExperiment},
 };
 
-use super::{QueryError, experiment, generation::Gap, lineage::no_parents};
+use super::{QueryError, Reader, experiment, generation::Gap, lineage::no_parents};
+
+/// Parents and children of some generations.
+#[derive(Debug, Clone, Default)]
+pub struct Families {
+    /// The names of the populations.
+    pub populations: Vec<String>,
+    /// The generations by their numbers.
+    pub generations: Vec<(u64, evolution::Families)>,
+    /// The generation from which on to ask next.
+    pub next: u64,
+}
+
+impl Reader {
+    /// Parents and children of a page of generations from `from` on, of those whose number `every`
+    /// divides. Refused where individuals have no parents.
+    pub async fn families(
+        &self,
+        id: u64,
+        from: u64,
+        every: NonZeroU64,
+    ) -> Result<Families, Status> {
+        let read = move |store: &_| StoredFamilies::read(store, ExperimentId(id), from, every);
+        self.reconstruct(read, StoredFamilies::replay).await
+    }
+}
 
 /// The generations from which the families of some are computed.
 #[derive(Debug)]
-pub struct StoredFamilies {
+struct StoredFamilies {
     experiment: StoredExperiment,
     first: u64,
     /// One generation in so many is wanted, those whose number it divides.
-    every: u64,
+    every: NonZeroU64,
     /// Before the first one, and the log from the generation before that on; none if there is
     /// nothing to go through.
     stored: Option<(Checkpoint, Vec<LogEntry>)>,
 }
 
-/// The names of the populations, some generations by their numbers, and the generation from which
-/// on to ask next.
-pub type FamiliesPage = (Vec<String>, Vec<(u64, Families)>, u64);
-
 impl StoredFamilies {
     /// Reads at most a page of generations from `from` on. The first one with parents is the one
     /// after the first in the log; of a fork, after its own first one.
-    pub fn read(
+    fn read(
         store: &Store,
         id: ExperimentId,
         from: u64,
-        every: u64,
+        every: NonZeroU64,
     ) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?;
         let n_generations = experiment.n_generations();
@@ -57,7 +81,7 @@ impl StoredFamilies {
     }
 
     /// Goes through the generations again: work for a CPU.
-    pub fn replay(self) -> Result<FamiliesPage, QueryError> {
+    fn replay(self) -> Result<Families, QueryError> {
         let Self { experiment, first, every, stored } = self;
         let other = |what: String| QueryError::OtherBits {
             experiment: experiment.id,
@@ -69,7 +93,9 @@ impl StoredFamilies {
             ExperimentConfig::from_json(&experiment.config_json, "", evolution::ALGORITHMS)
                 .map_err(|error| other(error.to_string()))?;
         let populations: Vec<String> = config.algorithm.populations.keys().cloned().collect();
-        let Some((checkpoint, log)) = stored else { return Ok((populations, Vec::new(), first)) };
+        let Some((checkpoint, log)) = stored else {
+            return Ok(Families { populations, next: first, ..Families::default() });
+        };
         let mut evolution =
             Evolution::restore(&checkpoint).map_err(|error| other(error.to_string()))?;
         let told = |(_, entry): &LogEntry| {
@@ -97,6 +123,6 @@ impl StoredFamilies {
             before = told;
             next = of.generation + 1;
         }
-        Ok((populations, generations, next))
+        Ok(Families { populations, generations, next })
     }
 }

@@ -1,6 +1,8 @@
 //! How evolution moved, generation by generation, found by going through them again.
 
-use evolution::{Checkpoint, Dynamics, Evolution, Told};
+use evolution::{Checkpoint, Evolution, Told};
+use swarm_proto::v1::{GenerationDynamics, ListDynamicsRequest, ListDynamicsResponse};
+use tonic::Status;
 
 use crate::{
     ids::ExperimentId,
@@ -8,11 +10,25 @@ use crate::{
     store::{ExperimentRecord, LogEntry, Store},
 };
 
-use super::{QueryError, experiment, generation::Gap};
+use super::{QueryError, Reader, experiment, generation::Gap};
+
+impl Reader {
+    /// How a page of generations moved the distribution.
+    pub async fn list_dynamics(
+        &self,
+        request: ListDynamicsRequest,
+    ) -> Result<ListDynamicsResponse, Status> {
+        let ListDynamicsRequest { experiment_id, from_generation } = request;
+        let read = move |store: &_| {
+            StoredDynamics::read(store, ExperimentId(experiment_id), from_generation)
+        };
+        self.reconstruct(read, StoredDynamics::replay).await
+    }
+}
 
 /// What the dynamics of some generations are computed from.
 #[derive(Debug)]
-pub struct StoredDynamics {
+struct StoredDynamics {
     experiment: ExperimentRecord,
     first: u64,
     /// Before the first one.
@@ -20,14 +36,10 @@ pub struct StoredDynamics {
     log: Vec<LogEntry>,
 }
 
-/// What some generations did, by their numbers; and the number of the next one, if there are
-/// more.
-pub type DynamicsPage = (Vec<(u64, Dynamics)>, Option<u64>);
-
 impl StoredDynamics {
     /// Reads what is needed of at most a page of generations from `from` on; of a fork, from
     /// its own first one on.
-    pub fn read(store: &Store, id: ExperimentId, from: u64) -> Result<Self, QueryError> {
+    fn read(store: &Store, id: ExperimentId, from: u64) -> Result<Self, QueryError> {
         let experiment = experiment(store, id)?.record;
         let n_generations = experiment.n_generations();
         let own = experiment.fork.as_ref().map_or(0, |fork| fork.generation + 1);
@@ -47,9 +59,9 @@ impl StoredDynamics {
     }
 
     /// Goes through the generations again: work for a CPU.
-    pub fn replay(self) -> Result<DynamicsPage, QueryError> {
+    fn replay(self) -> Result<ListDynamicsResponse, QueryError> {
         let Self { experiment, first, checkpoint, log } = self;
-        let Some(checkpoint) = checkpoint else { return Ok((Vec::new(), None)) };
+        let Some(checkpoint) = checkpoint else { return Ok(ListDynamicsResponse::default()) };
         let other = |what: String| QueryError::OtherBits {
             experiment: experiment.id,
             generation: first,
@@ -68,9 +80,17 @@ impl StoredDynamics {
                     found.digest, of.digest
                 )));
             }
-            generations.push((of.generation, found));
+            generations.push(GenerationDynamics {
+                generation: of.generation,
+                mean_step: found.mean_step,
+                deviations: found
+                    .deviations
+                    .map_or_else(Vec::new, |deviations| deviations.to_vec()),
+                rank_correlation: found.rank_correlation,
+            });
         }
         let next = first + log.len() as u64;
-        Ok((generations, (next < experiment.n_generations()).then_some(next)))
+        let next_generation = (next < experiment.n_generations()).then_some(next);
+        Ok(ListDynamicsResponse { generations, next_generation })
     }
 }

@@ -3,17 +3,54 @@
 use evolution::{ALGORITHMS, Champion, ChampionSource, Genotype};
 use experiment_file::ExperimentConfig;
 use sim_core::Simulation;
+use swarm_proto::v1::{
+    GetChampionRequest, GetChampionResponse, GetIndividualsRequest, GetIndividualsResponse,
+};
+use tonic::Status;
 
 use crate::{
+    Address, Who,
     limits::{INDIVIDUALS_LEN_MAX, PAGE_LEN_MAX},
     store::{Store, StoredExperiment},
+    wire,
 };
 
-use super::{Address, QueryError, StoredGeneration, Who, experiment, generation::Replayed};
+use super::{QueryError, Reader, StoredGeneration, address, experiment, generation::Replayed};
+
+impl Reader {
+    /// The champion of an experiment.
+    pub async fn get_champion(
+        &self,
+        request: GetChampionRequest,
+    ) -> Result<GetChampionResponse, Status> {
+        self.individual(&request.experiment_id.to_string()).await
+    }
+
+    /// The genotype at an address that names a single one.
+    pub async fn individual(&self, address: &str) -> Result<GetChampionResponse, Status> {
+        let request =
+            GetIndividualsRequest { address: address.into(), ..GetIndividualsRequest::default() };
+        let found = self.get_individuals(request).await?.individuals.pop();
+        found.ok_or_else(|| Status::invalid_argument(format!("`{address}` is nobody")))
+    }
+
+    /// Genotypes, computed again if need be.
+    pub async fn get_individuals(
+        &self,
+        request: GetIndividualsRequest,
+    ) -> Result<GetIndividualsResponse, Status> {
+        let GetIndividualsRequest { address: text, from_individual, page_size, fitness_only } =
+            request;
+        let address = address(&text)?;
+        let page = Several { first: from_individual, len: page_size, fitness_only };
+        let read = move |store: &_| StoredIndividuals::read(store, address, page);
+        self.reconstruct(read, StoredIndividuals::reconstruct).await
+    }
+}
 
 /// Genotypes as the store has them.
 #[derive(Debug)]
-pub enum StoredIndividuals {
+enum StoredIndividuals {
     /// A champion.
     Champion(StoredExperiment, Champion),
     /// Some of a generation.
@@ -21,19 +58,19 @@ pub enum StoredIndividuals {
 }
 
 /// Which individuals of a whole generation.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Several {
+#[derive(Debug, Clone, Copy)]
+struct Several {
     /// The index of the first.
-    pub first: u32,
+    first: u32,
     /// How many at most; 0: as many as possible.
-    pub len: u32,
+    len: u32,
     /// Whether their genotypes stay empty.
-    pub fitness_only: bool,
+    fitness_only: bool,
 }
 
 /// Whom of a generation.
 #[derive(Debug, Clone, Copy)]
-pub enum Wanted {
+enum Wanted {
     /// Some of all.
     Page(Several),
     /// The one of this index.
@@ -42,23 +79,9 @@ pub enum Wanted {
     Mean,
 }
 
-/// Genotypes, and what is known of them.
-#[derive(Debug)]
-pub struct Individuals {
-    /// Their experiment.
-    pub experiment: StoredExperiment,
-    /// In the order of their indices.
-    pub individuals: Vec<Champion>,
-    /// The network that the genotype of a single one encodes, as JSON; none if another
-    /// version of the simulation computed the experiment.
-    pub network_json: Option<String>,
-    /// The index of the next individual of the generation, if there are more.
-    pub next: Option<u32>,
-}
-
 impl StoredIndividuals {
     /// Reads what there is to know of those at an address; of a whole generation, a page.
-    pub fn read(store: &Store, address: Address, page: Several) -> Result<Self, QueryError> {
+    fn read(store: &Store, address: Address, page: Several) -> Result<Self, QueryError> {
         let id = address.experiment;
         let (generation, wanted) = match address.who {
             Who::Champion => {
@@ -73,9 +96,10 @@ impl StoredIndividuals {
         Ok(Self::OfGeneration(StoredGeneration::read(store, id, generation)?, wanted))
     }
 
-    /// Computes the generation again, and decodes a single genotype: work for a CPU.
-    pub fn reconstruct(self) -> Result<Individuals, QueryError> {
-        let (experiment, individuals, next, is_single) = match self {
+    /// Computes the generation again, and decodes a single genotype unless another version of the
+    /// simulation computed the experiment: work for a CPU.
+    fn reconstruct(self) -> Result<GetIndividualsResponse, QueryError> {
+        let (experiment, individuals, next_individual, is_single) = match self {
             Self::Champion(experiment, champion) => (experiment, vec![champion], None, true),
             Self::OfGeneration(stored, wanted) => {
                 let (individuals, next) = individuals(&stored, wanted)?;
@@ -86,11 +110,14 @@ impl StoredIndividuals {
         let network_json = match &individuals[..] {
             [only] if is_single && experiment.fingerprint == sim_core::FINGERPRINT => {
                 let network = network_json(&experiment.config_json, &only.genotype);
-                Some(network.map_err(QueryError::Undecodable)?)
+                network.map_err(QueryError::Undecodable)?
             }
-            _ => None,
+            _ => String::new(),
         };
-        Ok(Individuals { experiment, individuals, network_json, next })
+        let id = experiment.id.0;
+        let individual = |champion| wire::individual(id, champion, network_json.clone());
+        let individuals = individuals.into_iter().map(individual).collect();
+        Ok(GetIndividualsResponse { individuals, next_individual })
     }
 }
 

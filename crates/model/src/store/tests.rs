@@ -10,7 +10,7 @@ use evolution::{
 use super::*;
 
 pub fn new_experiment(request_id: Option<&str>) -> NewExperiment {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/quickstart.json");
     let submission = Submission {
         request_id: request_id.map(str::to_owned),
         config_json: fs::read_to_string(path).unwrap(),

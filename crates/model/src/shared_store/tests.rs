@@ -19,7 +19,7 @@ fn shared() -> (tempfile::TempDir, SharedStore) {
 }
 
 fn new_experiment() -> NewExperiment {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/quickstart.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/quickstart.json");
     let config_json = fs::read_to_string(path).unwrap();
     let new = Submission { config_json, ..Submission::default() }.check(&|| true).unwrap().new;
     // More than fits into what an empty database has reserved.

@@ -1,18 +1,35 @@
 //! Whom an individual descends from, found by going through its generations again.
 
-use evolution::{Ancestor, Checkpoint, Evolution, Pedigree, Told};
+use evolution::{Ancestor, Checkpoint, Evolution, Operator, Pedigree, Told};
 use experiment_file::ExperimentConfig;
+use swarm_proto::v1::{
+    self, BirthOperator, GenesOfParent, GetLineageRequest, GetLineageResponse, PopulationLineage,
+};
+use tonic::Status;
 
 use crate::{
+    Address, Who,
     limits::{ANCESTORS_MAX, LINEAGE_GENES_MAX},
     store::{LogEntry, Store, StoredExperiment},
 };
 
-use super::{Address, QueryError, Who, experiment, generation::check_in_log};
+use super::{QueryError, Reader, address, experiment, generation::check_in_log};
+
+impl Reader {
+    /// Whom an individual descends from.
+    pub async fn get_lineage(
+        &self,
+        request: GetLineageRequest,
+    ) -> Result<GetLineageResponse, Status> {
+        let (address, depth) = (address(&request.address)?, request.depth);
+        let read = move |store: &_| StoredLineage::read(store, address, depth);
+        self.reconstruct(read, StoredLineage::trace).await
+    }
+}
 
 /// What a lineage is computed from.
 #[derive(Debug)]
-pub struct StoredLineage {
+struct StoredLineage {
     experiment: StoredExperiment,
     individual: u32,
     /// Of the earliest generation.
@@ -22,15 +39,10 @@ pub struct StoredLineage {
     log: Vec<LogEntry>,
 }
 
-/// The lineage of an individual: per population its name, and the individual with its ancestors,
-/// later generations first. Populations descend on their own.
-#[derive(Debug)]
-pub struct Lineage(pub Vec<(String, Vec<Ancestor>)>);
-
 impl StoredLineage {
     /// Reads what the lineage of an individual is computed from. `depth`: generations before
     /// its own.
-    pub fn read(store: &Store, address: Address, depth: u32) -> Result<Self, QueryError> {
+    fn read(store: &Store, address: Address, depth: u32) -> Result<Self, QueryError> {
         let id = address.experiment;
         let Who::Individual(generation, individual) = address.who else {
             return Err(QueryError::NoLineage(format!(
@@ -46,8 +58,9 @@ impl StoredLineage {
         Ok(Self { experiment, individual, checkpoint, first, log })
     }
 
-    /// Goes through the generations again: work for a CPU.
-    pub fn trace(self) -> Result<Lineage, QueryError> {
+    /// Goes through the generations again: work for a CPU. Populations descend on their own; later
+    /// generations come first.
+    fn trace(self) -> Result<GetLineageResponse, QueryError> {
         let Self { experiment, individual, checkpoint, first, log } = self;
         let (id, generation) = (experiment.id, first + log.len() as u64 - 1);
         let other = |what: String| QueryError::OtherBits {
@@ -95,7 +108,35 @@ impl StoredLineage {
         if populations.iter().map(|(_, ancestors)| ancestors.len()).sum::<usize>() > ANCESTORS_MAX {
             return Err(too_deep());
         }
-        Ok(Lineage(populations))
+        let lineage = |(population, ancestors): (String, Vec<Ancestor>)| PopulationLineage {
+            population,
+            ancestors: ancestors.into_iter().map(ancestor).collect(),
+        };
+        Ok(GetLineageResponse { populations: populations.into_iter().map(lineage).collect() })
+    }
+}
+
+fn ancestor(ancestor: Ancestor) -> v1::Ancestor {
+    v1::Ancestor {
+        generation: ancestor.generation,
+        individual: ancestor.individual,
+        fitness: ancestor.fitness,
+        operator: match ancestor.birth.as_ref().map(|birth| birth.operator) {
+            None => BirthOperator::Unspecified,
+            Some(Operator::First) => BirthOperator::First,
+            Some(Operator::Elite) => BirthOperator::Elite,
+            Some(Operator::Copy) => BirthOperator::Copy,
+            Some(Operator::Crossover) => BirthOperator::Crossover,
+        }
+        .into(),
+        genes: ancestor.n_surviving as u32,
+        new_genes: ancestor.birth.as_ref().map_or(0, |birth| birth.n_new as u32),
+        parents: ancestor
+            .birth
+            .into_iter()
+            .flat_map(|birth| birth.parents)
+            .map(|(individual, genes)| GenesOfParent { individual, genes: genes as u32 })
+            .collect(),
     }
 }
 

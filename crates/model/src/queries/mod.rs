@@ -1,11 +1,10 @@
-//! Everything that is read: what there is to know of experiments, as core types.
+//! Everything that is read: what there is to know of experiments, in the messages of clients.
 //!
 //! Queries work on the store alone, so they need no running driver and cannot slow
-//! one down. The gRPC services convert what they return; a page or a program that
-//! reads a database can use the same.
+//! one down.
 
-mod address;
 mod bundle;
+mod calls;
 mod dynamics;
 mod explanation;
 mod families;
@@ -13,25 +12,22 @@ mod fitness;
 mod generation;
 mod individuals;
 mod lineage;
-mod pages;
-mod watch;
+mod reader;
+
+use tonic::Status;
 
 use crate::{
+    Address, NotAnAddress,
     ids::ExperimentId,
     store::{Store, StoreError, StoredExperiment},
 };
 
-pub use address::{Address, NotAnAddress, Who};
 pub use bundle::bundle;
-pub use dynamics::{DynamicsPage, StoredDynamics};
 pub use explanation::{incompatibility, latest_notices};
-pub use families::StoredFamilies;
-pub use fitness::fitness;
+pub use families::Families;
+use fitness::fitness;
 pub use generation::{Gap, StoredGeneration};
-pub use individuals::{Individuals, Several, StoredIndividuals};
-pub use lineage::{Lineage, StoredLineage};
-pub use pages::{Page, events, generations};
-pub use watch::{WatchError, watch};
+pub use reader::{BlockingReader, Reader};
 
 /// Why a query has no answer.
 #[derive(Debug, thiserror::Error)]
@@ -128,6 +124,11 @@ pub enum QueryError {
     /// The store cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
+}
+
+/// An address from a client; INVALID_ARGUMENT if it is none.
+fn address(text: &str) -> Result<Address, Status> {
+    text.parse().map_err(|error: NotAnAddress| Status::invalid_argument(error.to_string()))
 }
 
 /// Reads one experiment.

@@ -14,7 +14,7 @@ use super::{
     log::{self, SoundLog},
     source::Source,
 };
-use crate::{ids::ExperimentId, runs::restore_evolution};
+use crate::{ids::ExperimentId, restored::restore_evolution};
 
 /// What there is of an experiment. A part that is none is damaged.
 #[derive(Debug)]

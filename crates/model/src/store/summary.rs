@@ -85,7 +85,7 @@ mod tests {
     fn the_database_and_the_file_say_the_same_and_all_digits_of_a_seed() {
         let directory = tempfile::tempdir().unwrap();
         let mut store = Store::open(directory.path()).unwrap();
-        let config_json = include_str!("../../../configs/quickstart.json").to_owned();
+        let config_json = include_str!("../../../../configs/quickstart.json").to_owned();
         for seed in [7, (1 << 53) + 1, u64::MAX] {
             let config_json = config_json.clone();
             let submission = Submission { config_json, seed: Some(seed), ..Submission::default() };

@@ -11,7 +11,7 @@ use super::{
     *,
 };
 use crate::{
-    runs::restore_evolution,
+    restored::restore_evolution,
     store::{Filter, Store},
 };
 

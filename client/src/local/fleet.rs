@@ -4,7 +4,6 @@
 use std::{
     net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
-    thread,
 };
 
 use coordinator::{Access, Coordinator, CoordinatorConfig, RunError, Tokens};
@@ -15,7 +14,12 @@ use tokio::{task::JoinSet, time::timeout};
 use tokio_util::sync::CancellationToken;
 use worker::{FINISHING_TIME, WorkerConfig, WorkerError};
 
-use crate::{connection::Connection, error::Error, progress::Progress};
+use crate::{
+    connection::Connection,
+    error::Error,
+    pages::{login_address, random_token},
+    progress::Progress,
+};
 
 /// A running fleet; [`Fleet::shutdown`] ends it in order.
 pub struct Fleet {
@@ -134,25 +138,8 @@ impl Fleet {
     }
 }
 
-/// As many workers as this machine has cores.
-pub fn cores() -> usize {
-    thread::available_parallelism().map_or(1, Into::into)
-}
-
 fn credentials(token: &Token) -> Credentials {
     Credentials { token: Some(token.clone()), ..Credentials::default() }
-}
-
-/// The address that logs a browser in. What follows `#` is not sent to anybody: a script of
-/// the page reads it.
-pub fn login_address(pages: SocketAddr, token: &Token) -> String {
-    format!("http://{pages}/login#{}", token.reveal())
-}
-
-/// 256 bits from the system's source of randomness.
-pub fn random_token() -> Token {
-    let [high, low]: [u128; 2] = rand::random();
-    Token::parse(&format!("{high:032x}{low:032x}")).expect("hexadecimal digits are fit for a token")
 }
 
 #[cfg(test)]

@@ -1,0 +1,25 @@
+//! The services of a coordinator in this process.
+
+use coordinator::StartError;
+pub use coordinator::{Door, InProcess};
+
+use crate::error::Error;
+
+impl From<StartError> for Error {
+    fn from(error: StartError) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+/// The error of opening a data directory to ask it.
+pub fn refused(error: StartError) -> Error {
+    match error {
+        StartError::Store(error) => Error::from_store(&error),
+        error => error.into(),
+    }
+}
+
+/// Evaluates items for the coordinator that has started this process, until standard input ends.
+pub fn serve_referee() -> Result<(), Error> {
+    coordinator::referee::serve_stdio().map_err(|error| Error::Internal(error.to_string()))
+}

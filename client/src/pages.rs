@@ -1,0 +1,17 @@
+//! How a browser is let in to pages that this process serves.
+
+use std::net::SocketAddr;
+
+use swarm_transport::Token;
+
+/// The address that logs a browser in. What follows `#` is not sent to anybody: a script of
+/// the page reads it.
+pub fn login_address(pages: SocketAddr, token: &Token) -> String {
+    format!("http://{pages}/login#{}", token.reveal())
+}
+
+/// 256 bits from the system's source of randomness.
+pub fn random_token() -> Token {
+    let [high, low]: [u128; 2] = rand::random();
+    Token::parse(&format!("{high:032x}{low:032x}")).expect("hexadecimal digits are fit for a token")
+}

@@ -1,0 +1,137 @@
+//! The calls that only read, and those of them that read rows: experiments, and what has happened
+//! to them, page by page.
+
+use swarm_proto::v1::{
+    CompletedGeneration, GetExperimentRequest, GetExperimentResponse, ListEventsRequest,
+    ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse, ListGenerationsRequest,
+    ListGenerationsResponse,
+};
+use tonic::Status;
+
+use crate::{
+    ids::ExperimentId,
+    limits::PAGE_LEN_MAX,
+    store::{Filter, GenerationRecord},
+};
+
+use super::{Reader, experiment};
+
+/// Passes all reading calls of `ExperimentService` to a macro, before what else it gets. Each is a
+/// method of [`Reader`], from request to response.
+#[macro_export]
+macro_rules! reading_calls {
+    ($then:ident $($rest:tt)*) => {
+        $then! {
+            reads {
+                get_experiment(GetExperimentRequest) -> GetExperimentResponse;
+                list_experiments(ListExperimentsRequest) -> ListExperimentsResponse;
+                list_generations(ListGenerationsRequest) -> ListGenerationsResponse;
+                list_events(ListEventsRequest) -> ListEventsResponse;
+                get_champion(GetChampionRequest) -> GetChampionResponse;
+                get_individuals(GetIndividualsRequest) -> GetIndividualsResponse;
+                get_lineage(GetLineageRequest) -> GetLineageResponse;
+                list_dynamics(ListDynamicsRequest) -> ListDynamicsResponse;
+            }
+            $($rest)*
+        }
+    };
+}
+
+impl Reader {
+    /// One experiment, with its file in canonical form.
+    pub async fn get_experiment(
+        &self,
+        request: GetExperimentRequest,
+    ) -> Result<GetExperimentResponse, Status> {
+        let id = ExperimentId(request.experiment_id);
+        Ok(self.read(move |store| experiment(store, id)).await?.into())
+    }
+
+    /// The experiments that a client wants, oldest first.
+    pub async fn list_experiments(
+        &self,
+        request: ListExperimentsRequest,
+    ) -> Result<ListExperimentsResponse, Status> {
+        let filter = filter(request)?;
+        let found = self.read(move |store| Ok(store.experiments(&filter)?)).await?;
+        Ok(ListExperimentsResponse { experiments: found.into_iter().map(Into::into).collect() })
+    }
+
+    /// Completed generations, oldest first.
+    pub async fn list_generations(
+        &self,
+        request: ListGenerationsRequest,
+    ) -> Result<ListGenerationsResponse, Status> {
+        let ListGenerationsRequest { experiment_id, from_generation, page_size } = request;
+        let (id, len) = (ExperimentId(experiment_id), page_len(page_size));
+        let read = self.read(move |store| {
+            experiment(store, id)?;
+            Ok(store.generations(id, from_generation, len + 1)?)
+        });
+        let (generations, next) = split(read.await?, len);
+        let completed = |(completed_at_ms, generation): (u64, GenerationRecord)| {
+            CompletedGeneration { summary: Some(generation.into()), completed_at_ms }
+        };
+        Ok(ListGenerationsResponse {
+            generations: generations.into_iter().map(completed).collect(),
+            next_generation: next.map(|(_, generation)| generation.generation),
+        })
+    }
+
+    /// Events, oldest first.
+    pub async fn list_events(
+        &self,
+        request: ListEventsRequest,
+    ) -> Result<ListEventsResponse, Status> {
+        let ListEventsRequest { experiment_id, from_sequence, page_size } = request;
+        let (id, len) = (ExperimentId(experiment_id), page_len(page_size));
+        let read = self.read(move |store| {
+            experiment(store, id)?;
+            Ok(store.events(id, from_sequence, len + 1)?)
+        });
+        let (events, next) = split(read.await?, len);
+        Ok(ListEventsResponse {
+            events: events.into_iter().map(Into::into).collect(),
+            next_sequence: next.map(|event| event.sequence),
+        })
+    }
+}
+
+/// Which experiments a client wants; INVALID_ARGUMENT for a state that there is not.
+fn filter(request: ListExperimentsRequest) -> Result<Filter, Status> {
+    let states = request.states().map(TryInto::try_into).collect::<Result<_, _>>()?;
+    let ListExperimentsRequest {
+        named,
+        labels,
+        without_archived,
+        config_digest,
+        after,
+        page_size,
+        ..
+    } = request;
+    let some = |text: String| (!text.is_empty()).then_some(text);
+    let label = |label: String| match label.split_once('=') {
+        Some((key, value)) => (key.to_owned(), Some(value.to_owned())),
+        None => (label, None),
+    };
+    Ok(Filter {
+        named: some(named),
+        states,
+        labels: labels.into_iter().map(label).collect(),
+        without_archived,
+        config_digest: some(config_digest),
+        after,
+        limit: (page_size > 0).then_some(page_size),
+    })
+}
+
+/// Items of a page; 0 asks for as many as possible.
+fn page_len(page_size: u32) -> u32 {
+    if page_size == 0 { PAGE_LEN_MAX } else { page_size.min(PAGE_LEN_MAX) }
+}
+
+/// A page, and the first item after it, if there is one.
+fn split<T>(mut items: Vec<T>, page_len: u32) -> (Vec<T>, Option<T>) {
+    let rest = items.split_off((page_len as usize).min(items.len()));
+    (items, rest.into_iter().next())
+}

@@ -1,0 +1,142 @@
+//! The calls of clients that only read, on a database.
+
+use std::{io, path::Path, time::Duration};
+
+use prost::Message;
+use swarm_proto::v1;
+use tokio::{
+    runtime::{Builder, Runtime},
+    sync::{Semaphore, watch},
+    task,
+};
+use tonic::Status;
+
+use crate::{
+    ids::ExperimentId,
+    limits::RECONSTRUCTIONS_OF_PAGES_MAX,
+    shared_store::SharedStore,
+    store::{Store, StoreError},
+};
+
+use super::{QueryError, fitness};
+
+/// How often a data directory is looked at that somebody else may write to.
+const LOOK_EVERY: Duration = Duration::from_secs(2);
+
+/// Answers the reading calls of `ExperimentService`.
+#[derive(Debug)]
+pub struct Reader {
+    store: SharedStore,
+    /// One for each generation that is computed again.
+    reconstructions: Semaphore,
+    news: watch::Receiver<u64>,
+}
+
+impl Reader {
+    /// On a store. `n_reconstructions`: generations that are computed again at the same time.
+    pub fn new(store: SharedStore, n_reconstructions: usize) -> Self {
+        let news = store.news();
+        Self { store, reconstructions: Semaphore::new(n_reconstructions), news }
+    }
+
+    /// On a connection of its own to the database in `directory`, which writes nothing; `news`
+    /// changes when something has been written.
+    pub fn open(directory: &Path, news: watch::Receiver<u64>) -> Result<Self, StoreError> {
+        Ok(Self { news, ..Self::beside(directory)? })
+    }
+
+    /// On the database in `directory`, to which another program may write; looks for news now and
+    /// then.
+    pub fn open_alone(directory: &Path) -> Result<Self, StoreError> {
+        let this = Self::beside(directory)?;
+        this.store.look_every(LOOK_EVERY);
+        Ok(this)
+    }
+
+    fn beside(directory: &Path) -> Result<Self, StoreError> {
+        let store = SharedStore::new(Store::open_read_only(directory)?);
+        Ok(Self::new(store, RECONSTRUCTIONS_OF_PAGES_MAX))
+    }
+
+    /// Changes when something may have been stored.
+    pub fn news(&self) -> watch::Receiver<u64> {
+        self.news.clone()
+    }
+
+    /// Mean fitness over the trials, `[generation][individual]`, of at most `n` generations
+    /// from the first one on that the fitness log has, but not before `from`; and the number
+    /// of that one.
+    pub async fn fitness(
+        &self,
+        id: u64,
+        from: u64,
+        n: u32,
+    ) -> Result<(u64, Vec<Vec<f32>>), Status> {
+        self.read(move |store| fitness(store, ExperimentId(id), from, n)).await
+    }
+
+    /// Reads.
+    pub(super) async fn read<T: Send + 'static>(
+        &self,
+        query: impl FnOnce(&Store) -> Result<T, QueryError> + Send + 'static,
+    ) -> Result<T, Status> {
+        Ok(self.store.read(query).await?)
+    }
+
+    /// Reads, and then computes something of it again: work for a CPU, of which there is little at
+    /// the same time.
+    pub(super) async fn reconstruct<S: Send + 'static, T: Send + 'static>(
+        &self,
+        query: impl FnOnce(&Store) -> Result<S, QueryError> + Send + 'static,
+        compute: impl FnOnce(S) -> Result<T, QueryError> + Send + 'static,
+    ) -> Result<T, Status> {
+        let permit = self.reconstructions.acquire().await;
+        let _permit = permit.expect("nobody closes the semaphore");
+        let stored = self.store.read(query).await?;
+        let computed = task::spawn_blocking(move || compute(stored)).await;
+        let panicked = |_| Status::internal("evolution panicked; please report this");
+        Ok(computed.map_err(panicked)??)
+    }
+}
+
+macro_rules! calls {
+    (reads { $($name:ident($request:ident) -> $response:ident;)* }) => {
+        impl Reader {
+            /// A call by its name: request and response as they travel.
+            pub async fn call(&self, name: &str, request: &[u8]) -> Result<Vec<u8>, Status> {
+                $(
+                    if stringify!($request).strip_suffix("Request") == Some(name) {
+                        let request = v1::$request::decode(request)
+                            .map_err(|error| Status::invalid_argument(error.to_string()))?;
+                        return Ok(self.$name(request).await?.encode_to_vec());
+                    }
+                )*
+                Err(Status::unimplemented(format!("there is no reading call `{name}`")))
+            }
+        }
+    };
+}
+
+crate::reading_calls!(calls);
+
+/// The same for code that is not asynchronous.
+#[derive(Debug)]
+pub struct BlockingReader {
+    /// Dropped before the runtime that its tasks are on.
+    reader: Reader,
+    runtime: Runtime,
+}
+
+impl BlockingReader {
+    /// Opens the database in a directory; another program may write to it.
+    pub fn open(directory: &Path) -> io::Result<Self> {
+        let runtime = Builder::new_current_thread().enable_time().build()?;
+        let reader = Reader::beside(directory).map_err(io::Error::other)?;
+        Ok(Self { reader, runtime })
+    }
+
+    /// A reading call by its name: request and response as they travel.
+    pub fn call(&self, name: &str, request: &[u8]) -> Result<Vec<u8>, Status> {
+        self.runtime.block_on(self.reader.call(name, request))
+    }
+}
