@@ -4,7 +4,7 @@ use std::{fmt, str::FromStr};
 
 use model::{Address, NotAnAddress, Who, ids::ExperimentId};
 
-use crate::args::Subject;
+use crate::subject::Subject;
 
 /// Whom of an experiment somebody means: `3@5/7`, or `leader@5/7`.
 #[derive(Debug, Clone, PartialEq, Eq)]

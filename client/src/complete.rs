@@ -8,17 +8,15 @@ use std::{
     time::Duration,
 };
 
-use clap::Parser as _;
+use clap::Parser;
 use clap_complete::{CompletionCandidate, PathCompleter, engine::ValueCompleter as _};
+use model::wire::state_name;
 use swarm_proto::v1::{Experiment, ListWorkersRequest};
 use tokio::time::timeout;
 
 use crate::{
-    args::{Args, OutputFormat},
-    connection::Connection,
-    json::state_name,
-    place::Intent,
-    progress::Progress,
+    connection::Connection, output_format::OutputFormat, place::Intent, progress::Progress,
+    settings::Settings,
 };
 
 /// Nobody waits longer for a completion.
@@ -81,10 +79,17 @@ pub fn experiments_and_files(word: &OsStr) -> Vec<CompletionCandidate> {
     all
 }
 
+/// The options of a command line that say where experiments are.
+#[derive(Debug, Parser)]
+struct PlaceArgs {
+    #[command(flatten)]
+    settings: Settings,
+}
+
 /// What the command line says so far of the place.
 fn place() -> Vec<String> {
     let words: Vec<String> = env::args().collect();
-    let mut found = vec!["swarmctl".to_owned(), "list".to_owned()];
+    let mut found = vec!["swarmctl".to_owned()];
     for (i, word) in words.iter().enumerate() {
         match word.split('=').next() {
             Some("--data-dir" | "--coordinator") if word.contains('=') => found.push(word.clone()),
@@ -108,7 +113,7 @@ fn fetched<T: Send + 'static>(
 ) -> Option<T> {
     let fetch = || {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().ok()?;
-        let args = Args::try_parse_from(place()).ok()?;
+        let args = PlaceArgs::try_parse_from(place()).ok()?;
         runtime.block_on(async {
             let silent = Progress::new(OutputFormat::Json).silent();
             let connection = Connection::open(args.settings, Intent::Read, &silent);
@@ -168,6 +173,7 @@ mod tests {
     use clap_complete::ArgValueCompleter;
 
     use super::*;
+    use crate::cli::Args;
 
     /// All arguments that take a value, each with the command that has it.
     fn arguments(command: &Command) -> Vec<(String, Arg)> {
@@ -191,7 +197,8 @@ mod tests {
             let words: Vec<&str> = names.iter().flat_map(|name| name.split('|')).collect();
             let means = |known: &[&str]| words.iter().any(|word| known.contains(word));
             let is_new = NEW.contains(&&*shown) || OF_FILES.contains(&&*shown);
-            let offers = arg.get::<ArgValueCompleter>().is_some();
+            let offers =
+                arg.get::<ArgValueCompleter>().is_some() || !arg.get_possible_values().is_empty();
             let things = ["ID", "ID@G", "ID@G/I", "ADDRESS", "GROUP", "NAME"];
             let labels = ["KEY=VALUE", "KEY[=VALUE]", "KEY"];
             if (means(&things) || means(&labels)) && !is_new && !shown.contains("--tls-domain") {

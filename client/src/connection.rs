@@ -26,9 +26,10 @@ use tonic::{
 };
 
 use crate::{
+    defaults::DEFAULT_DATA_DIR,
     error::{Error, is_transient, reason},
     local::services::{self, Door, InProcess},
-    place::{DEFAULT_DATA_DIR, Intent, Place},
+    place::{Intent, Place},
     progress::Progress,
     settings::Settings,
     waiting,
@@ -110,6 +111,7 @@ impl Connection {
     }
 
     /// A connection to the coordinator in this process that computes what is in a data directory.
+    #[cfg(feature = "local")]
     pub fn computing(data_dir: &Path, door: Door) -> Self {
         Self::here(data_dir, door, None)
     }

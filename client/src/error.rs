@@ -104,7 +104,7 @@ pub enum Error {
         /// Why; may be empty.
         reason: String,
     },
-    /// The experiment has not ended within the time limit of `wait`.
+    /// The experiment has not ended within the time limit of `watch`.
     #[error("experiment {id} has not ended; `swarmctl explain {id}` says what it waits for")]
     TimedOut {
         /// Number of the experiment.

@@ -3,7 +3,7 @@
 use experiment_file::suggestion;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
-use crate::{args::Subject, connection::Connection, error::Error, file_kind};
+use crate::{connection::Connection, error::Error, file_kind, subject::Subject};
 
 /// Experiments in one answer: far fewer than make a message too long.
 const PAGE_LEN: u32 = 2_000;

@@ -8,9 +8,9 @@ use swarm_proto::v1::{
 
 use crate::{
     address::NamedAddress,
-    args::Subject,
     connection::{Connection, present},
     error::Error,
+    subject::Subject,
 };
 
 /// A genotype, and what it was evolved with.

@@ -3,11 +3,7 @@
 use swarm_proto::v1::{Experiment, ExperimentState};
 
 use crate::{
-    args::{Subject, Target},
-    connection::Connection,
-    error::Error,
-    progress::Progress,
-    text,
+    args::Target, connection::Connection, error::Error, progress::Progress, subject::Subject, text,
 };
 
 /// What became of a change.
@@ -89,7 +85,7 @@ pub async fn change_each<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::args::OutputFormat;
+    use crate::output_format::OutputFormat;
 
     fn quiet() -> Progress {
         Progress::to(OutputFormat::Table, Box::new(std::io::sink()))

@@ -3,36 +3,70 @@
 
 use std::{env, ffi::OsString};
 
-use clap::{ArgMatches, Command, CommandFactory as _, error::Error};
+use clap::{ArgMatches, Command, CommandFactory as _, Subcommand as _, error::Error};
 
-use crate::args::{Args, EXAMPLES, MORE};
+use crate::{
+    cli::{Args, EXAMPLES, MORE, WIDTH_MAX},
+    commands::{
+        control::Control, fleet::Fleet, individual::Measure, keep::Keep, look::Look, submit::Evolve,
+    },
+    settings::CONNECTION,
+};
 
 /// The option that shows everything.
 const ALL: &str = "--help-all";
-/// Longest lines of help.
-pub const WIDTH_MAX: usize = 100;
-/// Heading of the options that only `--help-all` shows.
-pub const CONNECTION: &str = "Where experiments are";
 /// Commands that work on a directory and on nothing else, or begin one: they show its option.
 const ON_A_DIRECTORY: [&str; 4] = ["backup", "doctor", "run", "web"];
 
-/// The commands, by what somebody wants to do.
-const GROUPS: [(&str, &[&str]); 8] = [
-    ("Evolve", &["run", "submit", "fork", "extend", "retry"]),
-    ("Look", &["list", "watch", "wait", "logs", "history", "explain", "plot", "replay", "web"]),
-    ("Compare and measure", &["compare", "evaluate", "simulate", "individual", "lineage", "bench"]),
-    ("Control", &["pause", "resume", "priority", "cancel"]),
-    (
-        "Keep and share",
-        &[
-            "get", "label", "archive", "prune", "delete", "export", "verify", "import", "backup",
-            "doctor",
-        ],
+/// Commands for something that somebody wants to do: those of a family of requests, and those that
+/// the help has before and after them.
+struct Group {
+    heading: &'static str,
+    before: &'static [&'static str],
+    family: fn(Command) -> Command,
+    after: &'static [&'static str],
+}
+
+/// All commands.
+const GROUPS: [Group; 8] = [
+    group("Evolve", &["run"], Evolve::augment_subcommands, &[]),
+    group("Look", &[], Look::augment_subcommands, &["plot", "replay", "web"]),
+    group(
+        "Compare and measure",
+        &["compare", "evaluate", "simulate"],
+        Measure::augment_subcommands,
+        &["bench"],
     ),
-    ("Fleet", &["workers", "fleet"]),
-    ("Experiment files", &["examples", "new", "validate", "schema"]),
-    ("Tools", &["completions", "man", "help"]),
+    group("Control", &[], Control::augment_subcommands, &[]),
+    group("Keep and share", &[], Keep::augment_subcommands, &["verify", "backup", "doctor"]),
+    group("Fleet", &[], Fleet::augment_subcommands, &[]),
+    group("Experiment files", &["examples", "new", "validate", "schema"], no_family, &[]),
+    group("Tools", &["completions", "man", "help"], no_family, &[]),
 ];
+
+const fn group(
+    heading: &'static str,
+    before: &'static [&'static str],
+    family: fn(Command) -> Command,
+    after: &'static [&'static str],
+) -> Group {
+    Group { heading, before, family, after }
+}
+
+fn no_family(command: Command) -> Command {
+    command
+}
+
+impl Group {
+    /// The names of its commands, in the order of the help.
+    fn names(&self) -> Vec<String> {
+        let family = (self.family)(Command::new("family"));
+        let of_family = family.get_subcommands().map(|command| command.get_name().to_owned());
+        let [before, after] =
+            [self.before, self.after].map(|names| names.iter().map(|name| (*name).to_owned()));
+        before.chain(of_family).chain(after).collect()
+    }
+}
 
 /// What pages of help show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,16 +148,11 @@ pub fn definition_for_tests() -> Command {
 
 /// The list of commands, group by group, in lines of the width.
 fn grouped(definition: &Command, width: Option<usize>) -> String {
-    let entry = |name: &&'static str| {
-        let command = definition.find_subcommand(name)?;
-        let mut about = command.get_about().map(ToString::to_string).unwrap_or_default();
-        for alias in command.get_visible_aliases() {
-            about += &format!(" [alias: {alias}]");
-        }
-        Some(Command::new(*name).about(about))
-    };
+    let groups: Vec<(&str, Vec<String>)> =
+        GROUPS.iter().map(|group| (group.heading, group.names())).collect();
+    let entry = |name: &String| definition.find_subcommand(name).cloned();
     // One list, so that all groups have columns of one width.
-    let names = GROUPS.iter().flat_map(|(_, names)| *names);
+    let names = groups.iter().flat_map(|(_, names)| names);
     let entries = names.filter_map(entry).enumerate().map(|(i, command)| command.display_order(i));
     let mut list = Command::new("list")
         .subcommands(entries)
@@ -135,7 +164,7 @@ fn grouped(definition: &Command, width: Option<usize>) -> String {
     }
     let (header, literal) = (*list.get_styles().get_header(), *list.get_styles().get_literal());
     let mut list = list.render_help().ansi().to_string();
-    for (heading, names) in GROUPS {
+    for (heading, names) in &groups {
         let first = format!("  {literal}{}{literal:#}", names[0]);
         list = list.replacen(&first, &format!("\n{header}{heading}:{header:#}\n{first}"), 1);
     }

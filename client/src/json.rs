@@ -6,13 +6,13 @@ mod individuals;
 use std::collections::BTreeMap;
 
 use experiment_file::Seed;
+use model::wire::state_name;
 use serde::Serialize;
 use swarm_proto::v1::{
-    Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
-    event::Kind,
+    Event, Experiment, ForkOrigin, GenerationSummary, GetChampionResponse, event::Kind,
 };
 
-use crate::{args::Subject, text};
+use crate::{subject::Subject, text};
 
 pub use self::individuals::{ChampionDocument, IndividualDocument, PopulationDocument};
 
@@ -26,25 +26,7 @@ pub fn document(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain data with string keys serialises")
 }
 
-/// The name of a state.
-pub fn state_name(state: ExperimentState) -> &'static str {
-    match state {
-        ExperimentState::Unspecified => "unknown",
-        ExperimentState::Running => "running",
-        ExperimentState::Paused => "paused",
-        ExperimentState::Completed => "completed",
-        ExperimentState::Failed => "failed",
-        ExperimentState::Cancelled => "cancelled",
-    }
-}
-
-/// Whether an experiment in this state has ended.
-pub fn has_ended(state: ExperimentState) -> bool {
-    use ExperimentState::{Cancelled, Completed, Failed};
-    matches!(state, Completed | Failed | Cancelled)
-}
-
-/// An event, as `logs` prints it.
+/// An event, as `watch --events` prints it.
 #[derive(Debug, Serialize)]
 pub struct LogLine<'a> {
     at_ms: u64,
@@ -293,7 +275,7 @@ pub fn experiments(subject: &Subject, experiments: &[Experiment]) -> String {
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
-    use swarm_proto::v1::{HeldOutFitness, JudgedFitness};
+    use swarm_proto::v1::{ExperimentState, HeldOutFitness, JudgedFitness};
 
     use super::*;
 

@@ -5,11 +5,13 @@
 mod address;
 mod args;
 mod change;
+mod cli;
 mod clock;
 mod commands;
 mod complete;
 mod connection;
 mod consent;
+mod defaults;
 mod error;
 mod examples;
 mod experiment_file;
@@ -18,6 +20,7 @@ mod experiments;
 mod fake_coordinator;
 mod figure;
 mod file_kind;
+mod finding;
 mod genotypes;
 mod group;
 mod help;
@@ -30,12 +33,15 @@ mod local;
 #[path = "without_local.rs"]
 mod local;
 mod output_file;
+mod output_format;
 mod pages;
 mod place;
 mod progress;
 mod recorded;
+mod remote;
 mod resimulation;
 mod settings;
+mod subject;
 mod sweep;
 mod synonyms;
 mod table;
@@ -49,12 +55,10 @@ use clap::{CommandFactory as _, FromArgMatches as _};
 use clap_complete::CompleteEnv;
 use swarm_telemetry::{block_on, report, runtime};
 
-use crate::{args::Args, error::Error, progress::Progress, synonyms::with_suggestions};
-
-/// The programs that this one can be instead. It contains all of their code, because `run` starts
-/// a coordinator and workers, so that a release is one file with three names.
-const OTHERS: [(&str, fn(Vec<OsString>) -> ExitCode); 2] =
-    [("coordinator", coordinator::program::main), ("worker", worker::program::main)];
+use crate::{
+    cli::Args, error::Error, local::services::PROGRAMS, progress::Progress,
+    synonyms::with_suggestions,
+};
 
 fn main() -> ExitCode {
     if let Some((main, words)) = other_program(env::args_os().collect()) {
@@ -80,7 +84,7 @@ fn main() -> ExitCode {
 /// The program that a command line is for, if it is not `swarmctl`, and the words for it: by the
 /// name that this file is called by, or, where a file has one name only, by the first word.
 fn other_program(words: Vec<OsString>) -> Option<(fn(Vec<OsString>) -> ExitCode, Vec<OsString>)> {
-    let named = |word: &OsString| OTHERS.iter().find(|(name, _)| *word == **name);
+    let named = |word: &OsString| PROGRAMS.iter().find(|(name, _)| *word == **name);
     let called = words.first().and_then(|word| Path::new(word).file_stem());
     if let Some((_, main)) = called.and_then(|name| named(&name.to_owned())) {
         return Some((*main, words));

@@ -11,16 +11,13 @@ use model::store;
 use tokio::{net::TcpStream, time::timeout};
 
 use crate::{
+    defaults::{DEFAULT_DATA_DIR, DEFAULT_LISTEN},
     error::Error,
     settings::{COORDINATOR_VARIABLE, Settings},
 };
 
-/// Where `run` and a coordinator keep their data unless told otherwise.
-pub const DEFAULT_DATA_DIR: &str = "./swarm-data";
 /// The environment variable that names the data directory.
 const DATA_DIR_VARIABLE: &str = "SWARM_DATA_DIR";
-/// Where a coordinator listens unless told otherwise.
-const DEFAULT_LISTEN: ([u8; 4], u16) = ([127, 0, 0, 1], 7700);
 /// How long somebody who listens there has to answer.
 const ANSWER_TIME: Duration = Duration::from_millis(300);
 

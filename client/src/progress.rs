@@ -15,11 +15,11 @@ use swarm_proto::v1::{Experiment, GenerationSummary};
 use swarm_telemetry::{escape, escape_lines};
 
 use crate::{
-    args::OutputFormat,
     clock,
-    commands::Finding,
     error::Error,
+    finding::Finding,
     json,
+    output_format::OutputFormat,
     place::Place,
     settings::Settings,
     table::{self, Screen, Table},

@@ -6,12 +6,12 @@ use serde::Deserialize;
 use swarm_proto::v1::{Experiment, GetExperimentRequest};
 
 use crate::{
-    args::Subject,
     connection::{Connection, present},
     error::Error,
     figure::Point,
     file_kind::{self, Kind},
     input::{TABLE_BYTES, read_text},
+    subject::Subject,
 };
 
 /// A run that the command line names.

@@ -11,13 +11,13 @@ use serde::Deserialize;
 use swarm_transport::{CredentialArgs, Credentials};
 
 use crate::{
+    defaults::DEFAULT_COORDINATOR,
     error::Error,
-    help::CONNECTION,
     input::{SETTINGS_BYTES, read_text},
 };
 
-/// The coordinator's default address.
-pub const DEFAULT_COORDINATOR: &str = "http://127.0.0.1:7700";
+/// Heading of the options that only `--help-all` shows.
+pub const CONNECTION: &str = "Where experiments are";
 /// The environment variable that holds the client token itself.
 const TOKEN_VARIABLE: &str = "SWARM_CLIENT_TOKEN";
 /// The environment variable that names the coordinator.

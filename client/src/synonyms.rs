@@ -5,7 +5,7 @@ use clap::{
     error::{ContextKind, ContextValue, ErrorKind},
 };
 
-use crate::{args::Args, file_kind};
+use crate::{cli::Args, file_kind};
 
 /// Other words, and what to suggest for them.
 const SYNONYMS: [(&[&str], &str); 10] = [
@@ -13,7 +13,7 @@ const SYNONYMS: [(&[&str], &str); 10] = [
     (&["remove", "rm", "purge"], "`delete` deletes an experiment that has ended"),
     (&["start", "launch", "evolve", "train"], "`run` evolves here, `submit` on a fleet"),
     (&["status", "ps", "show", "info"], "`list` has all experiments, `explain` one"),
-    (&["tail", "follow", "attach"], "`watch` follows an experiment, `logs --follow` all"),
+    (&["tail", "follow", "attach"], "`watch` follows an experiment, `watch --events` all"),
     (&["best", "result", "results", "genotype"], "`champion` prints the best individual"),
     (
         &["check", "lint"],

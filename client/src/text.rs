@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use model::wire::state_name;
 use swarm_proto::v1::{
     Event, Experiment, ExperimentState, ForkOrigin, GenerationSummary, GetChampionResponse,
     HeldOutFitness, JudgedFitness, event::Kind,
@@ -12,7 +13,7 @@ use model::store::Holder;
 use swarm_telemetry::escape;
 pub use swarm_telemetry::number;
 
-use crate::{clock, json::state_name, settings::DEFAULT_COORDINATOR};
+use crate::{clock, defaults::DEFAULT_COORDINATOR};
 
 /// Number of hexadecimal digits of a digest that are shown.
 const DIGEST_DIGITS: usize = 12;

@@ -63,12 +63,22 @@ pub mod fleet {
 pub mod services {
     //! No services.
 
-    use std::{path::Path, time::Duration};
+    use std::{ffi::OsString, path::Path, process::ExitCode, time::Duration};
 
     use model::store::Holder;
     use tonic::transport::Channel;
 
     use super::{Error, Infallible, missing};
+
+    /// The programs that this one cannot be instead.
+    pub const PROGRAMS: [(&str, fn(Vec<OsString>) -> ExitCode); 2] =
+        [("coordinator", no_program), ("worker", no_program)];
+
+    fn no_program(_words: Vec<OsString>) -> ExitCode {
+        let error = missing();
+        swarm_telemetry::report(&error.report());
+        error.exit_code().into()
+    }
 
     /// There is none.
     #[derive(Debug, Clone)]

@@ -361,16 +361,20 @@ class FleetRun(RecordedRun):
         """Takes it from the workers until it is resumed. FleetError if it has ended."""
         self._records._call("PauseExperiment", experiment_id=self.id, reason=reason)
 
-    def resume(self) -> None:
-        """Lets it go on, when it is paused or was cancelled."""
-        self._records._call("ResumeExperiment", experiment_id=self.id)
+    def resume(self, generations: int | None = None) -> None:
+        """Lets it go on, when it is paused, has failed or was cancelled; or, when it has completed,
+        to ``generations`` in all."""
+        if generations is None:
+            self._records._call("ResumeExperiment", experiment_id=self.id)
+        else:
+            self.extend(generations)
 
     def cancel(self) -> None:
         """Ends it."""
         self._records._call("CancelExperiment", experiment_id=self.id)
 
     def extend(self, generations: int) -> None:
-        """Has a completed experiment go on, to so many generations in all."""
+        """As ``resume(generations)``, under the name of earlier releases."""
         generations = arguments.whole(generations, "generations", 1)
         self._records._call("ExtendExperiment", experiment_id=self.id, generations=generations)
 

@@ -93,7 +93,10 @@ fn after_a_restart_with_less_memory_experiments_wait_for_others_to_end() {
 
     coordinator.swarmctl(&["cancel", &ids[0].to_string()]).expect_success();
     coordinator.process.wait_for("start", started);
-    let logs = coordinator.swarmctl(&["logs", &ids[2].to_string()]).expect_success().stdout;
+    let logs = coordinator
+        .swarmctl(&["watch", "--events", "--so-far", &ids[2].to_string()])
+        .expect_success()
+        .stdout;
     assert!(logs.contains("waits for memory"), "{logs}");
 }
 

@@ -30,7 +30,7 @@ fn runs_of_a_group_share_the_fleet_and_have_the_bits_of_runs_alone() {
     let ids = [&submitted[0]["id"], &submitted[1]["id"]];
     assert_eq!([&more[0]["id"], &more[2]["id"]], ids, "what exists is not submitted again");
 
-    coordinator.swarmctl(&["wait", "sizes"]).expect_success();
+    coordinator.swarmctl(&["watch", "--quiet", "sizes"]).expect_success();
     let listed = coordinator.swarmctl(&["list", "sizes"]).expect_success().json();
     assert_eq!(all(&listed, "state"), ["completed"; 4]);
 

@@ -8,7 +8,7 @@ const GENERATIONS: u64 = 4;
 
 /// An experiment, once it has completed.
 fn ended(coordinator: &CoordinatorProcess, id: &str) -> Value {
-    coordinator.swarmctl(&["wait", id]).expect_success().json()
+    coordinator.swarmctl(&["watch", "--quiet", id]).expect_success().json()
 }
 
 #[test]
@@ -23,10 +23,10 @@ fn an_experiment_goes_on_after_every_end_to_the_bits_of_one_that_never_ended() {
     let id = coordinator.submit(&short.path()).to_string();
     ended(&coordinator, &id);
     coordinator.swarmctl(&["archive", &id]).expect_success();
-    assert_eq!(coordinator.swarmctl(&["extend", &id, "--generations", "1"]).code, Some(2));
-    assert_eq!(coordinator.swarmctl(&["retry", &id]).code, Some(3));
+    assert_eq!(coordinator.swarmctl(&["resume", &id, "--generations", "1"]).code, Some(2));
+    assert_eq!(coordinator.swarmctl(&["resume", &id]).code, Some(3));
     let generations = GENERATIONS.to_string();
-    coordinator.swarmctl(&["extend", &id, "--generations", &generations]).expect_success();
+    coordinator.swarmctl(&["resume", &id, "--generations", &generations]).expect_success();
     assert_eq!(coordinator.swarmctl(&["delete", &id]).code, Some(3), "it has not ended");
     let extended = coordinator.watch(1).finish();
     assert_eq!(extended.digests(), expected);
@@ -36,7 +36,7 @@ fn an_experiment_goes_on_after_every_end_to_the_bits_of_one_that_never_ended() {
     let number = id.to_string();
     coordinator.wait_for_generation(0);
     coordinator.swarmctl(&["cancel", &number]).expect_success();
-    let cancelled = coordinator.swarmctl(&["wait", &number]);
+    let cancelled = coordinator.swarmctl(&["watch", "--quiet", &number]);
     assert_eq!(cancelled.code, Some(6));
     assert!(coordinator.n_committed(id) < GENERATIONS, "it was cancelled within the run");
     coordinator.process.kill();
@@ -45,8 +45,9 @@ fn an_experiment_goes_on_after_every_end_to_the_bits_of_one_that_never_ended() {
         .execute("UPDATE experiments SET state = 'failed' WHERE id = 2", [])
         .unwrap();
     coordinator.restart();
-    assert_eq!(coordinator.swarmctl(&["resume", &number]).code, Some(3), "it has failed");
-    coordinator.swarmctl(&["retry", &number]).expect_success();
+    let extended = coordinator.swarmctl(&["resume", &number, "--generations", "1000"]);
+    assert_eq!(extended.code, Some(3), "it has failed");
+    coordinator.swarmctl(&["resume", &number]).expect_success();
     coordinator.swarmctl(&["cancel", &number]).expect_success();
     coordinator.swarmctl(&["resume", &number]).expect_success();
     assert_eq!(coordinator.watch(id).finish().digests(), expected);

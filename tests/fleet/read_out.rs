@@ -19,13 +19,13 @@ fn waiting_is_explained_and_ends_with_the_experiment() {
     let completes = coordinator.submit(&Experiment::small(3).path()).to_string();
     let endless = coordinator.submit(&Experiment::small(100_000).path()).to_string();
     assert_eq!(finding(&coordinator, &completes), "no_workers");
-    let late = coordinator.swarmctl(&["wait", &completes, "--timeout", "0s"]);
+    let late = coordinator.swarmctl(&["watch", "--quiet", &completes, "--timeout", "0s"]);
     assert_eq!(late.code, Some(10), "{late:#?}");
 
     coordinator.swarmctl(&["pause", &endless, "--reason", "lunch"]).expect_success();
     assert_eq!(finding(&coordinator, &endless), "paused");
     let _worker = WorkerProcess::start(&coordinator, "worker-0");
-    coordinator.swarmctl(&["wait", &completes]).expect_success();
+    coordinator.swarmctl(&["watch", "--quiet", &completes]).expect_success();
     assert_eq!(finding(&coordinator, &completes), "ended");
     let workers = coordinator.swarmctl(&["workers"]).expect_success();
     let workers: Value = serde_json::from_str(&workers.stdout).unwrap();
@@ -34,8 +34,8 @@ fn waiting_is_explained_and_ends_with_the_experiment() {
     coordinator.swarmctl(&["resume", &endless]).expect_success();
     coordinator.swarmctl(&["priority", &endless, "200"]).expect_success();
     coordinator.swarmctl(&["cancel", &endless]).expect_success();
-    assert_eq!(coordinator.swarmctl(&["wait", &endless]).code, Some(6));
-    coordinator.swarmctl(&["wait", &endless, "--for", "ended"]).expect_success();
+    assert_eq!(coordinator.swarmctl(&["watch", "--quiet", &endless]).code, Some(6));
+    coordinator.swarmctl(&["watch", "--quiet", &endless, "--for", "ended"]).expect_success();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -46,14 +46,15 @@ async fn history_and_events_are_all_there_page_by_page() {
     let finished = coordinator.watch(ids[0]).finish();
     let digests: Vec<&str> =
         finished.generations.iter().map(|line| line["digest"].as_str().unwrap()).collect();
-    coordinator.swarmctl(&["wait", &ids[1].to_string()]).expect_success();
+    coordinator.swarmctl(&["watch", "--quiet", &ids[1].to_string()]).expect_success();
 
     let csv = coordinator.swarmctl(&["history", &ids[0].to_string(), "-o", "csv"]).expect_success();
     let rows: Vec<&str> = csv.stdout.lines().skip(1).collect();
     let listed: Vec<&str> = rows.iter().map(|row| row.rsplit(',').next().unwrap()).collect();
     assert_eq!(listed, digests);
 
-    let log = coordinator.swarmctl(&["logs"]).expect_success().json_lines();
+    let log =
+        coordinator.swarmctl(&["watch", "--events", "--so-far"]).expect_success().json_lines();
     let times: Vec<u64> = log.iter().map(|line| line["at_ms"].as_u64().unwrap()).collect();
     assert!(times.is_sorted(), "{times:?}");
     for (id, n_generations) in [(ids[0], 5), (ids[1], 3)] {
@@ -65,7 +66,7 @@ async fn history_and_events_are_all_there_page_by_page() {
         assert_eq!(ours.last().unwrap()["state"], "completed");
     }
     let id = ids[0].to_string();
-    let followed = coordinator.swarmctl(&["logs", &id, "--follow"]).expect_success().json_lines();
+    let followed = coordinator.swarmctl(&["watch", "--events", &id]).expect_success().json_lines();
     let ours: Vec<Value> = log.into_iter().filter(|line| line["experiment"] == ids[0]).collect();
     assert_eq!(followed, ours, "following ends with the experiment");
 

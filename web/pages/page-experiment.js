@@ -57,7 +57,7 @@ const NEXT = {
   unfinished: () => "No generation is complete, and these files do not say whether anybody computes: `swarmctl run FILE` goes on with it.",
   paused: () => "It is paused: resume lets it go on, and what was computed is kept.",
   cancelled: (it) => `It was cancelled${it.generations_done ? ": its generations and its champion stay" : " before a generation was complete"}. To compute it after all, submit its file, which is below, again.`,
-  failed: (it) => `${it.generations_done ? "Its generations stay." : "No generation was complete."} The events say what came before; \`swarmctl explain ${id}\` says more, and \`swarmctl retry ${id}\` lets it go on when the cause is gone.`,
+  failed: (it) => `${it.generations_done ? "Its generations stay." : "No generation was complete."} The events say what came before; \`swarmctl explain ${id}\` says more, and \`swarmctl resume ${id}\` lets it go on when the cause is gone.`,
 };
 
 /** Says where the experiment stands, unless the curve does. */

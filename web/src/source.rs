@@ -1,7 +1,7 @@
 //! What pages ask of a running coordinator, in the messages of clients. They read experiments as
 //! clients do, by [`Reader`](model::queries::Reader).
 
-use std::{collections::BTreeMap, num::NonZeroU64, ops::Range, time::Duration};
+use std::{collections::BTreeMap, ops::Range, time::Duration};
 
 use serde::Serialize;
 use swarm_proto::v1::{Experiment, ExplainExperimentResponse, SubmitExperimentRequest, Worker};

@@ -198,7 +198,7 @@ class Figures(BrowserTest):
     def test_groups_are_compared_as_the_client_does_and_files_by_their_keys(self):
         first = 1 + len(json.loads(self.fleet.swarmctl("list")))
         self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "sizes", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
-        self.fleet.swarmctl("wait", "sizes")
+        self.fleet.swarmctl("watch", "--quiet", "sizes")
         runs = [",".join(str(first + i) for i in part) for part in (range(3), range(3, 6))]
         self.open(f"/compare?runs={','.join(runs)}&as=groups")
         self.wait_for_text(".differences", "algorithm.population_size")
@@ -217,7 +217,7 @@ class Figures(BrowserTest):
     def test_swept_values_are_seen_beside_what_champions_are_worth(self):
         before = len(json.loads(self.fleet.swarmctl("list")))
         self.fleet.swarmctl("submit", str(CONFIG), "--generations", "2", "--group", "swept", "--set", "algorithm.population_size=8,16", "--seeds", "0..2")
-        self.fleet.swarmctl("wait", "swept")
+        self.fleet.swarmctl("watch", "--quiet", "swept")
         ids = [before + 1 + i for i in range(6)]
         compare = lambda ids: "/compare?runs=" + ",".join(map(str, ids))
         self.open(compare(ids))

@@ -30,7 +30,7 @@ class Lists(BrowserTest):
         submit("--seeds", f"0..{N_STILL - 1}", "--group", "still")
         cls.fleet.swarmctl("cancel", "still")
         cls.fleet.start_worker()
-        cls.fleet.swarmctl("wait", "judged")
+        cls.fleet.swarmctl("watch", "--quiet", "judged")
         submit("--seeds", f"0..{N_RUNNING - 1}", "--generations", "100000", "--group", "moving")
         for i in range(2, 6):
             cls.fleet.swarmctl("label", str(i), "paper=", f"draft={i % 2}")

@@ -74,7 +74,7 @@ class Screenshots(BrowserTest):
         workers = [fleet.start_worker(f"worker-{i}") for i in range(4)]
         fleet.swarmctl("submit", str(CONFIG), "--watch")
         fleet.swarmctl("submit", str(CONFIG), "--group", "sizes", "--set", "algorithm.population_size=16,48", "--seeds", "0..3")
-        fleet.swarmctl("wait", "sizes")
+        fleet.swarmctl("watch", "--quiet", "sizes")
         self.browser.get(fleet.pages + "/experiment/1")
         self.wait_for_text(".chart figcaption", "champion, 95 %")
         self.wait_for_text(".heat-map .scale", "fitness ≤")

@@ -77,7 +77,7 @@ class Standing(BrowserTest):
         fleet.swarmctl("submit", str(directory / "fails.json"))
         self.browser.get(fleet.pages + "/experiment/1")
         self.wait_for_text(".state", "failed")
-        self.wait_for_text(".standing", "swarmctl retry 1")
+        self.wait_for_text(".standing", "swarmctl resume 1")
         self.wait_for_text(".standing .bad", "division")
         shown = [it.text for it in self.browser.find_elements(By.CSS_SELECTOR, ".panel") if it.is_displayed()]
         self.assertEqual([it for it in shown if not it or "no generation is complete yet" in it], [])

@@ -10,7 +10,6 @@ use clap_complete::ArgValueCompleter;
 use statistics::{interquartile_mean, interval};
 
 use crate::{
-    args::Subject,
     complete,
     connection::Connection,
     error::Error,
@@ -21,6 +20,7 @@ use crate::{
     progress::Progress,
     recorded::Source,
     settings::Settings,
+    subject::Subject,
 };
 
 use self::{

@@ -3,7 +3,7 @@
 use clap::{Args as ClapArgs, CommandFactory as _};
 use clap_complete::Shell;
 
-use crate::{args::Args, error::Error, progress::Progress};
+use crate::{cli::Args, error::Error, progress::Progress};
 
 /// Print a script that completes this program's command line in a shell.
 #[derive(Debug, ClapArgs)]

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::{RemoteCommand, run::log};
 use crate::{
     args::cores, connection::Connection, error::Error, local::fleet::Fleet, progress::Progress,
-    text,
+    remote::Remote, text,
 };
 
 /// Executes a command with a coordinator and workers of its own, and stops them even if it fails.

@@ -2,22 +2,35 @@
 //! share of an experiment, or of each of a group, and print what they changed.
 
 use clap::Args;
+use experiment_file::limits;
+use model::wire::has_ended;
 use swarm_proto::v1::{
-    CancelExperimentRequest, Experiment, PauseExperimentRequest, ResumeExperimentRequest,
-    SetPriorityRequest,
+    CancelExperimentRequest, Experiment, ExperimentState, ExtendExperimentRequest,
+    PauseExperimentRequest, ResumeExperimentRequest, SetPriorityRequest,
 };
 
-use super::{Remote, watch};
+use super::watch;
 use crate::{
     args::{Target, whole},
     connection::{Connection, present},
     error::Error,
     group::{Outcome, change_each, members},
-    json::{self, has_ended},
+    json,
     place::Intent,
     progress::Progress,
+    remote::{Remote, family},
     text,
 };
+
+family! {
+    /// Commands that steer experiments.
+    Control {
+        Pause(PauseArgs),
+        Resume(ResumeArgs),
+        Priority(PriorityArgs),
+        Cancel(CancelArgs),
+    }
+}
 
 /// Pause an experiment, or a group: workers get no items of it until it is resumed.
 ///
@@ -55,15 +68,22 @@ impl Remote for PauseArgs {
     }
 }
 
-/// Continue a paused experiment, or those of a group; or one that was cancelled.
+/// Continue an experiment, or those of a group: a paused, failed or cancelled one, or a completed
+/// one to more generations.
 ///
-/// It goes on from its last stored generation, to the same bits. Of a group, those that are
-/// paused are continued; one that was cancelled is continued by its number. `retry` continues
-/// one that has failed, `extend` one that has completed.
+/// It goes on from its last stored generation, to the same bits as if it had never stopped. Of a
+/// group, those that are paused or have failed are continued; one that was cancelled is continued
+/// by its number. With --generations, completed ones are continued: generations, re-evaluations,
+/// champion and digests become those of a run that was asked for all of them at first, and the
+/// champion is judged again at the new end, on other trials. An experiment that has reached its
+/// target fitness has no more generations: `fork` goes on from it under another target.
 #[derive(Debug, Args)]
 pub struct ResumeArgs {
     #[command(flatten)]
     target: Target,
+    /// Number of generations in all, from the first, for what has completed.
+    #[arg(long, value_name = "G", value_parser = whole(1..=limits::GENERATIONS))]
+    generations: Option<u64>,
 }
 
 impl Remote for ResumeArgs {
@@ -72,14 +92,48 @@ impl Remote for ResumeArgs {
     }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let resume = async |experiment_id| {
-            let request = ResumeExperimentRequest { experiment_id };
-            let call = connection.call(async |client| client.resume_experiment(request).await);
-            present(call.await?.experiment)
-        };
-        let outcome = each(&self.target, connection, progress, resume).await?;
-        follow(&self.target, outcome, connection, progress).await
+        let Self { target, generations } = self;
+        match generations {
+            Some(generations) => extend(&target, generations, connection, progress).await,
+            None => resume(&target, connection, progress).await,
+        }
     }
+}
+
+async fn resume(
+    target: &Target,
+    connection: &Connection,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let resume = async |experiment_id| {
+        let request = ResumeExperimentRequest { experiment_id };
+        let call = connection.call(async |client| client.resume_experiment(request).await);
+        present(call.await?.experiment)
+    };
+    let goes_on = |state| state == ExperimentState::Failed || !has_ended(state);
+    let why_none = "all experiments of group `NAME` have completed or were cancelled";
+    let members = members(target, connection, goes_on, why_none).await?;
+    let outcome = change_each(&members, progress, resume).await;
+    follow(target, outcome, connection, progress).await
+}
+
+/// Continues what has completed, to so many generations in all.
+pub async fn extend(
+    target: &Target,
+    generations: u64,
+    connection: &Connection,
+    progress: &mut Progress,
+) -> Result<(), Error> {
+    let extend = async |experiment_id| {
+        let request = ExtendExperimentRequest { experiment_id, generations };
+        let call = connection.call(async |client| client.extend_experiment(request).await);
+        present(call.await?.experiment)
+    };
+    let is_completed = |state| state == ExperimentState::Completed;
+    let why_none = "no experiment of group `NAME` has completed";
+    let members = members(target, connection, is_completed, why_none).await?;
+    let outcome = change_each(&members, progress, extend).await;
+    follow(target, outcome, connection, progress).await
 }
 
 /// Change the share of the fleet of an experiment, or of each of a group.

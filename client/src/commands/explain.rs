@@ -1,30 +1,26 @@
 //! `swarmctl explain`: what an experiment waits for, and the next steps.
 
-mod finding;
 mod fleet;
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
+use model::wire::has_ended;
 use serde::Serialize;
 use swarm_proto::v1::{
     Event, ExplainExperimentRequest, ExplainExperimentResponse, HeldItems, Round, event::Kind,
 };
 
-use super::Remote;
 use crate::{
-    args::Subject,
     clock, complete,
     connection::{Connection, present},
     error::Error,
-    json::{self, has_ended},
+    finding::{self, Finding, WORKERS_MAX, batch_name},
+    json,
     progress::Progress,
+    remote::Remote,
+    subject::Subject,
     text,
 };
-
-pub use self::finding::{Finding, stall};
-
-/// Most workers that are listed, so that everything fits one screen.
-const WORKERS_MAX: usize = 8;
 
 #[derive(Debug, Serialize)]
 struct Explanation<'a> {
@@ -98,18 +94,6 @@ async fn explain(
         findings.iter_mut().for_each(|finding| finding.name_place(&data_dir));
     }
     Ok((answer, findings))
-}
-
-/// What a batch evaluates: "generation 12", or the champion after it.
-fn batch_name(round: &Round) -> String {
-    let generation = round.generation;
-    if round.judgement {
-        format!("the judgement of the champion after generation {generation}")
-    } else if round.held_out {
-        format!("the re-evaluation of candidates for the champion after generation {generation}")
-    } else {
-        format!("generation {generation}")
-    }
 }
 
 fn batch_lines(round: &Round) -> String {

@@ -11,15 +11,16 @@ use clap::Args;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::Remote;
 use crate::{
-    args::{Subject, Target},
+    args::Target,
     connection::{Connection, present},
     error::Error,
     file_kind::{self, Kind},
     json,
     output_file::Overwrite,
     progress::Progress,
+    remote::Remote,
+    subject::Subject,
     tensorboard::EventFile,
     text,
 };

@@ -18,15 +18,23 @@ use self::{
     autoscaler::{Autoscaler, Bounds, ITEMS_PER_WORKER, Job, Plan},
     slurm::Slurm,
 };
-use super::Remote;
 use crate::{
     args::whole,
     connection::{Connection, PATIENCE_WHILE_FOLLOWING},
     error::Error,
     json,
     progress::Progress,
+    remote::{Remote, family},
     text,
 };
+
+family! {
+    /// Commands for workers.
+    Fleet {
+        Workers(super::workers::WorkersArgs),
+        Fleet(FleetArgs),
+    }
+}
 
 /// A worker's job that ends sooner has not worked, unless its worker may be idle for less.
 const SHORT_LIFE: Duration = Duration::from_secs(30);

@@ -17,10 +17,11 @@ use crate::{
     json,
     place::Intent,
     progress::Progress,
+    remote::Remote,
     text,
 };
 
-use super::{Remote, watch};
+use super::watch;
 
 /// Continue an experiment from one of its generations as a new one, with something changed.
 ///

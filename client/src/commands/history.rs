@@ -6,14 +6,15 @@ use clap::Args;
 use serde::Serialize;
 use swarm_proto::v1::GenerationSummary;
 
-use super::Remote;
 use crate::{
-    args::{Subject, Target},
+    args::Target,
     clock,
     connection::{Connection, present},
     error::Error,
     json,
     progress::Progress,
+    remote::Remote,
+    subject::Subject,
     table::{Column, Table},
     text,
 };
@@ -70,7 +71,9 @@ Examples:
   swarmctl history 3 --dynamics --output csv > dynamics.csv";
 
 impl Remote for HistoryArgs {
-    const HAS_TABLE: bool = true;
+    fn has_table(&self) -> bool {
+        true
+    }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let experiments = connection.subject(&self.target.subject).await?;

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Remote, export};
-use crate::{connection::Connection, error::Error, json, place::Intent, progress::Progress, text};
+use super::export;
+use crate::{
+    connection::Connection, error::Error, json, place::Intent, progress::Progress, remote::Remote,
+    text,
+};
 
 /// Take the experiment of a bundle into a coordinator or a data directory.
 ///

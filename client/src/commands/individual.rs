@@ -5,10 +5,24 @@ use clap_complete::ArgValueCompleter;
 use model::Who;
 use swarm_proto::v1::{Experiment, GetChampionResponse};
 
-use super::Remote;
 use crate::{
-    address::NamedAddress, complete, connection::Connection, error::Error, json, progress::Progress,
+    address::NamedAddress,
+    complete,
+    connection::Connection,
+    error::Error,
+    json,
+    progress::Progress,
+    remote::{Remote, family},
 };
+
+family! {
+    /// Commands for genotypes.
+    Measure {
+        #[command(visible_alias = "champion")]
+        Individual(IndividualArgs),
+        Lineage(super::lineage::LineageArgs),
+    }
+}
 
 /// Print a genotype and the network that it encodes, as JSON: the champion, or any
 /// individual of any generation.

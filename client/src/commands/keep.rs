@@ -1,29 +1,45 @@
-//! `swarmctl delete`, `prune`, `archive` and `label`: what is kept of experiments, and what
-//! they are found by.
+//! `swarmctl get`, `delete`, `prune`, `archive` and `label`: what is kept of experiments, and
+//! what they are found by.
 
 use clap::Args;
 use clap_complete::ArgValueCompleter;
+use model::wire::has_ended;
 use swarm_proto::v1::{
-    ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, LabelExperimentRequest,
-    PruneExperimentRequest,
+    ArchiveExperimentRequest, DeleteExperimentRequest, Experiment, GetExperimentRequest,
+    LabelExperimentRequest, PruneExperimentRequest,
 };
 
 use super::{
-    Remote,
     control::{print, print_of},
+    export, import,
 };
 use crate::{
     args::{Label, Target},
+    change::Json,
     complete,
     connection::{Connection, present},
     consent::Consent,
     error::Error,
     group::{Outcome, change_each, members},
-    json::has_ended,
+    json,
     place::Intent,
     progress::Progress,
+    remote::{Remote, family},
     text,
 };
+
+family! {
+    /// Commands for what is kept of experiments.
+    Keep {
+        Get(GetArgs),
+        Label(LabelArgs),
+        Archive(ArchiveArgs),
+        Prune(PruneArgs),
+        Delete(DeleteArgs),
+        Export(export::ExportArgs),
+        Import(import::ImportArgs),
+    }
+}
 
 /// Why a command for what has ended applies to none of a group.
 const NONE_HAS_ENDED: &str = "no experiment of group `NAME` has ended";
@@ -202,6 +218,31 @@ fn print_with(
 
 fn mib(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
+}
+
+/// Print the experiment file of an experiment.
+///
+/// It is in canonical form: every key that has an effect, the seed included. Submitted again,
+/// it gives the same bits.
+#[derive(Debug, Args)]
+#[command(after_help = GET_HELP)]
+pub struct GetArgs {
+    #[command(flatten)]
+    target: Target,
+}
+
+const GET_HELP: &str = "\
+Examples:
+  swarmctl get 3 > experiment.json
+  swarmctl get 3 | swarmctl validate -";
+
+impl Remote for GetArgs {
+    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
+        let experiment_id = connection.one(&self.target.subject).await?.id;
+        let request = GetExperimentRequest { experiment_id };
+        let response = connection.call(async |client| client.get_experiment(request).await).await?;
+        progress.print(&json::document(&Json::parse(&response.config_json)))
+    }
 }
 
 #[cfg(test)]

@@ -8,10 +8,9 @@ use model::Address;
 use serde::Serialize;
 use swarm_proto::v1::{Ancestor, BirthOperator, GetLineageResponse, PopulationLineage};
 
-use super::Remote;
 use crate::{
     address::NamedAddress, args::whole, complete, connection::Connection, error::Error, json,
-    progress::Progress,
+    progress::Progress, remote::Remote,
 };
 
 /// Print whom an individual of a genetic algorithm descends from, and which genes it has from

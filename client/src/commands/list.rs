@@ -5,15 +5,16 @@ mod filter;
 use clap::Args;
 use clap_complete::ArgValueCompleter;
 use console::Style;
+use model::wire::state_name;
 use swarm_proto::v1::{Experiment, ListWorkersRequest};
 
-use super::Remote;
 use crate::{
     clock, complete,
     connection::Connection,
     error::Error,
-    json::{ExperimentDocument, state_name},
+    json::ExperimentDocument,
     progress::Progress,
+    remote::Remote,
     table::{Column, Table},
     text::{self, origin_address},
 };
@@ -74,7 +75,9 @@ Examples:
   swarmctl list --label user=ada --sort best";
 
 impl Remote for ListArgs {
-    const HAS_TABLE: bool = true;
+    fn has_table(&self) -> bool {
+        true
+    }
 
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
         let mut experiments = connection.list(self.filter.wanted(self.group.clone())).await?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, CommandFactory as _};
 
 use crate::{
-    args::Args,
+    cli::Args,
     error::Error,
     output_file::{Overwrite, unwritable},
     progress::Progress,
@@ -40,7 +40,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::args::OutputFormat;
+    use crate::output_format::OutputFormat;
 
     #[test]
     fn every_command_has_its_page() {

@@ -1,5 +1,5 @@
-//! The commands, each in a module of its own: its arguments with their help, its
-//! requests and its output. To add one, write the module and name it twice below.
+//! The commands: their arguments with their help, their requests and their output. Those that
+//! are requests to a coordinator are declared in families, at the top of a file each.
 
 mod backup;
 mod bench;
@@ -7,52 +7,50 @@ mod champion_file;
 mod compare;
 mod completions;
 mod compute;
-mod control;
+pub mod control;
 mod doctor;
 mod evaluate;
 mod examples;
 mod explain;
 mod export;
-mod fleet;
+pub mod fleet;
 mod fork;
-mod get;
 mod history;
 mod import;
-mod individual;
-mod keep;
+pub mod individual;
+pub mod keep;
 mod lineage;
 mod list;
-mod logs;
+pub mod look;
 mod man;
 mod new;
+mod old_words;
 mod plot;
-mod reopen;
 mod reordered;
 mod replay;
 mod run;
 mod schema;
 mod simulate;
-mod submit;
+pub mod submit;
 mod validate;
 mod verify;
-mod wait;
 mod watch;
 mod web;
 mod workers;
-
-pub use explain::Finding;
 
 use clap::Subcommand;
 use tokio_util::sync::CancellationToken;
 
 use crate::{
-    args::{Args, OutputFormat},
+    cli::Args,
     connection::Connection,
     error::Error,
     interrupt,
     local::services::serve_referee,
+    output_format::OutputFormat,
     place::{Intent, Place, data_dir},
     progress::Progress,
+    remote::{Remote, family},
 };
 
 /// The commands, in the order of the help.
@@ -85,96 +83,24 @@ pub enum Command {
     Referee,
 }
 
-/// The arguments of a command that sends requests to a coordinator and does nothing
-/// else, so that an interrupt may end it at any time.
-trait Remote: clap::Args {
-    /// Whether its answer is a table, which can be printed as CSV.
-    const HAS_TABLE: bool = false;
-
-    /// What it does with experiments.
-    fn intent(&self) -> Intent {
-        Intent::Read
+family! {
+    /// The commands that are requests to a coordinator, by what somebody wants to do.
+    RemoteCommand {
+        #[command(flatten)]
+        Evolve(submit::Evolve),
+        #[command(flatten)]
+        Look(look::Look),
+        #[command(flatten)]
+        Measure(individual::Measure),
+        #[command(flatten)]
+        Control(control::Control),
+        #[command(flatten)]
+        Keep(keep::Keep),
+        #[command(flatten)]
+        Fleet(fleet::Fleet),
+        #[command(flatten)]
+        OldWords(old_words::OldWords),
     }
-
-    /// Finds mistakes before anything is touched.
-    fn check(&self) -> Result<(), Error> {
-        Ok(())
-    }
-
-    /// Sends the requests and prints the answers.
-    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error>;
-}
-
-macro_rules! remote_commands {
-    ($($(#[$attribute:meta])* $name:ident($args:ty),)*) => {
-        /// The commands that are requests to a coordinator, in the order of the help.
-        #[derive(Debug, Subcommand)]
-        pub enum RemoteCommand {
-            $($(#[$attribute])* $name($args),)*
-        }
-
-        impl RemoteCommand {
-            /// Whether the answer is a table, which can be printed as CSV.
-            fn has_table(&self) -> bool {
-                match self {
-                    $(Self::$name(_) => <$args as Remote>::HAS_TABLE,)*
-                }
-            }
-
-            /// What it does with experiments.
-            fn intent(&self) -> Intent {
-                match self {
-                    $(Self::$name(args) => args.intent(),)*
-                }
-            }
-
-            /// Finds mistakes before anything is touched.
-            fn check(&self) -> Result<(), Error> {
-                match self {
-                    $(Self::$name(args) => args.check(),)*
-                }
-            }
-
-            async fn execute(
-                self,
-                connection: &Connection,
-                progress: &mut Progress,
-            ) -> Result<(), Error> {
-                match self {
-                    $(Self::$name(args) => args.execute(connection, progress).await,)*
-                }
-            }
-        }
-    };
-}
-
-remote_commands! {
-    Submit(submit::SubmitArgs),
-    Fork(fork::ForkArgs),
-    List(list::ListArgs),
-    Watch(watch::WatchArgs),
-    Wait(wait::WaitArgs),
-    Logs(logs::LogsArgs),
-    History(history::HistoryArgs),
-    Explain(explain::ExplainArgs),
-    Workers(workers::WorkersArgs),
-    Fleet(fleet::FleetArgs),
-    Pause(control::PauseArgs),
-    Resume(control::ResumeArgs),
-    Priority(control::PriorityArgs),
-    Cancel(control::CancelArgs),
-    Extend(reopen::ExtendArgs),
-    Retry(reopen::RetryArgs),
-    Get(get::GetArgs),
-    #[command(visible_alias = "champion")]
-    Individual(individual::IndividualArgs),
-    Lineage(lineage::LineageArgs),
-    Export(export::ExportArgs),
-    Label(keep::LabelArgs),
-    Archive(keep::ArchiveArgs),
-    Prune(keep::PruneArgs),
-    Delete(keep::DeleteArgs),
-    Import(import::ImportArgs),
 }
 
 /// Executes the command of a command line.
@@ -188,7 +114,7 @@ pub async fn execute(args: Args, mut progress: Progress) -> Result<(), Error> {
                 .into(),
         ));
     }
-    if matches!(&command, Command::Remote(RemoteCommand::Watch(_) | RemoteCommand::Logs(_))) {
+    if matches!(&command, Command::Remote(command) if command.ends_with_reader()) {
         progress.end_with_reader();
     }
     let command = match command {

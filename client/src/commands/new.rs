@@ -130,10 +130,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        args::{Args, OutputFormat},
+        cli::Args,
         commands::{Command, one_world::output},
         examples::EXAMPLES,
         experiment_file::{ExperimentFile, Overrides},
+        output_format::OutputFormat,
         progress::tests::Captured,
     };
 

@@ -14,7 +14,7 @@ use tokio_util::sync::CancellationToken;
 use worker::WorkerConfig;
 
 use super::execute;
-use crate::{args::Args, experiment_file::tests::quickstart, progress::tests::Captured};
+use crate::{cli::Args, experiment_file::tests::quickstart, progress::tests::Captured};
 
 /// No command here takes so long, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -29,6 +29,11 @@ const ASKED: &[&str] = &[
     "wait two",
     "wait 1 --output json",
     "wait 9",
+    "watch two --quiet",
+    "watch 1 --quiet --output json",
+    "watch --events --so-far",
+    "watch 1 --events --output json",
+    "watch 9 --events",
     "logs",
     "logs 1 --output json",
     "history 1",
@@ -111,6 +116,8 @@ const ASKED: &[&str] = &[
     "extend 1 --generations 2",
     "extend 9 --generations 2",
     "retry 9",
+    "resume 1 --generations 2",
+    "resume 9 --generations 2",
 ];
 
 /// Commands that set something going: the experiments are the same in the end.
@@ -119,6 +126,7 @@ const COMPUTED: &[(&str, &str)] = &[
     ("submit FILE --generations 1 --seeds 0..1 --group seeds", " --watch"),
     ("fork 1@1 --seed 9", " --watch"),
     ("extend 1 --generations 4", "; wait 1"),
+    ("resume 1 --generations 5", "; watch 1 --quiet"),
     ("resume 3", "; wait 3"),
     ("evaluate 1 --trials 2 --to TO.d", ""),
     ("verify exported.zip --generations 1", ""),
@@ -128,6 +136,7 @@ const COMPUTED: &[(&str, &str)] = &[
 const ALONE: &[&str] = &[
     "backup",
     "bench",
+    "examples",
     "completions",
     "doctor",
     "fleet",
@@ -317,7 +326,7 @@ async fn what_nobody_computes_is_not_waited_for() {
     let path = data_dir(temporary.path()).await;
     let at = ["--data-dir", path.to_str().unwrap()];
     let resume = format!("swarmctl resume 3 --data-dir {}", path.display());
-    for line in ["watch 3", "wait 3", "logs 3 --follow"] {
+    for line in ["watch 3", "wait 3", "logs 3 --follow", "watch 3 --quiet", "watch 3 --events"] {
         let text = output(line, &at).await;
         assert!(text.contains("[exit code 3]") && text.contains(&resume), "{line}: {text}");
     }

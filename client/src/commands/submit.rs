@@ -4,17 +4,27 @@ use clap::Args;
 use swarm_proto::v1::{Experiment, SubmitExperimentRequest};
 
 use crate::{
-    args::{ExperimentArgs, Subject, whole},
+    args::{ExperimentArgs, whole},
     connection::{Connection, present},
     error::Error,
     json,
     place::Intent,
     progress::Progress,
+    remote::{Remote, family},
+    subject::Subject,
     sweep::{self, SweepRun},
     text,
 };
 
-use super::{Remote, reordered, watch};
+use super::{reordered, watch};
+
+family! {
+    /// Commands that submit experiments.
+    Evolve {
+        Submit(SubmitArgs),
+        Fork(super::fork::ForkArgs),
+    }
+}
 
 /// Submit an experiment, or a group of runs of it, to the coordinator.
 ///
@@ -164,9 +174,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        args::{OutputFormat, SeedArg},
+        args::SeedArg,
         experiment_file::tests::quickstart,
         fake_coordinator::{FakeCoordinator, Script},
+        output_format::OutputFormat,
         progress::tests::Captured,
     };
 

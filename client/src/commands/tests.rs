@@ -1,6 +1,8 @@
 //! What people see: every command's help and output, against a scripted
 //! coordinator, and each option's refusals.
 
+use std::collections::BTreeSet;
+
 use clap::{CommandFactory as _, Parser as _};
 use swarm_proto::v1::{
     Event, Experiment, ExperimentState, ExplainExperimentResponse, GenerationSummary,
@@ -326,6 +328,49 @@ async fn one_huge_number_makes_no_table_wide() {
         assert!(widest(narrow) <= width, "{width}: {narrow}");
         assert!(widest(wide) <= 250, "{wide}");
         insta::assert_snapshot!(format!("huge_numbers_at_{width}_columns"), text);
+    }
+}
+
+/// Old words, and the new ones that say the same.
+const OLD_WORDS: &[(&str, &str)] = &[
+    ("wait 3", "watch 3 --quiet"),
+    ("wait leader --output json", "watch leader --quiet --output json"),
+    ("wait 3 --for ended", "watch 3 --quiet --for ended"),
+    ("wait 3 --timeout 0s", "watch 3 --quiet --timeout 0s"),
+    ("wait 9", "watch 9 --quiet"),
+    ("logs", "watch --events --so-far"),
+    ("logs 3", "watch 3 --events --so-far"),
+    ("logs --from 4 3 --output json", "watch --events --so-far --from 4 3 --output json"),
+    ("logs 9 --follow", "watch 9 --events"),
+    ("extend 3 --generations 60", "resume 3 --generations 60"),
+    (
+        "extend leader --generations 60 --output json",
+        "resume leader --generations 60 --output json",
+    ),
+    ("retry 9", "resume 9"),
+];
+
+#[tokio::test]
+async fn old_words_do_what_the_new_ones_do_and_no_help_has_them() {
+    let cancelled = || {
+        let mut script = script();
+        script.experiment.set_state(ExperimentState::Cancelled);
+        script
+    };
+    for (old, new) in OLD_WORDS {
+        for script in [script, cancelled] {
+            let [of_old, of_new] = [old, new].map(async |line| {
+                let text = transcript(script(), &[line]).await;
+                text.replacen(&format!("$ swarmctl {line}"), "", 1)
+            });
+            assert_eq!(of_old.await, of_new.await, "{old}");
+        }
+    }
+    let definition = Args::command();
+    let words: BTreeSet<&str> =
+        OLD_WORDS.iter().filter_map(|(old, _)| old.split(' ').next()).collect();
+    for word in words {
+        assert!(definition.find_subcommand(word).unwrap().is_hide_set(), "{word}");
     }
 }
 

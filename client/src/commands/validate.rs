@@ -154,7 +154,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        args::OutputFormat, experiment_file::tests::quickstart, progress::tests::Captured,
+        experiment_file::tests::quickstart, output_format::OutputFormat, progress::tests::Captured,
     };
 
     fn files() -> (tempfile::TempDir, [PathBuf; 3]) {

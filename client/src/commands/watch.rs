@@ -1,34 +1,41 @@
 //! Follows experiments to their end, across interruptions of the coordinator.
 
+pub mod events;
+mod follower;
+pub mod quiet;
 mod situation;
 
 use std::{future::pending, path::Path, sync::Arc, time::Duration};
 
 use clap::Args;
-use swarm_proto::v1::{
-    Event, Experiment, ExperimentState, GenerationSummary, GetChampionResponse, event::Kind,
-};
-use swarm_telemetry::escape;
+use clap_complete::ArgValueCompleter;
+use model::wire::has_ended;
+use swarm_proto::v1::{Experiment, ExperimentState, GetChampionResponse};
+use swarm_telemetry::parse_duration;
 use tokio::{
     sync::{Semaphore, mpsc},
     task::JoinSet,
-    time::{Instant, interval, sleep},
+    time::interval,
 };
-use tonic::Streaming;
 
-use super::{Remote, champion_file, compare, explain::Finding};
+use super::{champion_file, compare};
 use crate::{
-    args::Target,
-    connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff, present},
-    error::{Error, is_transient, reason},
-    json::{self, has_ended},
+    complete,
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE},
+    error::Error,
+    json,
     progress::Progress,
+    remote::Remote,
+    subject::Subject,
     text,
 };
 
-/// A stream that lasted so long counts as contact with the coordinator, even if it
-/// brought no event.
-const LASTING: Duration = Duration::from_secs(5);
+use self::{
+    events::Wanted,
+    follower::{Follower, News},
+    quiet::WaitFor,
+};
+
 /// Most experiments of a group that are followed at the same time, each by a stream of the
 /// one connection, which has one more for their situation; others follow when one has ended.
 const STREAMS_MAX: usize = 64;
@@ -56,22 +63,86 @@ pub struct Followed {
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct WatchArgs {
-    #[command(flatten)]
-    target: Target,
+    /// Number or name of the experiment, or name of a group of experiments [default with
+    /// --events: all, in the order of time]
+    #[arg(
+        value_name = "ID|NAME",
+        required_unless_present = "events",
+        add = ArgValueCompleter::new(complete::experiments)
+    )]
+    subject: Option<Subject>,
+    /// Print each event on a line instead: completed generations, changes of state, and notices
+    /// such as the re-evaluation of a champion.
+    #[arg(long, conflicts_with = "quiet")]
+    events: bool,
+    /// Start at the event with this sequence number.
+    #[arg(
+        long = "from",
+        value_name = "SEQ",
+        default_value_t = 1,
+        requires = "events",
+        requires = "subject"
+    )]
+    from_sequence: u64,
+    /// End after the events so far.
+    #[arg(long, requires = "events")]
+    so_far: bool,
+    /// Print nothing but how the experiment ended. Standard error still says what keeps it from
+    /// being computed.
+    #[arg(long)]
+    quiet: bool,
+    /// Which end counts as success.
+    #[arg(
+        long = "for",
+        value_enum,
+        default_value_t = WaitFor::Completed,
+        value_name = "END",
+        requires = "quiet"
+    )]
+    end: WaitFor,
+    /// Stop waiting after this time: 90s, 15m, 2h [default: no limit]
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, requires = "quiet")]
+    timeout: Option<Duration>,
 }
 
 const HELP: &str = "\
 With --output json it prints a line per generation (numbered from 0), then one
-for each experiment with state, digest and champion.
+for each experiment with state, digest and champion; with --events a line per
+event, with kind generation, state or notice.
+
+Exit codes:
+  0   it completed, or ended as --for demands; of --events: it has ended
+  5   it failed
+  6   it was cancelled
+  10  it has not ended within --timeout
 
 Examples:
   swarmctl watch 3 --output json | jq .best
-  swarmctl watch leader_selection_snes";
+  swarmctl watch leader_selection_snes
+  swarmctl watch 3 --quiet && swarmctl champion 3 > champion.json
+  swarmctl watch 3 --quiet --for ended --timeout 2h
+  swarmctl watch --events
+  swarmctl watch 3 --events --from 120 --output json | jq .kind";
 
 impl Remote for WatchArgs {
+    fn ends_with_reader(&self) -> bool {
+        !self.quiet
+    }
+
     async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        let experiments = connection.subject(&self.target.subject).await?;
-        watch(connection, experiments, progress).await
+        let Self { subject, from_sequence, end, timeout, .. } = self;
+        match subject {
+            Some(subject) if self.quiet => {
+                quiet::wait(connection, &subject, end, timeout, progress).await
+            }
+            Some(subject) if !self.events => {
+                watch(connection, connection.subject(&subject).await?, progress).await
+            }
+            subject => {
+                let wanted = Wanted { subject, follow: !self.so_far, from_sequence };
+                events::print(&wanted, connection, progress).await
+            }
+        }
     }
 }
 
@@ -290,143 +361,6 @@ pub fn success(experiment: &Experiment) -> Result<(), Error> {
         ExperimentState::Cancelled => Err(Error::Cancelled { id, reason }),
         _ => Err(Error::Failed { id, reason }),
     }
-}
-
-/// What is to be shown of an experiment.
-#[derive(Debug)]
-enum News {
-    /// A generation of the experiment of that number.
-    Generation(u64, GenerationSummary),
-    /// A line about the experiment of that number.
-    Notice(u64, String),
-    /// What keeps the experiment of that number from being computed; none: nothing any more.
-    Situation(u64, Option<Finding>),
-    /// The coordinator cannot be reached.
-    Lost(String),
-    /// The experiment of that number has ended; the best fitness of its first generation.
-    Ended(u64, Option<f64>),
-    /// It can be followed no further.
-    Failed(Error),
-}
-
-/// Reads the events of one experiment.
-struct Follower {
-    connection: Connection,
-    experiment_id: u64,
-    /// Shows what happens.
-    news: mpsc::Sender<News>,
-}
-
-/// How a stream of events ended.
-enum StreamEnd {
-    /// The experiment has ended.
-    Final,
-    /// For this reason, which may be transient.
-    Broken(String),
-}
-
-impl Follower {
-    /// Follows from an event on. Returns the best fitness of the first generation, if that
-    /// was among the events, once the experiment has ended.
-    async fn run(&self, next_sequence: u64) -> Result<Option<f64>, Error> {
-        let mut seen = Seen { next_sequence, first_best: None, is_over: false };
-        let mut backoff = backoff();
-        let mut unreachable_since = None;
-        loop {
-            let reason = match self.connection.events(self.experiment_id, seen.next_sequence).await
-            {
-                Ok(events) => {
-                    let (opened, sequence) = (Instant::now(), seen.next_sequence);
-                    match self.read(events, &mut seen).await? {
-                        StreamEnd::Final => return Ok(seen.first_best),
-                        StreamEnd::Broken(reason) => {
-                            // A stream that opens and breaks at once is no contact.
-                            if seen.next_sequence > sequence || opened.elapsed() > LASTING {
-                                backoff.reset();
-                                unreachable_since = None;
-                            }
-                            reason
-                        }
-                    }
-                }
-                Err(status) if is_transient(&status) => reason(&status),
-                Err(status) => return Err(self.connection.error(&status)),
-            };
-            let now = Instant::now();
-            if unreachable_since.is_none() {
-                self.tell(News::Lost(format!(
-                    "lost the connection to the coordinator ({reason}); trying to reconnect for {} s",
-                    PATIENCE.as_secs()
-                )))
-                .await;
-            }
-            let since = *unreachable_since.get_or_insert(now);
-            if now - since >= self.connection.patience() {
-                return Err(self.connection.unreachable(reason));
-            }
-            sleep(backoff.next_delay(rand::random())).await;
-        }
-    }
-
-    async fn read(
-        &self,
-        mut events: Streaming<swarm_proto::v1::WatchExperimentResponse>,
-        seen: &mut Seen,
-    ) -> Result<StreamEnd, Error> {
-        loop {
-            match events.message().await {
-                Ok(Some(response)) => {
-                    self.show(present(response.event)?, seen).await;
-                }
-                Ok(None) if seen.is_over => return Ok(StreamEnd::Final),
-                Ok(None) => {
-                    return Ok(StreamEnd::Broken("the coordinator ended the stream".into()));
-                }
-                Err(status) if is_transient(&status) => {
-                    return Ok(StreamEnd::Broken(reason(&status)));
-                }
-                Err(status) => return Err(self.connection.error(&status)),
-            }
-        }
-    }
-
-    async fn tell(&self, news: News) {
-        // Whoever is not interested any more ends this task.
-        let _ = self.news.send(news).await;
-    }
-
-    /// Shows an event once.
-    async fn show(&self, event: Event, seen: &mut Seen) {
-        if event.sequence < seen.next_sequence {
-            return;
-        }
-        seen.next_sequence = event.sequence + 1;
-        match event.kind {
-            Some(Kind::GenerationCompleted(summary)) => {
-                if summary.generation == 0 {
-                    seen.first_best = Some(summary.best);
-                }
-                self.tell(News::Generation(self.experiment_id, summary)).await;
-            }
-            Some(Kind::StateChanged(change)) => {
-                seen.is_over = has_ended(change.state());
-            }
-            Some(Kind::Notice(notice)) => {
-                let text = escape(&notice.message).into_owned();
-                self.tell(News::Notice(self.experiment_id, text)).await;
-            }
-            // A kind of event that only newer versions know.
-            None => {}
-        }
-    }
-}
-
-/// What has been read from the streams so far.
-struct Seen {
-    next_sequence: u64,
-    first_best: Option<f64>,
-    /// Whether the experiment has ended, as far as is known.
-    is_over: bool,
 }
 
 #[cfg(test)]

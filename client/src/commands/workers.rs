@@ -6,13 +6,13 @@ use console::Style;
 use serde::Serialize;
 use swarm_proto::v1::{ListWorkersRequest, ReadmitWorkerRequest, Worker};
 
-use super::Remote;
 use crate::{
     clock, complete,
     connection::Connection,
     error::Error,
     place::Intent,
     progress::Progress,
+    remote::Remote,
     table::{Column, Table},
     text,
 };
@@ -87,7 +87,9 @@ pub struct WorkersArgs {
 }
 
 impl Remote for WorkersArgs {
-    const HAS_TABLE: bool = true;
+    fn has_table(&self) -> bool {
+        true
+    }
 
     fn intent(&self) -> Intent {
         if self.readmit.is_some() { Intent::Change } else { Intent::Read }

@@ -26,8 +26,8 @@ fn names() -> Vec<String> {
 
 #[test]
 fn every_command_is_in_one_group() {
-    let grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| *names).copied().collect();
-    let distinct: BTreeSet<&str> = grouped.iter().copied().collect();
+    let grouped: Vec<String> = GROUPS.iter().flat_map(Group::names).collect();
+    let distinct: BTreeSet<&str> = grouped.iter().map(String::as_str).collect();
     assert_eq!(distinct.len(), grouped.len(), "a command is in two groups");
     let names = names();
     assert_eq!(distinct, names.iter().map(String::as_str).collect());
@@ -36,7 +36,7 @@ fn every_command_is_in_one_group() {
         for name in &names {
             assert!(page.lines().any(|line| line.starts_with(&format!("  {name} "))), "{name}");
         }
-        for (heading, _) in GROUPS {
+        for Group { heading, .. } in GROUPS {
             assert!(page.contains(&format!("\n\n{heading}:\n")), "{heading}");
         }
         assert!(!page.contains("\nCommands:"), "{page}");

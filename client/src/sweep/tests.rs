@@ -4,8 +4,8 @@ use clap::Parser as _;
 
 use super::*;
 use crate::{
-    args::Args,
-    commands::{Command, RemoteCommand},
+    cli::Args,
+    commands::{Command, RemoteCommand, submit::Evolve},
     experiment_file::tests::quickstart,
 };
 
@@ -15,7 +15,9 @@ fn swept(more: &[&str]) -> Result<Vec<SweepRun>, Error> {
     let line =
         ["swarmctl", "submit", path.to_str().unwrap()].into_iter().chain(more.iter().copied());
     let args = Args::try_parse_from(line).map_err(|error| Error::Input(error.to_string()))?;
-    let Command::Remote(RemoteCommand::Submit(args)) = args.command else { panic!() };
+    let Command::Remote(RemoteCommand::Evolve(Evolve::Submit(args))) = args.command else {
+        panic!()
+    };
     runs(&args.experiment)
 }
 

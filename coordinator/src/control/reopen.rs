@@ -22,7 +22,7 @@ pub enum Reopening {
     Extend(u64),
     /// What made it fail is gone.
     Retry,
-    /// It was cancelled, and that is taken back.
+    /// It has failed, or was cancelled and that is taken back.
     Resume,
 }
 
@@ -98,7 +98,9 @@ fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<Stri
         (&experiment.record, &experiment.config_json);
     let not_now = |what: String| Err(ControlError::NotNow(format!("experiment {id} {what}")));
     match (reopening, state) {
-        (Reopening::Retry, Failed) | (Reopening::Resume, Cancelled) => Ok(config_json.clone()),
+        (Reopening::Retry, Failed) | (Reopening::Resume, Cancelled | Failed) => {
+            Ok(config_json.clone())
+        }
         (Reopening::Extend(generations), Completed) if experiment.can_be_continued() => {
             longer(experiment, generations)
         }
@@ -109,14 +111,14 @@ fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<Stri
             experiment.n_generations().saturating_sub(1)
         )),
         (Reopening::Extend(_), Running | Paused) => {
-            not_now(format!("has not ended; wait until it has completed: swarmctl wait {id}"))
+            not_now(format!("has not ended; wait until it has completed: swarmctl watch {id}"))
         }
         (Reopening::Retry, Running) => not_now("is running already".to_owned()),
         (_, Paused) => not_now(format!("is paused; continue it with: swarmctl resume {id}")),
-        (_, Failed) => not_now(format!("has failed; go on with: swarmctl retry {id}")),
+        (_, Failed) => not_now(format!("has failed; go on with: swarmctl resume {id}")),
         (_, Cancelled) => not_now(format!("was cancelled; go on with: swarmctl resume {id}")),
         (_, Completed) => {
-            not_now(format!("has completed; go on with: swarmctl extend {id} --generations N"))
+            not_now(format!("has completed; go on with: swarmctl resume {id} --generations N"))
         }
         (Reopening::Resume, Running) => Ok(config_json.clone()),
     }

@@ -8,7 +8,6 @@ use crate::{
     driver::DriverEvent,
     ids::ExperimentId,
     limits::{CHANGE_TIMEOUT, TEXT_LEN_MAX},
-    priority::Priority,
     queries::QueryError,
     runs::Request,
     store::{ExperimentRecord, ExperimentState, Store, StoreError},
@@ -54,7 +53,8 @@ impl Control {
         self.change(id, Request::Pause(reason)).await
     }
 
-    /// Lets a paused experiment go on, unless it is damaged, or one that was cancelled.
+    /// Lets a paused experiment go on, unless it is damaged, or one that has failed or was
+    /// cancelled.
     pub async fn resume(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
         if !self.find(id).await?.state.is_unfinished() {
             return self.reopen(id, Reopening::Resume).await;
@@ -62,15 +62,6 @@ impl Control {
         self.take_up_if_left(id).await?;
         self.take_up(id).await?;
         self.change(id, Request::Resume).await
-    }
-
-    /// Changes an experiment's share of the fleet.
-    pub async fn set_priority(
-        &self,
-        id: ExperimentId,
-        priority: Priority,
-    ) -> Result<ExperimentRecord, ControlError> {
-        self.change(id, Request::SetPriority(priority)).await
     }
 
     /// Deletes the fitness log of an experiment that has ended; returns how many bytes that
@@ -110,7 +101,7 @@ impl Control {
     }
 
     /// Has the driver change an experiment that has not ended, and reads it again.
-    async fn change(
+    pub async fn change(
         &self,
         id: ExperimentId,
         request: Request,

@@ -23,7 +23,7 @@ use crate::{
     group::Membership,
     ids::ExperimentId,
     priority::Priority,
-    queries,
+    queries, runs,
     shared_store::SharedStore,
     submission::Submission,
 };
@@ -226,7 +226,7 @@ model::reading_calls! { service
         resume_experiment(ResumeExperimentRequest {}) -> ResumeExperimentResponse { experiment }
             = control.resume(id);
         set_priority(SetPriorityRequest { priority }) -> SetPriorityResponse { experiment }
-            = control.set_priority(id, convert::priority(priority)?);
+            = control.change(id, runs::Request::SetPriority(convert::priority(priority)?));
         extend_experiment(ExtendExperimentRequest { generations }) -> ExtendExperimentResponse { experiment }
             = control.extend(id, generations);
         retry_experiment(RetryExperimentRequest {}) -> RetryExperimentResponse { experiment }

@@ -8,6 +8,7 @@ use crate::{
     clock,
     engine::{Fate, TimelineEntry},
     ids::ExperimentId,
+    runs,
 };
 
 use super::{Experiments, convert, explain};
@@ -36,7 +37,8 @@ impl WebControl for Experiments {
             Action::Resume => self.control.resume(id).await,
             Action::Cancel => self.control.cancel(id).await,
             Action::Priority(weight) => {
-                self.control.set_priority(id, convert::priority(weight)?).await
+                let request = runs::Request::SetPriority(convert::priority(weight)?);
+                self.control.change(id, request).await
             }
             Action::Archive(is_archived) => {
                 self.control.archive(id, is_archived).await.map(|(experiment, _)| experiment)

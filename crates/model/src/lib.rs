@@ -8,6 +8,7 @@
 //! - [`submission`]: from an experiment file to a row; [`restored`]: from a row to evolution
 //! - [`queries`]: what can be read of experiments, in the messages of clients
 //! - [`codec`]: what coordinator and workers name on the wire
+//! - [`wire`]: rows as messages
 //! - [`limits`]: bounds on what is kept and answered
 
 mod address;
@@ -34,6 +35,6 @@ pub mod submission;
 #[cfg(feature = "database")]
 pub mod text;
 #[cfg(feature = "database")]
-mod wire;
+pub mod wire;
 
 pub use address::{Address, NotAnAddress, Who};

@@ -116,6 +116,16 @@ impl TryFrom<v1::ExperimentState> for ExperimentState {
     }
 }
 
+/// The name of a state.
+pub fn state_name(state: v1::ExperimentState) -> &'static str {
+    ExperimentState::try_from(state).map_or("unknown", ExperimentState::name)
+}
+
+/// Whether an experiment in this state has ended.
+pub fn has_ended(state: v1::ExperimentState) -> bool {
+    ExperimentState::try_from(state).is_ok_and(|state| !state.is_unfinished())
+}
+
 /// A genotype; `network_json`: empty if it is not decoded.
 pub fn individual(
     experiment_id: u64,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use experiment_file::Seed;
+use model::wire::state_name;
 use serde::Serialize;
 use serde_json::{Value, json};
 use swarm_proto::v1::{
@@ -51,7 +52,7 @@ impl ExperimentAnswer {
         Self {
             state: match experiment.state() {
                 ExperimentState::Running if !has_coordinator => "unfinished",
-                known => state(known),
+                known => state_name(known),
             },
             id: experiment.id,
             name: experiment.name,
@@ -80,18 +81,6 @@ impl ExperimentAnswer {
             archived: experiment.archived,
             generation_ms: experiment.recent_generation_ms.map(f64::round),
         }
-    }
-}
-
-/// The name of a state.
-pub fn state(state: ExperimentState) -> &'static str {
-    match state {
-        ExperimentState::Unspecified => "unknown",
-        ExperimentState::Running => "running",
-        ExperimentState::Completed => "completed",
-        ExperimentState::Failed => "failed",
-        ExperimentState::Cancelled => "cancelled",
-        ExperimentState::Paused => "paused",
     }
 }
 
@@ -126,8 +115,10 @@ pub struct EventAnswer {
 pub fn event(event: Event) -> Option<EventAnswer> {
     let text = match event.kind? {
         Kind::GenerationCompleted(_) => return None,
-        Kind::StateChanged(change) if change.reason.is_empty() => state(change.state()).to_owned(),
-        Kind::StateChanged(change) => format!("{}: {}", state(change.state()), change.reason),
+        Kind::StateChanged(change) if change.reason.is_empty() => {
+            state_name(change.state()).to_owned()
+        }
+        Kind::StateChanged(change) => format!("{}: {}", state_name(change.state()), change.reason),
         Kind::Notice(notice) => notice.message,
     };
     Some(EventAnswer { sequence: event.sequence, at_ms: event.at_ms, text })

@@ -10,13 +10,13 @@ use serde::Deserialize;
 use swarm_proto::v1::{Experiment, ExperimentState};
 
 use crate::{
-    args::Subject,
     connection::Connection,
     error::Error,
     file_kind::{self, Kind},
     input::{GENOTYPE_BYTES, read_text},
     progress::Progress,
     recorded::{GenerationFitness, Run},
+    subject::Subject,
     text,
 };
 

@@ -7,8 +7,8 @@ use swarm_proto::v1::{Experiment, ExperimentState, GenerationSummary, event::Kin
 
 use super::*;
 use crate::{
-    args::OutputFormat,
     fake_coordinator::{FakeCoordinator, Script},
+    output_format::OutputFormat,
     progress::Part,
     progress::tests::Captured,
 };

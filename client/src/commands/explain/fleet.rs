@@ -6,8 +6,10 @@ use swarm_proto::v1::{
     RunningEvaluation,
 };
 
-use super::{Explanation, explain, finding::Finding};
-use crate::{clock, connection::Connection, error::Error, json, progress::Progress, text};
+use super::{Explanation, explain};
+use crate::{
+    clock, connection::Connection, error::Error, finding::Finding, json, progress::Progress, text,
+};
 
 /// The fleet, as JSON.
 #[derive(Debug, Serialize)]

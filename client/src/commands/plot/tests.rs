@@ -6,9 +6,9 @@ use swarm_proto::v1::{Event, Experiment, GenerationSummary, event::Kind};
 
 use super::*;
 use crate::{
-    args::OutputFormat,
     fake_coordinator::{FakeCoordinator, Script},
     output_file::Overwrite,
+    output_format::OutputFormat,
     progress::tests::Captured,
 };
 

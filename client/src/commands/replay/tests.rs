@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 
 use super::{picture::Moments, *};
 use crate::{
-    args::{Args, OutputFormat},
+    cli::Args,
     commands::{Command, one_world::output},
     experiment_file::tests::quickstart,
+    output_format::OutputFormat,
     progress::tests::Captured,
 };
 

@@ -7,10 +7,11 @@ use swarm_proto::v1::{Experiment, GetChampionResponse};
 
 use super::*;
 use crate::{
-    args::{ChangedArg, IsaArgs, OutputFormat, SeedArg, StepsArg},
+    args::{ChangedArg, IsaArgs, SeedArg, StepsArg},
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script},
     output_file::Overwrite,
+    output_format::OutputFormat,
     progress::tests::Captured,
 };
 

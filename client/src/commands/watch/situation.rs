@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use model::wire::has_ended;
 use swarm_proto::v1::{ExplainExperimentResponse, WatchExplanationResponse};
 use tokio::{
     sync::mpsc,
@@ -9,12 +10,11 @@ use tokio::{
 };
 use tonic::Streaming;
 
-use super::News;
+use super::follower::News;
 use crate::{
-    commands::explain::{Finding, stall},
     connection::{Connection, backoff},
     error::is_transient,
-    json::has_ended,
+    finding::{Finding, stall},
 };
 
 /// A situation that passes within this time is not worth a line.

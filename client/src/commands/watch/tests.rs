@@ -5,12 +5,25 @@ use tonic::Status;
 
 use super::*;
 use crate::{
-    args::{OutputFormat, Subject},
     commands::one_world::output,
     experiment_file::tests::quickstart,
     fake_coordinator::{FakeCoordinator, Script, generation, state, unreachable_connection},
+    output_format::OutputFormat,
     progress::tests::Captured,
+    subject::Subject,
 };
+
+fn args(id: u64) -> WatchArgs {
+    WatchArgs {
+        subject: Some(Subject::Experiment(id)),
+        events: false,
+        from_sequence: 1,
+        so_far: false,
+        quiet: false,
+        end: WaitFor::Completed,
+        timeout: None,
+    }
+}
 
 fn experiment(state: ExperimentState) -> Experiment {
     Experiment { id: 3, generations: 3, state: state.into(), ..Experiment::default() }
@@ -92,7 +105,7 @@ async fn waiting_follows_the_events_instead_of_asking_again() {
 async fn an_unknown_experiment_is_not_found() {
     let (_fake, connection) = FakeCoordinator::serve(Script::default()).await;
     let mut progress = Captured::default().progress(OutputFormat::Table);
-    let args = WatchArgs { target: Target { subject: Subject::Experiment(9) } };
+    let args = args(9);
     let error = args.execute(&connection, &mut progress).await.unwrap_err();
     assert_eq!((error.exit_code(), error.to_string().as_str()), (3, "there is no experiment 9"));
 }
@@ -101,7 +114,7 @@ async fn an_unknown_experiment_is_not_found() {
 async fn a_coordinator_that_stays_away_is_unreachable() {
     let connection = unreachable_connection().await;
     let mut progress = Captured::default().progress(OutputFormat::Table);
-    let args = WatchArgs { target: Target { subject: Subject::Experiment(3) } };
+    let args = args(3);
     let error = args.execute(&connection, &mut progress).await.unwrap_err();
     assert_eq!(error.exit_code(), 4);
     let follower = Follower { connection, experiment_id: 3, news: mpsc::channel(1).0 };

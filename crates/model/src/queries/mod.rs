@@ -36,7 +36,7 @@ pub enum QueryError {
     #[error("there is no experiment {0}; `swarmctl list` shows all")]
     NotFound(ExperimentId),
     /// A bundle is of an experiment that has ended.
-    #[error("experiment {0} has not ended: `swarmctl wait {0}` ends when it has")]
+    #[error("experiment {0} has not ended: `swarmctl watch {0}` ends when it has")]
     NotEnded(ExperimentId),
     /// There is no champion yet.
     #[error("experiment {0} has no champion yet: its first generation is not complete")]

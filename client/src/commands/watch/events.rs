@@ -1,5 +1,4 @@
-//! `swarmctl logs`: what has happened to one experiment, or to all of them in
-//! the order of time.
+//! Prints what has happened to one experiment, or to all of them in the order of time.
 //!
 //! The merged log does not watch every experiment: one stream per experiment would not scale,
 //! and events can be put in the order of time only when all events of a moment are known. It
@@ -9,81 +8,55 @@ mod merge;
 
 use std::{collections::BTreeMap, path::Path};
 
-use clap::Args;
-use clap_complete::ArgValueCompleter;
+use model::wire::has_ended;
 use swarm_proto::v1::{Event, Experiment, WatchNewsResponse};
 use tokio::time::{Instant, sleep};
 use tonic::Streaming;
 
-use super::Remote;
 use crate::{
-    args::Subject,
-    complete,
-    connection::{Connection, PATIENCE_WHILE_FOLLOWING, backoff},
+    connection::{Connection, PATIENCE_WHILE_FOLLOWING as PATIENCE, backoff},
     error::{Error, is_transient},
-    json::{self, has_ended},
+    json,
     progress::Progress,
+    subject::Subject,
     text,
 };
 
 use self::merge::Merge;
 
-/// Print the events of an experiment, or of all of them.
-///
-/// Events are completed generations, changes of state, and notices such as the
-/// re-evaluation of a champion.
-#[derive(Debug, Args)]
-#[command(after_help = HELP)]
-pub struct LogsArgs {
-    /// Number or name of the experiment, or name of a group [default: all, in the order of
-    /// time]
-    #[arg(value_name = "ID|NAME", add = ArgValueCompleter::new(complete::experiments))]
-    id: Option<Subject>,
-    /// Keep printing new events; for an experiment or a group, until it ends.
-    #[arg(long, short)]
-    follow: bool,
-    /// Start at the event with this sequence number.
-    #[arg(long = "from", value_name = "SEQ", default_value_t = 1, requires = "id")]
-    from_sequence: u64,
+/// Which events are printed.
+#[derive(Debug)]
+pub struct Wanted {
+    /// Of which experiments; none: of all, in the order of time.
+    pub subject: Option<Subject>,
+    /// Whether new ones are waited for, until the experiments have ended.
+    pub follow: bool,
+    /// The sequence number of the first.
+    pub from_sequence: u64,
 }
 
-const HELP: &str = "\
-The log of all experiments is printed in the order of time. With --output json
-each event is an object on a line of its own, with kind generation, state or
-notice.
-
-Examples:
-  swarmctl logs 3 --follow
-  swarmctl logs --follow
-  swarmctl logs 3 --from 120 --output json | jq 'select(.kind == \"notice\")'";
-
-impl Remote for LogsArgs {
-    async fn execute(self, connection: &Connection, progress: &mut Progress) -> Result<(), Error> {
-        print_events(&self, connection, progress).await
-    }
-}
-
-async fn print_events(
-    args: &LogsArgs,
+/// Prints events, each on a line.
+pub async fn print(
+    wanted: &Wanted,
     connection: &Connection,
     progress: &mut Progress,
 ) -> Result<(), Error> {
-    let patience = if args.follow { PATIENCE_WHILE_FOLLOWING } else { connection.patience() };
+    let patience = if wanted.follow { PATIENCE } else { connection.patience() };
     // The first request has the usual patience: an unreachable coordinator is an
     // error soon.
-    let mut experiments = chosen(connection, args.id.as_ref()).await?;
+    let mut experiments = chosen(connection, wanted.subject.as_ref()).await?;
     let connection = connection.with_patience(patience);
     // Per experiment, the sequence number of the next event to print.
     let mut positions: BTreeMap<u64, u64> = BTreeMap::new();
     let mut news = News { connection: &connection, stream: None };
-    if args.follow {
+    if wanted.follow {
         // Before the first reading, so that nothing falls between.
         news.next().await?;
-        experiments = chosen(&connection, args.id.as_ref()).await?;
+        experiments = chosen(&connection, wanted.subject.as_ref()).await?;
     }
     loop {
         let with_news = experiments.iter().filter_map(|experiment| {
-            let next = *positions.entry(experiment.id).or_insert(args.from_sequence);
+            let next = *positions.entry(experiment.id).or_insert(wanted.from_sequence);
             (next <= experiment.last_sequence).then_some((experiment, next))
         });
         let mut merge = Merge::new(&connection, with_news.collect());
@@ -91,17 +64,17 @@ async fn print_events(
             positions.insert(experiment.id, event.sequence + 1);
             progress.print(&line(experiment, &event, progress.is_json()))?;
         }
-        let is_over = args.id.is_some() && experiments.iter().all(|e| has_ended(e.state()));
-        if !args.follow || is_over {
+        let is_over = wanted.subject.is_some() && experiments.iter().all(|e| has_ended(e.state()));
+        if !wanted.follow || is_over {
             return Ok(());
         }
         if let Some(data_dir) = connection.data_dir()
             && connection.holder().await.is_none()
         {
-            return deserted(&experiments, args.id.is_some(), data_dir, progress);
+            return deserted(&experiments, wanted.subject.is_some(), data_dir, progress);
         }
         news.next().await?;
-        experiments = chosen(&connection, args.id.as_ref()).await?;
+        experiments = chosen(&connection, wanted.subject.as_ref()).await?;
     }
 }
 

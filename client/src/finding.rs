@@ -8,8 +8,10 @@ use swarm_proto::v1::{
     Experiment, ExperimentState, ExplainExperimentResponse, Round, WithheldWorker,
 };
 
-use super::WORKERS_MAX;
 use crate::{clock, text};
+
+/// Most workers that are listed, so that everything fits one screen.
+pub const WORKERS_MAX: usize = 8;
 
 /// If a worker holds an item for longer, the findings suggest to look at the worker.
 const LONG_MS: u64 = 60_000;
@@ -147,7 +149,7 @@ pub fn findings(
             return vec![finding(Kind::Ended, "it has completed", steps)];
         }
         ExperimentState::Failed | ExperimentState::Cancelled => {
-            let steps = [format!("read its events: swarmctl logs {id}"), history(id)];
+            let steps = [format!("read its events: swarmctl watch {id} --events"), history(id)];
             return vec![finding(Kind::Ended, "it has ended early, for the reason above", steps)];
         }
         ExperimentState::Paused => {
@@ -327,7 +329,7 @@ fn of_round(
         let what = format!(
             "at the barrier: waiting for the last {} of {}, on {holders} for {held_for}",
             text::counted(n_held, "item"),
-            super::batch_name(round),
+            batch_name(round),
         );
         findings.push(finding(Kind::Barrier, what, look(round)));
     } else if n_held > 0 {
@@ -382,6 +384,18 @@ fn finding(
     next_steps: impl IntoIterator<Item = String>,
 ) -> Finding {
     Finding { kind, what: what.into(), next_steps: next_steps.into_iter().collect() }
+}
+
+/// What a batch evaluates: "generation 12", or the champion after it.
+pub fn batch_name(round: &Round) -> String {
+    let generation = round.generation;
+    if round.judgement {
+        format!("the judgement of the champion after generation {generation}")
+    } else if round.held_out {
+        format!("the re-evaluation of candidates for the champion after generation {generation}")
+    } else {
+        format!("generation {generation}")
+    }
 }
 
 #[cfg(test)]
