@@ -79,7 +79,7 @@ def test_examples_with_a_fleet_run(programs, folder, tmp_path, monkeypatch):
         monkeypatch.setenv("SWARM_COORDINATOR", running.url)
         blocks = [block for block in BLOCKS if any(it in block for it in FLEET) or "dask_client" in block]
         shorter = [
-            block.replace("generations=200", "generations=8").replace("run.extend(300)", "run.extend(10)")
+            block.replace("generations=200", "generations=8").replace("run.resume(300)", "run.resume(10)")
             .replace("http://head-node:7700", running.url).replace("dask_client, 40", "dask_client, 1")
             for block in blocks
         ]
