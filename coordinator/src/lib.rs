@@ -18,6 +18,7 @@
 //! - [`limits`]: every bound on what the network can ask for
 //! - [`program`]: the command line of the program
 
+mod byte_budget;
 mod clock;
 mod control;
 mod driver;

@@ -1,31 +1,29 @@
 //! The memory and the processors that requests of clients take before anything runs.
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    task,
-    time::sleep,
-};
+use tokio::{task, time::sleep};
 use tokio_util::sync::CancellationToken;
 
 use sim_core::TRYING_TIME_MAX;
 
-use crate::limits::{CHECKS_MAX, REQUESTS_LEN_MAX};
+use crate::{
+    byte_budget::{ByteBudget, TakenBytes},
+    limits::{CHECKS_MAX, REQUESTS_LEN_MAX},
+};
 
 use super::{
     ControlError,
     turns::{Client, Turns},
 };
 
-/// Bytes that are counted together; every request counts as one at least.
-const UNIT: usize = 16 << 10;
+/// What a request takes beside its bytes.
+const REQUEST_LEN: usize = 16 << 10;
 
 /// What clients have sent that is being checked, waits, or is computed.
 #[derive(Debug, Clone)]
 pub struct Requests {
-    /// A permit per unit.
-    room: Arc<Semaphore>,
+    room: ByteBudget,
     checks: Turns,
     /// Ends all checks.
     shutdown: CancellationToken,
@@ -34,24 +32,19 @@ pub struct Requests {
 /// The room that a request takes, until it is dropped.
 #[derive(Debug)]
 pub struct RequestPlace {
-    _room: OwnedSemaphorePermit,
+    _room: TakenBytes,
 }
 
 impl Requests {
     /// Nothing has been asked for yet; `shutdown` ends all checks.
     pub fn new(shutdown: CancellationToken) -> Self {
-        Self {
-            room: Arc::new(Semaphore::new(REQUESTS_LEN_MAX / UNIT)),
-            checks: Turns::new(CHECKS_MAX),
-            shutdown,
-        }
+        Self { room: ByteBudget::new(REQUESTS_LEN_MAX), checks: Turns::new(CHECKS_MAX), shutdown }
     }
 
     /// Takes room for a request of `len` bytes, if there is any.
     pub fn enter(&self, len: usize) -> Result<RequestPlace, ControlError> {
-        let n_units = u32::try_from(1 + len / UNIT).unwrap_or(u32::MAX);
-        let room = Arc::clone(&self.room).try_acquire_many_owned(n_units);
-        room.map(|room| RequestPlace { _room: room }).map_err(|_| ControlError::TooManyRequests)
+        let room = self.room.try_take(len.saturating_add(REQUEST_LEN));
+        room.map(|room| RequestPlace { _room: room }).ok_or(ControlError::TooManyRequests)
     }
 
     /// Checks something on a thread of its own, as that is work for a processor, and

@@ -3,7 +3,7 @@
 use std::{
     num::NonZeroU64,
     pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
 };
 
 use futures_util::stream::unfold;
@@ -15,16 +15,17 @@ use swarm_proto::{
     },
 };
 use swarm_transport::{Throttle, listening::Peer};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot};
 use tokio_stream::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 use tracing::warn;
 
 use crate::{
+    byte_budget::ByteBudget,
     clock,
     driver::{DriverEvent, EventSender, WorkerLink, WorkerMessage},
-    engine::{Introduction, NamePattern, ToWorker},
+    engine::{Introduction, NamePattern},
     ids::WorkerId,
     limits::{
         HELLO_TIMEOUT, RESULTS_PER_MESSAGE_MAX, SHORT_LEN, WORKER_OUTBOX_SLACK,
@@ -41,16 +42,14 @@ use super::{
 /// What a message takes while it is encoded, compared with its length: itself, and a buffer
 /// that grows.
 const COPIES: usize = 3;
-/// Bytes that are counted together.
-const UNIT: usize = 16 << 10;
 
 /// Room for long messages to workers.
 #[derive(Debug, Clone)]
-pub struct WorkerOutflow(Arc<Semaphore>);
+pub struct WorkerOutflow(ByteBudget);
 
 impl Default for WorkerOutflow {
     fn default() -> Self {
-        Self(Arc::new(Semaphore::new(WORKER_OUTFLOW_LEN_MAX / UNIT)))
+        Self(ByteBudget::new(WORKER_OUTFLOW_LEN_MAX))
     }
 }
 
@@ -112,28 +111,20 @@ impl WorkerService for Workers {
         let id = id.await.map_err(|_| shutting_down())?;
         tokio::spawn(listen(id, inbound, self.events.clone(), dropped));
 
-        let (times, room) = (self.times, Arc::clone(&self.outflow.0));
+        let (times, room) = (self.times, self.outflow.0.clone());
         let outbound = unfold((inbox, room, None), move |(mut inbox, room, place)| async move {
             // The message before has been taken.
             drop(place);
             let message = inbox.recv().await?;
-            let place = room_for(&message, &room).await;
+            // A long one waits for room until the worker has taken it.
+            let place = match message.len() {
+                0..=SHORT_LEN => None,
+                len => room.take(COPIES * len).await,
+            };
             Some((convert::to_wire(message, times), (inbox, room, place)))
         });
         Ok(Response::new(Box::pin(outbound)))
     }
-}
-
-/// Waits for the room that a long message takes until the worker has taken it; `None` if it is
-/// short.
-async fn room_for(message: &ToWorker, room: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
-    let len = message.len();
-    if len <= SHORT_LEN {
-        return None;
-    }
-    let n_units = (COPIES * len).min(WORKER_OUTFLOW_LEN_MAX) / UNIT;
-    let n_units = u32::try_from(n_units).unwrap_or(u32::MAX);
-    Arc::clone(room).acquire_many_owned(n_units).await.ok()
 }
 
 /// Passes on what a worker says until its stream ends.

@@ -3,50 +3,47 @@
 
 use std::{
     pin::Pin,
-    sync::Arc,
     task::{Context, Poll, ready},
 };
 
 use http_body::Frame;
 use swarm_transport::TO_COORDINATOR_LEN_MAX;
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::{Sleep, sleep},
-};
+use tokio::time::{Sleep, sleep};
 use tonic::{Status, body::Body, codegen::Bytes};
 
-use crate::limits::{INTAKE_LEN_MAX, MESSAGE_TIME, SHORT_LEN};
+use crate::{
+    byte_budget::{ByteBudget, TakenBytes},
+    limits::{INTAKE_LEN_MAX, MESSAGE_TIME, SHORT_LEN},
+};
 
 /// What a message takes, compared with its length: a buffer that grew, and what is decoded.
 const COPIES: usize = 3;
-/// Bytes that are counted together.
-const UNIT: usize = 16 << 10;
 /// Bytes before a message: whether it is compressed, and its length.
 const HEAD_LEN: usize = 5;
 
 /// Room for long messages.
 #[derive(Debug, Clone)]
-pub struct Intake(Arc<Semaphore>);
+pub struct Intake(ByteBudget);
 
 /// A call's messages, of which the long ones wait for room.
 struct Arriving {
     body: Body,
-    room: Arc<Semaphore>,
+    room: ByteBudget,
     /// What has arrived of the head of the next message.
     head: Vec<u8>,
     /// Bytes of the message that are still to come.
     n_left: usize,
     /// What has arrived and waits for room.
     held: Option<Bytes>,
-    waiting: Option<Pin<Box<dyn Future<Output = Option<OwnedSemaphorePermit>> + Send>>>,
+    waiting: Option<Pin<Box<dyn Future<Output = Option<TakenBytes>> + Send>>>,
     /// For the message that arrives, or has arrived last.
-    place: Option<OwnedSemaphorePermit>,
+    place: Option<TakenBytes>,
     deadline: Option<Pin<Box<Sleep>>>,
 }
 
 impl Default for Intake {
     fn default() -> Self {
-        Self(Arc::new(Semaphore::new(INTAKE_LEN_MAX / UNIT)))
+        Self(ByteBudget::new(INTAKE_LEN_MAX))
     }
 }
 
@@ -55,7 +52,7 @@ impl Intake {
     pub fn wrap(&self, body: Body) -> Body {
         Body::new(Arriving {
             body,
-            room: Arc::clone(&self.0),
+            room: self.0.clone(),
             head: Vec::with_capacity(HEAD_LEN),
             n_left: 0,
             held: None,
@@ -95,10 +92,8 @@ impl Arriving {
             return;
         }
         // A longer one is refused after its head.
-        let n_units = COPIES * len.min(TO_COORDINATOR_LEN_MAX) / UNIT;
-        let n_units = u32::try_from(n_units).unwrap_or(u32::MAX);
-        let place = Arc::clone(&self.room).acquire_many_owned(n_units);
-        self.waiting = Some(Box::pin(async { place.await.ok() }));
+        let room = self.room.take(COPIES * len.min(TO_COORDINATOR_LEN_MAX));
+        self.waiting = Some(Box::pin(room));
     }
 }
 
@@ -199,20 +194,20 @@ mod tests {
     async fn a_message_is_found_however_it_is_cut_and_its_room_is_free_when_the_next_begins() {
         for frame_len in [1, 4, 5, 7, 100_000, 10_000_000] {
             let intake = Intake::default();
-            let all = intake.0.available_permits();
+            let all = intake.0.len_left();
             let (mut both, sender) = body(&intake, &[3, 100_000, 0, 200_000, 3], frame_len);
             drop(sender);
             let mut fewest = all;
             let mut n_bytes = 0;
             while let Some(frame) = both.frame().await {
                 n_bytes += frame.unwrap().into_data().unwrap().len();
-                fewest = fewest.min(intake.0.available_permits());
+                fewest = fewest.min(intake.0.len_left());
             }
             assert_eq!(n_bytes, 300_006 + 5 * HEAD_LEN);
             if frame_len <= 100_000 {
-                assert_eq!(all - fewest, COPIES * 200_000 / UNIT, "{frame_len}");
+                assert_eq!(all - fewest, (COPIES * 200_000) >> 14 << 14, "{frame_len}");
             }
-            assert_eq!(intake.0.available_permits(), all);
+            assert_eq!(intake.0.len_left(), all);
         }
     }
 

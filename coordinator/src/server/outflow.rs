@@ -8,29 +8,27 @@ use std::{
 };
 
 use http_body::Frame;
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::{Instant, sleep_until},
-};
+use tokio::time::{Instant, sleep_until};
 use tonic::{Status, body::Body, codegen::Bytes};
 
-use crate::limits::{OUTFLOW_LEN_MAX, SHORT_LEN, WATCH_PATIENCE};
+use crate::{
+    byte_budget::{ByteBudget, TakenBytes},
+    limits::{OUTFLOW_LEN_MAX, SHORT_LEN, WATCH_PATIENCE},
+};
 
-/// Bytes that are counted together.
-const UNIT: usize = 16 << 10;
 /// Bytes that are handed to the connection at once: what it holds for a peer that does not
 /// read.
 const PIECE_LEN: usize = 32 << 10;
 
 /// Room for long answers.
 #[derive(Debug, Clone)]
-pub struct Outflow(Arc<Semaphore>);
+pub struct Outflow(ByteBudget);
 
 /// An answer, or a stream of them, and what of it waits.
 struct Unread {
     body: Body,
     rest: Bytes,
-    place: Option<OwnedSemaphorePermit>,
+    place: Option<TakenBytes>,
     /// When a piece was last taken.
     taken: Instant,
     is_watched: bool,
@@ -41,13 +39,13 @@ type Shared = Mutex<Option<Unread>>;
 
 /// Hands it out in pieces.
 struct Pieces {
-    room: Arc<Semaphore>,
+    room: ByteBudget,
     unread: Arc<Shared>,
 }
 
 impl Default for Outflow {
     fn default() -> Self {
-        Self(Arc::new(Semaphore::new(OUTFLOW_LEN_MAX / UNIT)))
+        Self(ByteBudget::new(OUTFLOW_LEN_MAX))
     }
 }
 
@@ -57,7 +55,7 @@ impl Outflow {
         let (rest, taken) = (Bytes::new(), Instant::now());
         let unread = Unread { body, rest, place: None, taken, is_watched: false };
         let unread = Arc::new(Mutex::new(Some(unread)));
-        Body::new(Pieces { room: Arc::clone(&self.0), unread })
+        Body::new(Pieces { room: self.0.clone(), unread })
     }
 }
 
@@ -94,8 +92,7 @@ impl http_body::Body for Pieces {
             Ok(bytes) => return Poll::Ready(Some(Ok(Frame::data(bytes)))),
             Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
         };
-        let n_units = u32::try_from(bytes.len() / UNIT).unwrap_or(u32::MAX);
-        let Ok(place) = Arc::clone(&self.room).try_acquire_many_owned(n_units) else {
+        let Some(place) = self.room.try_take(bytes.len()) else {
             let why = "many long answers wait for their readers; try again in a minute";
             return Poll::Ready(Some(Err(Status::resource_exhausted(why))));
         };
@@ -166,7 +163,7 @@ mod tests {
             tokio::time::sleep(WATCH_PATIENCE - Duration::from_secs(1)).await;
         }
         assert_eq!(n_bytes, 1_000_000);
-        assert_eq!(outflow.0.available_permits(), OUTFLOW_LEN_MAX / UNIT);
+        assert_eq!(outflow.0.len_left(), OUTFLOW_LEN_MAX);
     }
 
     #[tokio::test(start_paused = true)]
@@ -174,9 +171,9 @@ mod tests {
         let outflow = Outflow::default();
         let mut body = answer(&outflow, 1_000_000);
         assert_eq!(piece(&mut body).await.unwrap(), PIECE_LEN);
-        assert!(outflow.0.available_permits() < OUTFLOW_LEN_MAX / UNIT);
+        assert!(outflow.0.len_left() < OUTFLOW_LEN_MAX);
         tokio::time::sleep(WATCH_PATIENCE + Duration::from_secs(1)).await;
-        assert_eq!(outflow.0.available_permits(), OUTFLOW_LEN_MAX / UNIT);
+        assert_eq!(outflow.0.len_left(), OUTFLOW_LEN_MAX);
         assert_eq!(piece(&mut body).await.unwrap_err().code(), tonic::Code::Aborted);
     }
 
