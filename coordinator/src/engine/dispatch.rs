@@ -252,8 +252,8 @@ impl Engine {
         let n_before = (worker.load() / FULL_LOAD) as u32;
         let expected = now + expected * (n_before + 1);
         let Some(batch) = &mut work.batch else { return };
-        self.n_items_assigned += 1;
-        let id = AssignmentId(self.n_items_assigned);
+        self.counters.n_items_assigned += 1;
+        let id = AssignmentId(self.counters.n_items_assigned);
         if source == Source::Audits {
             batch.audits.in_flight.insert(id);
         } else {

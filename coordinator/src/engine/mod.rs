@@ -114,8 +114,6 @@ impl EngineConfig {
 pub struct Engine {
     config: EngineConfig,
     last_tick: Instant,
-    n_workers_seen: u64,
-    n_items_assigned: u64,
     workers: BTreeMap<WorkerId, Worker>,
     load_index: WorkerLoadIndex,
     jobs: BTreeMap<JobId, JobWork>,
@@ -134,8 +132,6 @@ impl Engine {
         Self {
             config,
             last_tick: now,
-            n_workers_seen: 0,
-            n_items_assigned: 0,
             workers: BTreeMap::new(),
             load_index: WorkerLoadIndex::default(),
             jobs: BTreeMap::new(),
@@ -172,9 +168,8 @@ impl Engine {
             let batches = works.filter_map(|work| work.batch.as_mut());
             batches.for_each(|batch| batch.losses.on_process_joined(process));
         }
-        self.n_workers_seen += 1;
         self.counters.n_workers_joined += 1;
-        let id = WorkerId(self.n_workers_seen);
+        let id = WorkerId(self.counters.n_workers_joined);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() + introduction.n_slots);
         let rest = self.trust.crash_loops.rest(&introduction.name);
         let quarantined = self.trust.quarantine.reason(&introduction).map(str::to_owned);

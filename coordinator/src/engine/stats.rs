@@ -87,11 +87,7 @@ impl Engine {
             } += 1;
         }
         FleetStats {
-            counters: Counters {
-                n_items_assigned: self.n_items_assigned,
-                n_questions: self.trust.questions.n_asked(),
-                ..self.counters
-            },
+            counters: Counters { n_questions: self.trust.questions.n_asked(), ..self.counters },
             n_workers_available: n_available,
             n_workers_draining: n_draining,
             n_workers_waiting: n_waiting,

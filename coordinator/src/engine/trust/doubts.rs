@@ -12,8 +12,7 @@ use super::{
         results::NoResult,
         worker::AssignedItem,
     },
-    questions::{Doubt, Party},
-    verdicts::{place, wrong},
+    questions::{Doubt, Party, place, wrong},
 };
 
 /// Questions of a job, at a time, about items that workers were lost with.
@@ -59,7 +58,8 @@ impl Engine {
         let Some(batch) = self.batch(job) else { return };
         let item = Item { individual: item.individual, trials: trial..trial + 1 };
         if first == REFEREE {
-            let reason = wrong(&second_values, &first_values, &place(&item), &batch.name());
+            let reason =
+                wrong(&second_values, &first_values, &place(&item, batch.request.trial_set));
             return self.put_in_quarantine(now, &second, &reason);
         }
         // What they differ about will be compared again when it is clear who is right.

@@ -10,12 +10,14 @@ use std::{
     time::{Duration, Instant},
 };
 
+use sim_core::TrialSet;
+
 use crate::{
     ids::{JobId, QuestionId, WorkerId},
     referee::RefereeRequest,
 };
 
-use super::super::{Command, OpenQuestion, item::Item};
+use super::super::{Command, OpenQuestion, batch::name_of, item::Item, known_results::same_bits};
 
 /// Processes that an item must take down before it is to blame: one may be killed by
 /// chance, or by a system that is short of memory.
@@ -90,6 +92,38 @@ impl Question {
             Doubt::Losses | Doubt::NoFitness => vec![],
             Doubt::Disagreement { parties: [(first, _), (second, _)] } => vec![first, second],
         }
+    }
+
+    /// The workers whose word is wrong, and in what, as the item comes to these values, or fails
+    /// for this reason.
+    pub fn refuted(&self, finding: Result<&[f64], &str>) -> Vec<(&Party, String)> {
+        let place = self.place();
+        match (&self.doubt, finding) {
+            (Doubt::Failure { reporter, message }, Ok(_)) => {
+                let reason = format!(
+                    "it reports that {place} fails (\"{message}\"), and the referee computes it"
+                );
+                vec![(reporter, reason)]
+            }
+            (Doubt::Disagreement { parties }, Ok(right)) => parties
+                .iter()
+                .filter(|(_, returned)| !same_bits(returned, right))
+                .map(|(party, returned)| (party, wrong(returned, right, &place)))
+                .collect(),
+            (Doubt::Disagreement { parties }, Err(failure)) => parties
+                .iter()
+                .map(|(party, returned)| {
+                    let first = returned.first().map_or("nothing".to_owned(), |v| format!("{v:?}"));
+                    (party, format!("it returned {first} for {place}, which fails: {failure}"))
+                })
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The item in messages.
+    pub fn place(&self) -> String {
+        place(&self.item, self.request.trial_set)
     }
 
     /// It, for people.
@@ -187,4 +221,24 @@ impl Questions {
     pub fn n_asked(&self) -> u64 {
         self.n_asked
     }
+}
+
+/// An item of the batch of a trial set in messages.
+pub fn place(item: &Item, trial_set: TrialSet) -> String {
+    let Item { individual, trials } = item;
+    let batch = name_of(trial_set);
+    if trials.len() == 1 {
+        format!("trial {} of individual {individual} of {batch}", trials.start)
+    } else {
+        format!("trials {}..{} of individual {individual} of {batch}", trials.start, trials.end)
+    }
+}
+
+/// What is wrong with numbers that a worker returned for a place, by the first that differs.
+pub fn wrong(returned: &[f64], right: &[f64], place: &str) -> String {
+    let mut pairs = returned.iter().zip(right);
+    let (returned, right) = pairs
+        .find(|(returned, right)| returned.to_bits() != right.to_bits())
+        .unwrap_or((&f64::NAN, &f64::NAN));
+    format!("it returned {returned:?} for {place}, and the referee {right:?}")
 }

@@ -14,14 +14,10 @@ use crate::{
 
 use super::{
     super::{
-        Command, Engine,
-        batch::{BatchInProgress, name_of},
-        item::Item,
-        known_results::{REFEREE, same_bits},
-        results::NoResult,
-        timeline::Fate,
+        Command, Engine, batch::BatchInProgress, item::Item, known_results::REFEREE,
+        results::NoResult, timeline::Fate,
     },
-    questions::{Doubt, Party, Question},
+    questions::{Doubt, Party, Question, wrong},
 };
 
 impl Engine {
@@ -45,11 +41,11 @@ impl Engine {
             Verdict::Unavailable(_) => self.release(&question),
             Verdict::Died(how) if question.on_death(now) => {
                 let failure = format!("it takes its process down ({how})");
-                self.settle_failure(now, id, &question, &failure);
+                self.settle(now, id, &question, Err(&failure));
             }
             Verdict::Died(_) => self.trust.questions.put_back(id, question),
-            Verdict::Failed(failure) => self.settle_failure(now, id, &question, &failure),
-            Verdict::Values(values) => self.settle_values(now, id, &question, &values),
+            Verdict::Failed(failure) => self.settle(now, id, &question, Err(&failure)),
+            Verdict::Values(values) => self.settle(now, id, &question, Ok(&values)),
         }
         self.assign(now);
     }
@@ -144,68 +140,41 @@ impl Engine {
         }
     }
 
-    /// The item is the same everywhere: it fails.
-    fn settle_failure(&mut self, now: Instant, id: QuestionId, question: &Question, failure: &str) {
+    /// The item is the same everywhere: it comes to these values, or fails for this reason.
+    /// Whoever says something else is faulty.
+    fn settle(
+        &mut self,
+        now: Instant,
+        id: QuestionId,
+        question: &Question,
+        finding: Result<&[f64], &str>,
+    ) {
         self.end_doubt(id, question);
-        if let Doubt::Disagreement { parties } = &question.doubt {
-            for (party, values) in parties {
-                let reason = format!(
-                    "it returned {} for {} of {}, which fails: {failure}",
-                    first(values),
-                    place(&question.item),
-                    name_of(question.request.trial_set),
-                );
-                self.put_in_quarantine(now, party, &reason);
-            }
+        for (party, reason) in question.refuted(finding) {
+            self.put_in_quarantine(now, party, &reason);
         }
-        if self.batch_of(question).is_some() {
-            self.fail(now, question.job, &question.item, failure);
+        let (job, item) = (question.job, &question.item);
+        let Some(progress) = self.batch_of(question) else { return };
+        let values = match finding {
+            Ok(values) => values,
+            Err(failure) => return self.fail(now, job, item, failure),
+        };
+        progress.n_without_fitness += u32::from(matches!(question.doubt, Doubt::NoFitness));
+        // What a third worker returned meanwhile may be wrong, too.
+        while let Some(progress) = self.batch_mut(job)
+            && let Err(disagreement) = progress.known.compare(item, values)
+            && disagreement.first != REFEREE
+        {
+            let [returned, right] = &disagreement.values;
+            let reason = wrong(returned, right, &question.place());
+            let party = Party { id: disagreement.first, name: disagreement.first_name };
+            self.put_in_quarantine(now, &party, &reason);
         }
-    }
-
-    /// The item is the same everywhere: it comes to these values.
-    fn settle_values(&mut self, now: Instant, id: QuestionId, question: &Question, values: &[f64]) {
-        self.end_doubt(id, question);
-        let place = place(&question.item);
-        let batch = name_of(question.request.trial_set);
-        match &question.doubt {
-            Doubt::Losses | Doubt::NoFitness => {}
-            Doubt::Failure { reporter, message } => {
-                let reason = format!(
-                    "it reports that {place} of {batch} fails (\"{message}\"), and the referee \
-                     computes it"
-                );
-                self.put_in_quarantine(now, reporter, &reason);
-            }
-            Doubt::Disagreement { parties } => {
-                for (party, returned) in parties {
-                    if !same_bits(returned, values) {
-                        let reason = wrong(returned, values, &place, &batch);
-                        self.put_in_quarantine(now, party, &reason);
-                    }
-                }
-            }
+        if self.batch(job).is_some_and(|batch| batch.n_values(item.trials.len()) == values.len()) {
+            self.take_values(now, job, REFEREE, item, values, true);
         }
-        if let Some(progress) = self.batch_of(question) {
-            let (job, item) = (question.job, &question.item);
-            progress.n_without_fitness += u32::from(matches!(question.doubt, Doubt::NoFitness));
-            // What a third worker returned meanwhile may be wrong, too.
-            while let Some(progress) = self.batch_mut(job)
-                && let Err(disagreement) = progress.known.compare(item, values)
-                && disagreement.first != REFEREE
-            {
-                let party = Party { id: disagreement.first, name: disagreement.first_name };
-                let [returned, right] = disagreement.values;
-                let reason = wrong(&returned, &right, &place, &batch);
-                self.put_in_quarantine(now, &party, &reason);
-            }
-            let n_values = self.batch(job).map(|batch| batch.n_values(item.trials.len()));
-            if n_values == Some(values.len()) {
-                self.take_values(now, job, REFEREE, item, values, true);
-            }
-            self.update_readiness(job);
-            self.finish_if_evaluated(now, job);
-        }
+        self.update_readiness(job);
+        self.finish_if_evaluated(now, job);
     }
 
     /// The batch that a question is about, if it is still being computed.
@@ -341,32 +310,4 @@ impl Engine {
     pub fn quarantine(&self) -> impl Iterator<Item = (&str, &str)> {
         self.trust.quarantine.iter()
     }
-}
-
-/// What an item is called in messages.
-pub(in crate::engine) fn place(item: &Item) -> String {
-    let (individual, trials) = (item.individual, &item.trials);
-    if trials.len() == 1 {
-        format!("trial {} of individual {individual}", trials.start)
-    } else {
-        format!("trials {}..{} of individual {individual}", trials.start, trials.end)
-    }
-}
-
-/// What is wrong with numbers that a worker returned, by the first that differs.
-pub(in crate::engine) fn wrong(
-    returned: &[f64],
-    right: &[f64],
-    place: &str,
-    batch: &str,
-) -> String {
-    let mut pairs = returned.iter().zip(right);
-    let (returned, right) = pairs
-        .find(|(returned, right)| returned.to_bits() != right.to_bits())
-        .unwrap_or((&f64::NAN, &f64::NAN));
-    format!("it returned {returned:?} for {place} of {batch}, and the referee {right:?}")
-}
-
-fn first(values: &[f64]) -> String {
-    values.first().map_or_else(|| "nothing".to_owned(), |first| format!("{first:?}"))
 }
