@@ -430,3 +430,37 @@ pub fn name_of(trial_set: TrialSet) -> String {
         TrialSet::Evaluation => "the evaluation".into(),
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "any instant will do as the origin")]
+mod tests {
+    use super::{ItemState::*, *};
+
+    #[test]
+    fn of_the_states_that_apply_to_a_trial_the_last_counts() {
+        let now = Instant::now();
+        let request = Batch::fitness(TrialSet::Generation(0), [vec![0.5]].into(), 2);
+        let mut batch = BatchInProgress::new(request, now, FleetTime::new(now));
+        let part = |trials| Item { individual: 0, trials };
+        let states = |batch: &BatchInProgress| [0, 1].map(|trial| batch.state(0, trial));
+        assert_eq!(states(&batch), [Queued; 2]);
+        let whole = batch.queue.pop_front(2).unwrap();
+        batch.add_holder(AssignmentId(1), WorkerId(1), whole.clone());
+        assert_eq!(states(&batch), [Assigned; 2]);
+        batch.delay(part(0..1), now);
+        assert_eq!(states(&batch), [Delayed, Assigned]);
+        batch.hold(whole.clone());
+        assert_eq!(states(&batch), [Held; 2]);
+        batch.known.accept(WorkerId(1), "one", &part(1..2), &[1.0]);
+        assert_eq!(states(&batch), [Held, Done]);
+        assert!(batch.release(&whole) && !batch.release(&whole));
+        assert_eq!(states(&batch), [Delayed, Done]);
+        assert_eq!(batch.take_due(now), None);
+        assert_eq!(batch.take_due(now + Duration::from_secs(1)), Some(part(0..1)));
+        assert_eq!(states(&batch), [Assigned, Done]);
+        batch.remove_holder(AssignmentId(1), 0);
+        assert_eq!(states(&batch), [Queued, Done]);
+        batch.discard("one");
+        assert_eq!(states(&batch), [Queued; 2]);
+    }
+}

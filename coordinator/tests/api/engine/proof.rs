@@ -382,6 +382,16 @@ fn a_worker_that_comes_back_after_a_loss_is_given_one_item_until_it_returns_some
 }
 
 #[test]
+fn a_worker_in_quarantine_is_promised_no_item() {
+    let mut fleet = plain_fleet();
+    let (faulty, _) = (fleet.join_by_hand(1), fleet.join_by_hand(1));
+    fleet.engine.on_quarantine_restored("worker-1", "it lies");
+    let again = fleet.restart(faulty).unwrap();
+    let status = fleet.status().into_iter().find(|worker| worker.id == again).unwrap();
+    assert_eq!((status.quarantined.as_deref(), status.waits), (Some("it lies"), None));
+}
+
+#[test]
 fn a_worker_that_finishes_nothing_while_others_do_gets_nothing_until_it_does() {
     let mut fleet = fleet();
     let (hung, other) = (fleet.join_by_hand(4), fleet.join_by_hand(1));
