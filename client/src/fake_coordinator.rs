@@ -1,5 +1,7 @@
 //! A coordinator for tests that follows a script.
 
+mod fleet;
+
 use std::{
     collections::VecDeque,
     pin::Pin,
@@ -18,16 +20,16 @@ use swarm_proto::v1::{
     GetLineageRequest, GetLineageResponse, ImportExperimentRequest, ImportExperimentResponse,
     LabelExperimentRequest, LabelExperimentResponse, ListDynamicsRequest, ListDynamicsResponse,
     ListEventsRequest, ListEventsResponse, ListExperimentsRequest, ListExperimentsResponse,
-    ListGenerationsRequest, ListGenerationsResponse, ListWorkersRequest, ListWorkersResponse,
-    PauseExperimentRequest, PauseExperimentResponse, PopulationLineage, PruneExperimentRequest,
-    PruneExperimentResponse, ReadmitWorkerRequest, ReadmitWorkerResponse, ResumeExperimentRequest,
-    ResumeExperimentResponse, RetryExperimentRequest, RetryExperimentResponse, SetPriorityRequest,
-    SetPriorityResponse, StateChange, SubmitExperimentRequest, SubmitExperimentResponse,
-    WatchExperimentRequest, WatchExperimentResponse, WatchExplanationRequest,
-    WatchExplanationResponse, WatchNewsRequest, WatchNewsResponse, Worker,
+    ListGenerationsRequest, ListGenerationsResponse, PauseExperimentRequest,
+    PauseExperimentResponse, PopulationLineage, PruneExperimentRequest, PruneExperimentResponse,
+    ResumeExperimentRequest, ResumeExperimentResponse, RetryExperimentRequest,
+    RetryExperimentResponse, SetPriorityRequest, SetPriorityResponse, StateChange,
+    SubmitExperimentRequest, SubmitExperimentResponse, WatchExperimentRequest,
+    WatchExperimentResponse, WatchExplanationRequest, WatchExplanationResponse, WatchNewsRequest,
+    WatchNewsResponse, Worker,
     event::Kind,
     experiment_service_server::{ExperimentService, ExperimentServiceServer},
-    fleet_service_server::{FleetService, FleetServiceServer},
+    fleet_service_server::FleetServiceServer,
 };
 use tokio::net::TcpListener;
 use tokio_stream::{Stream, StreamExt as _, wrappers::TcpListenerStream};
@@ -480,30 +482,5 @@ impl ExperimentService for FakeCoordinator {
             events: event.into_iter().collect(),
             ..Default::default()
         }))
-    }
-}
-
-#[tonic::async_trait]
-impl FleetService for FakeCoordinator {
-    async fn list_workers(
-        &self,
-        _: Request<ListWorkersRequest>,
-    ) -> Result<Response<ListWorkersResponse>, Status> {
-        let workers = self.script(|script| script.workers.clone());
-        Ok(Response::new(ListWorkersResponse { workers, ..Default::default() }))
-    }
-
-    async fn readmit_worker(
-        &self,
-        request: Request<ReadmitWorkerRequest>,
-    ) -> Result<Response<ReadmitWorkerResponse>, Status> {
-        let ReadmitWorkerRequest { name } = request.into_inner();
-        let is_out = self.script(|script| {
-            let mut workers = script.workers.iter_mut();
-            let worker = workers.find(|worker| worker.name == name)?;
-            (!std::mem::take(&mut worker.distrusted).is_empty()).then_some(())
-        });
-        is_out.ok_or_else(|| Status::not_found("no such worker is in quarantine"))?;
-        Ok(Response::new(ReadmitWorkerResponse {}))
     }
 }

@@ -1,6 +1,8 @@
 //! Output of a command: a progress bar on a terminal, lines elsewhere, or JSON lines.
 //! Results go to standard output, remarks to standard error.
 
+mod beside_bar;
+
 use std::{
     collections::{BTreeMap, VecDeque},
     io::{self, IsTerminal as _, Write},
@@ -25,6 +27,8 @@ use crate::{
     table::{self, Screen, Table},
     text, waiting,
 };
+
+pub use beside_bar::BesideBar;
 
 /// How a notice ends that is about trials which have selected somebody.
 const OPTIMISTIC: &str = ", optimistic";
@@ -485,19 +489,6 @@ fn fitting(parts: &[String], room: usize) -> String {
 fn remaining(durations_ms: &VecDeque<u64>, generations: u64) -> Duration {
     let mean_ms = durations_ms.iter().sum::<u64>() as f64 / durations_ms.len().max(1) as f64;
     Duration::from_secs((mean_ms * generations as f64 / 1000.0).round() as u64)
-}
-
-/// Standard error, beside a bar that may be shown there.
-pub struct BesideBar(ProgressBar);
-
-impl Write for BesideBar {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.suspend(|| io::stderr().write(bytes))
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        io::stderr().flush()
-    }
 }
 
 #[cfg(test)]

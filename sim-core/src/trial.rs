@@ -1,6 +1,8 @@
 //! One trial of an experiment: the phases of its environment steps, except what
 //! controllers do.
 
+mod address;
+
 use std::{mem, ops::Range};
 
 use crate::communication::{Mode, Radio};
@@ -9,7 +11,7 @@ use crate::fitness::{Fitness, Moment};
 use crate::lanes::Lanes;
 use crate::lights::LightPath;
 use crate::neighbours::Neighbours;
-use crate::objects::{Site, StaticObjects, Switches};
+use crate::objects::Switches;
 use crate::perturbations::Perturbations;
 use crate::record::{Measures, RobotRecord, StepRecord};
 use crate::script::{May, ScriptRun, View};
@@ -18,12 +20,14 @@ use crate::sensors::Surroundings;
 use crate::simulation::{EvaluateError, Simulation};
 use crate::stepping::Actions;
 use crate::swarm::Swarm;
-use crate::torus::{Torus, Vec2};
+use crate::torus::Vec2;
 use crate::world::World;
 use determinism::Isa;
 use determinism::random::{Purpose, Stream, TrialSet};
 use experiment_file::SensorQuery;
 use task_script::ScriptError;
+
+use self::address::Address;
 
 /// State of a trial.
 pub(crate) struct Trial<'a> {
@@ -63,63 +67,6 @@ pub(crate) struct Group {
     pub perturbations: Perturbations,
     /// Start positions, and those after each switch of the topology.
     positions: Stream,
-}
-
-/// Which trial it is.
-#[derive(Debug, Clone, Copy)]
-struct Address {
-    seed: u64,
-    trial_set: TrialSet,
-    trial: u32,
-}
-
-impl Address {
-    fn stream(self, purpose: Purpose, number: usize) -> Stream {
-        self.numbered_stream(purpose, number as u64)
-    }
-
-    fn numbered_stream(self, purpose: Purpose, number: u64) -> Stream {
-        Stream::new(self.seed, self.trial_set, self.trial.into(), purpose, number)
-    }
-
-    /// One stream for each of `n` robots, or lights.
-    fn streams(self, purpose: Purpose, n: usize) -> Vec<Stream> {
-        (0..n).map(|number| self.stream(purpose, number)).collect()
-    }
-
-    /// The failure of a script in a step of this trial.
-    fn failed(self, error: ScriptError, step: u32) -> EvaluateError {
-        EvaluateError::Script { error, step, trial_set: self.trial_set, trial: self.trial }
-    }
-
-    /// Draws the positions of an object's instances.
-    fn place(
-        self,
-        site: &Site,
-        torus: &Torus,
-        stream: &mut Stream,
-    ) -> Result<Vec<Vec2>, EvaluateError> {
-        site.positions.draw(torus, stream).map_err(|unplaceable| EvaluateError::Unplaceable {
-            object: site.name.clone(),
-            index: unplaceable.index,
-            trial_set: self.trial_set,
-            trial: self.trial,
-        })
-    }
-
-    /// Draws the positions of lights or ground areas.
-    fn place_static_objects(
-        self,
-        objects: &[StaticObjects],
-        torus: &Torus,
-    ) -> Result<Vec<Vec2>, EvaluateError> {
-        let mut positions = Vec::new();
-        for StaticObjects { site, .. } in objects {
-            let mut stream = self.stream(Purpose::Positions, site.object);
-            positions.extend(self.place(site, torus, &mut stream)?);
-        }
-        Ok(positions)
-    }
 }
 
 /// What encoders of a group's robots draw from, trial by trial; nothing if none draws.

@@ -5,6 +5,7 @@ mod documentation;
 mod generated;
 mod generator;
 mod hostile;
+mod original;
 mod parameters;
 mod problems;
 mod reference;
