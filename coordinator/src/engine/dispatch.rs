@@ -339,7 +339,7 @@ impl JobWork {
         pace: f64,
         workers: &BTreeMap<WorkerId, Worker>,
     ) -> Option<Slow> {
-        let batch = self.batch.as_ref().filter(|batch| batch.queue.len() == 0)?;
+        let batch = self.batch.as_ref().filter(|batch| batch.queue.is_empty())?;
         let ends = [batch.uncovered.last_key_value(), batch.uncovered.first_key_value()];
         ends.into_iter().flatten().find_map(|(&key, holder)| {
             let (expected, assignment_id) = key;

@@ -136,7 +136,7 @@ pub enum ToWorker {
 
 impl ToWorker {
     /// Bytes of what makes it long: a specification, or genes.
-    pub fn len(&self) -> usize {
+    pub fn payload_len(&self) -> usize {
         match self {
             Self::Spec(_, spec) => spec.len(),
             Self::Distribution(_, distribution) => distribution.len(),

@@ -117,7 +117,7 @@ impl WorkerService for Workers {
             drop(place);
             let message = inbox.recv().await?;
             // A long one waits for room until the worker has taken it.
-            let place = match message.len() {
+            let place = match message.payload_len() {
                 0..=SHORT_LEN => None,
                 len => room.take(COPIES * len).await,
             };
