@@ -50,7 +50,9 @@ export function familiesPanel(id) {
   const legend = element("div", { className: "keys small" });
   const picture = canvas((context, width, height) => paint(context, width, height), "");
   const frame = shape("svg", { "aria-hidden": "true" });
-  const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "scatter plot", "aria-label": "fitness of each child against the mean of its parents; arrow keys go through children and generations, Enter plays one" }, frame, picture);
+  /** Around the point that is read out: all of them are not painted anew for it. */
+  const ring = element("i", { className: "ring", hidden: true });
+  const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "scatter plot", "aria-label": "fitness of each child against the mean of its parents; arrow keys go through children and generations, Enter plays one" }, frame, picture, ring);
   const files = exports({ svg: () => whole(), table: () => table(), name: () => `families-${id}` });
   const node = element("details", { className: "panel families", hidden: true, ontoggle: () => ask() },
     element("summary", {}, "Parents and children"),
@@ -120,18 +122,12 @@ export function familiesPanel(id) {
       context.fillStyle = colors[color];
       for (const it of shown) if (it.operator === name) context.fillRect(scale.x(it.x) - EDGE.left - side / 2, scale.y(it.fitness) - EDGE.top - side / 2, side, side);
     }
-    context.globalAlpha = 1;
-    if (cursor === null) return;
-    const it = shown[cursor];
-    context.strokeStyle = colors.ink;
-    context.lineWidth = 2;
-    context.beginPath();
-    context.arc(scale.x(it.x) - EDGE.left, scale.y(it.fitness) - EDGE.top, 7, 0, 2 * Math.PI);
-    context.stroke();
   };
 
   const drawReadout = () => {
+    ring.hidden = cursor === null;
     if (cursor === null) return void (readout.textContent = "");
+    ring.style.transform = `translate(${scale.x(shown[cursor].x)}px, ${scale.y(shown[cursor].fitness)}px)`;
     const { generation, individual, population, operator, fitness, parents } = shown[cursor];
     const from = parents.map(([parent, its]) => `${parent} (${decimals(its, 3)})`).join(" and ");
     readout.textContent = `generation ${generation}, individual ${individual}${populations.length > 1 ? `, ${populations[population]}` : ""}: ${decimals(fitness, 3)}, ${operator} from ${from}`;
@@ -140,7 +136,6 @@ export function familiesPanel(id) {
   const look = (at) => {
     cursor = at;
     drawReadout();
-    picture.redraw();
   };
 
   const play = () => cursor !== null && location.assign(`/replay/${id}@${shown[cursor].generation}/${shown[cursor].individual}`);
@@ -150,11 +145,14 @@ export function familiesPanel(id) {
     if (!scale) return null;
     const box = picture.getBoundingClientRect();
     const [px, py] = [event.clientX - box.left + EDGE.left, event.clientY - box.top + EDGE.top];
-    let [found, least] = [null, NEAR];
-    shown.forEach((it, i) => {
-      const away = Math.hypot(scale.x(it.x) - px, scale.y(it.fitness) - py);
-      if (away < least) [found, least] = [i, away];
-    });
+    let found = null;
+    let least = NEAR ** 2;
+    for (let i = 0; i < shown.length; i++) {
+      const away = (scale.x(shown[i].x) - px) ** 2 + (scale.y(shown[i].fitness) - py) ** 2;
+      if (away >= least) continue;
+      found = i;
+      least = away;
+    }
     return found;
   };
   picture.addEventListener("pointermove", (event) => look(nearest(event)));
