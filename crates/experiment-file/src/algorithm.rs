@@ -4,61 +4,47 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{FitnessFunction, FitnessParams, GenotypeQuery, NamedMap, Params, limits, schema};
+use crate::DefaultValue::{Depends, Empty, Null, Required};
+use crate::Domain;
+use crate::parameters::parameters;
 
-/// Evolution and evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional("champion_every, champion_trials, judgement_trials, fitness_function, fitness_params")
-)]
-pub struct AlgorithmConfig {
-    /// The evolutionary algorithm, by the name in its
-    /// [description](super::AlgorithmDescription).
-    #[schemars(description = "The evolutionary algorithm.", schema_with = "schema::filled_in")]
-    pub name: String,
-    /// Name of the world object whose controller evolves.
-    pub evolvable_object: String,
-    /// Individuals per generation, P.
-    #[schemars(range(min = 1, max = limits::POPULATION))]
-    pub population_size: u32,
-    /// Number of generations.
-    #[schemars(range(min = 1, max = limits::GENERATIONS))]
-    pub generations: u64,
-    /// Environment steps per trial, T_E.
-    #[schemars(range(min = 1, max = limits::STEPS))]
-    pub evaluation_steps: u32,
-    /// Trials per individual.
-    #[schemars(range(min = 1, max = limits::TRIALS))]
-    pub num_evaluations: u32,
-    /// Fitness of a trial; may be left out if there is a `task`.
-    pub fitness_function: FitnessFunction,
-    /// Constants of the task.
-    #[serde(skip_serializing_if = "FitnessParams::is_default")]
-    pub fitness_params: FitnessParams,
-    /// Stop when the mean fitness of a generation reaches this.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(default, with = "f64")]
-    pub target_fitness: Option<f64>,
-    /// Generations between re-evaluations of candidates for the champion; default 10.
-    /// There is one at the end, too.
-    #[schemars(range(min = 1, max = limits::GENERATIONS))]
-    pub champion_every: u64,
-    /// Held-out trials of a re-evaluation; default 50. Candidates that are close get up
-    /// to four times as many.
-    #[schemars(range(min = 1, max = limits::TRIALS))]
-    pub champion_trials: u32,
-    /// Trials that judge the champion at the end and select nothing; default 200.
-    // 0 leaves the key out, for digests of generations alone.
-    #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(range(min = 1, max = limits::TRIALS))]
-    pub judgement_trials: u32,
-    /// Populations, in genotype order; several evolve cooperatively.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub populations: NamedMap<PopulationConfig>,
-}
-
-fn is_zero(number: &u32) -> bool {
-    *number == 0
+parameters! {
+    /// Evolution and evaluation.
+    pub struct AlgorithmConfig {
+        /// The evolutionary algorithm.
+        name: String = of(Domain::Text, Required),
+        /// Name of the world object whose controller evolves.
+        evolvable_object: String = of(Domain::Text, Required),
+        /// Individuals per generation, P.
+        population_size: u32 = of(Domain::Whole(1, limits::POPULATION), Required),
+        /// Number of generations.
+        generations: u64 = of(Domain::Whole(1, limits::GENERATIONS as u32), Required),
+        /// Environment steps per trial, T_E.
+        evaluation_steps: u32 = of(Domain::Whole(1, limits::STEPS), Required),
+        /// Trials per individual.
+        num_evaluations: u32 = of(Domain::Whole(1, limits::TRIALS), Required),
+        /// Fitness of a trial; may be left out if there is a `task`.
+        fitness_function: FitnessFunction =
+            of(Domain::Variant(FitnessFunction::VARIANTS), Depends("")),
+        /// Constants of the task.
+        fitness_params: FitnessParams =
+            of(Domain::Object(FitnessParams::OBJECT), Empty).recent(),
+        /// Stop when the mean fitness of a generation reaches this.
+        target_fitness: Option<f64> = of(Domain::QUANTITY, Null),
+        /// Generations between re-evaluations of candidates for the champion. There is one at the
+        /// end, too.
+        champion_every: u64 = whole([1, limits::GENERATIONS as u32], 10),
+        /// Held-out trials of a re-evaluation. Candidates that are close get up to four times as
+        /// many.
+        champion_trials: u32 = whole([1, limits::TRIALS], 50),
+        // 0 leaves the key out, for digests of generations alone.
+        /// Trials that judge the champion at the end and select nothing.
+        judgement_trials: u32 = whole([1, limits::TRIALS], 200).unless_zero(),
+    }
+    parts {
+        /// Populations, in genotype order; several evolve cooperatively.
+        populations: NamedMap<PopulationConfig> = required(schema::map::<PopulationConfig>);
+    }
 }
 
 /// One population: its segment of the genotype and its algorithm's parameters.

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ActuatorQuery;
-use crate::parameters::parameters;
+use crate::parameters::{parameters, variants};
 
 /// What an experiment must have for a fitness function to make sense of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,11 +33,8 @@ parameters! {
     }
 }
 
-impl FitnessParams {
-    /// Whether the canonical form leaves them out.
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
+variants! {
+    FitnessFunction, unsupported: &[];
 }
 
 /// Steps at the start of an episode that `alignment` does not count.

@@ -197,10 +197,6 @@ impl<'a> Node<'a> {
         self.number(QUANTITY)
     }
 
-    pub(crate) fn probability(self) -> f64 {
-        self.number(0.0..=1.0)
-    }
-
     /// A parameter of an algorithm that nothing is known of: a number or a name.
     pub(crate) fn parameter(self) -> ParameterValue {
         match self.value {
@@ -377,7 +373,9 @@ pub(crate) struct Object<'a> {
 
 impl<'a> Object<'a> {
     pub(crate) fn optional(&mut self, key: &'static str) -> Option<Node<'a>> {
-        self.known.push(key);
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
         let value = self.properties.swap_remove(key)?;
         Some(Node { report: self.report, path: self.path.key(key), value: Some(value) })
     }

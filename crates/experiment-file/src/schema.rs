@@ -4,7 +4,7 @@
 //! may say beyond that (keys left out, other forms, keys of the original
 //! simulator) is added by the attributes on them, in the words defined here.
 
-use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use super::description::describe_algorithms;
@@ -69,7 +69,7 @@ pub(super) fn ignored(keys: &'static str) -> impl Fn(&mut Schema) {
     }
 }
 
-fn add_property(schema: &mut Schema, key: &str, value: Value) {
+pub(super) fn add_property(schema: &mut Schema, key: &str, value: Value) {
     let properties = schema.ensure_object().entry("properties").or_insert_with(|| json!({}));
     if let Value::Object(properties) = properties {
         properties.insert(key.to_owned(), value);
@@ -116,6 +116,22 @@ pub(super) fn food_areas_and_nests(schema: &mut Schema) {
     }
 }
 
+/// Things by the names that the file chooses.
+pub(super) fn map<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    let entry = generator.subschema_for::<T>();
+    json_schema!({
+        "type": "object",
+        "additionalProperties": entry,
+        "minProperties": 1,
+        "maxProperties": limits::ENTRIES,
+    })
+}
+
+/// The neuron model may stand in a form of its own.
+pub(super) fn with_neurons(schema: &mut Schema) {
+    add_property(schema, "neurons", neurons());
+}
+
 /// One name, or several.
 pub(super) fn names(_: &mut SchemaGenerator) -> Schema {
     let name = json!({"type": "string"});
@@ -137,11 +153,6 @@ pub(super) fn seed(_: &mut SchemaGenerator) -> Schema {
         {"type": "integer", "format": "uint64", "minimum": 0},
         {"type": "string", "pattern": "^[0-9]+$"},
     ]})
-}
-
-/// A quantity > 0, or null for none.
-pub(super) fn positive_or_null(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({"type": ["number", "null"], "exclusiveMinimum": 0, "default": null})
 }
 
 /// The path of a script, which `swarmctl` reads, or the script itself.
@@ -171,7 +182,7 @@ pub(super) fn semantics() -> Value {
 }
 
 /// The neuron model in the form of Appendix A.
-pub(super) fn neurons() -> Value {
+fn neurons() -> Value {
     json!({
         "type": "object",
         "properties": {"model": {"enum": NeuronModel::names()}},

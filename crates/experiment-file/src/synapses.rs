@@ -20,14 +20,6 @@ pub enum SynapseModel {
     Dynamic,
 }
 
-impl SynapseModel {
-    /// Whether the canonical form leaves it out.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-    pub(super) fn is_static(&self) -> bool {
-        *self == Self::Static
-    }
-}
-
 /// What the spikes of a group of dynamic synapses release.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Neurotransmitter {

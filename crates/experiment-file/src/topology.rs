@@ -1,93 +1,72 @@
 //! `topology`: stimuli, ensembles, synapse groups, outputs and their decoding.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, json_schema};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 use super::{
     EncodingConfig, LearningConfig, NamedMap, NeuronModel, Neurotransmitter, SensorQuery,
     SynapseModel, SynapseParams, encoding, limits, neuron, schema,
 };
-use crate::DefaultValue::Required;
+use crate::DefaultValue::{Depends, Name, Number, Required, Switch, Whole};
 use crate::parameters::{kinds, parameters, variants};
 use crate::{Domain, Parameter};
 
-/// Of [`TopologyConfig::dt`], s.
-pub(super) const DEFAULT_DT: f64 = 0.1;
-/// Of [`TopologyConfig::dt`] of spiking neurons, ms.
-pub(super) const DEFAULT_SPIKING_DT: f64 = 1.0;
-/// Of [`TopologyConfig::time_scale`].
-pub(super) const DEFAULT_TIME_SCALE: u32 = 20;
-/// Of [`TopologyConfig::seed`].
-pub(super) const DEFAULT_CONNECTION_SEED: u64 = 821;
-
-/// Structure of the network; its trainable values come from the genotype.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional(
-        "dt, time_scale, seed, neuron_model, bias_in_gain, initial_rates, motor_tau, \
-         synapse_model, synapse_params, encoding, learning"
-    ),
-    transform = schema::property("neurons", schema::neurons())
-)]
-pub struct TopologyConfig {
-    /// Euler step of the network: of rate neurons in seconds, default 0.1; of spiking ones
-    /// in ms, default 1, at most 2.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub dt: f64,
-    /// Network substeps per environment step; default 20.
-    #[schemars(range(min = 1, max = limits::TIME_SCALE), extend("default" = DEFAULT_TIME_SCALE))]
-    pub time_scale: u32,
-    /// Seed of the random connections (and of fixed weights); default 821.
-    #[schemars(schema_with = "schema::seed", extend("default" = DEFAULT_CONNECTION_SEED))]
-    pub seed: u64,
-    /// How the neurons work; default `rate_model`.
-    #[serde(skip_serializing_if = "NeuronModel::is_default")]
-    pub neuron_model: NeuronModel,
-    /// Of rate neurons: whether the gain multiplies the bias, u = F(g (v + beta))
-    /// (Eq. 2.2), or not, u = F(g v + beta); default true.
-    #[serde(skip_serializing_if = "Clone::clone")]
-    #[schemars(extend("default" = true))]
-    pub bias_in_gain: bool,
-    /// What rate neurons show until their first substep; default `activation`.
-    #[serde(skip_serializing_if = "InitialRates::is_default")]
-    pub initial_rates: InitialRates,
-    /// Time constant of all rate neurons that an output reads, whatever the genotype
-    /// says, seconds; default null: that of the genotype.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "schema::positive_or_null")]
-    pub motor_tau: Option<f64>,
-    /// How spikes become currents; default `static_synapse`.
-    #[serde(skip_serializing_if = "SynapseModel::is_static")]
-    pub synapse_model: SynapseModel,
-    /// The receptors of dynamic synapses; ignored by static ones.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "SynapseParams")]
-    pub synapse_params: Option<SynapseParams>,
-    /// Inputs, in the order in which they are stacked.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub stimuli: NamedMap<StimulusConfig>,
-    /// How stimuli become spikes. A stimulus without an entry, or with `IdentityEncoding`, acts as
-    /// it is.
-    #[serde(skip_serializing_if = "NamedMap::is_empty")]
-    #[schemars(schema_with = "encoding::entries")]
-    pub encoding: NamedMap<EncodingConfig>,
-    /// Groups of neurons, in the order in which they are numbered.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub ensembles: NamedMap<EnsembleConfig>,
-    /// Which ensemble drives which actuator.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub outputs: NamedMap<OutputConfig>,
-    /// Groups of synapses.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub synapses: NamedMap<SynapseGroupConfig>,
-    /// How weights change while robots live; default null: they do not.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub learning: Option<LearningConfig>,
-    /// How activities become actions; one entry per output, same names.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub decoding: NamedMap<DecodingConfig>,
+parameters! {
+    /// Structure of the network; its trainable values come from the genotype.
+    pub struct TopologyConfig then schema::with_neurons {
+        /// Euler step of the network: of rate neurons in seconds, default 0.1; of spiking ones
+        /// in ms, default 1, at most 2.
+        dt: f64 = of(Domain::Positive, Depends("")),
+        /// Network substeps per environment step.
+        time_scale: u32 = whole([1, limits::TIME_SCALE], 20),
+        /// Seed of the random connections (and of fixed weights).
+        seed: u64 = of(Domain::Seed, Whole(821)),
+        /// How the neurons work.
+        neuron_model: NeuronModel =
+            of(Domain::Variant(NeuronModel::VARIANTS), Name("rate_model")).recent(),
+        /// Of rate neurons: whether the gain multiplies the bias, u = F(g (v + beta))
+        /// (Eq. 2.2), or not, u = F(g v + beta).
+        bias_in_gain: bool = switch(true).original(Switch(false)).recent(),
+        /// What rate neurons show until their first substep.
+        initial_rates: InitialRates =
+            of(Domain::Variant(InitialRates::VARIANTS), Name("activation"))
+            .original(Name("zero"))
+            .recent(),
+        /// Time constant of all rate neurons that an output reads, whatever the genotype
+        /// says, seconds.
+        motor_tau: Option<f64> = positive(0.0)
+            .null()
+            .shown("null: that of the genotype")
+            .original(Number(0.5))
+            .recent(),
+        /// How spikes become currents.
+        synapse_model: SynapseModel =
+            of(Domain::Variant(SynapseModel::VARIANTS), Name("static_synapse")).recent(),
+    }
+    parts {
+        /// The receptors of dynamic synapses; ignored by static ones.
+        synapse_params: Option<SynapseParams> =
+            optional(|generator| generator.subschema_for::<SynapseParams>())
+            unless Option::is_none;
+        /// Inputs, in the order in which they are stacked.
+        stimuli: NamedMap<StimulusConfig> = required(schema::map::<StimulusConfig>);
+        /// How stimuli become spikes. A stimulus without an entry, or with `IdentityEncoding`,
+        /// acts as it is.
+        encoding: NamedMap<EncodingConfig> =
+            optional(encoding::entries) unless NamedMap::is_empty;
+        /// Groups of neurons, in the order in which they are numbered.
+        ensembles: NamedMap<EnsembleConfig> = required(schema::map::<EnsembleConfig>);
+        /// Which ensemble drives which actuator.
+        outputs: NamedMap<OutputConfig> = required(schema::map::<OutputConfig>);
+        /// Groups of synapses.
+        synapses: NamedMap<SynapseGroupConfig> = required(schema::map::<SynapseGroupConfig>);
+        /// How weights change while robots live; default null: they do not.
+        learning: Option<LearningConfig> =
+            optional(|generator| generator.subschema_for::<Option<LearningConfig>>())
+            unless Option::is_none;
+        /// How activities become actions; one entry per output, same names.
+        decoding: NamedMap<DecodingConfig> = required(schema::map::<DecodingConfig>);
+    }
 }
 
 impl TopologyConfig {
@@ -107,14 +86,6 @@ pub enum InitialRates {
     Activation,
     /// 0.
     Zero,
-}
-
-impl InitialRates {
-    /// Whether the canonical form leaves it out.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 parameters! {
@@ -139,23 +110,8 @@ parameters! {
 
 variants! {
     ActuatorQuery, unsupported: &["wireless_transmitter:priority"];
-}
-
-/// One group of neurons.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(deny_unknown_fields, transform = schema::optional("activation, params"))]
-pub struct EnsembleConfig {
-    /// Number of neurons.
-    #[schemars(range(min = 1, max = limits::NEURONS))]
-    pub n: u32,
-    /// Activation function F; default sigmoid. None for a neuron model without one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Activation")]
-    pub activation: Option<Activation>,
-    /// Values for parameters that no query of the genotype covers: all parameters of
-    /// the neuron model, by name.
-    #[schemars(schema_with = "neuron::params_schema")]
-    pub params: NamedMap<f64>,
+    InitialRates, unsupported: &[];
+    SynapseModel, unsupported: &[];
 }
 
 /// Activation function of an ensemble.
@@ -200,36 +156,40 @@ impl ActuatorQuery {
     }
 }
 
-/// One group of synapses: every (pre, post) pair of neurons exists with
-/// probability `p`.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional("trainable, p"),
-    transform = schema::property("neuroTX", json!({
-        "description": "Of dynamic synapses, what their spikes release: `AMPA`, `AMPA+NMDA` \
-                        or `GABA`; default `AMPA`. Ignored by static ones."
-    })),
-    transform = schema::ignored("ntx_fixed")
-)]
-pub struct SynapseGroupConfig {
-    /// Names of stimuli or ensembles.
-    #[schemars(schema_with = "schema::names")]
-    pub pre: Vec<String>,
-    /// Names of ensembles.
-    #[schemars(schema_with = "schema::names")]
-    pub post: Vec<String>,
-    /// Whether the genotype may hold its weights, default true; fixed weights are
-    /// drawn from U(-1, 1) with `topology.seed`.
-    #[schemars(extend("default" = true))]
-    pub trainable: bool,
-    /// Connection probability; default 1.
-    #[schemars(range(min = 0, max = 1), extend("default" = 1))]
-    pub p: f64,
-    /// What their spikes release; none of static synapses.
-    #[serde(rename = "neuroTX", skip_serializing_if = "Option::is_none")]
-    #[schemars(skip)]
-    pub transmitter: Option<Neurotransmitter>,
+parameters! {
+    /// One group of synapses: every (pre, post) pair of neurons exists with probability `p`.
+    pub struct SynapseGroupConfig {
+        /// Names of stimuli or ensembles.
+        pre: Vec<String> = of(Domain::Names, Required),
+        /// Names of ensembles.
+        post: Vec<String> = of(Domain::Names, Required),
+        /// Whether the genotype may hold its weights. Fixed weights are drawn from U(-1, 1) with
+        /// `topology.seed`.
+        trainable: bool = switch(true),
+        /// Connection probability.
+        p: f64 = unit(1.0),
+    }
+    ignored { "ntx_fixed": "static synapses have no neurotransmitter"; }
+    parts {
+        /// Of dynamic synapses, what their spikes release: `AMPA`, `AMPA+NMDA` or `GABA`; default
+        /// `AMPA`. Ignored by static ones.
+        transmitter as "neuroTX": Option<Neurotransmitter> =
+            optional(|_| json_schema!({})) unless Option::is_none;
+    }
+
+    /// One group of neurons.
+    pub struct EnsembleConfig {
+        /// Number of neurons.
+        n: u32 = of(Domain::Whole(1, limits::NEURONS), Required),
+    }
+    parts {
+        /// Activation function F; default sigmoid. None for a neuron model without one.
+        activation: Option<Activation> =
+            optional(|generator| generator.subschema_for::<Activation>()) unless Option::is_none;
+        /// Values for parameters that no query of the genotype covers: all parameters of
+        /// the neuron model, by name.
+        params: NamedMap<f64> = optional(neuron::params_schema);
+    }
 }
 
 kinds! {

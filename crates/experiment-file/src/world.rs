@@ -8,26 +8,21 @@ use crate::DefaultValue::{Depends, Null, Number, Required};
 use crate::parameters::{kinds, parameters};
 use crate::{DefaultValue, Domain};
 
-/// Of [`WorldConfig::height`] and [`WorldConfig::width`].
-pub(super) const DEFAULT_WORLD_SIZE: f64 = 1000.0;
-
-/// A flat torus and its objects.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(
-    deny_unknown_fields,
-    transform = schema::optional("height, width"),
-    transform = schema::ignored("world_delay, render_connections")
-)]
-pub struct WorldConfig {
-    /// Height H (y axis), cm; default 1000.
-    #[schemars(range(min = 1), extend("default" = DEFAULT_WORLD_SIZE))]
-    pub height: f64,
-    /// Width W (x axis), cm; default 1000.
-    #[schemars(range(min = 1), extend("default" = DEFAULT_WORLD_SIZE))]
-    pub width: f64,
-    /// Robots, lights, ground areas; their order numbers the robots.
-    #[schemars(extend("minProperties" = 1, "maxProperties" = limits::ENTRIES))]
-    pub objects: NamedMap<ObjectConfig>,
+parameters! {
+    /// A flat torus and its objects.
+    pub struct WorldConfig {
+        /// Height H (y axis), cm.
+        height: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
+        /// Width W (x axis), cm.
+        width: f64 = between([1.0, limits::MAGNITUDE], 1000.0),
+    }
+    ignored {
+        "world_delay", "render_connections": "it concerns the original simulator's window";
+    }
+    parts {
+        /// Robots, lights, ground areas; their order numbers the robots.
+        objects: NamedMap<ObjectConfig> = required(schema::map::<ObjectConfig>);
+    }
 }
 
 /// One kind of object.

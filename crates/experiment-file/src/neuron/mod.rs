@@ -21,7 +21,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};
 
 use super::{Activation, NamedMap};
-use crate::{Domain, Parameter, parameters};
+use crate::{Domain, Parameter, ParameterValue, Variants, parameters};
 
 /// How the neurons of a network work: one model for all of them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -133,12 +133,12 @@ impl NeuronModel {
         Self::ALL.into_iter().find(|model| model.spec().names.contains(&name))
     }
 
-    /// Whether the canonical form leaves it out: files that name no model mean this
-    /// one, and canonical forms from before there was a choice stay what they are.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
+    /// Models by their names.
+    pub(crate) const VARIANTS: &'static Variants = &Variants {
+        names: || &["rate_model"],
+        read: |node| Some(node.one_of(&Self::names(), &[])?.into()),
+        schema: |generator| generator.subschema_for::<Self>(),
+    };
 }
 
 impl NeuronModelSpec {
@@ -185,6 +185,21 @@ impl GeneScale {
             Self::Linear => number.to_string(),
             Self::PowerOfTen { factor } => format!("{factor} * 10^{number}"),
         }
+    }
+}
+
+impl From<NeuronModel> for ParameterValue {
+    fn from(model: NeuronModel) -> Self {
+        model.name().into()
+    }
+}
+
+impl TryFrom<ParameterValue> for NeuronModel {
+    type Error = ParameterValue;
+
+    fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
+        let ParameterValue::Name(name) = &value else { return Err(value) };
+        Self::named(name).ok_or(value)
     }
 }
 

@@ -18,7 +18,7 @@ use crate::limits;
 pub(crate) use kinds::{Choice, bind, kind_table, kinds, kinds_schema, read_kind, serialize_kind};
 pub use kinds::{Kind, Kinds};
 pub(crate) use read::{Keys, defaults, inner, optional, params, read};
-pub(crate) use schema::{object, properties};
+pub(crate) use schema::{add_part, object, properties};
 pub use typed::{Nested, Parameters, Table, Variants};
 pub(crate) use typed::{key, parameters, variants};
 pub use value::{ParameterValue, Params};
@@ -49,6 +49,8 @@ pub struct Parameter {
     /// Whether the canonical form leaves it out where it has its default: the format has
     /// not always had it, and older files keep their digests.
     is_recent: bool,
+    /// Whether 0 stands for no key in the canonical form.
+    is_absent_at_zero: bool,
 }
 
 /// The values that a parameter may have.
@@ -73,6 +75,8 @@ pub enum Domain {
     },
     /// The name of a variant of a type.
     Variant(&'static Variants),
+    /// A whole number of 64 bits, or a text of its digits.
+    Seed,
     /// Any name.
     Text,
     /// True or false.
@@ -112,6 +116,8 @@ pub enum DefaultValue {
     Formula(&'static str),
     /// It depends on other parts of the file, in these words.
     Depends(&'static str),
+    /// The object without any key.
+    Empty,
     /// It is the one that the rest of the file leaves.
     Certain,
     /// There is none: a file must have the key.
@@ -163,6 +169,7 @@ macro_rules! constructors {
                     instead_of: None,
                     is_nullable: false,
                     is_recent: false,
+                    is_absent_at_zero: false,
                 }
             }
         )*}
@@ -242,6 +249,8 @@ setters! {
     null() = is_nullable: true, default: DefaultValue::Null;
     /// The same, left out of the canonical form where it has its default.
     recent() = is_recent: true;
+    /// The same, left out of the canonical form where it is 0.
+    unless_zero() = is_absent_at_zero: true;
 }
 
 impl Parameter {
@@ -251,6 +260,8 @@ impl Parameter {
         let is_none = match value {
             ParameterValue::Null => !self.is_nullable,
             ParameterValue::Objects(objects) => objects.is_empty(),
+            ParameterValue::Object(object) => self.is_recent && object.iter().next().is_none(),
+            ParameterValue::Whole(0) => self.is_absent_at_zero,
             _ => false,
         };
         self.is_recent && is_default() || is_none
@@ -279,8 +290,10 @@ impl Parameter {
             DefaultValue::Switch(switch) => switch.to_string(),
             DefaultValue::Numbers(numbers) => format!("{numbers:?}"),
             DefaultValue::Null if self.is_nullable => "null".to_owned(),
-            DefaultValue::Formula(text) | DefaultValue::Depends(text) => text.to_owned(),
-            DefaultValue::Null | DefaultValue::Required | DefaultValue::Certain => return None,
+            DefaultValue::Formula(text) | DefaultValue::Depends(text) if !text.is_empty() => {
+                text.to_owned()
+            }
+            _ => return None,
         })
     }
 }
@@ -331,7 +344,7 @@ impl DefaultValue {
             Self::Switch(switch) => Some(ParameterValue::Switch(switch)),
             Self::Numbers(numbers) => Some(ParameterValue::Numbers(numbers.to_vec())),
             Self::Null => Some(ParameterValue::Null),
-            Self::Formula(_) | Self::Depends(_) | Self::Certain | Self::Required => None,
+            _ => None,
         }
     }
 }

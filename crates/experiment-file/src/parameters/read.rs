@@ -109,15 +109,20 @@ pub(crate) fn params<'a>(
     params
 }
 
-/// The parameters of an empty object.
+/// The value of an empty object.
 pub(crate) fn defaults<T: Parameters>(semantics: Semantics) -> T {
+    T::from_params(&absent::<T>(semantics))
+}
+
+/// The parameters of an empty object.
+pub(super) fn absent<T: Parameters>(semantics: Semantics) -> Params {
     let mut params = Params::default();
     for parameter in T::TABLE.parameters {
         if let Some(value) = parameter.absent(&params, semantics, &[]) {
             params.set(parameter.key, value);
         }
     }
-    T::from_params(&params)
+    params
 }
 
 impl Parameter {
@@ -129,7 +134,8 @@ impl Parameter {
         given: &Given<'_>,
     ) -> Option<ParameterValue> {
         let value = |node: Node<'_>| self.value(node, semantics, given);
-        if matches!(self.default, DefaultValue::Required) {
+        let is_given = given.iter().any(|(key, _)| *key == self.key);
+        if self.is_required() && !is_given {
             return value(keys.required(self.key));
         }
         let also = self.also.and_then(|also| Some((also, keys.optional(also.key)?)));
@@ -163,7 +169,12 @@ impl Parameter {
         match self.original.filter(|_| semantics == Semantics::Original) {
             Some(Original::Value(default)) => default.value(),
             Some(Original::From(default)) => Some(ParameterValue::Number(default(params))),
-            None => self.default.value(),
+            None => match (self.default, self.domain) {
+                (DefaultValue::Empty, Domain::Object(object)) => {
+                    Some((object.absent)(semantics).into())
+                }
+                (default, _) => default.value(),
+            },
         }
     }
 
@@ -181,6 +192,7 @@ impl Parameter {
         Some(match self.domain {
             Domain::Positive => node.positive().into(),
             Domain::Between(min, max) => node.number(min..=max).into(),
+            Domain::Seed => ParameterValue::Long(node.seed()),
             Domain::Whole(min, max) => node.u32(min..=max).into(),
             // How large it may be is a relation between two keys.
             Domain::BelowPopulationSize => node.u32(0..=limits::POPULATION).into(),

@@ -30,6 +30,23 @@ pub(crate) fn object(table: &Table, meaning: &str, generator: &mut SchemaGenerat
     schema
 }
 
+/// Adds a key that is no parameter to the schema of an object.
+pub(crate) fn add_part(
+    object: &mut Schema,
+    key: &str,
+    meaning: &str,
+    is_required: bool,
+    mut schema: Schema,
+) {
+    schema.insert("description".to_owned(), json!(meaning.trim()));
+    schema::add_property(object, key, schema.to_value());
+    if is_required && let Some(required) = object.ensure_object().get_mut("required") {
+        required.as_array_mut().into_iter().for_each(|required| required.push(json!(key)));
+    } else if is_required {
+        object.insert("required".to_owned(), json!([key]));
+    }
+}
+
 /// Of each key of a table.
 pub(crate) fn properties(
     table: &[Parameter],
@@ -70,6 +87,7 @@ impl Parameter {
             Domain::Positive => number(least(self.domain), limits::MAGNITUDE),
             Domain::Between(min, max) if min == max => json!({"const": min as i64}),
             Domain::Between(min, max) => number(min, max),
+            Domain::Seed => schema::seed(generator).to_value(),
             Domain::Whole(min, max) => whole(min, max),
             Domain::BelowPopulationSize => whole(0, limits::POPULATION),
             Domain::WholeOrAll(max) => json!({"anyOf": [whole(0, max), {"const": "all"}]}),

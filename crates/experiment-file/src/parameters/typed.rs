@@ -28,6 +28,7 @@ pub trait Parameters: Sized + JsonSchema + 'static {
         read: |node, semantics, given| {
             node.object(|o| super::read::table(o, &Self::TABLE, semantics, given))
         },
+        absent: |semantics| super::read::absent::<Self>(semantics),
         schema: |generator| generator.subschema_for::<Self>(),
     };
 
@@ -50,6 +51,8 @@ pub struct Variants {
 #[derive(Debug)]
 pub struct Nested {
     pub(super) read: fn(Node<'_>, Semantics, &Given<'_>) -> Params,
+    /// The parameters of an empty object.
+    pub(super) absent: fn(Semantics) -> Params,
     pub(super) schema: fn(&mut SchemaGenerator) -> Schema,
 }
 
@@ -66,12 +69,13 @@ impl Table {
 
 /// Declares types whose fields are parameters. A row is the field, its key in the file if
 /// that is another word, its type, and the constructor of its [`Parameter`] without key and
-/// meaning. `: Default` makes the defaults those of the type.
+/// meaning. `: Default` makes the defaults those of the type. `parts` are fields that the reader
+/// fills in itself, each with its schema; it begins with their `Default`.
 macro_rules! parameters {
     ($(
         $(#[doc = $doc:literal])*
         $(#[derive($derive:ident)])?
-        pub struct $name:ident $(: $default:ident)? {
+        pub struct $name:ident $(: $default:ident)? $(then $transform:path)? {
             $(
                 $(#[doc = $meaning:literal])*
                 $field:ident $(as $key:literal)?: $type:ty =
@@ -81,6 +85,11 @@ macro_rules! parameters {
         }
         $(ignored { $($($ignored:literal),*: $why:literal;)* })?
         $(checked { $($checked:expr),* })?
+        $(parts {$(
+            $(#[doc = $part_meaning:literal])*
+            $part:ident $(as $part_key:literal)?: $part_type:ty =
+                $need:ident($part_schema:expr) $(unless $absent:path)?;
+        )*})?
     )*) => {$(
         $(#[doc = $doc])*
         #[derive(Debug, Clone, PartialEq $(, $derive)?)]
@@ -89,6 +98,10 @@ macro_rules! parameters {
                 $(#[doc = $meaning])*
                 pub $field: $type,
             )*
+            $($(
+                $(#[doc = $part_meaning])*
+                pub $part: $part_type,
+            )*)?
         }
 
         impl $crate::Parameters for $name {
@@ -105,7 +118,10 @@ macro_rules! parameters {
             };
 
             fn from_params(_params: &$crate::Params) -> Self {
-                Self { $($field: _params.of_key($crate::parameters::key!($field $($key)?)),)* }
+                Self {
+                    $($field: _params.of_key($crate::parameters::key!($field $($key)?)),)*
+                    $($($part: Default::default(),)*)?
+                }
             }
 
             fn to_params(&self) -> $crate::Params {
@@ -133,7 +149,15 @@ macro_rules! parameters {
 
         impl serde::Serialize for $name {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                $crate::Parameters::to_params(self).serialize(serializer)
+                let mut map = serializer.serialize_map(None)?;
+                for (key, value) in $crate::Parameters::to_params(self).iter() {
+                    serde::ser::SerializeMap::serialize_entry(&mut map, key, value)?;
+                }
+                $($(if !(false $(|| $absent(&self.$part))?) {
+                    let key = $crate::parameters::key!($part $($part_key)?);
+                    serde::ser::SerializeMap::serialize_entry(&mut map, key, &self.$part)?;
+                })*)?
+                serde::ser::SerializeMap::end(map)
             }
         }
 
@@ -143,11 +167,24 @@ macro_rules! parameters {
             }
 
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
-                $crate::parameters::object(
+                let mut _schema = $crate::parameters::object(
                     &<Self as $crate::Parameters>::TABLE,
                     concat!($($doc),*),
                     generator,
-                )
+                );
+                $($(
+                    let _part: fn(&mut schemars::SchemaGenerator) -> schemars::Schema =
+                        $part_schema;
+                    $crate::parameters::add_part(
+                        &mut _schema,
+                        $crate::parameters::key!($part $($part_key)?),
+                        concat!($($part_meaning),*),
+                        stringify!($need) == "required",
+                        _part(generator),
+                    );
+                )*)?
+                $($transform(&mut _schema);)?
+                _schema
             }
         }
 

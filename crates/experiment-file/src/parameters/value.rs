@@ -21,6 +21,8 @@ pub enum ParameterValue {
     Whole(u32),
     /// A number.
     Number(f64),
+    /// A whole number of 64 bits.
+    Long(u64),
     /// A name, for instance of an operator.
     Name(String),
     /// True or false.
@@ -162,6 +164,24 @@ types! {
     Params = Object,
 }
 
+impl From<u64> for ParameterValue {
+    fn from(number: u64) -> Self {
+        number.try_into().map_or(Self::Long(number), Self::Whole)
+    }
+}
+
+impl TryFrom<ParameterValue> for u64 {
+    type Error = ParameterValue;
+
+    fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
+        match value {
+            ParameterValue::Whole(number) => Ok(number.into()),
+            ParameterValue::Long(number) => Ok(number),
+            other => Err(other),
+        }
+    }
+}
+
 impl From<[f64; 2]> for ParameterValue {
     fn from(pair: [f64; 2]) -> Self {
         Self::Numbers(pair.to_vec())
@@ -215,6 +235,7 @@ impl fmt::Display for ParameterValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Whole(number) => write!(f, "{number}"),
+            Self::Long(number) => write!(f, "{number}"),
             Self::Number(number) => write!(f, "{number}"),
             Self::Name(name) => write!(f, "`{name}`"),
             Self::Switch(switch) => write!(f, "{switch}"),

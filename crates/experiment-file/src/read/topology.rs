@@ -4,33 +4,36 @@ use super::encoding;
 use super::node::{Node, Object};
 use crate::parameters::{self, Choice};
 use crate::semantics::Semantics;
-use crate::topology::{
-    DEFAULT_CONNECTION_SEED, DEFAULT_DT, DEFAULT_SPIKING_DT, DEFAULT_TIME_SCALE,
-};
 use crate::{
     Activation, DecodingConfig, EnsembleConfig, InitialRates, NamedMap, NeuronModel,
-    Neurotransmitter, Parameters, SynapseGroupConfig, SynapseModel, SynapseParams, TopologyConfig,
-    limits,
+    Neurotransmitter, ParameterValue, Parameters, SynapseGroupConfig, SynapseModel, SynapseParams,
+    TopologyConfig, limits,
 };
 
 pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConfig {
     let model = neuron_model(o);
-    let stimuli = o.required("stimuli").map(1, |_, node| node.object(plain));
-    let time_scale = o.or("time_scale", DEFAULT_TIME_SCALE, |n| n.u32(1..=limits::TIME_SCALE));
-    let encoding = encoding::encodings(o, &stimuli, time_scale);
     let is_spiking = model.is_some_and(NeuronModel::is_spiking);
-    let dt = if is_spiking {
-        o.or("dt", DEFAULT_SPIKING_DT, |node| node.number(limits::SPIKING_DT))
-    } else {
-        o.or("dt", DEFAULT_DT, Node::positive)
-    };
-    let (bias_in_gain, initial_rates, motor_tau) =
-        if is_spiking { of_spiking_neurons(o) } else { of_rate_neurons(o, semantics) };
-    let synapse_model: SynapseModel =
-        o.or("synapse_model", SynapseModel::Static, |node| node.variant(&[]).unwrap_or_default());
+    let mut given = vec![("neuron_model", model.unwrap_or_default().into()), ("dt", 0.1.into())];
+    if is_spiking {
+        given[1].1 = o.or("dt", 1.0, |node| node.number(limits::SPIKING_DT)).into();
+        for (key, value) in [
+            ("bias_in_gain", true.into()),
+            ("initial_rates", InitialRates::default().into()),
+            ("motor_tau", ParameterValue::Null),
+        ] {
+            o.optional(key)
+                .iter()
+                .for_each(|node| node.problem("a key of rate neurons; these spike"));
+            given.push((key, value));
+        }
+    }
+    let topology: TopologyConfig = parameters::read(o, semantics, &given);
+    let synapse_model = topology.synapse_model;
     if synapse_model == SynapseModel::Dynamic && model.is_some() && !is_spiking {
         o.problem("synapse_model", "dynamic synapses need neurons that spike");
     }
+    let stimuli = o.required("stimuli").map(1, |_, node| node.object(plain));
+    let encoding = encoding::encodings(o, &stimuli, topology.time_scale);
     let synapses: NamedMap<_> =
         o.required("synapses").map(1, |_, node| node.object(|o| synapse_group(o, synapse_model)));
     let learning = o.optional("learning").and_then(|node| {
@@ -40,15 +43,7 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
         node.or_null(|node| node.object(|o| parameters::read(o, semantics, &given)))
     });
     TopologyConfig {
-        dt,
-        time_scale,
-        seed: o.or("seed", DEFAULT_CONNECTION_SEED, Node::seed),
-        neuron_model: model.unwrap_or_default(),
-        bias_in_gain,
-        initial_rates,
-        motor_tau,
         synapse_params: synapse_params(o, synapse_model),
-        synapse_model,
         stimuli,
         encoding,
         ensembles: o.required("ensembles").map(1, |_, node| node.object(|o| ensemble(o, model))),
@@ -56,27 +51,8 @@ pub(super) fn topology(o: &mut Object<'_>, semantics: Semantics) -> TopologyConf
         synapses,
         learning,
         decoding: o.required("decoding").map(1, |_, node| node.object(decoding)),
+        ..topology
     }
-}
-
-/// `bias_in_gain`, `initial_rates` and `motor_tau`.
-fn of_rate_neurons(o: &mut Object<'_>, semantics: Semantics) -> (bool, InitialRates, Option<f64>) {
-    let initial_rates = |node: Node<'_>| node.variant(&[]).unwrap_or_default();
-    (
-        o.or("bias_in_gain", semantics.bias_in_gain(), Node::bool),
-        o.or("initial_rates", semantics.initial_rates(), initial_rates),
-        o.or("motor_tau", semantics.motor_tau(), |node| node.or_null(Node::positive)),
-    )
-}
-
-/// The same keys where nothing has a rate.
-fn of_spiking_neurons(o: &mut Object<'_>) -> (bool, InitialRates, Option<f64>) {
-    for key in ["bias_in_gain", "initial_rates", "motor_tau"] {
-        if let Some(node) = o.optional(key) {
-            node.problem("a key of rate neurons; these spike");
-        }
-    }
-    (true, InitialRates::default(), None)
 }
 
 /// The model, which a file may name in two places; none if it is unreadable.
@@ -101,12 +77,12 @@ fn plain<T: Parameters>(o: &mut Object<'_>) -> T {
 /// `model`: none if it is unreadable; then nobody can tell which parameters are
 /// right.
 fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
-    let n = o.required("n").u32(1..=limits::NEURONS);
+    let ensemble: EnsembleConfig = plain(o);
     let Some(spec) = model.map(NeuronModel::spec) else {
         for key in ["activation", "params"] {
             o.optional(key);
         }
-        return EnsembleConfig { n, activation: None, params: NamedMap::new() };
+        return ensemble;
     };
     let activation = |o: &mut Object<'_>| -> Option<Activation> {
         spec.activation?;
@@ -124,7 +100,7 @@ fn ensemble(o: &mut Object<'_>, model: Option<NeuronModel>) -> EnsembleConfig {
     {
         o.problem("activation", "`params` has another one");
     }
-    EnsembleConfig { n, activation: outer.or(inner).or(spec.activation), params }
+    EnsembleConfig { activation: outer.or(inner).or(spec.activation), params, ..ensemble }
 }
 
 /// None of static synapses.
@@ -161,13 +137,7 @@ fn synapse_group(o: &mut Object<'_>, model: SynapseModel) -> SynapseGroupConfig 
             }))
         }
     };
-    SynapseGroupConfig {
-        pre: o.required("pre").names(),
-        post: o.required("post").names(),
-        trainable: o.or("trainable", true, Node::bool),
-        p: o.or("p", 1.0, Node::probability),
-        transmitter,
-    }
+    SynapseGroupConfig { transmitter, ..plain(o) }
 }
 
 fn decoding(o: &mut Object<'_>) -> DecodingConfig {

@@ -4,23 +4,17 @@ use super::node::{Node, Object};
 use super::robot::robot;
 use crate::parameters::{self, Choice};
 use crate::semantics::Semantics;
-use crate::world::DEFAULT_WORLD_SIZE;
 use crate::{
     GroundAreaConfig, GroundAreaParams, Initializer, LightController, LightSourceConfig,
     NamedAreaParams, ObjectConfig, ParameterValue, PositionInitializers, WorldConfig, limits,
 };
 
 pub(super) fn world(o: &mut Object<'_>, semantics: Semantics) -> WorldConfig {
-    for key in ["world_delay", "render_connections"] {
-        o.ignored(key, "it concerns the original simulator's window");
-    }
-    let size = |node: Node<'_>| node.number(1.0..=limits::MAGNITUDE);
-    let height = o.or("height", DEFAULT_WORLD_SIZE, size);
-    let width = o.or("width", DEFAULT_WORLD_SIZE, size);
-    let center = [width / 2.0, height / 2.0];
+    let world: WorldConfig = parameters::read(o, semantics, &[]);
+    let center = [world.width / 2.0, world.height / 2.0];
     let objects =
         o.required("objects").map(1, |_, node| node.object(|o| object(o, center, semantics)));
-    WorldConfig { height, width, objects }
+    WorldConfig { objects, ..world }
 }
 
 fn object(o: &mut Object<'_>, center: [f64; 2], semantics: Semantics) -> ObjectConfig {
