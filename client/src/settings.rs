@@ -172,9 +172,7 @@ fn user_file() -> Option<PathBuf> {
 }
 
 fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
-    // Some editors begin a file with a byte order mark; comments and trailing commas are as in
-    // experiment files.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    // Comments and trailing commas are as in experiment files.
     let file: SettingsFile =
         serde_json::from_str(&experiment_file::plain(text)).map_err(|error| {
             let place = format!(" at line {} column {}", error.line(), error.column());
@@ -243,7 +241,7 @@ mod tests {
     #[test]
     fn a_mistake_in_the_file_is_named_with_its_line() {
         let path = Path::new("config.json");
-        for empty in ["{}", "\u{feff}{}", "{ // the usual place\n}", "/* none */ {}"] {
+        for empty in ["{}", "{ // the usual place\n}", "/* none */ {}"] {
             assert_eq!(parse(path, empty).unwrap(), settings(None));
         }
         for (text, expected) in [

@@ -2,7 +2,9 @@
 
 use std::cmp::Reverse;
 
-use serde_json::{Value, json};
+use evolution::Digest;
+use experiment_file::ExperimentConfig;
+use serde_json::Value;
 use swarm_proto::v1::{Experiment, ExperimentState, ListExperimentsRequest};
 
 use crate::{connection::Connection, text};
@@ -24,9 +26,9 @@ pub async fn remark(connection: &Connection, submitted: &[Experiment]) -> Option
         return None;
     }
     earlier.sort_by_key(|experiment| Reverse(experiment.id));
-    let file = without_order(&connection.stored(first.id).await.ok()?.1);
+    let file = without_order(&connection.stored(first.id).await.ok()?.1)?;
     for other in earlier.iter().take(COMPARED_MAX) {
-        if without_order(&connection.stored(other.id).await.ok()?.1) == file {
+        if without_order(&connection.stored(other.id).await.ok()?.1)? == file {
             return Some(format!(
                 "{} is of this file with its keys in another order; the order of ensembles, \
                  synapses and objects is the order of genes and random draws, so experiment {} is \
@@ -47,21 +49,18 @@ fn may_be_reordered(earlier: &Experiment, later: &Experiment) -> bool {
         && earlier.forked_from.is_none()
 }
 
-/// A file in canonical form as a value that equals those with its keys in another order, without
-/// the length of the run, which makes no other experiment.
-fn without_order(config_json: &str) -> Value {
-    let mut file: Value = serde_json::from_str(config_json).unwrap_or_default();
-    if let Some(algorithm) = file.get_mut("algorithm").and_then(Value::as_object_mut) {
-        algorithm.insert("generations".to_owned(), json!(0));
-        algorithm.remove("target_fitness");
-        algorithm.remove("judgement_trials");
-    }
-    file
+/// A file in canonical form as a value that equals those with its keys in another order, as far
+/// as a digest covers it: the length of the run makes no other experiment.
+fn without_order(config_json: &str) -> Option<Value> {
+    let config = ExperimentConfig::from_canonical_json(config_json).ok()?;
+    serde_json::to_value(Digest::covered(config)).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use std::fs;
+
+    use serde_json::json;
 
     use super::{super::one_world::output, *};
     use crate::{

@@ -35,17 +35,22 @@ pub struct Digest([u8; 32]);
 impl Digest {
     /// Link -1. `simulation`: the fingerprint of what computes fitness.
     pub fn of_config(config: &ExperimentConfig, simulation: &str) -> Self {
-        let mut config = config.clone();
-        config.name.clear();
-        config.algorithm.generations = 0;
-        config.algorithm.target_fitness = None;
-        config.algorithm.judgement_trials = 0;
+        let config = Self::covered(config.clone());
         let mut hash = Sha256::new();
         hash.update("swarmevo digest 1\n");
         hash.update(simulation);
         hash.update("\n");
         hash.update(config.to_canonical_json());
         Self(hash.finalize().into())
+    }
+
+    /// The configuration without what cannot change a bit of a generation.
+    pub fn covered(mut config: ExperimentConfig) -> ExperimentConfig {
+        config.name.clear();
+        config.algorithm.generations = 0;
+        config.algorithm.target_fitness = None;
+        config.algorithm.judgement_trials = 0;
+        config
     }
 
     /// Link -1 of an evolution without an experiment file: of the text that
