@@ -60,6 +60,9 @@ use crate::{
     synonyms::with_suggestions,
 };
 
+/// A program, from its command line.
+type Program = fn(Vec<OsString>) -> ExitCode;
+
 fn main() -> ExitCode {
     if let Some((main, words)) = other_program(env::args_os().collect()) {
         return main(words);
@@ -83,7 +86,7 @@ fn main() -> ExitCode {
 
 /// The program that a command line is for, if it is not `swarmctl`, and the words for it: by the
 /// name that this file is called by, or, where a file has one name only, by the first word.
-fn other_program(words: Vec<OsString>) -> Option<(fn(Vec<OsString>) -> ExitCode, Vec<OsString>)> {
+fn other_program(words: Vec<OsString>) -> Option<(Program, Vec<OsString>)> {
     let named = |word: &OsString| PROGRAMS.iter().find(|(name, _)| *word == **name);
     let called = words.first().and_then(|word| Path::new(word).file_stem());
     if let Some((_, main)) = called.and_then(|name| named(&name.to_owned())) {

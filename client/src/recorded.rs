@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-use swarm_proto::v1::{Experiment, GetExperimentRequest};
+use serde::{Deserialize, Deserializer};
+use swarm_proto::v1::{Experiment, GenerationSummary, GetExperimentRequest};
 
 use crate::{
     connection::{Connection, present},
@@ -41,38 +41,28 @@ pub struct Run {
     pub points: Vec<GenerationFitness>,
 }
 
-/// The fitness of a generation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The fitness of a generation: a row of the file, too.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct GenerationFitness {
     pub generation: u64,
+    #[serde(deserialize_with = "number")]
     pub best: f64,
+    #[serde(deserialize_with = "number")]
     pub mean: f64,
+    #[serde(deserialize_with = "number")]
     pub min: f64,
     /// Number of episodes, if it is recorded.
     pub episodes: Option<u64>,
 }
 
-/// A row of the file; of values that are not finite, the place is empty.
-#[derive(Debug, Deserialize)]
-struct Row {
-    generation: u64,
-    best: Option<f64>,
-    mean: Option<f64>,
-    min: Option<f64>,
-    episodes: Option<u64>,
+/// In files, the place of a value that is not finite is empty.
+fn number<'a, D: Deserializer<'a>>(value: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(value)?.unwrap_or(f64::NAN))
 }
 
-impl Row {
-    /// None if there is a value that is not finite.
-    fn fitness(&self) -> Option<GenerationFitness> {
-        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-        Some(GenerationFitness {
-            generation: self.generation,
-            best: finite(self.best)?,
-            mean: finite(self.mean)?,
-            min: finite(self.min)?,
-            episodes: self.episodes,
-        })
+impl GenerationFitness {
+    fn is_finite(&self) -> bool {
+        [self.best, self.mean, self.min].iter().all(|value| value.is_finite())
     }
 }
 
@@ -94,19 +84,15 @@ impl Run {
         let mut generations = Vec::new();
         for completed in connection.generations(experiment_id).await? {
             let summary = present(completed.summary)?;
-            generations.push(Row {
-                generation: summary.generation,
-                best: Some(summary.best),
-                mean: Some(summary.mean),
-                min: Some(summary.min),
-                episodes: Some(summary.episodes),
-            });
+            let GenerationSummary { generation, best, mean, min, episodes, .. } = summary;
+            let episodes = Some(episodes);
+            generations.push(GenerationFitness { generation, best, mean, min, episodes });
         }
         let source = format!("experiment {experiment_id}");
         let request = GetExperimentRequest { experiment_id };
         let stored = connection.call(async |client| client.get_experiment(request).await).await?;
         let function = fitness_function(&stored.config_json);
-        match (Self { function, ..Self::new(experiment.name, source.clone(), &generations) }) {
+        match (Self { function, ..Self::new(experiment.name, source.clone(), generations) }) {
             run if run.points.is_empty() => {
                 Err(Error::NotFound(format!("{source} has no complete generation yet")))
             }
@@ -120,7 +106,7 @@ impl Run {
         file_kind::expect(path, &[Kind::History], "the history of a run").map_err(problem)?;
         let text = read_text(path, TABLE_BYTES).map_err(|error| problem(error.to_string()))?;
         let mut reader = csv::Reader::from_reader(text.as_bytes());
-        let generations: Vec<Row> =
+        let generations: Vec<GenerationFitness> =
             reader.deserialize().collect::<Result<_, _>>().map_err(|error| {
                 problem(format!(
                     "{}; expected what `swarmctl history ID --output csv` writes",
@@ -131,15 +117,15 @@ impl Run {
             return Err(problem("the generations are not those of one run, in order".into()));
         }
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let run = Self::new(name, path.display().to_string(), &generations);
+        let run = Self::new(name, path.display().to_string(), generations);
         if run.points.is_empty() {
             return Err(problem("there is no generation with a fitness in it".into()));
         }
         Ok(run)
     }
 
-    fn new(name: String, source: String, rows: &[Row]) -> Self {
-        let points = rows.iter().filter_map(Row::fitness).collect();
+    fn new(name: String, source: String, mut points: Vec<GenerationFitness>) -> Self {
+        points.retain(GenerationFitness::is_finite);
         Self { name, function: None, source, points }
     }
 }

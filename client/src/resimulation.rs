@@ -57,7 +57,7 @@ impl Resimulation {
                 Box::new(Connection::new(settings.address(), &settings.credentials()?)?);
             return Ok(Self::Fleet { connection, config_json: config_json.to_owned() });
         }
-        let n_threads = n_threads.map_or_else(|| cores(), usize::from);
+        let n_threads = n_threads.map_or_else(cores, usize::from);
         Ok(Self::Here { n_threads, isa: isa.get() })
     }
 

@@ -69,9 +69,10 @@ pub mod services {
     use tonic::transport::Channel;
 
     use super::{Error, Infallible, missing};
+    use crate::Program;
 
     /// The programs that this one cannot be instead.
-    pub const PROGRAMS: [(&str, fn(Vec<OsString>) -> ExitCode); 2] =
+    pub const PROGRAMS: [(&str, Program); 2] =
         [("coordinator", no_program), ("worker", no_program)];
 
     fn no_program(_words: Vec<OsString>) -> ExitCode {

@@ -193,7 +193,8 @@ async fn ask(
     result
 }
 
-#[cfg(all(test, feature = "local"))]
+#[cfg(test)]
+#[cfg(feature = "local")]
 mod one_world;
 #[cfg(test)]
 mod tests;

@@ -1,15 +1,13 @@
 //! The services of a coordinator in this process.
 
-use std::{ffi::OsString, process::ExitCode};
-
 use coordinator::StartError;
 pub use coordinator::{Door, InProcess};
 
-use crate::error::Error;
+use crate::{Program, error::Error};
 
 /// The programs that this one can be instead. It contains all of their code, because `run` starts
 /// a coordinator and workers, so that a release is one file with three names.
-pub const PROGRAMS: [(&str, fn(Vec<OsString>) -> ExitCode); 2] =
+pub const PROGRAMS: [(&str, Program); 2] =
     [("coordinator", coordinator::program::main), ("worker", worker::program::main)];
 
 impl From<StartError> for Error {

@@ -48,6 +48,7 @@ pub use explain::Explanation;
 pub use fitness::FitnessOrder;
 pub use follow::{WatchError, watch};
 pub use placement::{Existing, Placement, place};
+pub use reopen::Reopening;
 pub use submit::Submitted;
 pub use turns::Client;
 

@@ -27,22 +27,8 @@ pub enum Reopening {
 }
 
 impl Control {
-    /// Lets a completed experiment go on until it has `generations` in all.
-    pub async fn extend(
-        &self,
-        id: ExperimentId,
-        generations: u64,
-    ) -> Result<ExperimentRecord, ControlError> {
-        self.reopen(id, Reopening::Extend(generations)).await
-    }
-
-    /// Lets a failed experiment go on.
-    pub async fn retry(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
-        self.reopen(id, Reopening::Retry).await
-    }
-
     /// Lets an experiment go on that has ended, to the bits of one that never had.
-    pub(super) async fn reopen(
+    pub async fn reopen(
         &self,
         id: ExperimentId,
         reopening: Reopening,

@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use crate::{
-    control::{self, Control, ControlError, Existing, Submitted},
+    control::{self, Control, ControlError, Existing, Reopening, Submitted},
     group::Membership,
     ids::ExperimentId,
     priority::Priority,
@@ -228,9 +228,9 @@ model::reading_calls! { service
         set_priority(SetPriorityRequest { priority }) -> SetPriorityResponse { experiment }
             = control.change(id, runs::Request::SetPriority(convert::priority(priority)?));
         extend_experiment(ExtendExperimentRequest { generations }) -> ExtendExperimentResponse { experiment }
-            = control.extend(id, generations);
+            = control.reopen(id, Reopening::Extend(generations));
         retry_experiment(RetryExperimentRequest {}) -> RetryExperimentResponse { experiment }
-            = control.retry(id);
+            = control.reopen(id, Reopening::Retry);
         prune_experiment(PruneExperimentRequest {}) -> PruneExperimentResponse { experiment, freed_bytes }
             = control.prune(id);
         delete_experiment(DeleteExperimentRequest {}) -> DeleteExperimentResponse { experiment, freed_bytes }
