@@ -26,7 +26,7 @@ fn tests_in(path: &Path) -> Vec<String> {
 
 #[test]
 fn every_test_that_the_page_on_faults_names_exists() {
-    let tests: BTreeSet<String> = ["tests", "coordinator", "worker", "client"]
+    let tests: BTreeSet<String> = ["tests", "coordinator", "crates/model", "worker", "client"]
         .iter()
         .flat_map(|directory| rust_files(&workspace_file(directory)))
         .flat_map(|path| tests_in(&path))
