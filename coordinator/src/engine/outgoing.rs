@@ -45,7 +45,7 @@ impl Outgoing {
 }
 
 impl Engine {
-    /// ReadyQueue what has been put together into commands.
+    /// Turns what has been put together into commands.
     pub(super) fn send(&mut self) {
         let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
         for (worker, assignments) in recalled {

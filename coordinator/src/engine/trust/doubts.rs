@@ -1,4 +1,4 @@
-//! ReadyQueue trouble with workers into questions for the referee.
+//! Turns trouble with workers into questions for the referee.
 
 use std::time::Instant;
 
