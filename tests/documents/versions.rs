@@ -29,6 +29,22 @@ fn every_file_that_names_a_version_of_rust_names_the_same() {
 }
 
 #[test]
+fn every_file_that_names_the_version_of_the_project_names_the_same() {
+    let version = between("Cargo.toml", "\nversion = \"", "\"");
+    for (path, before, after) in [
+        ("python/Cargo.toml", "\nversion = \"", "\""),
+        ("CITATION.cff", "\nversion: ", "\n"),
+        ("codemeta.json", "\"version\": \"", "\""),
+        ("CHANGELOG.md", "\n## [", "]"),
+        ("docs/deploy.md", "-t swarmevo/worker:", " "),
+        ("docs/deploy/kubernetes/coordinator.yaml", "image: swarmevo/coordinator:", "\n"),
+        ("docs/deploy/kubernetes/worker.yaml", "image: swarmevo/worker:", "\n"),
+    ] {
+        assert_eq!(between(path, before, after), version, "{path}");
+    }
+}
+
+#[test]
 fn images_are_built_from_every_crate_of_the_workspace() {
     let members = between("Cargo.toml", "members = [", "]");
     let context = fs::read_to_string(workspace_file(".dockerignore")).unwrap();
