@@ -17,7 +17,7 @@ pub enum Availability<'a> {
     Stalled,
     /// Its word is in doubt until the referee has answered.
     Doubted,
-    /// It was lost before it returned anything, and gets nothing until this time.
+    /// It was lost, has returned nothing since, and gets nothing until this time.
     Resting(Instant),
     /// It was lost, and has returned nothing since: it is given one item.
     OnProbation,

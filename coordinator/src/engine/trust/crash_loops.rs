@@ -1,4 +1,4 @@
-//! Workers that are lost before they have returned anything, again and again.
+//! Workers that are lost, and lost again before they return a result.
 //!
 //! A worker that comes back after a loss is given one item until it has returned a result,
 //! so that a loop of crashes holds up one item at a time. It waits for longer and longer

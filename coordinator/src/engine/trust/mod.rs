@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | a worker reports a failure, or two return different bits | `doubts.rs` | a question for the referee (`questions.rs`) |
 //! | workers are lost with the same item | `losses.rs` | the item becomes a suspect, and then a question |
-//! | a worker is lost before it returns anything | `crash_loops.rs` | it gets its next item later, and one only |
+//! | a worker is lost, whatever it had returned | `crash_loops.rs` | it gets its next item later, and one only |
 //! | the referee answers | `verdicts.rs` | the item fails its job, or a worker is quarantined (`quarantine.rs`) |
 //! | a result comes in | `audits.rs`, `unaudited.rs` | a second worker computes a share of the results, too |
 
