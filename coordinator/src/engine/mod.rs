@@ -8,7 +8,7 @@
 //! at a time: genotypes times trials of one trial set. A batch is computed as *items*
 //! (`item.rs`), each one genotype and a range of trials. An item given to a worker
 //! (`worker.rs`) is an *assignment*. Items go through these states
-//! ([`ItemState`](item::ItemState)), in which [`BatchInProgress`] keeps them:
+//! (`ItemState`), in which `BatchInProgress` keeps them:
 //!
 //! | from | to | when | in |
 //! |---|---|---|---|
@@ -27,7 +27,7 @@
 //! counts by its place in the batch, and the first one for each place is kept. So who computes
 //! what, and how often, cannot change the results of a batch.
 //!
-//! Whether a worker is given items is its [`Availability`](availability::Availability).
+//! Whether a worker is given items is its `Availability` (`availability.rs`).
 //! Trouble with workers is settled by proof (`trust/`), and never fails a job.
 
 mod activity;
