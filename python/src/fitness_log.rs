@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use model::{ids::ExperimentId, store::Store};
 use evolution::Told;
+use model::{ids::ExperimentId, store::Store};
 use numpy::PyArray2;
 use pyo3::{exceptions::PyOSError, prelude::*};
 
@@ -25,8 +25,8 @@ pub fn fitness_log<'py>(
         let told = |entry: Vec<u8>| Told::from_bytes(&entry).ok().map(|told| told.trial_fitness);
         Ok(entries.into_iter().map(|entry| entry.and_then(told)).collect::<Vec<_>>())
     })?;
-    let read = read
-        .map_err(|error: model::store::StoreError| PyOSError::new_err(error.to_string()))?;
+    let read =
+        read.map_err(|error: model::store::StoreError| PyOSError::new_err(error.to_string()))?;
     let array = |fitness: Vec<Vec<f64>>| PyArray2::from_vec2(py, &fitness);
     read.into_iter().map(|fitness| Ok(fitness.map(array).transpose()?)).collect()
 }
