@@ -43,7 +43,8 @@ mod _core {
 
     /// An experiment file to begin with.
     #[pymodule_export]
-    const QUICKSTART: &str = include_str!("../../configs/quickstart.json");
+    // A link: the package of sources has no folder configs/.
+    const QUICKSTART: &str = include_str!("quickstart.json");
 
     /// The gRPC protocol, as a set of file descriptors.
     #[pymodule_export]
