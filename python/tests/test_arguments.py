@@ -102,6 +102,7 @@ CASES = {
     "Archive.run.experiment": lambda it: HERE.archive.run(it),
     "Archive.individual.address": lambda it: HERE.archive.individual(it),
     "FleetRun.extend.generations": lambda it: HERE.run.extend(it),
+    "FleetRun.resume.generations": lambda it: HERE.run.resume(it),
     "FleetRun.set_priority.priority": lambda it: HERE.run.set_priority(it),
     **{
         f"RecordedRun.{name}": lambda it, call=call: call(HERE.recorded, it)
