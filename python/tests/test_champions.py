@@ -101,9 +101,9 @@ def test_a_champion_file_says_what_it_was_evolved_in():
         swarmevo.Experiment.from_file(PROJECT / "configs/leader_selection_ga.json", champion.origin.seed).check(champion)
 
 
-def test_one_of_an_older_simulation_is_told_so():
-    file = next((PROJECT / "results/format-2/champions").glob("leader_selection_snes-*.json"), None)
-    file = file or next((PROJECT / "results/format-2/champions").glob("*.json"))
+def test_one_of_an_older_simulation_is_told_so(tmp_path):
+    file = tmp_path / "older.json"
+    file.write_text(FILE.read_text().replace("sim-core 0.1.0 format 3", "sim-core 0.1.0 format 2"))
     champion = swarmevo.Champion.from_file(file)
     with pytest.raises(REFUSED, match="by the simulation `sim-core 0.1.0 format 2`"):
         swarmevo.Experiment.quickstart().check(champion)

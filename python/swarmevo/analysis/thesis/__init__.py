@@ -2,5 +2,5 @@
 
     python -m swarmevo.analysis.thesis leader_selection -o figures
 
-draws those of one experiment, from ``results/`` and ``configs/`` of the project.
+draws those of one experiment, from ``results/`` (after ``results/fetch``) and ``configs/`` of the project.
 """
