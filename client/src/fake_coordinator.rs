@@ -336,6 +336,10 @@ impl ExperimentService for FakeCoordinator {
         &self,
         request: Request<RetryExperimentRequest>,
     ) -> Result<Response<RetryExperimentResponse>, Status> {
+        self.script(|script| {
+            script.experiment.set_state(ExperimentState::Running);
+            script.experiment.reason.clear();
+        });
         let experiment = self.experiment(request.into_inner().experiment_id)?;
         Ok(Response::new(RetryExperimentResponse { experiment }))
     }

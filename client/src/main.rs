@@ -27,6 +27,7 @@ mod help;
 mod input;
 mod interrupt;
 mod json;
+// One or the other: the same names, with and without a coordinator inside.
 #[cfg(feature = "local")]
 mod local;
 #[cfg(not(feature = "local"))]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-/// Bytes that are counted together.
+/// Bytes that are counted together: what is short of them is not counted.
 const UNIT: usize = 16 << 10;
 
 /// A number of bytes. Clones share it.

@@ -40,7 +40,7 @@ family! {
 pub struct PauseArgs {
     #[command(flatten)]
     target: Target,
-    /// Reason of the pause; list, logs and explain show it.
+    /// Reason of the pause; list and explain show it.
     #[arg(long, value_name = "TEXT")]
     reason: Option<String>,
 }

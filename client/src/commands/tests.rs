@@ -347,6 +347,7 @@ const OLD_WORDS: &[(&str, &str)] = &[
         "extend leader --generations 60 --output json",
         "resume leader --generations 60 --output json",
     ),
+    ("retry 3", "resume 3"),
     ("retry 9", "resume 9"),
 ];
 

@@ -1,7 +1,7 @@
 //! What clients can have a running coordinator do: submit and steer experiments,
 //! evaluate genotypes, ask what the fleet does.
 //!
-//! Works on core types. What is only read is in [`queries`](crate::queries).
+//! Works on core types. What is only read is in [`queries`](model::queries).
 
 mod evaluate;
 mod experiment_files;

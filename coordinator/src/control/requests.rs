@@ -17,7 +17,7 @@ use super::{
     turns::{Client, Turns},
 };
 
-/// What a request takes beside its bytes.
+/// What a request takes beside its bytes: no less than a `ByteBudget` counts.
 const REQUEST_LEN: usize = 16 << 10;
 
 /// What clients have sent that is being checked, waits, or is computed.

@@ -25,7 +25,7 @@ pub enum Availability<'a> {
     Free,
 }
 
-/// What keeps items from a worker. Several things may at the same time, and each ends by itself.
+/// What keeps items from a worker. Several things may at the same time, each for its own reason.
 #[derive(Debug, Default)]
 pub struct Obstacles {
     /// Whether it wants no more items.

@@ -14,8 +14,8 @@
 //! |---|---|---|---|
 //! | | queued | a batch is requested | `batch.rs` |
 //! | queued | assigned | it is a job's turn (`ready_queue.rs`), and a worker has room (`load_index.rs`) | `dispatch.rs` |
-//! | assigned | done | a worker returns values that contradict no others | `results.rs`, `known_results.rs` |
-//! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); or another worker is free | `results.rs` (`retry`, `requeue`), `dispatch.rs` |
+//! | any but done | done | a worker returns values that contradict no others, late or not | `results.rs`, `known_results.rs` |
+//! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); its job is paused; or another worker is free | `results.rs` (`retry`, `requeue`), `dispatch.rs` |
 //! | assigned | delayed | two workers are lost with copies of it at the same time | `results.rs` (`retry`) |
 //! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
 //! | any but done | held | a worker says that it fails, or workers are lost with it: the referee is asked | `trust/verdicts.rs` |
@@ -391,7 +391,7 @@ impl Engine {
 
     fn forget_job(&mut self, now: Instant, id: JobId) {
         self.withdraw_questions(id, |_| true);
-        // It has no turn then.
+        // A paused job has no turn.
         self.pause(now, id);
         self.jobs.remove(&id);
     }

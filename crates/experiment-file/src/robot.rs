@@ -143,13 +143,15 @@ pub enum WholeReceiver {
     WirelessReceiver,
 }
 
+/// The name of all readings of the receiver, as [`WholeReceiver`] serialises.
+const WHOLE_RECEIVER: &str = "wireless_receiver";
+
 /// `stimuli_inhibition.stimuli`
 const INHIBITED: &Variants = &Variants {
     names: SensorQuery::VARIANTS.names,
     read: |node| {
-        let is_receiver = node.is("wireless_receiver");
-        if is_receiver {
-            Some("wireless_receiver".into())
+        if node.is(WHOLE_RECEIVER) {
+            Some(WHOLE_RECEIVER.into())
         } else {
             (SensorQuery::VARIANTS.read)(node)
         }
@@ -161,7 +163,7 @@ impl From<InhibitedStimulus> for ParameterValue {
     fn from(stimulus: InhibitedStimulus) -> Self {
         match stimulus {
             InhibitedStimulus::Reading(reading) => reading.into(),
-            InhibitedStimulus::Receiver(_) => "wireless_receiver".into(),
+            InhibitedStimulus::Receiver(_) => WHOLE_RECEIVER.into(),
         }
     }
 }
@@ -170,7 +172,11 @@ impl TryFrom<ParameterValue> for InhibitedStimulus {
     type Error = ParameterValue;
 
     fn try_from(value: ParameterValue) -> Result<Self, ParameterValue> {
-        let receiver = Self::Receiver(WholeReceiver::WirelessReceiver);
-        Ok(SensorQuery::try_from(value).map_or(receiver, Self::Reading))
+        match value {
+            ParameterValue::Name(name) if name == WHOLE_RECEIVER => {
+                Ok(Self::Receiver(WholeReceiver::WirelessReceiver))
+            }
+            value => SensorQuery::try_from(value).map(Self::Reading),
+        }
     }
 }

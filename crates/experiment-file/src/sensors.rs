@@ -1,7 +1,6 @@
-//! The sensors of robots: one row per kind of sensor in [`sensors!`] below, from
-//! which the types, the reader, the schema, the readings that stimuli may name,
-//! their checks and the budget follow, and its parameters. What they sense is
-//! `sim-core`'s `sensors`.
+//! The sensors of robots: one row per kind of sensor in [`sensors!`] below, from which the key in
+//! files, the readings that stimuli may name, their checks and the budget follow; then the
+//! parameters of each kind, in `parameters!`. `sim-core`'s `sensors` compute the readings.
 
 use std::f64::consts::PI;
 

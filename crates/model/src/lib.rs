@@ -1,4 +1,4 @@
-//! Experiments as they are kept: what names them, the rows of the database, and the queries that
+//! The database of experiments: what names them, the rows of the database, and the queries that
 //! read it. Whoever only reads or names experiments needs this crate and no coordinator.
 //!
 //! - [`ids`], [`Address`], [`group`], [`labels`], [`priority`]: what names, joins and ranks

@@ -1,4 +1,4 @@
-//! Bounds on what is kept of an experiment, and on what one answer has of it.
+//! Bounds on what is kept of experiments and on one answer about them, and those that clients know, too.
 
 /// Generations that are computed again at the same time for pages, which share the processor
 /// with the coordinator.

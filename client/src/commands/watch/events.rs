@@ -1,4 +1,4 @@
-//! Prints what has happened to one experiment, or to all of them in the order of time.
+//! Prints what has happened to an experiment, to those of a group, or to all, in the order of time.
 //!
 //! The merged log does not watch every experiment: one stream per experiment would not scale,
 //! and events can be put in the order of time only when all events of a moment are known. It

@@ -60,7 +60,7 @@ pub struct Trust {
     doubted: Doubted,
     /// The workers that are proved faulty.
     pub quarantine: Quarantine,
-    /// The workers that were lost before they returned anything.
+    /// The workers that were lost, and have returned no result since.
     pub crash_loops: CrashLoops,
     /// When there were last two workers that can audit each other, or the engine began.
     auditors_seen: Instant,

@@ -146,7 +146,7 @@ impl Question {
 
     /// Whether its item is given to no worker until it is answered. What workers have
     /// computed is not waited for; what the referee cannot answer at present is not either.
-    pub fn holds_back(&self) -> bool {
+    pub fn holds(&self) -> bool {
         matches!(self.doubt, Doubt::Failure { .. } | Doubt::Losses) && self.trouble.is_none()
     }
 

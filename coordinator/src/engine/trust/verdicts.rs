@@ -200,7 +200,7 @@ impl Engine {
             if let Some(batch) = self.batch_of(question) {
                 batch.n_disagreements -= 1;
             }
-        } else if question.holds_back() {
+        } else if question.holds() {
             self.release(question);
         }
     }

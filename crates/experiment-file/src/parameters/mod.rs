@@ -42,7 +42,7 @@ pub struct Parameter {
     default_text: &'static str,
     /// Another key that says the same.
     also: Option<Also>,
-    /// The key of a parameter that has no value where this one has one.
+    /// The key of a parameter before this one, which has no value where this one has one.
     instead_of: Option<&'static str>,
     /// Whether it may be null, too, which stands for none.
     is_nullable: bool,

@@ -101,9 +101,11 @@ impl StoredFamilies {
         let told = |(_, entry): &LogEntry| {
             Told::from_bytes(entry).map_err(|error| other(error.to_string()))
         };
-        let mut before = told(&log[0])?;
+        let (first_entry, log) =
+            log.split_first().ok_or_else(|| other("its log is empty".to_owned()))?;
+        let mut before = told(first_entry)?;
         let (mut generations, mut n_children, mut next) = (Vec::new(), 0, first);
-        for entry in &log[1..] {
+        for entry in log {
             if n_children >= CHILDREN_MAX {
                 break;
             }
@@ -124,5 +126,86 @@ impl StoredFamilies {
             next = of.generation + 1;
         }
         Ok(Families { populations, generations, next })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::{store::inspection::tests::advance_to, submission::Submission};
+
+    const POPULATION: usize = 6;
+
+    fn store_with(algorithm: &str, n_generations: u64) -> (tempfile::TempDir, Store, ExperimentId) {
+        let quickstart = include_str!("../../../../configs/quickstart.json");
+        let mut config: Value = serde_json::from_str(quickstart).unwrap();
+        let section = &mut config["algorithm"];
+        section["name"] = json!(algorithm);
+        section["population_size"] = json!(POPULATION);
+        section["generations"] = json!(n_generations);
+        for (_, population) in section["populations"].as_object_mut().unwrap() {
+            population["params"] = json!({ "encoding": "real" });
+        }
+        let submission = Submission { config_json: config.to_string(), ..Submission::default() };
+        let directory = tempfile::tempdir().unwrap();
+        let mut store = Store::open(directory.path()).unwrap();
+        let (id, _) = store.create(&submission.check(&|| true).unwrap().new, 5).unwrap();
+        for generation in 0..n_generations {
+            let is_last = generation + 1 == n_generations;
+            advance_to(generation % 40 == 0, &mut store, id, is_last.then_some(""));
+        }
+        (directory, store, id)
+    }
+
+    fn page(
+        store: &Store,
+        id: ExperimentId,
+        from: u64,
+        every: u64,
+    ) -> Result<Families, QueryError> {
+        let every = NonZeroU64::new(every).unwrap();
+        StoredFamilies::read(store, id, from, every)?.replay()
+    }
+
+    /// The generations of all pages, each with the number of its children.
+    fn pages(store: &Store, id: ExperimentId, every: u64) -> Vec<(u64, usize)> {
+        let (mut from, mut all) = (0, Vec::new());
+        loop {
+            let page = page(store, id, from, every).unwrap();
+            assert!(page.generations.len() as u64 <= FAMILIES_PAGE_LEN_MAX);
+            let n_children =
+                |families: &evolution::Families| families.births.iter().map(Vec::len).sum();
+            all.extend(page.generations.iter().map(|(number, of)| (*number, n_children(of))));
+            if page.next == from {
+                return all;
+            }
+            from = page.next;
+        }
+    }
+
+    #[test]
+    fn pages_have_each_generation_with_parents_once_and_all_its_children() {
+        let n = FAMILIES_PAGE_LEN_MAX + 30;
+        let (_directory, store, id) = store_with("GA", n);
+        let all = pages(&store, id, 1);
+        let numbers: Vec<u64> = all.iter().map(|(number, _)| *number).collect();
+        assert_eq!(numbers, (1..n).collect::<Vec<_>>());
+        assert!(all.iter().all(|(_, n_children)| *n_children == POPULATION), "{all:?}");
+        let tenth: Vec<u64> = pages(&store, id, 10).into_iter().map(|(number, _)| number).collect();
+        assert_eq!(tenth, (10..n).step_by(10).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn generations_that_were_pruned_and_individuals_without_parents_are_refused() {
+        let (_directory, mut store, id) = store_with("GA", 5);
+        assert!(store.prune(id, None, 9).unwrap() > 0);
+        let error = page(&store, id, 0, 1).unwrap_err();
+        assert!(matches!(error, QueryError::NotInLog { .. }), "{error}");
+
+        let (_directory, store, id) = store_with("SNES", 3);
+        let error = page(&store, id, 0, 1).unwrap_err();
+        assert!(error.to_string().contains("parents"), "{error}");
     }
 }

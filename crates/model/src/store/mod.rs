@@ -14,7 +14,7 @@ mod file;
 mod fitness_log;
 mod forks;
 mod history;
-mod inspection;
+pub(crate) mod inspection;
 mod labels;
 mod older_schemas;
 mod quarantine;
