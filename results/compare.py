@@ -16,7 +16,7 @@ TASKS = {
     "A": "leader_selection",
     "B": "borderline",
     "C": "orientation_consensus",
-    "C, original's function": "orientation_consensus_alignment",
+    "C, SpikeSwarmSim's function": "orientation_consensus_alignment",
     "D": "light_follower",
 }
 QUANTITIES = {"judged": "champion", "mean": "mean, last 50", "best": "best, last 50"}

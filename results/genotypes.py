@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Prints how many genes the original simulator gives to the networks of the thesis's experiments.
+"""Prints how many genes SpikeSwarmSim gives to the networks of the thesis's experiments.
 
     results/genotypes.py [FILE...]    experiment files; by default one per network
 
-The original draws connections with numpy's generator, seeded with 821, group by group in the order of
+SpikeSwarmSim draws connections with numpy's generator, seeded with 821, group by group in the order of
 the file. `swarmctl validate` prints the number of genes in this simulator, which draws from another
 generator. Needs Python 3.9 and nothing else.
 """

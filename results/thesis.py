@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints what each reading of the thesis comes to: its tables, and the constants of its program.
+"""Prints what each reading of the thesis comes to: its tables, and the constants of SpikeSwarmSim.
 
     results/thesis.py              the table of docs/howto/did-the-thesis-hold.md
     results/thesis.py --update     writes it into that page
@@ -20,23 +20,23 @@ BEGIN, END = "<!-- generated: readings -->\n", "<!-- end: readings -->"
 # Experiment, reading, algorithm, and the name of the experiment file.
 READINGS = [
     ("A", "Table 3.4", "GA", "leader_selection_ga"),
-    ("A", "the program's rates", "SNES", "leader_selection_snes"),
+    ("A", "SpikeSwarmSim's rates", "SNES", "leader_selection_snes"),
     ("B", "Table 3.4", "GA", "borderline_ga"),
-    ("B", "two constants of the program", "GA", "borderline_ga_original"),
-    ("B", "the program's file", "GA", "borderline_ga_program"),
-    ("B", "the program's rates", "SNES", "borderline_snes"),
+    ("B", "two constants of SpikeSwarmSim", "GA", "borderline_ga_original"),
+    ("B", "SpikeSwarmSim's file", "GA", "borderline_ga_program"),
+    ("B", "SpikeSwarmSim's rates", "SNES", "borderline_snes"),
     ("C", "Eq. 5.5 and Table 3.4", "GA", "orientation_consensus_ga"),
-    ("C", "Eq. 5.5, the program's rates", "SNES", "orientation_consensus_snes"),
-    ("C", "the program's function, Table 3.4", "GA", "orientation_consensus_alignment_ga"),
-    ("C", "the program's function and rates", "SNES", "orientation_consensus_alignment_snes"),
-    ("C", "the program's file", "GA", "orientation_consensus_ga_program"),
-    ("D", "Table 3.2 and 3.4, twice the program's speed", "GA", "light_follower_thesis_sensors_ga"),
-    ("D", "Table 3.2, twice the program's speed", "SNES", "light_follower_thesis_sensors_snes"),
-    ("D", "Table 3.4, the program's sensors, twice its speed", "GA", "light_follower_ga"),
-    ("D", "the program's sensors and rates, twice its speed", "SNES", "light_follower_snes"),
-    ("D", "the program's constants and speed, its network for the GA", "SNES", "light_follower_snes_original"),
-    ("D", "the program's file", "GA", "light_follower_ga_program"),
-    ("D", "the program's file", "SNES", "light_follower_snes_program"),
+    ("C", "Eq. 5.5, SpikeSwarmSim's rates", "SNES", "orientation_consensus_snes"),
+    ("C", "SpikeSwarmSim's function, Table 3.4", "GA", "orientation_consensus_alignment_ga"),
+    ("C", "SpikeSwarmSim's function and rates", "SNES", "orientation_consensus_alignment_snes"),
+    ("C", "SpikeSwarmSim's file", "GA", "orientation_consensus_ga_program"),
+    ("D", "Table 3.2 and 3.4, twice SpikeSwarmSim's speed", "GA", "light_follower_thesis_sensors_ga"),
+    ("D", "Table 3.2, twice SpikeSwarmSim's speed", "SNES", "light_follower_thesis_sensors_snes"),
+    ("D", "Table 3.4, SpikeSwarmSim's sensors, twice its speed", "GA", "light_follower_ga"),
+    ("D", "SpikeSwarmSim's sensors and rates, twice its speed", "SNES", "light_follower_snes"),
+    ("D", "SpikeSwarmSim's constants and speed, its network for the GA", "SNES", "light_follower_snes_original"),
+    ("D", "SpikeSwarmSim's file", "GA", "light_follower_ga_program"),
+    ("D", "SpikeSwarmSim's file", "SNES", "light_follower_snes_program"),
 ]
 
 
