@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let descriptors = protox::compile(files, ["."])?;
     let out_dir = PathBuf::from(env::var("OUT_DIR")?);
     fs::write(out_dir.join("swarm.v1.bin"), descriptors.encode_to_vec())?;
-    // In an order: what is printed of them does not depend on chance.
+    // Ordered maps, so that their debug output is the same on every run.
     tonic_prost_build::configure().btree_map(".").compile_fds(descriptors)?;
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! The wire protocol: generated from `swarm/v1/*.proto`, and the
-//! limits that both sides keep.
+//! The wire protocol: code generated from `swarm/v1/*.proto`, and the limits that coordinator and
+//! worker enforce.
 
 /// Package `swarm.v1`.
 // Generated code keeps its own style.
@@ -12,13 +12,13 @@ pub mod v1 {
 /// agree.
 pub const PROTOCOL_VERSION: u32 = v1::ProtocolVersion::Current as u32;
 
-/// Most items per slot that a worker is given before it has answered any.
+/// Most items per slot that a coordinator assigns to a worker before the worker's first result.
 pub const ITEMS_PER_SLOT_MAX: usize = 64;
 
-/// Most slots of a worker.
+/// Largest number of slots of a worker.
 pub const SLOTS_MAX: u32 = 4096;
 
-/// Most bytes of a worker's name, and of its version.
+/// Largest length of a worker's name, and of its version, in bytes.
 pub const WORKER_NAME_LEN_MAX: usize = 128;
 
 /// The encoded descriptors of the package, for gRPC reflection.

@@ -21,7 +21,7 @@ const SERVICE_METHODS: i32 = 2;
 /// Names of a file's elements, with the paths to them.
 type Elements = Vec<(String, Vec<i32>)>;
 
-/// A path and the name of what it leads to, from the elements of a list.
+/// The elements of a list, each with its path.
 fn children<'a, T>(
     path: &'a [i32],
     list: i32,
@@ -37,13 +37,13 @@ fn add_message(elements: &mut Elements, scope: &str, path: &[i32], message: &Des
         elements.push((format!("{scope}.{}", field.name()), path));
     }
     for (path, oneof) in children(path, MESSAGE_ONEOFS, &message.oneof_decl) {
-        // The others stand for optional fields, not for words of a file.
+        // The compiler adds oneofs with `_` for optional fields; the file does not mention them.
         if !oneof.name().starts_with('_') {
             elements.push((format!("{scope}.{}", oneof.name()), path));
         }
     }
     for (path, nested) in children(path, MESSAGE_NESTED, &message.nested_type) {
-        // The entries of a map are no words of a file either.
+        // The compiler adds messages for the entries of maps, too.
         if !nested.options.as_ref().is_some_and(|options| options.map_entry()) {
             add_message(elements, &scope, &path, nested);
         }

@@ -1,11 +1,11 @@
-//! What clients were promised stays: the protocol only grows.
+//! The protocol only grows: everything that was promised to clients stays.
 //!
-//! `worker.proto` may change with its version: workers come from the same release as
-//! their coordinator. What stays of it is the [`HANDSHAKE`], by which workers of
-//! another version are refused with the reason.
+//! `worker.proto` may change with its version: workers come from the same release as their
+//! coordinator. Only the [`HANDSHAKE`] stays, so that a coordinator can refuse workers of another
+//! version and say why.
 //!
-//! `swarm.v1.binpb` is the descriptor of what was promised. After additions, let
-//! them be promised, too, with
+//! `swarm.v1.binpb` is the descriptor of the promised interface. After additions, promise them,
+//! too, with
 //!
 //! ```sh
 //! SWARM_PROMISE=1 cargo test -p swarm-proto --test compatibility
@@ -26,7 +26,7 @@ const PROMISED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/swarm.v1.binpb");
 fn present() -> FileDescriptorSet {
     let mut set = FileDescriptorSet::decode(FILE_DESCRIPTOR_SET).unwrap();
     for file in &mut set.file {
-        // Comments are no promise.
+        // Comments promise nothing.
         file.source_code_info = None;
     }
     set
@@ -36,8 +36,7 @@ fn promised() -> FileDescriptorSet {
     FileDescriptorSet::decode(&*fs::read(PROMISED).unwrap()).unwrap()
 }
 
-/// Everything that a client may rely on, one line each. A change of anything is
-/// the loss of a line.
+/// Everything that a client may rely on, one line each. Any change removes a line.
 fn facts(set: &FileDescriptorSet) -> BTreeSet<String> {
     let mut facts = BTreeSet::new();
     for file in &set.file {
@@ -91,7 +90,7 @@ fn add_service(facts: &mut BTreeSet<String>, scope: &str, service: &ServiceDescr
     }
 }
 
-/// What of `worker.proto` holds for all its versions: beginnings of facts.
+/// Beginnings of the facts of `worker.proto` that hold for all its versions.
 const HANDSHAKE: [&str; 5] = [
     "service swarm.v1.WorkerService",
     "method swarm.v1.WorkerService/Work ",
@@ -100,7 +99,8 @@ const HANDSHAKE: [&str; 5] = [
     "field swarm.v1.Hello.sim_core_fingerprint ",
 ];
 
-/// The version that a `worker.proto` describes; none before it said so.
+/// The version that a `worker.proto` describes; none for those from before the version was in the
+/// file.
 fn worker_version(set: &FileDescriptorSet) -> Option<i32> {
     let mut enums = set.file.iter().flat_map(|file| &file.enum_type);
     let version = enums.find(|enumeration| enumeration.name() == "ProtocolVersion")?;
@@ -114,7 +114,7 @@ fn files(set: &FileDescriptorSet, is_in: impl Fn(&str) -> bool) -> FileDescripto
     FileDescriptorSet { file }
 }
 
-/// What the first promises and the second does not keep.
+/// Facts of the first protocol that the second lacks.
 fn broken(promised: &FileDescriptorSet, present: &FileDescriptorSet) -> Vec<String> {
     let is_workers = |name: &str| name.ends_with("/worker.proto");
     let facts_of =
@@ -143,7 +143,7 @@ fn the_protocol_keeps_its_promises() {
     );
 }
 
-/// What breaks if `change` is done to a protocol with a bit of everything.
+/// The promises that `change` breaks, applied to a protocol with a bit of everything.
 fn broken_by(change: impl FnOnce(&mut FileDescriptorSet)) -> Vec<String> {
     let mut changed = present();
     change(&mut changed);
