@@ -280,7 +280,7 @@ async fn what_the_referee_is_asked_is_shown_and_needs_no_help() {
     let said = "worker \"broken-2\" reports that it fails: the wheels came off";
     let asked = wait_for_finding(&coordinator, id, "referee", said);
     assert!(asked["next_steps"].as_array().unwrap().is_empty(), "{asked:#}");
-    let said = "broken-2: its word is in doubt until the referee has answered";
+    let said = "broken-2: one of its results is in doubt until the referee has answered";
     wait_for_finding(&coordinator, id, "workers_waiting", said);
     // Nobody is left, so more workers are asked for.
     let available = wait_for_finding(&coordinator, id, "no_workers_available", "");

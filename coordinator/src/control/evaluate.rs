@@ -1,4 +1,4 @@
-//! Evaluates a genotype on the fleet: many trials, every step measured.
+//! Evaluates a genotype on the fleet in many trials, with the measures of every step.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::{
 
 use super::{Control, ControlError, requests::RequestPlace};
 
-/// What a client wants evaluated.
+/// A client's request to evaluate one genotype.
 #[derive(Debug)]
 pub struct EvaluationOrder {
     /// The experiment file.
@@ -26,7 +26,7 @@ pub struct EvaluationOrder {
     pub genotype: Genotype,
     /// Trials, from trial 0.
     pub n_trials: u32,
-    /// Its share of the fleet.
+    /// Priority against other jobs.
     pub priority: Priority,
 }
 
@@ -42,8 +42,8 @@ pub struct CheckedEvaluation {
     place: RequestPlace,
 }
 
-/// An evaluated genotype. Counts as being computed until it is dropped, so that the
-/// numbers of few are held in memory.
+/// An evaluated genotype. It occupies one of the places for evaluations until it is dropped,
+/// which bounds the numbers in memory.
 #[derive(Debug)]
 pub struct Evaluated {
     /// The numbers of all trials, one trial after the other.
@@ -55,12 +55,12 @@ pub struct Evaluated {
 }
 
 impl EvaluationOrder {
-    /// Bytes that it takes until it is answered.
+    /// Bytes of memory that the order takes until its answer.
     fn len(&self) -> usize {
         2 * self.config_json.len() + size_of_val(&*self.genotype)
     }
 
-    /// Checks everything about an order; work for a CPU.
+    /// Checks an order completely; CPU-bound.
     fn check(self, place: RequestPlace) -> Result<CheckedEvaluation, ControlError> {
         let Self { config_json, genotype, n_trials, priority } = self;
         if n_trials == 0 || n_trials > limits::TRIALS {
@@ -96,25 +96,26 @@ impl EvaluationOrder {
 }
 
 impl Evaluated {
-    /// Per trial its fitness, and the measures of all steps.
+    /// For each trial, its fitness and the measures of all steps.
     pub fn trials(&self) -> impl Iterator<Item = (f64, &[f64])> {
         self.values.chunks_exact(self.n_values).map(|values| (values[0], &values[1..]))
     }
 }
 
 impl Control {
-    /// Checks everything about an order.
+    /// Checks an order completely.
     pub async fn check_evaluation(
         &self,
         mut order: EvaluationOrder,
     ) -> Result<CheckedEvaluation, ControlError> {
-        // It waits for its check already, and a list that grew as it was read has room for more.
+        // The order may wait long for its check, and a list that grew while it was read has spare
+        // capacity.
         order.genotype.shrink_to_fit();
         let place = self.requests.enter(order.len())?;
         self.requests.check(self.client, move |_| order.check(place)).await?
     }
 
-    /// Has the fleet evaluate a genotype, once few enough others are evaluated.
+    /// Has the fleet evaluate a genotype, after waiting for one of the places for evaluations.
     /// Dropping the future tells the driver that nobody waits.
     pub async fn evaluate(&self, checked: CheckedEvaluation) -> Result<Evaluated, ControlError> {
         let CheckedEvaluation { evaluation, place, .. } = checked;

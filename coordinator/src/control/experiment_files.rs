@@ -1,5 +1,5 @@
-//! Experiment files that were checked a moment ago: a client that evolves by itself sends the
-//! same one generation by generation.
+//! A cache of checked experiment files: a client that runs its own evolution sends the same file
+//! with every generation.
 
 use std::{
     num::NonZeroUsize,
@@ -11,7 +11,7 @@ use experiment_file::{ConfigError, ExperimentConfig};
 use lru::LruCache;
 use sim_core::Simulation;
 
-/// Files that are remembered. A large one takes tens of megabytes.
+/// Number of files in the cache. A large one takes tens of megabytes.
 const REMEMBERED: NonZeroUsize = NonZeroUsize::new(4).expect("it is not 0");
 
 /// A file that has passed all checks.
@@ -21,7 +21,7 @@ pub struct CheckedFile {
     pub name: Arc<str>,
     /// Its canonical form.
     pub spec: Arc<str>,
-    /// What it describes.
+    /// The simulation that it describes.
     pub simulation: Simulation,
 }
 
@@ -36,7 +36,7 @@ impl Default for ExperimentFiles {
 }
 
 impl ExperimentFiles {
-    /// Checks everything about a file, unless it is remembered; work for a CPU.
+    /// Checks a file completely, unless the cache has it; CPU-bound.
     pub fn check(&self, config_json: &str) -> Result<Arc<CheckedFile>, ConfigError> {
         let latest = || self.0.lock().expect("nothing panics while it holds the files");
         if let Some(known) = latest().get(config_json) {

@@ -1,4 +1,5 @@
-//! What an experiment is doing, or waits for: gathered from the engine and the store.
+//! Explains the present activity of an experiment, or why it waits, from the engine and the
+//! store.
 
 use crate::{
     driver::DriverEvent,
@@ -11,25 +12,25 @@ use crate::{
 
 use super::{Control, ControlError};
 
-/// What an experiment is doing, or waits for.
+/// The present activity of an experiment, or the reason why it waits.
 #[derive(Debug)]
 pub struct Explanation {
     /// The experiment.
     pub experiment: ExperimentRecord,
-    /// What the fleet does for it.
+    /// The fleet's work for it.
     pub activity: JobActivity,
-    /// How much memory it waits for, if it does.
+    /// The missing memory, if it waits for memory.
     pub shortage: Option<Shortage>,
     /// Its latest notices, oldest first.
     pub notices: Vec<Event>,
-    /// Why the latest write did not reach the disk, if it did not.
+    /// Why the latest write failed, if it did.
     pub store_trouble: Option<String>,
     /// Why this program cannot compute it, if it cannot.
     pub incompatible: Option<String>,
 }
 
 impl Control {
-    /// Says what an experiment is doing.
+    /// Explains an experiment.
     pub async fn explain(&self, id: ExperimentId) -> Result<Explanation, ControlError> {
         self.find(id).await?;
         let (activity, shortage) =

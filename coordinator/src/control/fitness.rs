@@ -1,4 +1,4 @@
-//! Has the fleet simulate again what an evolution was told.
+//! Has the fleet recompute the fitness that an evolution recorded.
 
 use std::sync::Arc;
 
@@ -20,23 +20,23 @@ pub struct FitnessOrder {
     pub config_json: String,
     /// Genes in \[0, 1\].
     pub genotypes: Vec<Genotype>,
-    /// Which worlds and noise.
+    /// The trial set.
     pub trial_set: TrialSet,
     /// Trials of each genotype, from trial 0.
     pub n_trials: u32,
-    /// Its share of the fleet.
+    /// Priority against other jobs.
     pub priority: Priority,
 }
 
 impl FitnessOrder {
-    /// Bytes that it takes until it is answered.
+    /// Bytes of memory that the order takes until its answer.
     fn len(&self) -> usize {
         let genes: usize = self.genotypes.iter().map(|genes| size_of_val(&**genes)).sum();
-        // Where there are no genes, the lists are what takes memory.
+        // Without genes, the lists alone take memory.
         2 * self.config_json.len() + size_of_val(&*self.genotypes) + genes
     }
 
-    /// Checks everything about an order; work for a CPU.
+    /// Checks an order completely; CPU-bound.
     fn check(self, files: &ExperimentFiles) -> Result<Evaluation, ControlError> {
         let Self { config_json, genotypes, trial_set, n_trials, priority } = self;
         let invalid = |what: String| Err(ControlError::Invalid(what));
@@ -66,10 +66,10 @@ impl FitnessOrder {
 }
 
 impl Control {
-    /// Has the fleet compute fitness: per genotype that of every trial. Dropping the future
+    /// Has the fleet compute the fitness of each genotype in every trial. Dropping the future
     /// tells the driver that nobody waits.
     pub async fn fitness(&self, mut order: FitnessOrder) -> Result<Vec<Vec<f64>>, ControlError> {
-        // Lists that grew as they were read have room for more.
+        // Lists that grew while they were read have spare capacity.
         order.genotypes.iter_mut().for_each(Vec::shrink_to_fit);
         order.genotypes.shrink_to_fit();
         let _place = self.requests.enter(order.len())?;

@@ -11,13 +11,13 @@ use crate::{
     store::{Event, Store, StoreError},
 };
 
-/// Why a watcher gets no more events although the experiment goes on.
+/// Why a stream of events ends before its experiment does.
 #[derive(Debug, thiserror::Error)]
 pub enum WatchError {
-    /// It did not read.
+    /// The client read too slowly.
     #[error("events were not read for {} s; resume from sequence {next}", WATCH_PATIENCE.as_secs())]
     TooSlow {
-        /// Sequence number of the first event that it did not get.
+        /// Sequence number of the first event that was not sent.
         next: u64,
     },
     /// The coordinator stops.
@@ -28,8 +28,8 @@ pub enum WatchError {
     Store(#[from] StoreError),
 }
 
-/// Sends an experiment's events from `from_sequence` on, past ones first, and ends
-/// after the event that ends the experiment. A dropped receiver ends it, too.
+/// Sends an experiment's events from `from_sequence` on, past ones first, and ends after the
+/// event that ends the experiment. Dropping the receiver also ends it.
 pub fn watch(
     store: SharedStore,
     shutdown: CancellationToken,
@@ -37,7 +37,7 @@ pub fn watch(
     from_sequence: u64,
 ) -> mpsc::Receiver<Result<Event, WatchError>> {
     let (outbox, inbox) = mpsc::channel(WATCH_QUEUE_LEN + 1);
-    // There is always room to say how it ends.
+    // Reserved, so that there is always room for the error that ends the stream.
     let final_slot = outbox.clone().try_reserve_owned().expect("a new channel has room");
     tokio::spawn(async move {
         let error = tokio::select! {

@@ -1,4 +1,4 @@
-//! Takes an experiment in that another coordinator has computed.
+//! Imports an experiment that another coordinator has computed.
 
 use bundle::{Bundle, Sample, Verification};
 use experiment_file::ExperimentConfig;
@@ -13,9 +13,9 @@ use crate::{
 use super::{Control, ControlError};
 
 impl Control {
-    /// Takes the experiment of a bundle in, once everything that follows from its log has been
-    /// checked. Returns the experiment, and whether it is new here. `place`: kept as long as the
-    /// bundle takes memory, which outlives a client that goes away.
+    /// Imports the experiment of a bundle, after checking everything that follows from its
+    /// fitness log. Returns the experiment, and whether the import created it. `place`: kept as
+    /// long as the bundle takes memory, even if the client goes away.
     pub async fn import(
         &self,
         bytes: Vec<u8>,
@@ -37,8 +37,8 @@ impl Control {
     }
 }
 
-/// Checks everything but the fitness itself; work for a CPU. `memory_budget`: bytes that the
-/// evolution may take that is gone through.
+/// Checks everything except the fitness itself; CPU-bound. `memory_budget`: bytes that the
+/// repeated evolution may take.
 fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
     let invalid = |error: &dyn std::fmt::Display| ControlError::Invalid(error.to_string());
     let bundle = Bundle::read(bytes).map_err(|error| invalid(&error))?;
@@ -57,7 +57,7 @@ fn check(bytes: &[u8], memory_budget: u64) -> Result<Imported, ControlError> {
     Ok(Imported { name: config.name, genotype_len, state, champion, fork: None, bundle })
 }
 
-/// Finds the parent of a fork; none if it is not here.
+/// Finds the parent of a fork; none if the store lacks it.
 fn with_parent(store: &Store, imported: Imported) -> Result<Option<Imported>, StoreError> {
     let Some(fork) = imported.bundle.manifest.fork.clone() else { return Ok(Some(imported)) };
     let link = imported.bundle.history[fork.generation as usize].digest.to_string();

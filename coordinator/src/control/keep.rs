@@ -1,4 +1,4 @@
-//! What is kept of experiments, and what they are called: delete, archive, label.
+//! Housekeeping of experiments: delete, archive, label.
 
 use crate::{
     ids::ExperimentId,
@@ -9,16 +9,16 @@ use crate::{
 use super::{Control, ControlError};
 
 impl Control {
-    /// Deletes an experiment that has ended; returns it as it was, and how many bytes of the
-    /// database are free now.
+    /// Deletes an experiment that has ended. Returns its last state, and the number of free bytes
+    /// in the database.
     pub async fn delete(&self, id: ExperimentId) -> Result<(ExperimentRecord, u64), ControlError> {
         let experiment = self.ended(id, "delete").await?;
         let n_bytes = self.store.try_write(move |store| store.delete(id)).await?;
         Ok((experiment, n_bytes))
     }
 
-    /// Marks an experiment that has ended as archived, or not; returns it, and how many bytes
-    /// its fitness log takes.
+    /// Marks an experiment that has ended as archived, or removes the mark. Returns the
+    /// experiment, and the size of its fitness log in bytes.
     pub async fn archive(
         &self,
         id: ExperimentId,
@@ -30,7 +30,7 @@ impl Control {
         Ok((self.find(id).await?, n_bytes))
     }
 
-    /// Adds labels to an experiment, or gives them other values, and removes others.
+    /// Adds, changes and removes labels of an experiment.
     pub async fn label(
         &self,
         id: ExperimentId,
@@ -45,7 +45,7 @@ impl Control {
         self.find(id).await
     }
 
-    /// An experiment, if it has ended. `what`: what is to be done with it.
+    /// An experiment, if it has ended. `what`: the verb for the error message.
     async fn ended(&self, id: ExperimentId, what: &str) -> Result<ExperimentRecord, ControlError> {
         let experiment = self.find(id).await?;
         match experiment.state.is_unfinished() {

@@ -1,7 +1,7 @@
-//! What clients can have a running coordinator do: submit and steer experiments,
-//! evaluate genotypes, ask what the fleet does.
+//! The operations that a running coordinator offers to clients: submit and steer experiments,
+//! evaluate genotypes, report the fleet's activity.
 //!
-//! Works on core types. What is only read is in [`queries`](model::queries).
+//! It works on core types. Calls that only read are in [`queries`](model::queries).
 
 mod evaluate;
 mod experiment_files;
@@ -52,26 +52,27 @@ pub use reopen::Reopening;
 pub use submit::Submitted;
 pub use turns::Client;
 
-/// The way to a running coordinator.
+/// A handle to a running coordinator.
 #[derive(Debug, Clone)]
 pub struct Control {
     events: EventSender,
     store: SharedStore,
-    /// Bytes that all unfinished experiments may take together.
+    /// Bytes of memory for all unfinished experiments together.
     memory_budget: u64,
     requests: Requests,
-    /// Who asks.
+    /// The client that calls.
     client: Client,
     experiment_files: Arc<ExperimentFiles>,
-    /// One for each evaluation that is computed.
+    /// One permit for each evaluation in progress.
     evaluations: Arc<Semaphore>,
-    /// Unfinished experiments that are damaged, so that the driver does not know them.
+    /// Damaged unfinished experiments, which the driver does not know.
     set_aside: Arc<Mutex<BTreeSet<ExperimentId>>>,
-    /// Unfinished experiments that nobody has asked for, so that the driver does not know them.
+    /// Unfinished experiments that no client has requested yet, so that the driver does not know
+    /// them.
     left_alone: Arc<Mutex<BTreeSet<ExperimentId>>>,
 }
 
-/// Why something is not done.
+/// Why an operation failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
     /// The client's mistake.
@@ -80,33 +81,34 @@ pub enum ControlError {
     /// The experiment file has mistakes.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Too much is going on already.
+    /// The limit of unfinished experiments is reached.
     #[error("{UNFINISHED_MAX} experiments are unfinished already; wait, or cancel some")]
     TooManyUnfinished,
-    /// Clients have sent too much at the same time.
+    /// The limit of memory for requests is reached.
     #[error(
         "experiment files and genotypes of {} MiB, as much as the coordinator takes at the \
          same time, are being checked or wait to be evaluated; try again when some are done",
         REQUESTS_LEN_MAX >> 20
     )]
     TooManyRequests,
-    /// An experiment is not in a state for it; the text says what to do.
+    /// The state of the experiment does not allow the operation; the text says what to do
+    /// instead.
     #[error("{0}")]
     NotNow(String),
     /// There is no memory for another experiment.
     #[error("{0}")]
     NoMemory(Shortage),
-    /// A change is not stored in time; it will be.
+    /// The database did not store a change in time; the coordinator keeps trying.
     #[error(
-        "the database does not take it that experiment {0} is changed; \
-         the coordinator tries again, and its log says why"
+        "the database did not store the change of experiment {0} in time; the coordinator tries \
+         again, and its log says why"
     )]
     NotStoredYet(ExperimentId),
     /// The fleet could not evaluate a genotype.
     #[error("{0}")]
     EvaluationFailed(String),
-    /// A fork comes without the experiment that it is a fork of.
-    #[error("it is a fork of an experiment that this coordinator does not have: import that first")]
+    /// The parent of an imported fork is missing.
+    #[error("this experiment is a fork, and this coordinator does not have its parent: import the parent first")]
     NoParent,
     /// A query without an answer.
     #[error(transparent)]
@@ -121,9 +123,9 @@ pub enum ControlError {
         }
     )]
     NotInQuarantine {
-        /// Who is not there.
+        /// The name that the client gave.
         name: String,
-        /// The names of those who are.
+        /// The names of the workers in quarantine.
         there: Vec<String>,
     },
     /// The coordinator stops.
@@ -141,8 +143,8 @@ impl From<StoreError> for ControlError {
 }
 
 impl Control {
-    /// The way to the coordinator with this driver and store. `memory_budget`: bytes that
-    /// all unfinished experiments may take together. `shutdown` ends what is being checked.
+    /// A handle to the coordinator with this driver and store. `memory_budget`: bytes of memory
+    /// for all unfinished experiments together. `shutdown` ends checks in progress.
     pub fn new(
         events: EventSender,
         store: SharedStore,
@@ -163,7 +165,7 @@ impl Control {
         }
     }
 
-    /// The same for a client: what it has checked waits for its turn among those of all clients.
+    /// The same handle for one client: its checks take turns with those of other clients.
     pub fn for_client(&self, client: Client) -> Self {
         Self { client, ..self.clone() }
     }
@@ -173,17 +175,17 @@ impl Control {
         self.ask(DriverEvent::WorkersRequested).await
     }
 
-    /// What is evaluated, experiments aside.
+    /// The evaluations in progress, without experiments.
     pub async fn evaluations(&self) -> Result<Vec<EvaluationActivity>, ControlError> {
         self.ask(DriverEvent::EvaluationsRequested).await
     }
 
-    /// Who computed what lately.
+    /// The recent work of every worker.
     pub async fn timeline(&self) -> Result<Vec<TimelineEntry>, ControlError> {
         self.ask(DriverEvent::TimelineRequested).await
     }
 
-    /// Asks the driver something.
+    /// Sends the driver a question and waits for the answer.
     async fn ask<T>(
         &self,
         question: impl FnOnce(oneshot::Sender<T>) -> DriverEvent,

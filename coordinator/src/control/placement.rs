@@ -1,5 +1,5 @@
-//! Decides which experiment a submission leads to: a new one, the one of the same
-//! request, or one of the same bits that can go on.
+//! Decides which experiment a submission leads to: a new one, the one of the same request, or an
+//! identical one that can continue.
 
 use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
@@ -19,11 +19,11 @@ use crate::{
 
 use super::{ControlError, reopen};
 
-/// Where a submission ends up.
+/// The experiment that a submission leads to.
 pub enum Placement {
-    /// The driver has to run it.
+    /// An experiment that the driver has to run.
     Runs(Box<Runnable>),
-    /// The driver knows it, or it has ended.
+    /// An experiment that the driver knows, or that has ended.
     RunsAlready(ExperimentId),
     /// Too many experiments are unfinished.
     TooMany,
@@ -31,19 +31,19 @@ pub enum Placement {
     NoMemory(Shortage),
 }
 
-/// What of an existing experiment a submission may lead to.
+/// How existing experiments may satisfy a submission.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Existing {
-    /// One of the same bits that can go on.
+    /// Whether an identical experiment that can continue may.
     pub resume_unfinished: bool,
-    /// One of the same bits that has completed.
+    /// Whether an identical experiment that has completed may.
     pub reuse: bool,
 }
 
-/// Stores a submission, or finds the experiment that it stands for: the one of the same
-/// request, or, as `existing` says, one of the same bits. `memory_budget`: bytes that
-/// all unfinished experiments may take together, whether they run or wait. Returns an identical
-/// experiment, too, if there was one.
+/// Stores a submission, or finds the experiment that satisfies it: the one of the same request,
+/// or, if `existing` allows it, an identical one. `memory_budget`: bytes of memory for all
+/// unfinished experiments together, running or waiting. Also returns an identical experiment, if
+/// one existed.
 pub fn place(
     store: &mut Store,
     new: NewExperiment,
@@ -86,7 +86,7 @@ fn place_beside(
     let (id, is_new) = store.create(new, clock::unix_ms())?;
     Ok(if is_new {
         let genotype_len = new.genotype_len as u64;
-        // Those that a fork shares with its parent.
+        // The generations that a fork shares with its parent.
         let latest = store.experiment(id)?.and_then(|stored| stored.record.latest);
         let runnable = Runnable::new(id, new.config.clone(), genotype_len, new.priority);
         Placement::Runs(Box::new(Runnable { latest, ..runnable }))
@@ -95,8 +95,8 @@ fn place_beside(
     })
 }
 
-/// An experiment of the same file, but for its name, of the same seed and version, and from the
-/// same state: the latest that has completed, or else the latest that has not ended.
+/// An experiment with the same file except the name, the same seed and version, and the same
+/// first state: the latest that has completed, or else the latest that has not ended.
 fn identical(store: &Store, new: &NewExperiment) -> Result<Option<ExperimentRecord>, StoreError> {
     let link = |fork: &Option<ForkRecord>| fork.as_ref().map(|fork| fork.link.clone());
     let mut same = of_the_same_digest(store, new)?;
@@ -109,7 +109,7 @@ fn identical(store: &Store, new: &NewExperiment) -> Result<Option<ExperimentReco
     Ok(found.map(|i| same.swap_remove(i).record))
 }
 
-/// The experiments of the same file, version and seed, but for their length; the latest first.
+/// The experiments of the same file, version and seed, of any length; the latest first.
 fn of_the_same_digest(
     store: &Store,
     new: &NewExperiment,
@@ -126,7 +126,7 @@ fn differs_in_name_only(config_json: &str, config: &ExperimentConfig) -> bool {
         .is_ok_and(|(other, _)| ExperimentConfig { name: config.name.clone(), ..other } == *config)
 }
 
-/// Whether an experiment can become unfinished beside those that are; else why not.
+/// Checks that there is room for one more unfinished experiment.
 pub fn check_room(
     store: &Store,
     summary: &Summary,
@@ -143,22 +143,22 @@ pub fn check_room(
     }
 }
 
-/// Why there is no memory for another experiment, if there is none.
+/// The missing memory, if there is too little for another experiment.
 fn shortage(
     unfinished: &[ExperimentRecord],
     summary: &Summary,
     genotype_len: u64,
     memory_budget: u64,
 ) -> Option<Shortage> {
-    // One of another release does not run.
+    // An experiment of another release does not run.
     let taken = unfinished.iter().filter(|other| other.fingerprint == sim_core::FINGERPRINT);
     let in_use = taken.map(|other| memory::estimate(&other.summary, other.genotype_len)).sum();
     let needed = memory::estimate(summary, genotype_len);
     Shortage::check(needed, in_use, memory_budget).err()
 }
 
-/// Looks for an experiment of the same bits that can go on: one that is
-/// unfinished, or one that was asked for fewer generations.
+/// Looks for an identical experiment that can continue: an unfinished one, or one with fewer
+/// generations.
 fn resume(
     store: &mut Store,
     new: &NewExperiment,
@@ -166,7 +166,7 @@ fn resume(
     shortage: Option<Shortage>,
 ) -> Result<Option<Placement>, StoreError> {
     let mut same_bits = of_the_same_digest(store, new)?;
-    // A fork has other bits than an experiment that begins with its file.
+    // A fork computes other bits than an experiment that starts from the same file.
     same_bits.retain(|found| found.fork.is_none());
     let mut unfinished = same_bits.iter().filter(|found| found.state.is_unfinished());
     if let Some(same) = unfinished.find(|found| found.config_json == config_json) {
@@ -188,7 +188,7 @@ fn resume(
                 store.reopen(experiment.id, completed, config_json, why, clock::unix_ms())?;
                 return Ok(Some(Placement::Runs(Box::new(runnable))));
             }
-            // It is computed anew instead.
+            // A new experiment computes it instead.
             Err(error @ (StoreError::Unsound { .. } | StoreError::NoCheckpoint(_))) => {
                 warn!("{error}; a new experiment begins in its place");
             }

@@ -1,4 +1,4 @@
-//! Has an experiment that has ended go on from its last stored generation.
+//! Continues an ended experiment from its last stored generation.
 
 use evolution::ALGORITHMS;
 use experiment_file::ExperimentConfig;
@@ -15,30 +15,30 @@ use crate::{
 
 use super::{Control, ControlError, placement};
 
-/// Why an experiment goes on that had ended.
+/// Why an ended experiment continues.
 #[derive(Debug, Clone, Copy)]
 pub enum Reopening {
-    /// A completed one shall have so many generations in all.
+    /// A client extends a completed experiment to this total number of generations.
     Extend(u64),
-    /// What made it fail is gone.
+    /// A client retries a failed experiment, because the cause is gone.
     Retry,
-    /// It has failed, or was cancelled and that is taken back.
+    /// A client resumes a failed or cancelled experiment.
     Resume,
 }
 
 impl Control {
-    /// Lets an experiment go on that has ended, to the bits of one that never had.
+    /// Continues an ended experiment, to the bits of one that never ended.
     pub async fn reopen(
         &self,
         id: ExperimentId,
         reopening: Reopening,
     ) -> Result<ExperimentRecord, ControlError> {
         self.find(id).await?;
-        // The end that is taken back must not be on its way any more.
+        // Wait until the experiment's end is stored.
         self.request(id, Request::Settle).await?;
         let (store, events) = (self.store.clone(), self.events.clone());
         let memory_budget = self.memory_budget;
-        // In a task of its own: what is stored must reach the driver even if the client goes
+        // In a task of its own: the driver must hear of a stored change even if the client goes
         // away meanwhile.
         let reopening = tokio::spawn(async move {
             let runnable =
@@ -53,7 +53,7 @@ impl Control {
     }
 }
 
-/// Checks that an experiment can go on, and stores that it does.
+/// Checks that an experiment can continue, and stores that it does.
 fn prepare(
     store: &mut Store,
     id: ExperimentId,
@@ -65,7 +65,7 @@ fn prepare(
     if let Some(incompatible) = queries::incompatibility(&experiment) {
         return Err(ControlError::NotNow(format!("experiment {id} cannot go on: {incompatible}")));
     }
-    // More generations take no more memory.
+    // More generations need no more memory.
     placement::check_room(store, &experiment.summary, experiment.genotype_len, memory_budget)?;
     let runnable = runnable(store, id, &config_json)?;
     let why = match reopening {
@@ -77,7 +77,7 @@ fn prepare(
     Ok(runnable)
 }
 
-/// The configuration under which an experiment goes on, or why it cannot.
+/// The configuration with which an experiment continues, or why it cannot.
 fn config_of(experiment: &StoredExperiment, reopening: Reopening) -> Result<String, ControlError> {
     use ExperimentState::{Cancelled, Completed, Failed, Paused, Running};
     let (ExperimentRecord { id, state, .. }, config_json) =
@@ -123,12 +123,12 @@ fn longer(experiment: &StoredExperiment, generations: u64) -> Result<String, Con
     let (mut config, _) = ExperimentConfig::from_json(&experiment.config_json, "", ALGORITHMS)?;
     config.algorithm.generations = generations;
     let config_json = config.to_canonical_json();
-    // The limits of a file hold here, too.
+    // The limits of an experiment file apply here, too.
     ExperimentConfig::from_json(&config_json, "", ALGORITHMS)?;
     Ok(config_json)
 }
 
-/// An experiment that has ended, under a configuration by which it goes on.
+/// An ended experiment, with the configuration with which it continues.
 pub fn runnable(
     store: &Store,
     id: ExperimentId,

@@ -1,4 +1,4 @@
-//! The memory and the processors that requests of clients take before anything runs.
+//! Bounds the memory and processor time that clients' requests take before they run.
 
 use std::time::Duration;
 
@@ -17,10 +17,10 @@ use super::{
     turns::{Client, Turns},
 };
 
-/// What a request takes beside its bytes: no less than a `ByteBudget` counts.
+/// Bytes that a request takes beside its content: at least the unit of a `ByteBudget`.
 const REQUEST_LEN: usize = 16 << 10;
 
-/// What clients have sent that is being checked, waits, or is computed.
+/// Requests of clients in progress: in a check, waiting, or evaluated.
 #[derive(Debug, Clone)]
 pub struct Requests {
     room: ByteBudget,
@@ -29,28 +29,28 @@ pub struct Requests {
     shutdown: CancellationToken,
 }
 
-/// The room that a request takes, until it is dropped.
+/// The memory reserved for a request; dropping this returns it.
 #[derive(Debug)]
 pub struct RequestPlace {
     _room: TakenBytes,
 }
 
 impl Requests {
-    /// Nothing has been asked for yet; `shutdown` ends all checks.
+    /// No requests; `shutdown` ends all checks.
     pub fn new(shutdown: CancellationToken) -> Self {
         Self { room: ByteBudget::new(REQUESTS_LEN_MAX), checks: Turns::new(CHECKS_MAX), shutdown }
     }
 
-    /// Takes room for a request of `len` bytes, if there is any.
+    /// Reserves memory for a request of `len` bytes, if enough is free.
     pub fn enter(&self, len: usize) -> Result<RequestPlace, ControlError> {
         let room = self.room.try_take(len.saturating_add(REQUEST_LEN));
         room.map(|room| RequestPlace { _room: room }).ok_or(ControlError::TooManyRequests)
     }
 
-    /// Checks something on a thread of its own, as that is work for a processor, and
-    /// takes memory: not for many at the same time, and clients take turns. The check asks its
-    /// argument whether to go on: not when it has taken long, when nobody waits for its answer, or
-    /// when the coordinator stops.
+    /// Runs a check on a thread of its own, because it is CPU-bound and takes memory. Few checks
+    /// run at the same time, and clients take turns. The check calls its argument to learn
+    /// whether to continue: false if the check has taken too long, if nobody waits for its
+    /// answer, or if the coordinator stops.
     pub async fn check<T: Send + 'static>(
         &self,
         client: Client,
@@ -70,7 +70,7 @@ impl Requests {
         let end = self.shutdown.child_token();
         let ended_in_time = end.clone().drop_guard();
         let checking = task::spawn_blocking(move || {
-            // Goes on to count if the client goes away.
+            // The thread keeps its place even if the client goes away.
             let _turn = turn;
             check(&|| !end.is_cancelled())
         });
@@ -109,7 +109,7 @@ mod tests {
         assert!(requests.enter(usize::MAX).is_err());
     }
 
-    /// A check that does nothing until it is told to end, and says that it was.
+    /// A check that does nothing until it has to end, and then says so.
     fn endless(goes_on: &dyn Fn() -> bool) -> &'static str {
         while goes_on() {
             std::thread::yield_now();

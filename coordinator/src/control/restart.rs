@@ -1,4 +1,4 @@
-//! Goes on with what is unfinished when the coordinator starts.
+//! Continues unfinished experiments when the coordinator starts.
 
 use std::sync::PoisonError;
 
@@ -15,9 +15,9 @@ use crate::{
 use super::{Control, ControlError};
 
 impl Control {
-    /// Hands every unfinished experiment that this program can compute to the driver:
-    /// first those that are not paused, as memory may not suffice for all. One that is
-    /// damaged is paused, and the others go on.
+    /// Hands every unfinished experiment that this program can compute to the driver. Paused ones
+    /// come last, because memory may not suffice for all. It pauses damaged experiments and
+    /// continues the others.
     pub async fn run_unfinished(&self) -> Result<(), StoreError> {
         let unfinished = Filter::unfinished();
         let mut experiments = self.store.read(move |store| store.experiments(&unfinished)).await?;
@@ -33,7 +33,7 @@ impl Control {
         Ok(())
     }
 
-    /// Takes nothing up that is unfinished: [`Self::take_up`] does when it is asked for.
+    /// Starts no unfinished experiment: [`Self::take_up`] starts one when a client requests it.
     pub async fn leave_unfinished(&self) -> Result<(), StoreError> {
         let unfinished = Filter::unfinished();
         let unfinished = self.store.read(move |store| store.experiments(&unfinished)).await?;
@@ -42,9 +42,9 @@ impl Control {
         Ok(())
     }
 
-    /// Hands an experiment that was left alone to the driver. One that is damaged is paused.
+    /// Hands an experiment that was left alone to the driver; pauses a damaged one.
     pub async fn take_up_if_left(&self, id: ExperimentId) -> Result<(), ControlError> {
-        // Of two requests, one starts it.
+        // Of two concurrent requests, one starts it.
         if !self.left_alone.lock().unwrap_or_else(PoisonError::into_inner).remove(&id) {
             return Ok(());
         }
@@ -57,13 +57,13 @@ impl Control {
         Ok(())
     }
 
-    /// Hands an experiment that was set aside to the driver, if it is sound by now.
+    /// Hands an experiment that was set aside to the driver, if the damage is gone.
     pub async fn take_up(&self, id: ExperimentId) -> Result<(), ControlError> {
         if !self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).contains(&id) {
             return Ok(());
         }
         let restored = self.restore(id).await?;
-        // Of two requests, one starts it.
+        // Of two concurrent requests, one starts it.
         let is_first = self.set_aside.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
         if let (true, Some(runnable)) = (is_first, restored) {
             self.start(runnable).await;
@@ -76,7 +76,7 @@ impl Control {
         let _ = self.events.send(DriverEvent::ExperimentReady(Box::new(runnable))).await;
     }
 
-    /// An experiment as the store has it; none if it waits for another program.
+    /// The stored experiment; none if it needs another version of this program.
     async fn restore(&self, id: ExperimentId) -> Result<Option<Runnable>, StoreError> {
         let (experiment, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
         if experiment.fingerprint != sim_core::FINGERPRINT {
@@ -97,7 +97,7 @@ impl Control {
         }
     }
 
-    /// Pauses an experiment that is damaged.
+    /// Pauses a damaged experiment.
     async fn set_aside(&self, id: ExperimentId, unsound: &StoreError) -> Result<(), StoreError> {
         let reason = unsound.to_string();
         error!(experiment = %id, reason, "experiment paused");

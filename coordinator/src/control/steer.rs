@@ -1,4 +1,4 @@
-//! Steers an experiment: cancel, pause, resume, another priority, prune.
+//! Steers an experiment: cancel, pause, resume, change its priority, prune.
 
 use evolution::Evolution;
 use tokio::{sync::oneshot, task, time::timeout};
@@ -16,11 +16,11 @@ use crate::{
 
 use super::{Control, ControlError, reopen::Reopening};
 
-/// Why an experiment is paused that a client paused.
+/// The reason of a pause for which the client gave none.
 const PAUSED: &str = "paused by a client";
 
 impl Control {
-    /// Ends an experiment; one that has ended stays as it is.
+    /// Ends an experiment; does nothing if it has ended.
     pub async fn cancel(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
         let experiment = self.find(id).await?;
         if !experiment.state.is_unfinished() {
@@ -29,7 +29,7 @@ impl Control {
         self.request(id, Request::Cancel).await
     }
 
-    /// Has an experiment wait until it is resumed. `reason`: for others; may be empty.
+    /// Pauses an experiment until a client resumes it. `reason`: shown to people; may be empty.
     pub async fn pause(
         &self,
         id: ExperimentId,
@@ -40,7 +40,7 @@ impl Control {
             return Err(ControlError::Invalid(message));
         }
         let reason = match printable(reason) {
-            // A pause without a reason keeps the reason of the one before.
+            // A pause without a reason keeps the reason of the previous pause.
             empty if empty.is_empty() => {
                 let experiment = self.find(id).await?;
                 if experiment.state == ExperimentState::Paused {
@@ -53,8 +53,7 @@ impl Control {
         self.change(id, Request::Pause(reason)).await
     }
 
-    /// Lets a paused experiment go on, unless it is damaged, or one that has failed or was
-    /// cancelled.
+    /// Resumes an experiment that is paused, failed or cancelled, unless it is damaged.
     pub async fn resume(&self, id: ExperimentId) -> Result<ExperimentRecord, ControlError> {
         if !self.find(id).await?.state.is_unfinished() {
             return self.reopen(id, Reopening::Resume).await;
@@ -64,8 +63,8 @@ impl Control {
         self.change(id, Request::Resume).await
     }
 
-    /// Deletes the fitness log of an experiment that has ended; returns how many bytes that
-    /// were.
+    /// Deletes the fitness log of an experiment that has ended. Also returns the number of freed
+    /// bytes.
     pub async fn prune(&self, id: ExperimentId) -> Result<(ExperimentRecord, u64), ControlError> {
         let experiment = self.find(id).await?;
         if experiment.state.is_unfinished() {
@@ -74,7 +73,8 @@ impl Control {
         let keyframe = match self.keyframe(id).await {
             Ok(keyframe) => Some(keyframe),
             Err(ControlError::Query(QueryError::Store(StoreError::NoCheckpoint(_)))) => None,
-            // Of what ended early, older versions kept nothing to go on from.
+            // Older versions stored no state from which an experiment that ended early could
+            // continue.
             Err(ControlError::Query(QueryError::Store(StoreError::Unsound { .. })))
                 if !experiment.can_be_continued() =>
             {
@@ -83,13 +83,13 @@ impl Control {
             Err(error) => return Err(error),
         };
         let now_ms = clock::unix_ms();
-        // The driver does not know it any more.
+        // The driver no longer knows the experiment.
         let prune = move |store: &mut Store| store.prune(id, keyframe.as_deref(), now_ms);
         let n_bytes = self.store.try_write(prune).await?;
         Ok((self.find(id).await?, n_bytes))
     }
 
-    /// Evolution after the latest generation.
+    /// The state of evolution after the latest generation.
     async fn keyframe(&self, id: ExperimentId) -> Result<Vec<u8>, ControlError> {
         let (_, checkpoint) = self.store.read(move |store| store.resumable(id)).await?;
         let restoring = task::spawn_blocking(move || Evolution::restore(&checkpoint));
@@ -100,7 +100,8 @@ impl Control {
         Ok(evolution.keyframe())
     }
 
-    /// Has the driver change an experiment that has not ended, and reads it again.
+    /// Has the driver change an experiment that has not ended, and returns the changed
+    /// experiment.
     pub async fn change(
         &self,
         id: ExperimentId,
@@ -116,7 +117,7 @@ impl Control {
         Ok(experiment)
     }
 
-    /// Has the driver change an experiment, and reads it again.
+    /// Has the driver change an experiment, and returns the changed experiment.
     pub(super) async fn request(
         &self,
         id: ExperimentId,
@@ -128,8 +129,8 @@ impl Control {
         let stored =
             timeout(CHANGE_TIMEOUT, stored).await.map_err(|_| ControlError::NotStoredYet(id))?;
         let experiment = self.find(id).await?;
-        // Not stored: it has ended in another way meanwhile, or the coordinator is
-        // about to.
+        // Not stored: the experiment has ended otherwise meanwhile, or the coordinator is
+        // stopping.
         if stored.is_err() && experiment.state.is_unfinished() {
             return Err(ControlError::ShuttingDown);
         }

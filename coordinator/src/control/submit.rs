@@ -1,4 +1,4 @@
-//! Submits an experiment: checks it, stores it, has it run.
+//! Submits an experiment: checks it, stores it, and hands it to the driver.
 
 use tracing::info;
 
@@ -26,13 +26,14 @@ pub struct Submitted {
     /// Keys of the file without effect, and parameters that keep their defaults; one
     /// line each.
     pub warnings: Vec<String>,
-    /// Another one of the same bits, or this one if it was there.
+    /// An identical experiment; `experiment` itself if it existed already.
     pub identical: Option<ExperimentId>,
 }
 
 impl Control {
-    /// Submits an experiment. `existing`: what of one that is there it may lead to. `fork_of`: the generation of an experiment after which it
-    /// goes on.
+    /// Submits an experiment. `existing`: how an identical experiment in the database may satisfy
+    /// this request. `fork_of`: the generation of another experiment after which this one
+    /// continues.
     pub async fn submit(
         &self,
         submission: Submission,
@@ -68,8 +69,8 @@ impl Control {
         };
         let checked = self.requests.check(self.client, check).await??;
         let CheckedSubmission { new, warnings } = checked?;
-        // In a task of its own: what is stored must reach the driver even if the
-        // client goes away meanwhile.
+        // In a task of its own: the driver must hear of a stored experiment even if the client
+        // goes away meanwhile.
         let (store, events) = (self.store.clone(), self.events.clone());
         let memory_budget = self.memory_budget;
         let placing = tokio::spawn(async move {
@@ -84,7 +85,7 @@ impl Control {
     }
 }
 
-/// Hands what has been placed to the driver, if it is to run.
+/// Hands a placed experiment to the driver, if it has to run.
 async fn run(placement: Placement, events: &EventSender) -> Result<ExperimentId, ControlError> {
     match placement {
         Placement::Runs(runnable) => {

@@ -12,7 +12,7 @@ use super::*;
 async fn what_is_stored_runs_although_its_client_is_gone() {
     let directory = tempfile::tempdir().unwrap();
     let store = SharedStore::new(Store::open(directory.path()).unwrap());
-    // There is no room on the way to the driver.
+    // The channel to the driver is full.
     let (events, mut queue) = mpsc::channel(1);
     let filler = DriverEvent::WorkerLeft { worker: WorkerId(0), reason: String::new() };
     events.send(filler).await.unwrap();
@@ -25,7 +25,7 @@ async fn what_is_stored_runs_although_its_client_is_gone() {
     let client =
         tokio::spawn(async move { control.submit(submission, Existing::default(), None).await });
     news.changed().await.unwrap();
-    // Stored, and not yet with the driver.
+    // The experiment is stored, and the driver does not know it yet.
     client.abort();
     assert!(client.await.unwrap_err().is_cancelled());
 

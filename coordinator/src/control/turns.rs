@@ -1,5 +1,4 @@
-//! Who is next, where clients wait for one of few places: clients take turns, however much each
-//! of them asks for.
+//! A fair queue for a few places: clients take turns, however many requests each of them has.
 
 use std::{
     collections::VecDeque,
@@ -9,7 +8,7 @@ use std::{
 
 use tokio::sync::oneshot;
 
-/// Whose requests wait in one queue: those of one machine, or of this process.
+/// A client, whose requests share one queue: a machine, or this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Client(pub Option<IpAddr>);
 
@@ -21,7 +20,7 @@ pub(super) struct Turns(Arc<Mutex<Line<oneshot::Sender<Turn>>>>);
 #[derive(Debug)]
 pub(super) struct Turn(Option<Turns>);
 
-/// Clients and what each of them waits for, the next client first.
+/// Clients and their waiting requests, the next client first.
 #[derive(Debug)]
 struct Line<T> {
     n_free: usize,
@@ -40,7 +39,7 @@ impl<T> Line<T> {
         is_free
     }
 
-    /// Waits behind what the client waits for already.
+    /// Adds a request behind the client's other ones.
     fn wait(&mut self, client: Client, waiter: T) {
         match self.waiting.iter_mut().find(|(other, _)| *other == client) {
             Some((_, waiters)) => waiters.push_back(waiter),
@@ -48,7 +47,7 @@ impl<T> Line<T> {
         }
     }
 
-    /// Takes out who gets the place that has become free; it stays free if nobody waits.
+    /// Returns the request that gets a freed place; the place stays free if none waits.
     fn next(&mut self) -> Option<T> {
         let Some((client, mut waiters)) = self.waiting.pop_front() else {
             self.n_free += 1;
@@ -89,7 +88,8 @@ impl Turns {
 impl Drop for Turn {
     fn drop(&mut self) {
         let Some(turns) = self.0.take() else { return };
-        // Who has gone away meanwhile gives it back; not as a turn, which would come here again.
+        // A client that has gone away returns the place; not as a `Turn`, whose drop would come
+        // here again.
         loop {
             let Some(next) = turns.line().next() else { return };
             match next.send(Turn(Some(turns.clone()))) {

@@ -1,4 +1,5 @@
-//! Says again and again what keeps experiments from being computed, and when there is news.
+//! Streams explanations of an experiment whenever its situation changes, and news of all
+//! experiments.
 
 use std::time::Duration;
 
@@ -17,10 +18,10 @@ use crate::{
 
 use super::{Control, ControlError, Explanation};
 
-/// A round whose last items are held for so long waits for them.
+/// A round waits for its last items if workers have held them for so long.
 const LONG: Duration = Duration::from_secs(10);
 
-/// What of an explanation is worth another message, if it changes.
+/// The parts of an explanation whose change leads to another message.
 #[derive(Debug, PartialEq)]
 struct Situation {
     state: ExperimentState,
@@ -28,7 +29,7 @@ struct Situation {
     has_workers: bool,
     has_workers_available: bool,
     has_workers_of_others: bool,
-    /// The workers that are given nothing, and why.
+    /// The workers that get no items, and why.
     withheld: Vec<(String, String)>,
     has_store_trouble: bool,
     is_short_of_memory: bool,
@@ -36,16 +37,16 @@ struct Situation {
     stage: Stage,
 }
 
-/// What a round waits for.
+/// The reason why a round waits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
-    /// Nothing, or nothing for long.
+    /// It does not wait, or not yet for long.
     None,
-    /// The workers compute other experiments.
+    /// For workers that compute other experiments.
     Others,
-    /// The last items, for long.
+    /// For its last items, for a long time.
     Barrier,
-    /// A second worker.
+    /// For a second worker, which audits need.
     Audits,
 }
 
@@ -86,7 +87,7 @@ impl Stage {
 
 impl Control {
     /// Explains an experiment at once, and again whenever its situation changes, until it has
-    /// ended. A dropped receiver ends it, too.
+    /// ended. Dropping the receiver also ends the explanations.
     pub async fn watch_explanation(
         &self,
         id: ExperimentId,
@@ -105,7 +106,7 @@ impl Control {
                     Err(error) => error,
                 },
             };
-            // Whoever has left no room does not read.
+            // If the channel is full, the client does not read.
             let _ = last.try_send(Err(error));
         });
         Ok(inbox)
@@ -134,14 +135,14 @@ impl Control {
                 return Ok(());
             }
             sleep(NEWS_PAUSE).await;
-            // Time alone makes some of it, such as a barrier.
+            // Some situations arise by time alone, such as a barrier.
             let _ = timeout(SITUATION_INTERVAL, changed(&mut stored, &mut fleet)).await;
             explanation = self.explain(id).await?;
         }
     }
 
-    /// Sends something at once, and whenever something has been stored since. A dropped
-    /// receiver ends it.
+    /// Sends a message at once, and again after each change of the store. Dropping the receiver
+    /// ends it.
     pub fn watch_news(&self, shutdown: CancellationToken) -> mpsc::Receiver<()> {
         let (outbox, inbox) = mpsc::channel(1);
         let mut stored = self.store.news();
@@ -164,7 +165,7 @@ impl Control {
     }
 }
 
-/// Waits until something has been stored, or the fleet has changed.
+/// Waits for a change of the store or of the fleet.
 async fn changed(stored: &mut watch::Receiver<u64>, fleet: &mut watch::Receiver<u64>) {
     tokio::select! {
         _ = stored.changed() => {}

@@ -1,4 +1,4 @@
-//! What the driver is told.
+//! The events that the driver handles.
 
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
@@ -15,7 +15,7 @@ use crate::{
 
 use super::StatsSnapshot;
 
-/// Events that wait for the driver; a sender of more waits.
+/// Capacity of the queue of events; senders wait while it is full.
 const EVENT_QUEUE_LEN: usize = 1024;
 
 /// Everything that can happen.
@@ -25,9 +25,9 @@ pub enum DriverEvent {
     WorkerJoined {
         /// Its name, version and slots.
         introduction: Introduction,
-        /// The way to it.
+        /// The channel to it.
         link: WorkerLink,
-        /// Gets its id.
+        /// Receives the worker's id.
         reply: oneshot::Sender<WorkerId>,
     },
     /// A worker has sent a message.
@@ -39,63 +39,63 @@ pub enum DriverEvent {
         /// How its stream ended, for the log.
         reason: String,
     },
-    /// A stored experiment is to run.
+    /// A stored experiment is ready to run.
     ExperimentReady(Box<Runnable>),
-    /// A client wants something of an unfinished experiment.
+    /// A client wants to change an unfinished experiment.
     Requested {
         /// The experiment.
         experiment: ExperimentId,
-        /// What the client wants.
+        /// The change.
         request: Request,
-        /// Answered when it is stored; dropped if it is not going to be.
+        /// Answered once the change is stored; dropped if it is not going to be.
         reply: oneshot::Sender<()>,
     },
     /// A client wants to see the workers.
     WorkersRequested(oneshot::Sender<Vec<WorkerStatus>>),
-    /// A client wants to see what is evaluated, experiments aside.
+    /// A client wants to see the evaluations in progress.
     EvaluationsRequested(oneshot::Sender<Vec<EvaluationActivity>>),
-    /// Somebody wants to see who computed what lately.
+    /// A client wants to see the recent work of every worker.
     TimelineRequested(oneshot::Sender<Vec<TimelineEntry>>),
     /// A client lets a worker out of quarantine.
     WorkerReadmitted {
-        /// What it calls itself.
+        /// The worker's name.
         name: String,
-        /// Answered when it is stored.
+        /// Answered once the change is stored.
         reply: ReadmissionReply,
     },
     /// A client wants a genotype evaluated.
     EvaluationRequested(Box<Evaluation>, EvaluationReply),
-    /// A client wants to know what the fleet does for an experiment, and how much memory it
-    /// waits for, if it does.
+    /// A client wants to know the fleet's work for an experiment, and the memory that it waits
+    /// for, if any.
     ActivityRequested(ExperimentId, oneshot::Sender<(JobActivity, Option<Shortage>)>),
-    /// A client wants to hear of it when workers come, leave or are given nothing any more.
+    /// A client wants to know when workers join, leave or stop getting items.
     FleetWatched(oneshot::Sender<watch::Receiver<u64>>),
-    /// A metrics endpoint wants the numbers of all.
+    /// The metrics endpoint wants the statistics of fleet and experiments.
     StatsRequested(oneshot::Sender<StatsSnapshot>),
 }
 
-/// Gets the numbers of all trials, one trial after the other, or why there are none.
-/// A dropped receiver ends the evaluation.
+/// Receives the numbers of all trials, one trial after the other, or why the evaluation failed.
+/// Dropping the receiver ends the evaluation.
 pub type EvaluationReply = oneshot::Sender<Result<Vec<Vec<f64>>, String>>;
 
-/// Gets the names of those that are in quarantine if the worker is not.
+/// On failure, receives the names of the workers that are in quarantine.
 pub type ReadmissionReply = oneshot::Sender<Result<(), Vec<String>>>;
 
-/// What a worker says after its introduction.
+/// A worker's message after its introduction.
 #[derive(Debug)]
 pub enum WorkerMessage {
-    /// It is alive.
+    /// A sign of life.
     Heartbeat,
-    /// It has computed items.
+    /// Results of items.
     Results(Vec<ItemResult>),
-    /// It wants no more items.
+    /// The worker wants no more items.
     Draining,
 }
 
-/// The way to a connected worker.
+/// The channel to a connected worker.
 #[derive(Debug)]
 pub struct WorkerLink {
-    /// Bounded; a worker that lets it fill up does not read and is dropped.
+    /// Bounded. A worker that lets it fill up does not read, so the coordinator drops it.
     pub outbox: mpsc::Sender<ToWorker>,
     /// Cancelled when the coordinator has dropped the worker.
     pub dropped: CancellationToken,

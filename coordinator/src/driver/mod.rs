@@ -1,10 +1,10 @@
 //! The loop that connects the engine and the life of runs with the network and the
 //! store.
 //!
-//! It decides nothing: everything that happens becomes a [`DriverEvent`] or the end of
-//! a task, the two state machines ([`Engine`]: who computes what; [`Runs`]: what an
-//! experiment does next) answer with commands, and the loop carries them out. What
-//! may take long runs beside it, in [`tasks`].
+//! It decides nothing. Every input becomes a [`DriverEvent`] or the end of a task. Two state
+//! machines answer with commands: the [`Engine`] assigns items to workers, [`Runs`] decides the
+//! next step of each experiment. The loop carries the commands out. Slow work runs beside the
+//! loop, in [`tasks`].
 
 mod events;
 mod questions;
@@ -45,7 +45,7 @@ pub use stats::StatsSnapshot;
 use tasks::{Disk, Done};
 use workers::ConnectedWorkers;
 
-/// How soon late work is noticed.
+/// Longest time until the loop notices late work.
 const TICK_INTERVAL_MAX: Duration = Duration::from_millis(100);
 /// Genotypes of about this many bytes travel in one message.
 const ITEMS_LEN_MAX: usize = 1 << 20;
@@ -66,34 +66,35 @@ pub struct Driver {
     evaluations: BTreeMap<EvaluationId, EvaluationReply>,
     tasks: JoinSet<Done>,
     questions: Questions,
-    /// Who enters and leaves quarantine and is not stored yet; the first is being written.
+    /// Workers that enter or leave quarantine, in changes that are not stored yet; the first is
+    /// being written.
     quarantine_changes: VecDeque<QuarantineChange>,
-    /// Counts what happens to workers.
+    /// Counts changes of the fleet.
     fleet_news: watch::Sender<u64>,
 }
 
-/// Who enters or leaves quarantine.
+/// A worker enters or leaves quarantine.
 enum QuarantineChange {
     Add(QuarantinedWorker),
-    /// The client is told when it is stored.
+    /// `reply` tells the client once the change is stored.
     Remove {
         name: String,
         reply: ReadmissionReply,
     },
 }
 
-/// How a loop works.
+/// The configuration of the loop.
 #[derive(Debug)]
 pub struct DriverConfig {
-    /// How the engine decides.
+    /// The configuration of the engine.
     pub engine: EngineConfig,
-    /// Bytes that all experiments together may take.
+    /// Bytes of memory for all experiments together.
     pub memory_budget: u64,
-    /// Computes what a worker's word is doubted for.
+    /// Computes items for which a worker's result is in doubt.
     pub referee: Referee,
     /// Workers that have been proved faulty.
     pub quarantine: Vec<QuarantinedWorker>,
-    /// Measures how long commits take, s.
+    /// Durations of commits, s.
     pub commit_duration: Histogram,
 }
 
@@ -129,7 +130,7 @@ impl Driver {
         }
     }
 
-    /// Runs until shutdown, and then finishes what is being stored.
+    /// Runs until shutdown, and then finishes writes in progress.
     pub async fn run(mut self) {
         let mut ticks = tokio::time::interval(self.tick_interval);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -241,7 +242,7 @@ impl Driver {
         }
     }
 
-    /// Stores the next change of the quarantine: they must not overtake each other.
+    /// Stores the next change of the quarantine. Changes are stored in order, one at a time.
     fn write_quarantine(&mut self) {
         if let Some(change) = self.quarantine_changes.front() {
             let write = match change {
@@ -270,13 +271,13 @@ impl Driver {
             }
             Ok(Done::QuarantineNotWritten) => self.quarantine_changes.clear(),
             Ok(Done::ChangeWritten(id, is_stored)) => self.runs.on_change_written(id, is_stored),
-            // Its run, or its client, would wait for ever. At the next start every
-            // experiment goes on from its last commit.
+            // Otherwise a run or a client would wait for ever. After a restart, every experiment
+            // continues from its last commit.
             Err(error) => panic!("storing a generation or a change: {error}"),
         }
     }
 
-    /// Carries out commands until neither state machine has more.
+    /// Carries out the commands of both state machines until none are left.
     fn carry_out_all(&mut self) {
         loop {
             if let Some(command) = self.runs.poll_command() {
@@ -408,7 +409,7 @@ fn log_verdict(question: QuestionId, verdict: &Verdict) {
 
 fn log_request(experiment: ExperimentId, request: &Request) {
     match request {
-        // Its end is logged.
+        // The log has the job's end already.
         Request::Cancel | Request::Settle => {}
         Request::Pause(reason) => info!(%experiment, reason, "experiment paused"),
         Request::Resume => info!(%experiment, "experiment resumed"),

@@ -1,4 +1,4 @@
-//! What the referee is asked, one item at a time.
+//! The queue of questions for the referee, which answers one at a time.
 
 use std::{collections::VecDeque, future::pending};
 
@@ -11,7 +11,7 @@ use crate::{
     text::printable,
 };
 
-/// The questions that wait, and the one that is asked.
+/// The waiting questions, and the one that the referee computes.
 #[derive(Debug)]
 pub struct Questions {
     referee: Referee,
@@ -26,7 +26,7 @@ impl Questions {
         Self { referee, waiting: VecDeque::new(), asked: None, task: JoinSet::new() }
     }
 
-    /// Asks a question after those that wait.
+    /// Queues a question.
     pub fn ask(&mut self, id: QuestionId, request: RefereeRequest) {
         self.waiting.push_back((id, request));
         self.go_on();
@@ -42,13 +42,13 @@ impl Questions {
         }
     }
 
-    /// The next answer; never, if nothing is asked.
+    /// The next answer; pending for ever without questions.
     pub async fn answer(&mut self) -> (QuestionId, Verdict) {
         loop {
             let (id, verdict) = match self.task.join_next().await {
                 Some(Ok((id, _))) if self.asked != Some(id) => continue,
                 Some(Ok((id, verdict))) => (id, verdict.map_text(|text| printable(&text))),
-                // It was withdrawn.
+                // The question was withdrawn.
                 Some(Err(error)) if error.is_cancelled() => continue,
                 Some(Err(error)) => match self.asked {
                     Some(id) => (id, Verdict::Unavailable(format!("{error}; please report this"))),

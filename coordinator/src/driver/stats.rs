@@ -1,4 +1,4 @@
-//! How things stand, as numbers.
+//! Statistics for the metrics endpoint.
 
 use crate::{
     clock,
@@ -8,7 +8,7 @@ use crate::{
 
 use super::Driver;
 
-/// How things stand at a moment.
+/// Statistics of fleet and experiments at one moment.
 #[derive(Debug, Default)]
 pub struct StatsSnapshot {
     /// The fleet.
@@ -18,7 +18,7 @@ pub struct StatsSnapshot {
 }
 
 impl Driver {
-    /// How things stand now.
+    /// The present statistics.
     pub(super) fn stats(&self) -> StatsSnapshot {
         let runs = self.runs.stats().into_iter().map(|run| {
             let work = self.engine.job_stats(run.experiment.into());

@@ -1,5 +1,5 @@
-//! What may take long and so runs beside the loop: evolution's arithmetic and the
-//! disk.
+//! Slow tasks that run beside the loop: evolution's arithmetic, and reading and writing the
+//! database.
 
 use std::{sync::Arc, time::Duration};
 
@@ -20,33 +20,33 @@ use crate::{
     store::{Entry, GenerationCommit, GenerationRecord, QuarantinedWorker, Store, StoreError},
 };
 
-/// Pause before a checkpoint that could not be read is read again.
+/// Pause before another attempt to read a checkpoint.
 const READ_RETRY_DELAY: Duration = Duration::from_secs(5);
 
 /// The outcome of a task.
 pub enum Done {
-    /// A run is loaded, or cannot be.
+    /// A run was loaded, or loading failed.
     Loaded(RunId, Result<Round, String>),
-    /// Conclusions are drawn, or cannot be.
+    /// A round was concluded, or concluding failed.
     Concluded(RunId, Result<Next, String>),
-    /// A commit is over.
+    /// A commit has ended.
     Committed(RunId, CommitOutcome),
-    /// A change of the quarantine is stored.
+    /// A change of the quarantine was stored.
     QuarantineWritten,
-    /// The coordinator stops before it is.
+    /// The coordinator stops before the change was stored.
     QuarantineNotWritten,
-    /// The write of a change is over; whether it is stored.
+    /// The write of a change has ended; whether the change was stored.
     ChangeWritten(ExperimentId, bool),
 }
 
-/// What writing tasks need.
+/// The store, and what tasks that use it share.
 #[derive(Clone)]
 pub struct Disk {
     /// The store.
     pub store: SharedStore,
-    /// Ends attempts to write to a store that cannot be written.
+    /// Ends repeated attempts to write.
     pub shutdown: CancellationToken,
-    /// Measures the time per commit, s.
+    /// Durations of commits, s.
     pub commit_duration: Histogram,
 }
 
@@ -83,7 +83,7 @@ pub async fn load(run: RunId, disk: Disk) -> Done {
     Done::Loaded(run, loaded)
 }
 
-/// Draws conclusions from an evaluated batch.
+/// Concludes a round with its evaluated batch.
 pub async fn conclude(
     run: RunId,
     config: Arc<ExperimentConfig>,
@@ -162,8 +162,8 @@ pub async fn write_change(id: ExperimentId, change: Change, disk: Disk) -> Done 
     let now_ms = clock::unix_ms();
     failpoint::reached("before change");
     let what = format!("the {} of experiment {id}", change.name());
-    // If the coordinator stops before it is written, the experiment is at the next
-    // start as it was before, and can be changed again.
+    // If the coordinator stops before the write, the experiment is unchanged after a restart, and
+    // clients can change it again.
     let written = disk
         .store
         .write(&disk.shutdown, &what, Retry::Always, move |store| change.write(store, id, now_ms))
@@ -178,9 +178,9 @@ pub async fn write_change(id: ExperimentId, change: Change, disk: Disk) -> Done 
 /// A change of the quarantine.
 #[derive(Debug, Clone)]
 pub enum QuarantineWrite {
-    /// A worker is in it.
+    /// Adds a worker.
     Add(QuarantinedWorker),
-    /// The worker of this name is not any more.
+    /// Removes the worker of this name.
     Remove(String),
 }
 
@@ -195,8 +195,8 @@ pub async fn write_quarantine(change: QuarantineWrite, disk: Disk) -> Done {
         QuarantineWrite::Add(worker) => store.quarantine(worker, now_ms),
         QuarantineWrite::Remove(name) => store.readmit(name),
     };
-    // If the coordinator stops before it is written, a faulty worker is found out again, and a
-    // client that readmits one is not told that it is done.
+    // If the coordinator stops before the write, a later fault reveals the worker again, and a
+    // client that readmits one gets no confirmation.
     match disk.store.write(&disk.shutdown, &what, Retry::Always, write).await {
         Written::Yes => Done::QuarantineWritten,
         Written::NotWanted | Written::Never(_) => Done::QuarantineNotWritten,
@@ -225,7 +225,7 @@ fn log_generation(id: ExperimentId, config: &ExperimentConfig, generation: &Gene
     );
 }
 
-/// Six decimals: the store has all of them.
+/// Rounds to six decimals; the store has all bits.
 fn readable(fitness: f64) -> f64 {
     (fitness * 1e6).round() / 1e6
 }

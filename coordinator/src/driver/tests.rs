@@ -64,8 +64,8 @@ impl Rig {
         rig
     }
 
-    /// Carries out what there is to do; the worker answers all it is sent. Returns
-    /// of which generation that was.
+    /// Carries out all commands; the worker answers every assignment. Returns the generation of
+    /// the assignments.
     fn answer(&mut self) -> Option<u64> {
         let mut answered = None;
         loop {
@@ -104,8 +104,8 @@ async fn generations_are_evaluated_and_stored() {
     assert_eq!(rig.answer(), Some(0));
     rig.advance().await;
     assert_eq!(rig.answer(), Some(1), "before generation 0 is known to be stored");
-    // In whatever order it hears that 0 is stored and what 1 teaches, 2 is evaluated
-    // only when 0 is stored, and they are stored in order.
+    // Generation 2 is evaluated only after 0 is stored, and generations are stored in order,
+    // whether the commit of 0 or the conclusion of 1 ends first.
     rig.advance().await;
     rig.advance().await;
     assert!(rig.stored().await.latest.is_some(), "0 is stored");

@@ -1,4 +1,4 @@
-//! The connected workers and the ways to them.
+//! The connected workers and the channels to them.
 
 use std::collections::BTreeMap;
 
@@ -32,8 +32,8 @@ impl Driver {
     ) {
         let Introduction { name, version, n_slots, experiments, .. } = introduction.clone();
         let id = self.engine.on_worker_joined(clock::now(), introduction);
-        // The worker is welcomed before it is sent work: commands are carried out
-        // after this.
+        // The worker is welcomed before it gets work, because commands are carried out after
+        // this.
         self.workers.insert(id, ConnectedWorker { name: name.clone(), link, is_draining: false });
         self.send(id, ToWorker::Welcome(id));
         self.fleet_news.send_modify(|count| *count += 1);
@@ -61,7 +61,7 @@ impl Driver {
         self.forget_worker(id, reason, n_items_requeued);
     }
 
-    /// Sends a worker a message; one that has left room for none is dropped.
+    /// Sends a worker a message; drops the worker if its outbox is full.
     pub(super) fn send(&mut self, id: WorkerId, message: ToWorker) {
         let Some(worker) = self.workers.get(&id) else { return };
         if worker.link.outbox.try_send(message).is_err() {
@@ -69,7 +69,7 @@ impl Driver {
         }
     }
 
-    /// Drops the way to a worker that the engine has forgotten.
+    /// Closes the channel to a worker that the engine has forgotten.
     pub(super) fn forget_worker(&mut self, id: WorkerId, reason: &str, items_requeued: usize) {
         let Some(ConnectedWorker { name, link, is_draining }) = self.workers.remove(&id) else {
             return;

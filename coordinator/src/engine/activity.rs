@@ -1,4 +1,4 @@
-//! What a job is doing at a moment, and what it waits for.
+//! Reports the present activity of a job, and the reason why it waits.
 
 use std::{
     sync::Arc,
@@ -13,45 +13,44 @@ use super::{
     Engine, availability::Availability, batch::BatchInProgress, job::JobWork, worker::Worker,
 };
 
-/// What a job is doing, and which workers could compute it.
+/// The present activity of a job, and the workers that could compute it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JobActivity {
-    /// The batch that is being computed; none between batches, and once the job has
-    /// ended.
+    /// The batch in progress; none between batches, and after the end of the job.
     pub batch: Option<BatchActivity>,
-    /// Connected workers.
+    /// Number of connected workers.
     pub n_workers: usize,
-    /// Those that are given the job's items.
+    /// Number of those that get the job's items.
     pub n_workers_available: usize,
-    /// Those that would be given items, but do not take the job's.
+    /// Number of those that would get items, but whose pattern excludes the job.
     pub n_workers_of_others: usize,
-    /// Those that are given nothing, but for the ones that are leaving.
+    /// Workers that get no items, except those that are leaving.
     pub withheld: Vec<WithheldWorker>,
-    /// What the referee is asked about the job.
+    /// Open questions about the job for the referee.
     pub questions: Vec<OpenQuestion>,
     /// Other jobs with items that no worker has.
     pub rivals: Vec<JobId>,
 }
 
-/// A connected worker that is given nothing.
+/// A connected worker that gets no items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WithheldWorker {
     /// The worker.
     pub worker: WorkerId,
-    /// What it calls itself, or the name under which it is in quarantine.
+    /// Its name, or the name under which it is in quarantine.
     pub name: String,
-    /// Why.
+    /// Why it gets no items.
     pub reason: String,
-    /// Whether it is in quarantine; else it is for a while only.
+    /// Whether it is in quarantine; any other reason passes by itself.
     pub is_quarantined: bool,
 }
 
-/// An item that the referee is asked about.
+/// An item that the referee computes, or will.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenQuestion {
     /// The item's individual.
     pub individual: u32,
-    /// What is in doubt.
+    /// The doubt that the referee settles.
     pub doubt: String,
     /// Why the referee could not answer so far.
     pub trouble: Option<String>,
@@ -60,7 +59,7 @@ pub struct OpenQuestion {
 /// A batch that is being computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchActivity {
-    /// Which worlds and noise its trials meet.
+    /// Its trial set.
     pub trial_set: TrialSet,
     /// Trials, over all individuals.
     pub n_episodes: usize,
@@ -68,10 +67,10 @@ pub struct BatchActivity {
     pub n_episodes_left: usize,
     /// Items that no worker has.
     pub n_items_queued: usize,
-    /// Audits that no worker has; they need one of another name than the first.
+    /// Audits that no worker has. Each needs a worker with another name than the first.
     pub n_audits_waiting: usize,
-    /// Individuals that a worker was computing when it was lost, and that have no result
-    /// since.
+    /// Individuals that were in progress when their worker was lost, and that still have no
+    /// result.
     pub n_individuals_failing: usize,
     /// The workers that have the other items.
     pub held: Vec<HeldItems>,
@@ -84,13 +83,13 @@ pub struct BatchActivity {
 pub struct HeldItems {
     /// The worker.
     pub worker: WorkerId,
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Number of items.
     pub n_items: usize,
-    /// Time since it was given the oldest of them.
+    /// Time since the oldest of these assignments.
     pub held_for: Duration,
-    /// Time since its last sign of life.
+    /// Time since its last message.
     pub silent_for: Duration,
 }
 
@@ -99,12 +98,12 @@ pub struct HeldItems {
 pub struct EvaluationActivity {
     /// Its experiment's name.
     pub name: Arc<str>,
-    /// What it is doing.
+    /// Its activity.
     pub activity: JobActivity,
 }
 
 impl Engine {
-    /// What all evaluations are doing, in the order in which they came.
+    /// The activity of all evaluations, in the order of their arrival.
     pub fn evaluations(&self, now: Instant) -> Vec<EvaluationActivity> {
         let evaluations = self.jobs.iter().filter(|(id, _)| id.experiment().is_none());
         let activity = |(&id, work): (&JobId, &JobWork)| EvaluationActivity {
@@ -114,7 +113,7 @@ impl Engine {
         evaluations.map(activity).collect()
     }
 
-    /// What a job is doing; without a batch if the engine does not know it.
+    /// The activity of a job; without a batch if the engine does not know the job.
     pub fn activity(&self, now: Instant, id: JobId) -> JobActivity {
         let work = self.jobs.get(&id);
         let usable = self.workers.values().filter(|worker| worker.is_usable());

@@ -1,4 +1,4 @@
-//! Whether a worker is given items.
+//! Decides whether a worker gets items.
 
 use std::time::Instant;
 
@@ -6,26 +6,27 @@ use crate::ids::QuestionId;
 
 use super::worker::Worker;
 
-/// Whether a worker is given items; if not, the first reason that applies.
+/// Whether a worker gets items; if not, the first reason that applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Availability<'a> {
-    /// It wants no more items.
+    /// The worker wants no more items.
     Draining,
-    /// It is proved faulty, for this reason.
+    /// The worker is proved faulty, for this reason.
     Quarantined(&'a str),
-    /// It returned nothing for a long time while others did: it gets nothing until it does.
+    /// The worker returned nothing for a long time while others did. It gets no items until it
+    /// returns a result.
     Stalled,
-    /// Its word is in doubt until the referee has answered.
+    /// A result of the worker is in doubt. It gets no items until the referee has answered.
     Doubted,
-    /// It was lost, has returned nothing since, and gets nothing until this time.
+    /// The worker was lost, and has returned nothing since. It gets no items until this time.
     Resting(Instant),
-    /// It was lost, and has returned nothing since: it is given one item.
+    /// The worker was lost, and has returned nothing since. It gets one item.
     OnProbation,
-    /// It is given as many items as it has credit for.
+    /// The worker gets as many items as it has credit for.
     Free,
 }
 
-/// What keeps items from a worker. Several things may at the same time, each for its own reason.
+/// The reasons why a worker gets no items; several may apply at the same time.
 #[derive(Debug, Default)]
 pub struct Obstacles {
     /// Whether it wants no more items.
@@ -34,7 +35,7 @@ pub struct Obstacles {
     pub quarantined: Option<String>,
     /// Whether it is stalled.
     pub is_stalled: bool,
-    /// The question that its word is in doubt for.
+    /// The open question about a result of it.
     pub question: Option<QuestionId>,
     /// Until when it rests.
     pub resting_until: Option<Instant>,
@@ -43,7 +44,7 @@ pub struct Obstacles {
 }
 
 impl Worker {
-    /// Whether it is given items.
+    /// Whether the worker gets items.
     pub fn availability(&self) -> Availability<'_> {
         match &self.obstacles {
             Obstacles { is_draining: true, .. } => Availability::Draining,
@@ -56,18 +57,18 @@ impl Worker {
         }
     }
 
-    /// Whether it may be given items now.
+    /// Whether the worker may get items now.
     pub fn is_usable(&self) -> bool {
         matches!(self.availability(), Availability::Free | Availability::OnProbation)
     }
 
-    /// Whether audits wait for it: it may be given items now, or soon.
+    /// Whether audits wait for the worker: it may get items now, or soon.
     pub fn may_audit(&self) -> bool {
         self.is_usable()
             || matches!(self.availability(), Availability::Doubted | Availability::Resting(_))
     }
 
-    /// Why it is given nothing for a while, for people.
+    /// Why the worker gets nothing for a while, for people.
     pub fn waits(&self, now: Instant) -> Option<String> {
         match self.availability() {
             Availability::Stalled => {
@@ -75,11 +76,11 @@ impl Worker {
                 let seconds = now.saturating_duration_since(silent).as_secs();
                 Some(format!(
                     "it has returned nothing for {seconds} s while others have; it gets items \
-                     when it does"
+                     again after its next result"
                 ))
             }
             Availability::Doubted => {
-                Some("its word is in doubt until the referee has answered".to_owned())
+                Some("one of its results is in doubt until the referee has answered".to_owned())
             }
             Availability::Resting(until) => {
                 let left = until.saturating_duration_since(now).as_secs_f64();

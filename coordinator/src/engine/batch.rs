@@ -1,5 +1,4 @@
-//! A batch that is being computed: the results so far, who computes the rest, and
-//! what waits.
+//! A batch in progress: its results, the workers that compute the rest, and the queues.
 
 use std::{
     collections::BTreeMap,
@@ -21,16 +20,15 @@ use super::{
     trust::{Audits, LossRecord},
 };
 
-/// Numbers of one item of measures, half a MiB: results travel in messages of
-/// limited size.
+/// Most numbers per item of measures: half a MiB, because messages have a limited size.
 const VALUES_PER_ITEM: usize = 1 << 16;
 
 /// Individuals that the referee evaluates before a generation counts as one without finite
-/// fitness. One is enough if any worker is honest and the fitness function is of use; more,
-/// as single genotypes may have no finite fitness.
+/// fitness. One would do if a worker were honest and every genotype had a finite fitness. Some
+/// genotypes may have none, hence more than one.
 const WITHOUT_FITNESS_MIN: u32 = 8;
 
-/// Trials of an item: all of them, unless they give more numbers than that.
+/// Trials per item: all of them, unless their numbers exceed [`VALUES_PER_ITEM`].
 fn trials_per_item(batch: &Batch) -> u32 {
     let n_trials = match batch.output {
         Output::Fitness => batch.n_trials,
@@ -49,7 +47,7 @@ struct Holder {
     item: Item,
 }
 
-/// How long an item is given to no worker.
+/// Until when no worker gets an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Until {
     Time(Instant),
@@ -59,34 +57,34 @@ enum Until {
 /// A batch that is being computed.
 #[derive(Debug)]
 pub struct BatchInProgress {
-    /// What is computed.
+    /// The genotypes and trials of the batch.
     pub request: Batch,
-    /// The [queued](ItemState::Queued) items, in the order in which workers are given them.
+    /// The [queued](ItemState::Queued) items, in the order of assignment.
     pub queue: Queue,
-    /// Queued items that workers were lost with.
+    /// Queued items that were in progress when workers were lost.
     pub suspects: Queue,
     /// The [assigned](ItemState::Assigned) items and their copies, by individual.
     holders: BTreeMap<u32, Vec<Holder>>,
-    /// The [delayed](ItemState::Delayed) and [held](ItemState::Held) items; twice, where two
-    /// copies were lost.
+    /// The [delayed](ItemState::Delayed) and [held](ItemState::Held) items; an item is here twice
+    /// if two copies of it were lost.
     withheld: Vec<(Item, Until)>,
     /// The results of the trials that are [done](ItemState::Done).
     pub known: KnownResults,
-    /// Assignments that are not duplicated yet, by when they should be done.
+    /// Assignments without a duplicate, sorted by the time at which they should be done.
     pub uncovered: BTreeMap<(Instant, AssignmentId), WorkerId>,
-    /// Done items that another worker has to confirm.
+    /// Done items that a second worker has to confirm.
     pub audits: Audits,
-    /// Items that workers were lost with.
+    /// Items that were in progress when workers were lost.
     pub losses: LossRecord,
     /// Disagreements that the referee has not settled.
     pub n_disagreements: usize,
-    /// Individuals that the referee has evaluated because none has a finite fitness.
+    /// Number of individuals that the referee has evaluated because none has a finite fitness.
     pub n_without_fitness: u32,
     started: Instant,
     fleet_time_at_start: FleetTime,
 }
 
-/// Everything that a batch asks for, as items.
+/// All items of a batch.
 fn items(batch: &Batch) -> impl Iterator<Item = Item> + use<> {
     let (n_trials, n_per_item) = (batch.n_trials, trials_per_item(batch));
     (0..batch.genotypes.len() as u32).flat_map(move |individual| {
@@ -140,7 +138,7 @@ impl BatchInProgress {
         item.parts(|trial| is_in(self.state(item.individual, trial)))
     }
 
-    /// The first part of an item that may be given to another worker as well.
+    /// The first part of an item that a second worker may compute as well.
     pub fn duplicable(&self, item: &Item) -> Option<Item> {
         self.parts(item, |state| state <= ItemState::Assigned).into_iter().next()
     }
@@ -165,14 +163,14 @@ impl BatchInProgress {
         }
     }
 
-    /// Queues those parts of an item before all others that have left their state.
+    /// Queues the parts of an item that belong in a queue, ahead of all other items.
     pub fn queue_first(&mut self, item: &Item) {
         for part in self.parts(item, |state| state == ItemState::Queued).into_iter().rev() {
             self.queue_of(&part).push_front(part);
         }
     }
 
-    /// Queues everything without a result, as no worker computes it any more.
+    /// Queues all trials without a result, after all workers have been told to stop.
     pub fn requeue_all(&mut self) {
         self.holders.clear();
         self.audits.in_flight.clear();
@@ -181,7 +179,7 @@ impl BatchInProgress {
         items(&self.request).for_each(|item| self.queue_behind(&item));
     }
 
-    /// Takes those parts of an individual out of the queues that are done or withheld.
+    /// Removes the done and withheld parts of an individual from the queues.
     pub fn unqueue(&mut self, individual: u32) {
         let [mut queue, mut suspects] = [&mut self.queue, &mut self.suspects].map(mem::take);
         let rest = |item: Item| match item.individual == individual {
@@ -193,8 +191,7 @@ impl BatchInProgress {
         (self.queue, self.suspects) = (queue, suspects);
     }
 
-    /// Forgets all values of a worker, and the audits of them, and queues what is unknown
-    /// then.
+    /// Forgets all values of a worker, and their audits, and queues the trials again.
     pub fn discard(&mut self, name: &str) {
         self.audits.discard(name);
         for item in self.known.discard(name) {
@@ -202,7 +199,7 @@ impl BatchInProgress {
         }
     }
 
-    /// Gives an item to no worker until [`Self::release`].
+    /// Withholds an item from all workers until [`Self::release`].
     pub fn hold(&mut self, item: Item) {
         let individual = item.individual;
         self.withheld.push((item, Until::Answer));
@@ -214,13 +211,13 @@ impl BatchInProgress {
         self.end_withholding(|held, until| held == item && until == Until::Answer).is_some()
     }
 
-    /// Gives an item to no worker until a time.
+    /// Withholds an item from all workers until a time.
     pub fn delay(&mut self, item: Item, until: Instant) {
         self.withheld.push((item, Until::Time(until)));
     }
 
-    /// An item whose time has come. One at a time: an item that waits twice, because two
-    /// copies were lost, stays delayed until the second one is taken, too.
+    /// Takes an item whose delay has passed, one per call. An item that waits twice, because two
+    /// copies were lost, stays delayed until the second entry is taken, too.
     pub fn take_due(&mut self, now: Instant) -> Option<Item> {
         self.end_withholding(|_, until| matches!(until, Until::Time(time) if time < now))
     }
@@ -235,33 +232,33 @@ impl BatchInProgress {
         self.queue.pop_whole_first(n_trials, trials_per_item(&self.request) as usize)
     }
 
-    /// Numbers that so many trials give.
+    /// Number of values of `n_trials` trials.
     pub fn n_values(&self, n_trials: usize) -> usize {
         n_trials * self.request.values_per_trial
     }
 
-    /// Items that wait for a worker, audits included.
+    /// Number of items that wait for a worker, including audits.
     pub fn n_waiting(&self) -> usize {
         self.queue.len() + self.suspects.len() + self.audits.n_waiting()
     }
 
-    /// Whether anything waits.
+    /// Whether any item waits for a worker.
     pub fn has_waiting(&self) -> bool {
         !self.queue.is_empty() || !self.suspects.is_empty() || !self.audits.is_empty()
     }
 
-    /// Items that workers have.
+    /// Number of items that workers have.
     pub fn n_in_flight(&self) -> usize {
         self.holders.values().map(Vec::len).sum::<usize>() + self.audits.in_flight.len()
     }
 
-    /// An item has been given to a worker.
+    /// Records that a worker computes an item.
     pub fn add_holder(&mut self, assignment_id: AssignmentId, worker: WorkerId, item: Item) {
         let holder = Holder { assignment_id, worker, item };
         self.holders.entry(holder.item.individual).or_default().push(holder);
     }
 
-    /// A worker does not compute an item any more.
+    /// Records that a worker no longer computes an item.
     pub fn remove_holder(&mut self, assignment_id: AssignmentId, individual: u32) {
         let Some(holders) = self.holders.get_mut(&individual) else { return };
         holders.retain(|holder| holder.assignment_id != assignment_id);
@@ -291,8 +288,8 @@ impl BatchInProgress {
         redundant.map(|holder| (holder.worker, holder.assignment_id)).collect()
     }
 
-    /// Queues an audit of what workers have computed of an item, in parts that are each
-    /// one worker's.
+    /// Queues audits of the known results of an item, one for each part that a single worker
+    /// computed.
     pub fn push_audit(&mut self, item: &Item) {
         for part in self.known.by_worker(item) {
             if let Some(name) = self.known.name(part.individual, part.trials.start) {
@@ -306,19 +303,19 @@ impl BatchInProgress {
         self.known.name(item.individual, item.trials.start).map(|name| &**name)
     }
 
-    /// An audit by a worker has agreed.
+    /// Records that an audit by a worker has agreed.
     pub fn count_audited(&mut self, item: &Item, auditor: Arc<str>) {
         self.audits.count(auditor, self.known.name(item.individual, item.trials.start));
     }
 
-    /// The names of those who contributed, and whether an audit has agreed with them.
+    /// The names of the workers that contributed, and whether an audit has agreed with each.
     pub fn contributors(&self) -> impl Iterator<Item = (Arc<str>, bool)> {
         let names = self.known.names();
         names.map(|name| (Arc::clone(name), self.audits.has_confirmed(name)))
     }
 
-    /// Individuals with trials that a worker was computing when it was lost, and that have
-    /// no result since.
+    /// Number of individuals with trials that were in progress when a worker was lost, and that
+    /// still have no result.
     pub fn n_individuals_failing(&self) -> usize {
         self.losses.n_individuals(|individual, trial| !self.known.has(individual, trial))
     }
@@ -328,13 +325,13 @@ impl BatchInProgress {
         now.saturating_duration_since(self.started)
     }
 
-    /// What it is called in messages.
+    /// The name of the batch in messages.
     pub fn name(&self) -> String {
         name_of(self.request.trial_set)
     }
 
-    /// Whether all fitness is known and undisputed, and no audit is under way, or waits for
-    /// a worker that is there.
+    /// Whether all fitness is known and undisputed, no audit is in progress, and no audit waits
+    /// for a connected worker.
     pub fn is_finished(&self, is_there: impl Fn(&Self) -> bool) -> bool {
         self.is_known_throughout()
             && self.n_disagreements == 0
@@ -347,8 +344,8 @@ impl BatchInProgress {
         self.known.n_episodes_left() == 0
     }
 
-    /// If no individual of a generation has a finite fitness: the next that the referee
-    /// evaluates for that reason. Call when all fitness is known.
+    /// The next individual for the referee, if no individual of a generation has a finite
+    /// fitness. Call when all fitness is known.
     pub fn without_fitness(&self) -> Option<Item> {
         let is_generation = matches!(self.request.trial_set, TrialSet::Generation(_));
         let n_individuals = self.request.genotypes.len() as u32;
@@ -380,8 +377,8 @@ impl BatchInProgress {
         }
     }
 
-    /// Panics if the state contradicts itself; `in_flight`: what workers hold of it, and whether
-    /// that is an audit.
+    /// Panics if the state contradicts itself; `in_flight`: the assignments of workers, and
+    /// whether each is an audit.
     pub fn sanity_check(&self, in_flight: &BTreeMap<AssignmentId, (WorkerId, Item, bool)>) {
         self.known.sanity_check();
         let mut held = BTreeMap::new();
@@ -401,7 +398,7 @@ impl BatchInProgress {
         }
         let n_queued: usize = self.queue.iter().map(|item| item.trials.len()).sum();
         assert_eq!(n_queued, self.queue.n_trials());
-        // A trial is in one queued item if it is queued, else in none.
+        // A queued trial is in exactly one queued item, any other trial in none.
         let n_trials = self.request.n_trials as usize;
         let mut n_queued = vec![0_u32; self.known.n_episodes()];
         for item in self.queue.iter().chain(self.suspects.iter()) {
@@ -417,7 +414,7 @@ impl BatchInProgress {
     }
 }
 
-/// What the batch of a trial set is called in messages.
+/// The name of a trial set's batch in messages.
 pub fn name_of(trial_set: TrialSet) -> String {
     match trial_set {
         TrialSet::Generation(generation) => format!("generation {generation}"),

@@ -1,12 +1,12 @@
-//! Who gets what next.
+//! Assigns queued items to workers.
 //!
-//! First, queued items: the job with the least virtual time gives its next item to
-//! the least loaded worker. An item is split by trial when slots would stay empty
-//! otherwise, and towards the end of a batch.
+//! First, queued items: the least loaded worker gets the next item of the job with the least
+//! virtual time. The engine splits an item by trial if slots would stay empty otherwise, and
+//! towards the end of a batch.
 //!
-//! Then, while slots are idle: what waits in a worker behind other items moves to
-//! them; and what others compute is computed by them as well, if they should be
-//! done sooner, or if it is late, again and again if need be. The first result wins.
+//! Then, while slots are idle: the engine moves items to them that wait at a worker behind other
+//! items. It also gives idle slots copies of items in progress if they should finish sooner, or
+//! if the item is late, repeatedly if necessary. The first result wins.
 
 use std::{
     collections::BTreeMap,
@@ -24,22 +24,21 @@ use super::{
     worker::{AssignedItem, FULL_LOAD, Source, Worker},
 };
 
-/// What moving work costs: a round trip, and the coordinator's own delays.
+/// Time lost by moving an item: a round trip, and the coordinator's own delays.
 const MOVING_COST: Duration = Duration::from_millis(20);
-/// Trials of a slot's share of a batch that are left to others: half a one as shares are
-/// rounded down, and some for what the rests cost as calls of their own. Of 0 to 1.3, this
-/// makes the most of the fleets of `cargo bench -p coordinator --bench scaling`.
+/// Trials of a slot's share of a batch that are left to others: half a trial because shares are
+/// rounded down, and some because the remainders are calls of their own. Of values from 0 to 1.3,
+/// this one is best in `cargo bench -p coordinator --bench scaling`.
 const LOST_PER_SLOT: f64 = 0.7;
-/// Workers that are looked at when the first is not suitable.
+/// Number of workers to try if the first is not suitable.
 const N_LOOKED_AT: usize = 8;
-/// Time after which an item is late whose like nobody has computed yet.
+/// Time after which an item is late if no similar item has been computed yet.
 const UNKNOWN_LATE: Duration = Duration::from_secs(5);
-/// Copies of such an item for each that is late: the first may hang, too, and so may the
-/// next, so that their number has to grow.
+/// Copies per late copy of such an item. Copies may hang, too, so their number has to grow.
 const UNKNOWN_COPIES: usize = 2;
 
 impl Engine {
-    /// Gives every slot something to do, as far as there is something.
+    /// Gives every slot work, as far as there is any.
     pub(super) fn assign(&mut self, now: Instant) {
         self.hand_out_queued(now);
         while self.has_idle_slot() {
@@ -66,10 +65,9 @@ impl Engine {
         }
     }
 
-    /// The job whose item is next, the worker that gets it, and the queue that it is in. A job
-    /// whose next item waits for a free slot keeps later jobs from being served ahead: no slot
-    /// would become free. They get slots that are idle, which are those of workers that do not
-    /// take the job.
+    /// The next item: its job, its queue, and the worker that gets it. While a job's next item
+    /// waits for a free slot, later jobs get only idle slots, which are those of workers that do
+    /// not take the job. Serving later jobs ahead would keep slots from becoming free.
     fn next_item(&self) -> Option<(JobId, WorkerId, Source)> {
         if self.load_index.available.is_empty() {
             return None;
@@ -95,7 +93,7 @@ impl Engine {
         None
     }
 
-    /// Takes a worker's next item out of a queue.
+    /// Takes the next item for a worker out of a queue.
     fn take(&mut self, job: JobId, worker: WorkerId, source: Source) -> Option<Item> {
         match source {
             Source::Audits => self.take_audit(job, worker),
@@ -113,22 +111,21 @@ impl Engine {
         }
     }
 
-    /// The workers with credit that take a job's items, the least loaded first, each with its
+    /// The workers with credit that accept a job's items, the least loaded first, each with its
     /// rank.
     pub(super) fn takers(&self, work: &JobWork) -> impl Iterator<Item = (u64, WorkerId)> {
         let available = self.load_index.available.iter().map(|&(load, _, id)| (load, id));
         available.filter(|(_, id)| self.workers[id].takes(work))
     }
 
-    /// Slots among which a job's items are divided: the jobs with something to hand out get
-    /// about equal parts of them.
+    /// Number of slots for a job's items: jobs with queued items divide the slots about equally.
     fn n_slots_each(&self, n_slots: usize) -> usize {
         n_slots / self.ready_queue.len().max(1)
     }
 
-    /// Whether workers whose slots are full get a job's items, too. Not near the end
-    /// of a batch, when the worker that is free first should have what is left;
-    /// except items so short that they take no longer than a round trip.
+    /// Whether workers with full slots get a job's items, too. Not near the end of a batch, where
+    /// the first free worker should get the remaining items; unless items take no longer than a
+    /// round trip.
     fn hands_out_ahead(&self, id: JobId) -> bool {
         let Some(batch) = self.batch(id) else { return false };
         let n_slots = self.n_slots_each(self.load_index.n_usable_slots);
@@ -136,14 +133,14 @@ impl Engine {
         !self.config.split || batch.queue.n_trials() > n_left || self.is_short(id)
     }
 
-    /// Whether a job's trials take no longer than a round trip, as far as is known.
+    /// Whether a job's trials take no longer than a round trip; true if their duration is
+    /// unknown.
     fn is_short(&self, id: JobId) -> bool {
         self.jobs[&id].expected(1, 1.0).is_none_or(|trial| trial < MOVING_COST)
     }
 
-    /// How many trials of the next item a worker is given: all of them, unless slots would
-    /// stay empty, or the batch is near its end, when the worker's share of what is left is
-    /// smaller than an item.
+    /// Number of trials of the next item that a worker gets: all of them, unless slots would stay
+    /// empty, or the worker's share of the rest of the batch is smaller than an item.
     fn n_trials_per_item(&self, id: JobId, worker: &Worker) -> usize {
         let Some(batch) = self.batch(id).filter(|_| self.config.split) else { return usize::MAX };
         let n_trials = batch.request.n_trials as usize;
@@ -158,9 +155,9 @@ impl Engine {
         n_trials.div_ceil(n_parts).min(share as usize).max(1)
     }
 
-    /// How many more trials a worker would be given if all that is left of a batch were given
-    /// out now, and every worker took equally long. Short trials are given out so, because a
-    /// worker that has none left waits for the next ones as long as a trial takes.
+    /// A worker's further share of the remaining trials of a batch, if the engine assigned all of
+    /// them now so that all workers finish together. The engine assigns short trials like this,
+    /// because a worker without trials waits for new ones as long as a trial takes.
     fn share_of_batch(&self, batch: &BatchInProgress, worker: &Worker) -> f64 {
         let n_slots = self.load_index.n_usable_slots as f64;
         let n_left = self.ready_queue.len().max(1) as f64 * batch.known.n_episodes_left() as f64;
@@ -171,8 +168,8 @@ impl Engine {
         work * share - held.n_trials() as f64 - CALL_OVERHEAD * (held.len() + 1) as f64
     }
 
-    /// Takes the last item that waits behind others in a worker back and queues
-    /// it; whether there was one that is worth it.
+    /// Takes back the last item that waits at a worker behind others, and queues it. Returns
+    /// whether moving an item was worthwhile.
     fn move_waiting(&mut self, now: Instant) -> bool {
         let candidate =
             self.load_index.backlogged.iter().rev().take(N_LOOKED_AT).find_map(|&(_, holder)| {
@@ -191,8 +188,7 @@ impl Engine {
         true
     }
 
-    /// Gives work that is being computed to idle slots, too; whether there was any
-    /// for which that is worth it.
+    /// Gives idle slots copies of items in progress. Returns whether a copy was worthwhile.
     fn duplicate(&mut self, now: Instant) -> bool {
         let candidate = self.jobs.iter().find_map(|(&id, work)| {
             let idle = self.idle_taker(work, |_| true)?;
@@ -225,7 +221,7 @@ impl Engine {
         true
     }
 
-    /// The least loaded worker with an idle slot that takes a job's items and is suitable.
+    /// The least loaded suitable worker with an idle slot that accepts a job's items.
     pub(super) fn idle_taker(
         &self,
         work: &JobWork,
@@ -248,7 +244,7 @@ impl Engine {
         let Some(work) = self.jobs.get_mut(&job) else { return };
         let worker = &self.workers[&worker_id];
         let expected = work.expected(item.trials.len(), worker.pace).unwrap_or_default();
-        // What it has been given before comes first.
+        // Earlier assignments of the worker come first.
         let n_before = (worker.load() / FULL_LOAD) as u32;
         let expected = now + expected * (n_before + 1);
         let Some(batch) = &mut work.batch else { return };
@@ -269,7 +265,8 @@ impl Engine {
             id,
             trials: item.trials.clone(),
             genotype: batch.genotype(item.individual),
-            // Audits are sent genotypes, so that they compare the two ways, too.
+            // Audits get genotypes instead of a distribution, so that they also compare the two
+            // ways.
             is_drawn: source != Source::Audits && request.distribution.is_some(),
         };
         self.outgoing.assign(worker_id, job, request, assignment);
@@ -278,8 +275,8 @@ impl Engine {
         self.update_worker(worker_id, |worker| worker.in_flight.insert(id, assigned));
     }
 
-    /// Ends an assignment and gives its worker the credit back; none if the worker does not
-    /// have it.
+    /// Ends an assignment and returns the worker's credit; `None` if the worker does not have the
+    /// assignment.
     pub(super) fn take_assignment(
         &mut self,
         worker: WorkerId,
@@ -291,7 +288,7 @@ impl Engine {
         Some(assignment)
     }
 
-    /// A worker computes an assignment no more.
+    /// Records that a worker no longer computes an assignment.
     pub(super) fn forget_holder(&mut self, assignment_id: AssignmentId, assignment: &AssignedItem) {
         let Some(batch) = self.batch_mut(assignment.job) else { return };
         batch.audits.in_flight.remove(&assignment_id);
@@ -299,7 +296,8 @@ impl Engine {
         batch.uncovered.remove(&(assignment.expected, assignment_id));
     }
 
-    /// Takes an assignment back: its worker is told to drop it. None if it does not have it.
+    /// Takes an assignment back, by telling its worker to drop it. `None` if the worker does not
+    /// have it.
     pub(super) fn recall(
         &mut self,
         now: Instant,
@@ -318,20 +316,19 @@ impl Engine {
     }
 }
 
-/// Work that is worth computing once more.
+/// An assignment worth computing a second time.
 struct Slow {
     key: (Instant, AssignmentId),
     item: Item,
-    /// Into how many items it is split for that.
+    /// Number of parts, each for another worker.
     n_parts: usize,
-    /// How many times.
+    /// Number of copies of each part.
     n_copies: usize,
 }
 
 impl JobWork {
-    /// Of the running work that nobody duplicates, that which is expected last, or
-    /// else that which is latest, if idle slots should do it sooner. Experiments
-    /// with queued work have no need.
+    /// The assignment without a duplicate that should end last, or else the latest one, if idle
+    /// slots should finish it sooner. Jobs with queued items need no duplicates.
     fn slowest(
         &self,
         now: Instant,
@@ -348,9 +345,10 @@ impl JobWork {
             let n_trials = item.trials.len();
             let n_parts = (n_idle_slots / batch.uncovered.len()).clamp(1, n_trials);
             let (needed, n_copies) = match self.expected(n_trials.div_ceil(n_parts), pace) {
-                // Half as long again, as a worker may finish what it is told to drop.
+                // Half as much again, because a worker may finish an item that it was told to
+                // drop.
                 Some(needed) => (needed.mul_f64(1.5) + MOVING_COST, 1),
-                // Later each time.
+                // The limit grows with the age of the batch.
                 None => (UNKNOWN_LATE.max(batch.running_for(now) / 2), UNKNOWN_COPIES),
             };
             let is_worth_it = needed < remaining(expected, now);

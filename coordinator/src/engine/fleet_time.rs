@@ -1,8 +1,8 @@
-//! How much of the slots' time goes into results.
+//! Measures how much of the slots' time leads to results.
 
 use std::time::{Duration, Instant};
 
-/// How long the fleet's slots have existed, and computed, altogether.
+/// The sums of the times that the fleet's slots have existed and computed.
 #[derive(Debug, Clone, Copy)]
 pub struct FleetTime {
     now: Instant,
@@ -17,17 +17,17 @@ impl FleetTime {
         Self { now, n_slots: 0, capacity_s: 0.0, busy_s: 0.0 }
     }
 
-    /// Slots that exist.
+    /// Number of slots.
     pub fn n_slots(&self) -> usize {
         self.n_slots
     }
 
-    /// Time that slots have existed, s.
+    /// Time that slots have existed, summed over slots, s.
     pub fn capacity_s(&self) -> f64 {
         self.capacity_s
     }
 
-    /// Part of it that went into results, s.
+    /// The part of [`Self::capacity_s`] that led to results, s.
     pub fn busy_s(&self) -> f64 {
         self.busy_s
     }
@@ -39,18 +39,18 @@ impl FleetTime {
         self.now = self.now.max(now);
     }
 
-    /// Slots come or go.
+    /// Sets the number of slots.
     pub fn set_slots(&mut self, now: Instant, n_slots: usize) {
         self.advance(now);
         self.n_slots = n_slots;
     }
 
-    /// A slot has computed for so long.
+    /// Adds the computing time of a result.
     pub fn add_busy(&mut self, time: Duration) {
         self.busy_s += time.as_secs_f64();
     }
 
-    /// Share of the slots' time since `start` that was not spent computing.
+    /// Share of the slots' time since `start` without computation, 0 to 1.
     pub fn idle_share_since(&self, start: &Self) -> f64 {
         let capacity_s = self.capacity_s - start.capacity_s;
         if capacity_s > 0.0 {
@@ -61,7 +61,7 @@ impl FleetTime {
     }
 }
 
-/// One worker's computing, over all its time and recently.
+/// One worker's computing time, in total and recently.
 #[derive(Debug)]
 pub struct WorkerTime {
     n_slots: usize,
@@ -88,9 +88,9 @@ impl WorkerTime {
         Self { n_slots, joined: now, busy: Duration::ZERO, previous: window, current: window }
     }
 
-    /// Counts a result; returns the part of `compute_time` that can be true: a
-    /// worker's slots cannot have computed for longer than they exist, nor an
-    /// item for longer than since it was `assigned`.
+    /// Counts a result. Returns the plausible part of `compute_time`: a worker's slots cannot
+    /// have computed for longer than they exist, nor an item for longer than since it was
+    /// `assigned`.
     pub fn add_result(
         &mut self,
         now: Instant,
@@ -150,7 +150,8 @@ mod tests {
         let start = Instant::now();
         let mut time = WorkerTime::new(start, 2);
         let now = start + SECOND;
-        // One item: as long as since it was assigned. Two slots: two seconds.
+        // One item counts at most the time since it was assigned; two slots count at most two
+        // seconds.
         assert_eq!(time.add_result(now, start, Duration::MAX), SECOND);
         assert_eq!(time.add_result(now, start, SECOND / 2), SECOND / 2);
         assert_eq!(time.add_result(now, start, SECOND), SECOND / 2);

@@ -1,4 +1,4 @@
-//! The items that a worker has been given and has not answered.
+//! The items assigned to a worker that have no result yet.
 
 use std::{
     collections::{BTreeMap, btree_map::IntoIter},
@@ -9,7 +9,7 @@ use crate::ids::{AssignmentId, JobId};
 
 use super::worker::AssignedItem;
 
-/// Items by assignment, oldest first, as ids grow; and how many trials they have.
+/// Items by assignment, oldest first because ids grow, and the sum of their trials.
 #[derive(Debug, Default)]
 pub struct InFlight {
     items: BTreeMap<AssignmentId, AssignedItem>,
@@ -17,26 +17,26 @@ pub struct InFlight {
 }
 
 impl InFlight {
-    /// Trials of all of them.
+    /// Number of trials of all items.
     pub fn n_trials(&self) -> usize {
         self.n_trials
     }
 
-    /// Adds one.
+    /// Adds an item.
     pub fn insert(&mut self, id: AssignmentId, item: AssignedItem) {
         self.n_trials += item.item.trials.len();
         let former = self.items.insert(id, item);
         assert!(former.is_none(), "an assignment is given once");
     }
 
-    /// Takes one out.
+    /// Removes an item.
     pub fn remove(&mut self, id: AssignmentId) -> Option<AssignedItem> {
         let item = self.items.remove(&id)?;
         self.n_trials -= item.item.trials.len();
         Some(item)
     }
 
-    /// Takes those of a job out.
+    /// Removes the items of a job.
     pub fn remove_of(&mut self, job: JobId) -> Vec<(AssignmentId, AssignedItem)> {
         let removed: Vec<_> = self.items.extract_if(.., |_, item| item.job == job).collect();
         self.n_trials -=

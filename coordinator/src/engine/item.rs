@@ -1,4 +1,4 @@
-//! The unit of scheduling: one genotype on a range of trials, and the states that it goes through.
+//! The unit of scheduling: one genotype on a range of trials, and its states.
 
 use std::ops::Range;
 
@@ -12,17 +12,17 @@ pub struct Item {
 }
 
 /// The state of a trial of a batch. The trials of an item share it until the item is divided.
-/// Where several states apply, the last of them counts: copies of a held item may still be
-/// computed, and one of them may make it done.
+/// Where several states apply, the last of them counts: workers may still compute copies of a
+/// held item, and a result of a copy makes the item done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ItemState {
     /// It waits in a queue of the batch, in exactly one item.
     Queued,
-    /// A worker computes it, or several do.
+    /// One or more workers compute it.
     Assigned,
-    /// No worker is given it before a certain time, because workers were lost with it.
+    /// No worker gets it before a certain time, because workers were lost while they computed it.
     Delayed,
-    /// No worker is given it until the referee has answered.
+    /// No worker gets it until the referee has answered.
     Held,
     /// Its result is known.
     Done,

@@ -1,4 +1,4 @@
-//! What the engine knows of a job, and the job's share of the fleet.
+//! The state of a job in the engine, and the job's share of the fleet.
 
 use std::{
     sync::Arc,
@@ -9,33 +9,32 @@ use crate::priority::Priority;
 
 use super::{batch::BatchInProgress, item::Item, trust::Unaudited};
 
-/// What a call costs beside its trials, in trials. Measured: one trial of the
-/// shipped experiments takes 1.38 to 1.8 times as long as one of several.
+/// Overhead of a call, in trials. Measured: a single trial of the shipped experiments takes 1.38
+/// to 1.8 times as long as one of several in a call.
 pub const CALL_OVERHEAD: f64 = 0.4;
-/// What a trial is taken to cost before one has been seen.
+/// Assumed duration of a trial before the first result.
 const UNKNOWN_TRIAL: Duration = Duration::from_millis(10);
 
 /// A job that has not ended.
 #[derive(Debug)]
 pub struct JobWork {
-    /// Its experiment's name, by which workers take it or leave it.
+    /// Its experiment's name, which workers' patterns accept or exclude.
     pub name: Arc<str>,
-    /// Opaque to the engine; every worker gets it once.
+    /// The specification, opaque to the engine; every worker gets it once.
     pub spec: Arc<str>,
-    /// Whether it waits to be resumed.
+    /// Whether it is paused.
     pub is_paused: bool,
     /// The batch that is being computed.
     pub batch: Option<BatchInProgress>,
-    /// Decides its share of the fleet.
+    /// Its priority, which determines its share of the fleet.
     pub priority: Priority,
-    /// Workers' time that it was given, divided by its priority, in ns: the job with
-    /// the least is next.
+    /// Workers' time that it got, divided by its priority, in ns: the job with the least is next.
     pub virtual_time: u128,
-    /// Trials whose fitness became known.
+    /// Number of trials whose fitness became known.
     pub n_episodes: u64,
-    /// Whose results have not been confirmed for how long.
+    /// For each worker, how long its results have been unconfirmed.
     pub unaudited: Unaudited,
-    /// What its owner should know when the batch is done.
+    /// Notices for the owner, sent with the finished batch.
     pub notices: Vec<String>,
     /// Time per trial for a worker of pace 1, s; smoothed.
     trial_s: Option<f64>,
@@ -60,36 +59,39 @@ impl JobWork {
         }
     }
 
-    /// Whether it has something to hand out.
+    /// Whether it has queued items.
     pub fn is_ready(&self) -> bool {
         !self.is_paused && self.batch.as_ref().is_some_and(BatchInProgress::has_waiting)
     }
 
-    /// How long so many trials take a worker of a pace; none before any result.
+    /// Expected duration of `n_trials` trials for a worker of this pace; `None` before any
+    /// result.
     pub fn expected(&self, n_trials: usize, pace: f64) -> Option<Duration> {
         let trial_s = self.trial_s?;
         let seconds = (n_trials as f64 + CALL_OVERHEAD) * trial_s * pace;
         Some(Duration::from_secs_f64(seconds.clamp(1e-6, 1e9)))
     }
 
-    /// What it is charged for so many trials until their time is known.
+    /// The charge for `n_trials` trials until their real duration is known.
     pub fn charge(&self, n_trials: usize, pace: f64) -> Duration {
         self.expected(n_trials, pace).unwrap_or(UNKNOWN_TRIAL * n_trials as u32)
     }
 
-    /// Learns from an item that took a worker of a pace `busy`, one of so many.
+    /// Learns from an item that took `busy` for a worker of this pace, in a fleet of this many
+    /// workers.
     pub fn learn(&mut self, item: &Item, busy: Duration, pace: f64, n_workers: usize) {
         let trial_s = busy.as_secs_f64() / (item.trials.len() as f64 + CALL_OVERHEAD) / pace;
         let smoothed = self.trial_s.get_or_insert(trial_s);
-        // The mean of the first, then of the last: over several rounds of all workers, as the
-        // fast ones answer first and would all seem to be as slow as each other.
+        // The mean of the first results, then a moving mean over several rounds of all workers.
+        // Fast workers answer first, so a shorter mean would hide the differences between
+        // workers.
         self.n_learnt += 1;
         let n_of_mean = self.n_learnt.min(100 + 4 * n_workers as u64);
         let gain = 1.0 / n_of_mean as f64;
         *smoothed = (*smoothed + gain * (trial_s - *smoothed)).max(1e-9);
     }
 
-    /// Replaces a charge by the time that it took.
+    /// Replaces a charge by the real duration.
     pub fn correct_charge(&mut self, charged: Duration, real: Duration) {
         self.virtual_time =
             (self.virtual_time + self.weighted(real)).saturating_sub(self.weighted(charged));
@@ -100,8 +102,8 @@ impl JobWork {
     }
 }
 
-/// How long it will be until something is done, or for how long it should have
-/// been: what is late by so much is taken to need as long again.
+/// The remaining time of an item. An overdue item is assumed to need as long again as it is
+/// overdue.
 pub fn remaining(expected: Instant, now: Instant) -> Duration {
     let late = now.saturating_duration_since(expected);
     late.max(expected.saturating_duration_since(now))

@@ -1,4 +1,4 @@
-//! What is known of a batch: the numbers of its trials, and who computed them.
+//! The results of a batch: the numbers of its trials, and the workers that computed them.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,9 +10,9 @@ use crate::ids::WorkerId;
 
 use super::item::Item;
 
-/// Stands for the worker of a trial without a result.
+/// The worker id of a trial without a result.
 const NOBODY: WorkerId = WorkerId(0);
-/// Stands for the worker of a trial that the referee has computed.
+/// The worker id of a trial that the referee has computed.
 pub const REFEREE: WorkerId = WorkerId(u64::MAX);
 
 /// Two workers' results for the same trial differ.
@@ -31,13 +31,13 @@ pub struct Disagreement {
 /// The results of a batch so far.
 #[derive(Debug)]
 pub struct KnownResults {
-    /// Trials of an individual.
+    /// Number of trials per individual.
     n_trials: u32,
     values_per_trial: usize,
-    /// Per individual the numbers of all trials; meaningless for trials without a result.
+    /// For each individual, the numbers of all trials; meaningless for trials without a result.
     values: Vec<Vec<f64>>,
-    /// The worker that computed each trial, or [`NOBODY`]: one row of all individuals
-    /// with all their trials.
+    /// The worker that computed each trial, or [`NOBODY`]; flattened, shape
+    /// `[individual][trial]`.
     evaluated_by: Vec<WorkerId>,
     /// The names of all workers in `evaluated_by`.
     names: BTreeMap<WorkerId, Arc<str>>,
@@ -45,7 +45,7 @@ pub struct KnownResults {
 }
 
 impl KnownResults {
-    /// Nothing is known yet.
+    /// A batch without results.
     pub fn new(n_individuals: usize, n_trials: u32, values_per_trial: usize) -> Self {
         let n_episodes = n_individuals * n_trials as usize;
         let n_values = n_trials as usize * values_per_trial;
@@ -59,12 +59,12 @@ impl KnownResults {
         }
     }
 
-    /// Trials of all individuals.
+    /// Number of trials of all individuals.
     pub fn n_episodes(&self) -> usize {
         self.evaluated_by.len()
     }
 
-    /// Trials without a result.
+    /// Number of trials without a result.
     pub fn n_episodes_left(&self) -> usize {
         self.n_trials_left
     }
@@ -80,12 +80,12 @@ impl KnownResults {
         self.names.get(&self.by(individual, trial))
     }
 
-    /// The names of those who contributed.
+    /// The names of the workers that contributed.
     pub fn names(&self) -> impl Iterator<Item = &Arc<str>> {
         self.names.values()
     }
 
-    /// An item in parts that are each one worker's.
+    /// Splits an item into parts that one worker computed each.
     pub fn by_worker(&self, item: &Item) -> Vec<Item> {
         let individual = item.individual;
         let mut parts: Vec<Item> = Vec::new();
@@ -118,8 +118,8 @@ impl KnownResults {
         Ok(())
     }
 
-    /// Records the numbers of those trials of an item that have none; returns how many
-    /// trials these are.
+    /// Records the numbers of an item's trials that have none yet; returns the number of these
+    /// trials.
     pub fn accept(&mut self, worker: WorkerId, name: &str, item: &Item, numbers: &[f64]) -> usize {
         let mut n_new = 0;
         for (trial, values) in item.trials.clone().zip(numbers.chunks_exact(self.values_per_trial))
@@ -138,8 +138,8 @@ impl KnownResults {
         n_new
     }
 
-    /// Forgets what workers of a name computed; returns which items that was, in parts of
-    /// whole ranges of trials.
+    /// Forgets the results of workers of this name; returns their items, each with a contiguous
+    /// range of trials.
     pub fn discard(&mut self, name: &str) -> Vec<Item> {
         let its = self.names.extract_if(.., |_, of| **of == *name);
         let by: BTreeSet<WorkerId> = its.map(|(id, _)| id).collect();
@@ -162,12 +162,12 @@ impl KnownResults {
         discarded
     }
 
-    /// Per individual the numbers of all trials; meaningless for trials without a result.
+    /// For each individual, the numbers of all trials; meaningless for trials without a result.
     pub fn values(&self) -> &[Vec<f64>] {
         &self.values
     }
 
-    /// Per individual the numbers of all trials.
+    /// For each individual, the numbers of all trials.
     pub fn into_values(self) -> Vec<Vec<f64>> {
         self.values
     }
@@ -186,7 +186,7 @@ impl KnownResults {
         individual as usize * self.n_trials as usize + trial as usize
     }
 
-    /// Where the numbers of a trial are among those of its individual.
+    /// The indices of a trial's numbers among those of its individual.
     fn places(&self, trial: u32) -> Range<usize> {
         let first = trial as usize * self.values_per_trial;
         first..first + self.values_per_trial

@@ -1,4 +1,4 @@
-//! Which workers can take items, and which have items that wait.
+//! An index of workers: those that can take items, and those with items that wait.
 
 use std::collections::BTreeSet;
 
@@ -9,22 +9,22 @@ use super::worker::{FULL_LOAD, Worker};
 /// The workers, sorted by load.
 #[derive(Debug, Default)]
 pub struct WorkerLoadIndex {
-    /// Workers with credit: that which would be done first with another item first
-    /// ([`Worker::finish_rank`]), and among equals the fastest.
+    /// Workers with credit, sorted by the time at which they would finish one more item
+    /// ([`Worker::finish_rank`]), and among equals the fastest first.
     pub available: BTreeSet<(u64, u32, WorkerId)>,
     /// Workers with items that wait behind others, most loaded last.
     pub backlogged: BTreeSet<(u64, WorkerId)>,
-    /// Slots that may have an item and have none.
+    /// Number of usable slots without an item.
     pub n_idle_slots: usize,
-    /// Slots that may have an item.
+    /// Number of slots that may get an item.
     pub n_usable_slots: usize,
-    /// The work that these do in the time that one of pace 1 takes for
+    /// The speed of the usable slots together; a slot of pace 1 counts
     /// [`SPEED_UNIT`](super::worker::SPEED_UNIT).
     pub usable_speed: u64,
 }
 
 impl WorkerLoadIndex {
-    /// Sorts a worker in.
+    /// Adds a worker.
     pub fn add(&mut self, id: WorkerId, worker: &Worker) {
         let load = worker.load();
         if worker.has_credit() {
@@ -38,7 +38,7 @@ impl WorkerLoadIndex {
         self.usable_speed += worker.usable_speed();
     }
 
-    /// Takes a worker out, as it was when it was added.
+    /// Removes a worker, which must be in the state in which it was added.
     pub fn remove(&mut self, id: WorkerId, worker: &Worker) {
         let load = worker.load();
         if worker.has_credit() {

@@ -1,4 +1,4 @@
-//! What goes into the engine and what comes out of it, as plain data.
+//! The engine's inputs and outputs, as plain data.
 
 use std::{
     fmt,
@@ -18,14 +18,14 @@ use evolution::{Genotype, Population};
 
 use super::NamePattern;
 
-/// What a job wants computed at once: every genotype on every trial.
+/// The genotypes and trials that a job evaluates at once: every genotype on every trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch {
-    /// Which worlds and noise the trials meet.
+    /// The trial set.
     pub trial_set: TrialSet,
     /// The genotypes, by individual.
     pub genotypes: Population,
-    /// What workers can draw the genotypes from by themselves, if they can.
+    /// The distribution from which workers can draw the genotypes themselves, if any.
     pub distribution: Option<Arc<[u8]>>,
     /// Trials per genotype: trials 0 to `n_trials` - 1 of the set.
     pub n_trials: u32,
@@ -62,7 +62,7 @@ impl Batch {
     }
 }
 
-/// What the shell has to do.
+/// A request to the shell.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
     /// Send a worker a message.
@@ -73,17 +73,17 @@ pub enum Command {
         worker: WorkerId,
         /// For the log and for the worker.
         reason: String,
-        /// Number of items that it held and that others will get.
+        /// Number of its items that go to other workers.
         n_items_requeued: usize,
     },
-    /// All results of a batch are there; the engine has forgotten the batch already.
+    /// A batch has all its results; the engine has forgotten the batch already.
     FinishBatch {
         /// The job whose batch it was.
         job: JobId,
         /// The results.
         evaluated: EvaluatedBatch,
     },
-    /// Have the referee evaluate an item, after those that it was asked for before, and report
+    /// Have the referee evaluate an item, after earlier questions, and report
     /// [`Engine::on_verdict`](super::Engine::on_verdict).
     AskReferee {
         /// Names this in the report.
@@ -91,20 +91,20 @@ pub enum Command {
         /// The item, with the specification of its job.
         request: RefereeRequest,
     },
-    /// An answer of the referee is not needed any more.
+    /// The engine no longer needs an answer of the referee.
     WithdrawQuestion {
         /// As given to [`Command::AskReferee`].
         question: QuestionId,
     },
-    /// A worker is proved faulty: it is given nothing until an operator says otherwise, and
-    /// this has to be remembered.
+    /// A worker is proved faulty. Store this: the worker gets no items until an operator readmits
+    /// it.
     Quarantine {
-        /// What it calls itself.
+        /// Its name.
         name: String,
         /// For people.
         reason: String,
     },
-    /// A job cannot go on; the engine has forgotten it already.
+    /// A job has failed; the engine has forgotten it already.
     FailJob {
         /// The job.
         job: JobId,
@@ -113,29 +113,29 @@ pub enum Command {
     },
 }
 
-/// What a worker is told.
+/// A message to a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ToWorker {
-    /// It is welcome under this id; from the shell.
+    /// Accepts the worker under this id. The shell creates this message.
     Welcome(WorkerId),
     /// A job's specification, as given to
     /// [`Engine::on_job_started`](super::Engine::on_job_started), before its first assignment.
     Spec(JobId, Arc<str>),
-    /// What a worker draws genotypes of a job's batch from, as given to
+    /// The distribution from which the worker draws genotypes of a job's batch, as given to
     /// [`Engine::on_batch_requested`](super::Engine::on_batch_requested).
     Distribution(JobId, Arc<[u8]>),
     /// Items of a job's batch.
     Assignments(Assignments),
-    /// Assignments whose results are not wanted any more, at least one.
+    /// Assignments whose results the engine no longer needs, at least one.
     Drop(Vec<AssignmentId>),
-    /// A job that the worker knows is over, or paused.
+    /// The end or pause of a job that the worker knows.
     End(JobId),
-    /// It is dropped; the text says why. From the shell.
+    /// The coordinator drops the worker; the text says why. The shell creates this message.
     Dropped(String),
 }
 
 impl ToWorker {
-    /// Bytes of what makes it long: a specification, or genes.
+    /// Bytes of the long parts: a specification, a distribution, or genes.
     pub fn payload_len(&self) -> usize {
         match self {
             Self::Spec(_, spec) => spec.len(),
@@ -149,12 +149,12 @@ impl ToWorker {
     }
 }
 
-/// Items of one batch that a worker computes.
+/// Items of one batch, assigned to one worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignments {
     /// The job whose batch it is.
     pub job: JobId,
-    /// Which worlds and noise the trials meet.
+    /// The trial set.
     pub trial_set: TrialSet,
     /// What the worker returns for a trial.
     pub output: Output,
@@ -210,94 +210,93 @@ impl fmt::Debug for SharedGenotype {
     }
 }
 
-/// What a worker returns for an assignment.
+/// A worker's result for an assignment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ItemResult {
     /// The assignment.
     pub id: AssignmentId,
-    /// The numbers of all its trials, one trial after the other, each as
-    /// [`Batch::output`] says; or why there are none.
+    /// The numbers of all its trials, one trial after the other, each as [`Batch::output`] says;
+    /// or the worker's failure message.
     pub outcome: Result<Vec<f64>, String>,
-    /// What the worker says that these numbers are.
+    /// The worker's statement of the kind of these numbers.
     pub output: Output,
-    /// Time that the worker says it computed.
+    /// The computing time that the worker reports.
     pub compute_time: Duration,
 }
 
 /// A batch with all its results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluatedBatch {
-    /// Which worlds and noise the trials met.
+    /// The trial set.
     pub trial_set: TrialSet,
-    /// Per individual the numbers of all its trials, one trial after the other:
+    /// For each individual, the numbers of all its trials, one trial after the other:
     /// [`Batch::values_per_trial`] each.
     pub values: Vec<Vec<f64>>,
     /// From the batch's start to its last result.
     pub duration: Duration,
     /// Workers connected at its end.
     pub n_workers: usize,
-    /// Share of the slots' time, 0 to 1, that did not go into results meanwhile.
+    /// Share of the slots' time, 0 to 1, that led to no results meanwhile.
     pub idle_share: f64,
     /// Items that a second worker computed to the same bits.
     pub n_audited: usize,
     /// Items that were to be audited while there was no second worker.
     pub n_unaudited: usize,
-    /// What the experiment's owner should know about its results.
+    /// Notices for the experiment's owner about the results.
     pub notices: Vec<String>,
 }
 
-/// Who a worker says it is.
+/// A worker's introduction of itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Introduction {
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Version of its software.
     pub version: String,
-    /// Items it computes at the same time.
+    /// Number of items that it computes at the same time.
     pub n_slots: usize,
-    /// The experiments that it takes.
+    /// Pattern for the names of the experiments whose items it takes.
     pub experiments: NamePattern,
-    /// Its process; the same when it comes back after its stream broke.
+    /// Identifies its process; unchanged if it reconnects after its stream broke.
     pub process: Option<NonZeroU64>,
 }
 
-/// A connected worker as people see it.
+/// A connected worker, for people.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkerStatus {
     /// Its connection.
     pub id: WorkerId,
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Version of its software.
     pub version: String,
-    /// Items it computes at the same time.
+    /// Number of items that it computes at the same time.
     pub n_slots: usize,
-    /// The experiments that it takes.
+    /// Pattern for the names of the experiments whose items it takes.
     pub experiments: NamePattern,
-    /// Assignments that it has not answered.
+    /// Number of assignments without a result.
     pub n_in_flight: usize,
     /// Results per second of about the last minute.
     pub results_per_s: f64,
-    /// Share of its slots' time, 0 to 1, that did not go into results in about the
-    /// last minute.
+    /// Share of its slots' time, 0 to 1, that led to no results in about the last minute.
     pub idle_share: f64,
-    /// Time since it introduced itself.
+    /// Time since its introduction.
     pub connected_for: Duration,
-    /// Time since its last sign of life.
+    /// Time since its last message.
     pub silent_for: Duration,
     /// Whether it wants no more items.
     pub is_draining: bool,
     /// Why it is in quarantine, if it is.
     pub quarantined: Option<String>,
-    /// Why it is given nothing for a while, if that is so.
+    /// Why it gets nothing for a while, if that is so.
     pub waits: Option<String>,
 }
 
-/// The fleet as a reader of logs sees it.
+/// The size of the fleet, for the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FleetSize {
-    /// Connected workers.
+    /// Number of connected workers.
     pub n_workers: usize,
-    /// Their slots.
+    /// Number of their slots.
     pub n_slots: usize,
 }

@@ -1,14 +1,13 @@
-//! Who computes what: a synchronous state machine.
+//! Schedules items on workers: a synchronous state machine.
 //!
-//! The shell calls a handler for everything that happens and then carries out the [`Command`]s
-//! that it collects with [`Engine::poll_command`]. Time is an argument; there is no I/O, no clock
-//! and no randomness, so a test can drive any fleet through any history.
+//! The shell calls a handler for every event, and then carries out the [`Command`]s that
+//! [`Engine::poll_command`] returns. Time is an argument; there is no I/O, no clock and no
+//! randomness, so a test can drive any fleet through any history.
 //!
 //! A *job* (`job.rs`) is an experiment or an evaluation. It has at most one *batch* (`batch.rs`)
-//! at a time: genotypes times trials of one trial set. A batch is computed as *items*
-//! (`item.rs`), each one genotype and a range of trials. An item given to a worker
-//! (`worker.rs`) is an *assignment*. Items go through these states
-//! (`ItemState`), in which `BatchInProgress` keeps them:
+//! at a time: genotypes times trials of one trial set. A batch consists of *items* (`item.rs`),
+//! each one genotype and a range of trials. An item given to a worker (`worker.rs`) is an
+//! *assignment*. `BatchInProgress` keeps every item in one of these states (`ItemState`):
 //!
 //! | from | to | when | in |
 //! |---|---|---|---|
@@ -18,17 +17,17 @@
 //! | assigned | queued | its worker leaves, falls silent, is faulty or stalls (`stalls.rs`); its job is paused; or another worker is free | `results.rs` (`retry`, `requeue`), `dispatch.rs` |
 //! | assigned | delayed | two workers are lost with copies of it at the same time | `results.rs` (`retry`) |
 //! | delayed | queued | the time is over | `results.rs` (`requeue_delayed`) |
-//! | any but done | held | a worker says that it fails, or workers are lost with it: the referee is asked | `trust/verdicts.rs` |
-//! | held | done, or queued | the referee has computed it, or knows nothing | `trust/verdicts.rs` |
+//! | any but done | held | a worker reports that it fails, or workers are lost while they compute it: the referee has to compute it | `trust/verdicts.rs` |
+//! | held | done, or queued | the referee has computed it, or could not | `trust/verdicts.rs` |
 //! | done | queued | its worker is proved faulty | `trust/verdicts.rs` (`discard`) |
 //!
-//! Beside this, slow items are assigned to further workers as *copies* (`dispatch.rs`), and a
-//! share of the done items is computed by a second worker as *audits* (`trust/`). A result
-//! counts by its place in the batch, and the first one for each place is kept. So who computes
-//! what, and how often, cannot change the results of a batch.
+//! Further workers get slow items as *copies* (`dispatch.rs`), and a second worker computes a
+//! share of the done items as *audits* (`trust/`). A result counts by its place in the batch, and
+//! the engine keeps the first one for each place. So the assignment of items to workers, and the
+//! number of computations, cannot change the results of a batch.
 //!
-//! Whether a worker is given items is its `Availability` (`availability.rs`).
-//! Trouble with workers is settled by proof (`trust/`), and never fails a job.
+//! A worker's `Availability` (`availability.rs`) says whether it gets items. Worker faults never
+//! fail a job: the referee's proofs settle them (`trust/`).
 
 mod activity;
 mod availability;
@@ -89,21 +88,21 @@ pub use timeline::{Fate, TimelineEntry};
 use trust::Trust;
 use worker::{AssignedItem, Worker};
 
-/// How an engine decides.
+/// The configuration of an engine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EngineConfig {
     /// A worker that is silent for this long loses its assignments.
     pub lease: Duration,
     /// Share of the individuals, 0 to 1, that two workers compute.
     pub audit_fraction: f64,
-    /// Whether items are split by trial when that keeps slots busy.
+    /// Whether to split items by trial where that keeps slots busy.
     pub split: bool,
-    /// Whether waiting items move to idle slots, and running ones are duplicated.
+    /// Whether to move waiting items to idle slots, and to duplicate items in progress.
     pub duplicate: bool,
 }
 
 impl EngineConfig {
-    /// Splits and duplicates, audits nothing.
+    /// The defaults: splits and duplicates items, without audits.
     pub fn new(lease: Duration) -> Self {
         Self { lease, audit_fraction: 0.0, split: true, duplicate: true }
     }
@@ -145,13 +144,12 @@ impl Engine {
         }
     }
 
-    /// The next thing to do, if any. Call until there is none after every
-    /// handler.
+    /// The next command, if any. Call it after every handler until it returns `None`.
     pub fn poll_command(&mut self) -> Option<Command> {
         self.commands.pop_front()
     }
 
-    /// Connected workers and slots.
+    /// Numbers of connected workers and slots.
     pub fn fleet_size(&self) -> FleetSize {
         FleetSize { n_workers: self.workers.len(), n_slots: self.fleet_time.n_slots() }
     }
@@ -187,8 +185,8 @@ impl Engine {
         id
     }
 
-    /// Jobs that only this worker takes, beside others that are there already, have saved up
-    /// no time meanwhile.
+    /// Renews the virtual time of jobs that had to wait for this worker, so that they have saved
+    /// up no time.
     fn take_up_stranded(&mut self, joining: &Worker) {
         if self.workers.is_empty() {
             return;
@@ -204,14 +202,14 @@ impl Engine {
         }
     }
 
-    /// A worker's stream has ended. Its items go to others; returns their number.
+    /// A worker's stream has ended. Its items go to other workers; returns their number.
     pub fn on_worker_left(&mut self, now: Instant, id: WorkerId) -> usize {
         let n_items_requeued = self.forget_worker(now, id, true);
         self.assign(now);
         n_items_requeued
     }
 
-    /// A worker is alive.
+    /// A worker has sent a sign of life.
     pub fn on_heartbeat(&mut self, now: Instant, id: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.last_heard = now;
@@ -236,8 +234,8 @@ impl Engine {
         self.assign(now);
     }
 
-    /// A job exists. `name`: which workers take it, by their patterns. `spec`: what workers
-    /// need beside its items.
+    /// A job starts. `name`: compared with the workers' patterns. `spec`: the specification,
+    /// which all its items share.
     pub fn on_job_started(
         &mut self,
         id: JobId,
@@ -248,7 +246,7 @@ impl Engine {
         self.jobs.insert(id, JobWork::new(name, spec, priority));
     }
 
-    /// A job wants a batch computed. It has no other meanwhile.
+    /// A job requests a batch. It has no other batch in progress.
     pub fn on_batch_requested(&mut self, now: Instant, id: JobId, batch: Batch) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         assert!(work.batch.is_none(), "one batch at a time");
@@ -258,8 +256,7 @@ impl Engine {
         self.assign(now);
     }
 
-    /// A job waits until it is resumed. Its assignments are taken back; results are
-    /// kept.
+    /// A job is paused. The engine takes its assignments back and keeps its results.
     pub fn on_job_paused(&mut self, now: Instant, id: JobId) {
         self.pause(now, id);
         self.assign(now);
@@ -281,18 +278,18 @@ impl Engine {
         }
     }
 
-    /// A job is over, for whatever reason.
+    /// A job has ended, for any reason.
     pub fn on_job_ended(&mut self, now: Instant, id: JobId) {
         self.forget_job(now, id);
         self.assign(now);
     }
 
-    /// Time has passed. Call several times per lease, and as often as late work
-    /// should be noticed.
+    /// Time has passed. Call it several times per lease, and as often as the engine should look
+    /// for late work.
     pub fn on_tick(&mut self, now: Instant) {
         let lease = self.config.lease;
-        // If the coordinator itself has paused (a suspended laptop, a debugger),
-        // that is not its workers' silence.
+        // If the coordinator itself was paused (a suspended laptop, a debugger), its workers were
+        // not silent.
         let pause = now.saturating_duration_since(mem::replace(&mut self.last_tick, now));
         if pause > lease / 2 {
             self.workers.values_mut().for_each(|worker| worker.last_heard += pause);
@@ -304,7 +301,7 @@ impl Engine {
             .map(|(&id, _)| id)
             .collect();
         for id in silent {
-            // Silence is the network's fault, or a pause's, not an item's.
+            // The network or a pause explains silence; no item is to blame.
             let reason = format!("silent for {} s", lease.as_secs_f64());
             let n_items_requeued = self.forget_worker(now, id, false);
             self.commands.push_back(Command::Disconnect { worker: id, reason, n_items_requeued });
@@ -322,7 +319,7 @@ impl Engine {
         self.workers.values().any(Worker::is_usable)
     }
 
-    /// Gives items again to workers that have waited for long enough, or that are all there is.
+    /// Ends the rest of workers that have rested long enough, or that are the only ones.
     fn wake_rested(&mut self, now: Instant) {
         let is_needed = !self.has_usable_worker();
         let resting = self.workers.iter().filter(|(_, worker)| {
@@ -334,21 +331,21 @@ impl Engine {
         }
     }
 
-    /// Gives a job a turn if it has something to hand out, and else none.
+    /// Adds a job to the ready queue if it has queued items, otherwise removes it.
     fn update_readiness(&mut self, id: JobId) {
         if let Some(work) = self.jobs.get_mut(&id) {
             self.ready_queue.update(id, work);
         }
     }
 
-    /// Replaces what a job was charged for an item by the time that the item took.
+    /// Replaces a job's charge for an item by the item's real duration.
     fn correct_charge(&mut self, id: JobId, charged: Duration, real: Duration) {
         if let Some(work) = self.jobs.get_mut(&id) {
             self.ready_queue.correct_charge(id, work, charged, real);
         }
     }
 
-    /// `is_evidence`: whether the items that the worker was computing may have taken it down.
+    /// Forgets a worker. `is_evidence`: whether its items in progress may have taken it down.
     fn forget_worker(&mut self, now: Instant, id: WorkerId, is_evidence: bool) -> usize {
         let Some(worker) = self.workers.remove(&id) else { return 0 };
         if worker.obstacles.is_draining {
@@ -359,8 +356,8 @@ impl Engine {
         }
         self.load_index.remove(id, &worker);
         self.fleet_time.set_slots(now, self.fleet_time.n_slots() - worker.n_slots());
-        // Only what it was computing can have taken it down: its oldest items,
-        // one per slot. A worker that said goodbye was not taken down.
+        // Only items in progress can have taken it down: its oldest ones, one per slot. A worker
+        // that said goodbye was not taken down.
         let n_items = worker.in_flight.len();
         let n_computing = n_items - worker.n_waiting();
         let is_evidence = is_evidence && !worker.obstacles.is_draining;
@@ -403,7 +400,7 @@ impl Engine {
         }
     }
 
-    /// Takes a job away from all workers; its items wait again.
+    /// Takes a job's items back from all workers, and queues them.
     fn withdraw(&mut self, now: Instant, id: JobId) {
         let mut audits = Vec::new();
         for (&worker_id, worker) in &mut self.workers {
@@ -418,7 +415,7 @@ impl Engine {
                     self.timeline.add(now, who, item, Fate::TakenBack, Duration::ZERO);
                 }
                 audits.extend(ours.into_iter().filter(|(_, a)| a.is_audit()).map(|(_, a)| a.item));
-                // Nothing is left that it could answer.
+                // The worker has no assignment of the job left.
                 worker.obstacles.is_stalled &= !worker.written_off.is_empty();
                 self.load_index.add(worker_id, worker);
                 self.commands.push_back(Command::Send(worker_id, ToWorker::End(id)));
@@ -431,27 +428,29 @@ impl Engine {
         self.update_readiness(id);
     }
 
-    /// The batch that a job computes at present.
+    /// The batch of a job in progress.
     fn batch(&self, id: JobId) -> Option<&BatchInProgress> {
         self.jobs.get(&id)?.batch.as_ref()
     }
 
-    /// The batch that a job computes at present.
+    /// The batch of a job in progress.
     fn batch_mut(&mut self, id: JobId) -> Option<&mut BatchInProgress> {
         self.jobs.get_mut(&id)?.batch.as_mut()
     }
 
-    /// The same, if it is that of a trial set: else that one is over.
+    /// The batch of a job in progress, if it has this trial set; otherwise the batch of that
+    /// trial set has ended.
     fn batch_with(&self, id: JobId, trial_set: TrialSet) -> Option<&BatchInProgress> {
         self.batch(id).filter(|batch| batch.request.trial_set == trial_set)
     }
 
-    /// The same, if it is that of a trial set: else that one is over.
+    /// The batch of a job in progress, if it has this trial set; otherwise the batch of that
+    /// trial set has ended.
     fn batch_with_mut(&mut self, id: JobId, trial_set: TrialSet) -> Option<&mut BatchInProgress> {
         self.batch_mut(id).filter(|batch| batch.request.trial_set == trial_set)
     }
 
-    /// Changes a worker; none if it has left.
+    /// Changes a worker and updates the load index; `None` if the worker has left.
     fn update_worker<T>(
         &mut self,
         id: WorkerId,

@@ -1,4 +1,4 @@
-//! Which experiments a worker takes.
+//! Patterns for the names of experiments, by which a worker chooses them.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use wildmatch::WildMatch;
 pub struct NamePattern(Option<WildMatch>);
 
 impl NamePattern {
-    /// The pattern that is written so.
+    /// Parses a pattern.
     pub fn new(text: &str) -> Self {
         Self((!text.is_empty()).then(|| WildMatch::new(text)))
     }

@@ -1,4 +1,4 @@
-//! Messages to workers that are being put together while items are assigned.
+//! Collects messages to workers while the engine assigns items.
 
 use std::{collections::BTreeMap, mem, sync::Arc};
 
@@ -13,8 +13,8 @@ const DISTRIBUTION_LEN_MAX: usize = 16 << 20;
 #[derive(Debug, Default)]
 pub struct Outgoing {
     recalled: BTreeMap<WorkerId, Vec<AssignmentId>>,
-    /// In the order given, so that what a worker computes first is what [`InFlight`] has as its
-    /// oldest: a loss is blamed on that.
+    /// In the order of assignment, so that a worker first computes the items that are oldest in
+    /// [`InFlight`]; a loss is blamed on these.
     ///
     /// [`InFlight`]: super::in_flight::InFlight
     assignments: BTreeMap<WorkerId, Vec<Assignments>>,
@@ -45,7 +45,7 @@ impl Outgoing {
 }
 
 impl Engine {
-    /// Turns what has been put together into commands.
+    /// Turns the collected messages into commands.
     pub(super) fn send(&mut self) {
         let Outgoing { recalled, assignments } = mem::take(&mut self.outgoing);
         for (worker, assignments) in recalled {
@@ -74,9 +74,9 @@ impl Engine {
         self.commands.push_back(Command::Send(worker, message));
     }
 
-    /// Has a worker draw the genotypes of its assignments where that is possible, if it has
-    /// the distribution, or if that is shorter than the genotypes that it is expected to be
-    /// given of the batch; else has them sent.
+    /// Decides whether a worker draws the genotypes of its assignments or receives them. It draws
+    /// them if it has the distribution already, or if the distribution is shorter than the
+    /// genotypes that it will probably get of the batch.
     fn choose_way(&mut self, id: WorkerId, job: JobId, assignments: &mut [Assignment]) {
         let drawn: Vec<&mut Assignment> =
             assignments.iter_mut().filter(|assignment| assignment.is_drawn).collect();

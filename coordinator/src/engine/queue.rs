@@ -1,4 +1,4 @@
-//! Items that wait for a worker, in the order in which they are given out.
+//! Items that wait for a worker, in the order of assignment.
 
 use std::{
     collections::{VecDeque, vec_deque},
@@ -7,7 +7,7 @@ use std::{
 
 use super::item::Item;
 
-/// Items, and how many trials they have.
+/// Queued items, and the sum of their trials.
 #[derive(Debug, Default)]
 pub struct Queue {
     items: VecDeque<Item>,
@@ -15,17 +15,17 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Items.
+    /// Number of items.
     pub fn len(&self) -> usize {
         self.items.len()
     }
 
-    /// Whether nothing waits.
+    /// Whether the queue is empty.
     pub fn is_empty(&self) -> bool {
         self.items.is_empty()
     }
 
-    /// Trials of all items.
+    /// Number of trials of all items.
     pub fn n_trials(&self) -> usize {
         self.n_trials
     }
@@ -35,13 +35,13 @@ impl Queue {
         self.items.iter()
     }
 
-    /// Adds an item before all others.
+    /// Adds an item at the front.
     pub fn push_front(&mut self, item: Item) {
         self.n_trials += item.trials.len();
         self.items.push_front(item);
     }
 
-    /// Adds an item behind all others.
+    /// Adds an item at the back.
     pub fn push_back(&mut self, item: Item) {
         self.n_trials += item.trials.len();
         self.items.push_back(item);
@@ -52,7 +52,8 @@ impl Queue {
         *self = mem::take(&mut self.items).into_iter().flat_map(parts).collect();
     }
 
-    /// Takes at most `n_trials` trials, the first ones, of the first item. The rest is first then.
+    /// Takes at most `n_trials` trials from the beginning of the first item. The remainder stays
+    /// at the front.
     pub fn pop_front(&mut self, n_trials: usize) -> Option<Item> {
         let item = self.items.pop_front()?;
         let (item, rest) = self.split(item, n_trials);
@@ -62,9 +63,9 @@ impl Queue {
         Some(item)
     }
 
-    /// The same, but rests wait until no item of `whole` trials is first, and the last rest is
-    /// taken first then: whoever is given whole items does not get them in pieces, each a call of
-    /// its own.
+    /// Like [`Self::pop_front`], but remainders wait until no item of `whole` trials is first;
+    /// then the last remainder comes first. A worker that gets whole items then does not get them
+    /// in pieces, each a call of its own.
     pub fn pop_whole_first(&mut self, n_trials: usize, whole: usize) -> Option<Item> {
         let is_whole = self.items.front()?.trials.len() == whole;
         let item = if is_whole { self.items.pop_front() } else { self.items.pop_back() }?;
@@ -73,7 +74,7 @@ impl Queue {
         Some(item)
     }
 
-    /// At most `n_trials` trials, the first ones, of an item that was taken out, and the rest.
+    /// Splits an item that was taken out: at most its first `n_trials` trials, and the remainder.
     fn split(&mut self, mut item: Item, n_trials: usize) -> (Item, Option<Item>) {
         let mut rest = None;
         if n_trials < item.trials.len() {

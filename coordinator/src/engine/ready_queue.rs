@@ -2,8 +2,8 @@
 //! Scheduling: Deterministic Proportional-Share Resource Management", MIT/LCS/TM-528, 1995).
 //!
 //! A job's *virtual time* grows by the workers' time that it gets, divided by its priority, and
-//! the job with the least virtual time comes first. A job that had nothing to hand out starts
-//! again at the present virtual time, so that nobody saves up time.
+//! the job with the least virtual time comes first. A job that had no queued items starts again
+//! at the present virtual time, so that no job saves up time.
 
 use std::{collections::BTreeSet, time::Duration};
 
@@ -11,32 +11,32 @@ use crate::ids::JobId;
 
 use super::job::JobWork;
 
-/// The jobs with something to hand out.
+/// The jobs with queued items.
 #[derive(Debug, Default)]
 pub struct ReadyQueue {
-    /// By virtual time.
+    /// Sorted by virtual time.
     ready: BTreeSet<(u128, JobId)>,
-    /// The present virtual time: that of the job that was given workers last.
+    /// The present virtual time: that of the job whose item was assigned last.
     now: u128,
 }
 
 impl ReadyQueue {
-    /// The jobs, the one whose turn it is first.
+    /// The jobs, the next one first.
     pub fn iter(&self) -> impl Iterator<Item = JobId> {
         self.ready.iter().map(|&(_, id)| id)
     }
 
-    /// How many there are.
+    /// Number of jobs.
     pub fn len(&self) -> usize {
         self.ready.len()
     }
 
-    /// Whether a job is among them.
+    /// Whether a job is in the queue.
     pub fn has(&self, id: JobId, work: &JobWork) -> bool {
         self.ready.contains(&(work.virtual_time, id))
     }
 
-    /// Sorts a job in or out, depending on whether it has something to hand out.
+    /// Adds or removes a job, depending on whether it has queued items.
     pub fn update(&mut self, id: JobId, work: &mut JobWork) {
         if !work.is_ready() {
             self.ready.remove(&(work.virtual_time, id));
@@ -46,20 +46,21 @@ impl ReadyQueue {
         }
     }
 
-    /// A job has waited for a worker that takes it: it has saved up no time meanwhile.
+    /// Moves a job that waited for a suitable worker to the present virtual time, so that it has
+    /// saved up none.
     pub fn renew(&mut self, id: JobId, work: &mut JobWork) {
         self.ready.remove(&(work.virtual_time, id));
         self.update(id, work);
     }
 
-    /// It is a job's turn, and it is charged for the workers' time that its item should take.
+    /// Charges a job, whose turn it is, for the expected duration of its item.
     pub fn charge(&mut self, id: JobId, work: &mut JobWork, time: Duration) {
         self.now = self.now.max(work.virtual_time);
         self.correct_charge(id, work, Duration::ZERO, time);
         self.update(id, work);
     }
 
-    /// Replaces a charge by the time that the item took.
+    /// Replaces a charge by the real duration of the item.
     pub fn correct_charge(
         &mut self,
         id: JobId,

@@ -1,4 +1,4 @@
-//! What becomes of results, and of work that gave none.
+//! Handles results, and assignments that end without one.
 
 use std::{
     num::NonZeroU64,
@@ -18,19 +18,20 @@ use super::{
     worker::{AssignedItem, Source, Worker},
 };
 
-/// Why an item has no result yet.
+/// Why an assignment ended without a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoResult {
-    /// It was taken back, or has to be done by somebody else.
+    /// It was taken back, or another worker has to compute it.
     TakenBack,
-    /// Its worker was lost while it computed it, and `is_alone` nothing else.
+    /// Its worker was lost during the computation. `is_alone`: whether the worker was computing
+    /// nothing else.
     WorkerLost { process: Option<NonZeroU64>, is_alone: bool },
 }
 
 impl Engine {
-    /// A worker has answered an assignment that it has, or had when it was written off; or one
-    /// that was taken back from it. Another answer does no harm: the job has ended meanwhile,
-    /// or the worker makes items up.
+    /// A worker has answered an assignment: one that it has, one that it had when it was written
+    /// off, or one that was taken back. Any other answer is ignored: its job has ended meanwhile,
+    /// or the worker invents items.
     pub(super) fn on_result(&mut self, now: Instant, id: WorkerId, result: ItemResult) {
         let Some(worker) = self.workers.get(&id) else { return };
         let in_flight = worker.in_flight.get(&result.id);
@@ -63,7 +64,7 @@ impl Engine {
         }
     }
 
-    /// Why a result is not one that a worker in order returns for an assignment.
+    /// Why a correct worker cannot return this result for an assignment, if so.
     fn impossibility(&self, assignment: &AssignedItem, result: &ItemResult) -> Option<String> {
         let batch = self.batch(assignment.job)?;
         let values = result.outcome.as_ref().ok()?;
@@ -79,7 +80,7 @@ impl Engine {
         })
     }
 
-    /// Another's result came first, but this one is here, so they are compared.
+    /// Compares the result of a recalled assignment with the earlier result of another worker.
     fn compare_recalled(&mut self, now: Instant, id: WorkerId, result: &ItemResult) {
         let worker = self.workers.get_mut(&id);
         let recalled = worker.and_then(|worker| worker.take_recalled(result.id));
@@ -93,9 +94,9 @@ impl Engine {
         }
     }
 
-    /// Ends an assignment that is answered, and learns how long things take, and that its
-    /// worker is at work; returns the assignment and how long it took, as far as that can
-    /// be true. One change of the worker, as this is done for every result.
+    /// Ends an answered assignment, and learns from its duration. Returns the assignment and its
+    /// plausible duration. All of this is one update of the worker, because it happens for every
+    /// result.
     fn end_assignment(
         &mut self,
         now: Instant,
@@ -130,8 +131,8 @@ impl Engine {
         Some((assignment, busy))
     }
 
-    /// Takes the values of an assignment, or finds that another worker's differ. `is_late`: others
-    /// have been given the item meanwhile.
+    /// Accepts the values of an assignment, or finds that another worker's differ. `is_late`:
+    /// whether other workers have got the item meanwhile.
     fn accept(
         &mut self,
         now: Instant,
@@ -157,13 +158,13 @@ impl Engine {
         if is_late && is_audit {
             return;
         }
-        // What was to be audited may have been discarded meanwhile.
+        // The audited values may have been discarded meanwhile.
         let n_new = self.take_values(now, job, id, item, values, is_late || is_audit);
         if is_audit && n_new == 0 {
             let auditor = self.party(id).name;
             let Some(batch) = self.batch_mut(job) else { return };
             if batch.computed_by(item) == Some(&auditor) {
-                // What it was to audit is gone, and its own value in the place.
+                // The audited value is gone, and the audit's own value takes its place.
                 batch.push_audit(item);
             } else {
                 batch.count_audited(item, auditor);
@@ -173,8 +174,8 @@ impl Engine {
         self.finish_if_evaluated(now, job);
     }
 
-    /// Takes the values of those trials that have none; returns the number of these.
-    /// `may_be_queued`: whether the item may be waiting for another worker.
+    /// Accepts the values of trials that have none; returns the number of these trials.
+    /// `may_be_queued`: whether the item may wait for another worker.
     pub(super) fn take_values(
         &mut self,
         now: Instant,
@@ -187,7 +188,7 @@ impl Engine {
         let is_audited = self.is_audited(job, item);
         let Some(work) = self.jobs.get_mut(&job) else { return 0 };
         let Some(batch) = &mut work.batch else { return 0 };
-        // The referee is nobody's name.
+        // The referee has no worker's name.
         let name = self.workers.get(&id).map_or("", Worker::name);
         let new = if is_audited {
             batch.parts(item, |state| state != ItemState::Done)
@@ -207,7 +208,7 @@ impl Engine {
         n_new
     }
 
-    /// Finishes batches whose last audits no worker can do any more.
+    /// Finishes batches whose last audits no connected worker can do.
     pub(super) fn finish_waived(&mut self, now: Instant) {
         let known = |batch: &BatchInProgress| batch.is_known_throughout();
         let waiting: Vec<JobId> = self
@@ -221,17 +222,16 @@ impl Engine {
         }
     }
 
-    /// Reports a batch of which nothing is left to do. An audit for which
-    /// there is no second worker, and has been none for a while, is waived, and counted as
-    /// such.
+    /// Reports a batch that has no work left. If there has been no second worker for a while, the
+    /// engine waives the remaining audits, and counts them.
     pub(super) fn finish_if_evaluated(&mut self, now: Instant, id: JobId) {
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = work.batch.as_ref().filter(|_| !work.is_paused) else { return };
         let is_in_grace = self.trust.awaits_auditor(now);
         let (workers, job) = (&self.workers, &*work);
         let has_auditor = |batch: &BatchInProgress| {
-            // Of a fleet that is divided among experiments, auditors that have been seen may be
-            // another's.
+            // In a fleet that is divided among experiments, the auditors seen last may not take
+            // this one.
             let is_awaited = is_in_grace && workers.values().all(|worker| worker.takes(job));
             let mut auditors =
                 workers.values().filter(|worker| worker.may_audit() && worker.takes(job));
@@ -258,14 +258,14 @@ impl Engine {
         self.withdraw_questions(id, |question| matches!(question.doubt, Doubt::Losses));
     }
 
-    /// Queues an item again that gave no result.
+    /// Queues an item again after an assignment without a result.
     pub(super) fn retry(&mut self, now: Instant, assignment: AssignedItem, why: NoResult) {
         let AssignedItem { job: id, item, source, .. } = assignment;
         let Some(work) = self.jobs.get_mut(&id) else { return };
         let Some(batch) = &mut work.batch else { return };
         self.counters.n_items_requeued += 1;
         if source == Source::Audits {
-            // It may have been the second worker that made an audit possible.
+            // The lost worker may have been the only possible auditor.
             batch.push_audit(&item);
             self.update_readiness(id);
             return;
@@ -285,7 +285,8 @@ impl Engine {
         }
     }
 
-    /// Others have what a lost worker was computing, but it may have taken the worker down.
+    /// A worker was lost after it was written off. Other workers have its items already, but an
+    /// item may have taken the worker down.
     pub(super) fn on_written_off_lost(
         &mut self,
         now: Instant,
@@ -303,7 +304,7 @@ impl Engine {
         }
     }
 
-    /// Queues items that had to wait for a while.
+    /// Queues delayed items whose time has come.
     pub(super) fn requeue_delayed(&mut self, now: Instant) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
@@ -314,8 +315,8 @@ impl Engine {
         }
     }
 
-    /// Queues what no other worker computes of an item, before all others, and lets
-    /// what others compute of it be duplicated again.
+    /// Queues the parts of an item that no other worker computes, ahead of all other items. Parts
+    /// that other workers compute may get duplicates again.
     pub(super) fn requeue(&mut self, id: JobId, item: &Item) {
         let Some(batch) = self.jobs.get_mut(&id).and_then(|work| work.batch.as_mut()) else {
             return;
@@ -333,7 +334,7 @@ impl Engine {
         self.update_readiness(id);
     }
 
-    /// An item fails wherever it is computed.
+    /// Fails the job of an item that fails wherever it is computed.
     pub(super) fn fail(&mut self, now: Instant, id: JobId, item: &Item, failure: &str) {
         let Some(batch) = self.batch_mut(id) else { return };
         let reason = format!(

@@ -1,4 +1,4 @@
-//! What is always true of an engine between two events.
+//! The invariants of an engine between two events.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use super::{
 };
 
 impl Engine {
-    /// Panics if the state contradicts itself. For tests: it looks at everything.
+    /// Panics if the state contradicts itself. For tests: it is slow, because it checks
+    /// everything.
     pub fn sanity_check(&self) {
         let mut load_index = WorkerLoadIndex::default();
         let mut in_flight: BTreeMap<JobId, BTreeMap<_, _>> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Workers that say that they are alive and finish nothing.
+//! Finds workers that send heartbeats but no results.
 
 use std::time::{Duration, Instant};
 
@@ -6,14 +6,14 @@ use crate::ids::WorkerId;
 
 use super::{Engine, results::NoResult, worker::Worker};
 
-/// A worker is stalled after so many times the time that its oldest item should take, and so
-/// much longer.
+/// A worker is stalled if its oldest item takes this many times its expected duration, plus this
+/// time.
 const PATIENCE: (u32, Duration) = (4, Duration::from_secs(1));
-/// The same, if that item is an audit that no other worker can do: it would be waived.
+/// The same for an audit that no other worker can do, and that the engine would have to waive.
 const PATIENCE_WITH_AUDITOR: (u32, Duration) = (40, Duration::from_secs(10));
 
 impl Engine {
-    /// Gives what stalled workers have to others.
+    /// Gives the items of stalled workers to others.
     pub(super) fn write_off_stalled(&mut self, now: Instant) {
         let mut idle = self
             .workers
@@ -31,7 +31,7 @@ impl Engine {
         let n = latest.len().min(2);
         latest.select_nth_unstable_by_key(n - 1, |&latest| std::cmp::Reverse(latest));
         latest.truncate(n);
-        // Or could have: they have nothing to do.
+        // Idle workers count, too: they could have returned something.
         let others_since =
             |id, since| has_idle || latest.iter().any(|&(at, other)| other != id && at > since);
         let stalled: Vec<WorkerId> = self
@@ -48,8 +48,8 @@ impl Engine {
         }
     }
 
-    /// Since when a worker should have returned something, and until when that is no
-    /// trouble.
+    /// The time of a worker's last progress, and the deadline after which the worker counts as
+    /// stalled.
     fn deadline(&self, id: WorkerId, worker: &Worker) -> Option<(Instant, Instant)> {
         let (_, oldest) = worker.in_flight.first_key_value()?;
         let since = worker.last_result.map_or(oldest.assigned, |at| at.max(oldest.assigned));
@@ -67,8 +67,8 @@ impl Engine {
         Some((since, since + takes * times + more))
     }
 
-    /// A worker gets nothing until it returns something. What waits in it is taken back, and
-    /// what it should be computing is given to others as well.
+    /// Marks a worker as stalled: it gets no items until it returns a result. The engine takes
+    /// its waiting items back, and gives copies of its items in progress to others.
     fn write_off(&mut self, now: Instant, id: WorkerId) {
         self.counters.n_workers_stalled += 1;
         self.update_worker(id, |worker| worker.obstacles.is_stalled = true);

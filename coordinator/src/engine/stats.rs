@@ -1,4 +1,4 @@
-//! What the engine has done, and what it has to do, as numbers.
+//! Statistics of the engine's past and pending work.
 
 use std::time::Instant;
 
@@ -6,72 +6,72 @@ use crate::ids::JobId;
 
 use super::{Engine, availability::Availability, batch::BatchInProgress};
 
-/// What has happened since the engine began.
+/// Counts of events since the engine began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
-    /// Workers that joined; one that comes back counts again.
+    /// Workers that joined; a worker that reconnects counts again.
     pub n_workers_joined: u64,
-    /// Workers that left after they had said so.
+    /// Workers that announced that they leave, and left.
     pub n_workers_left: u64,
-    /// Workers that left otherwise, or were dropped.
+    /// Workers that left without announcing it, or were dropped.
     pub n_workers_lost: u64,
-    /// Items given to workers.
+    /// Assignments to workers.
     pub n_items_assigned: u64,
-    /// Items that gave fitness, wanted or not.
+    /// Items that workers returned values for, needed or not.
     pub n_items_computed: u64,
     /// Items that a worker could not compute.
     pub n_items_failed: u64,
-    /// Items that were given back, or taken away from a worker that is lost or not
-    /// trusted, without a result.
+    /// Items without a result that workers returned, or that were taken from a lost or distrusted
+    /// worker.
     pub n_items_requeued: u64,
-    /// Items taken back from a worker because another has the result, or has time.
+    /// Items taken back from a worker because another has the result, or a free slot.
     pub n_items_recalled: u64,
     /// Trials whose fitness became known.
     pub n_episodes: u64,
     /// Workers that were proved faulty.
     pub n_workers_quarantined: u64,
-    /// Times that a worker finished nothing for long while others did.
+    /// How often a worker returned nothing for a long time while others did.
     pub n_workers_stalled: u64,
-    /// Items that the referee was asked about.
+    /// Questions for the referee.
     pub n_questions: u64,
 }
 
-/// The fleet in numbers.
+/// Statistics of the fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FleetStats {
-    /// What has happened.
+    /// Counts of past events.
     pub counters: Counters,
-    /// Connected workers that are given work.
+    /// Connected workers that get items.
     pub n_workers_available: usize,
-    /// Connected workers that want no more.
+    /// Connected workers that want no more items.
     pub n_workers_draining: usize,
-    /// Connected workers that are given nothing for a while.
+    /// Connected workers that get nothing for a while.
     pub n_workers_waiting: usize,
     /// Connected workers in quarantine.
     pub n_workers_quarantined: usize,
     /// Slots of all connected workers.
     pub n_slots: usize,
-    /// Time that slots have existed, s.
+    /// Time that slots have existed, summed over slots, s.
     pub slot_time_s: f64,
-    /// Part of it that went into results, s.
+    /// Part of `slot_time_s` that led to results, s.
     pub busy_time_s: f64,
 }
 
-/// A job's work in numbers.
+/// Statistics of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct JobStats {
-    /// Whether it waits to be resumed.
+    /// Whether it is paused.
     pub is_paused: bool,
     /// Items that wait for a worker; none while it is paused.
     pub n_items_queued: usize,
-    /// Items that workers have; an item that several compute counts as many times.
+    /// Items that workers have; every copy of an item counts.
     pub n_items_in_flight: usize,
-    /// Trials whose results became known since the engine has known the job.
+    /// Trials whose results became known since the job started in this engine.
     pub n_episodes: u64,
 }
 
 impl Engine {
-    /// The fleet in numbers.
+    /// Statistics of the fleet.
     pub fn fleet_stats(&self, now: Instant) -> FleetStats {
         let mut fleet_time = self.fleet_time;
         fleet_time.advance(now);
@@ -98,7 +98,7 @@ impl Engine {
         }
     }
 
-    /// A job's work in numbers; zeros if it has ended.
+    /// Statistics of a job; zeros if it has ended.
     pub fn job_stats(&self, id: JobId) -> JobStats {
         let Some(work) = self.jobs.get(&id) else { return JobStats::default() };
         let count = |number: fn(&BatchInProgress) -> usize| work.batch.as_ref().map_or(0, number);

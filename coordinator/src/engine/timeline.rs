@@ -1,5 +1,5 @@
-//! Who computed what lately: assignments that have ended, as many as there is room for, and
-//! those that have not.
+//! Records the recent work of every worker: a limited number of ended assignments, and all that
+//! have not ended.
 
 use std::{
     collections::VecDeque,
@@ -18,22 +18,22 @@ use super::{
     worker::{AssignedItem, Worker},
 };
 
-/// Assignments that are remembered after their end.
+/// Number of ended assignments to keep.
 const ENDED_MAX: usize = 2048;
-/// Those without a result that are remembered beside them: they are rare, and what people
-/// look for.
+/// Number of ended assignments without a result to keep as well: they are rare, and people look
+/// for them.
 const BROKEN_MAX: usize = 256;
-/// Unanswered assignments in one answer, the oldest first.
+/// Most unanswered assignments in one timeline; the oldest come first.
 const UNANSWERED_MAX: usize = 2048;
 
-/// What has become of an assignment.
+/// The outcome of an assignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
     /// The worker has it, and has not answered.
     Unanswered,
     /// The worker has returned its values.
     Computed,
-    /// Its result was not needed any more, or another worker was to compute it.
+    /// The engine took it back: it no longer needed the result, or had another worker compute it.
     TakenBack,
     /// The worker reported that it cannot be computed.
     Failed,
@@ -41,28 +41,28 @@ pub enum Fate {
     Lost,
 }
 
-/// An assignment as people see it.
+/// An assignment, for people.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimelineEntry {
     /// The connection of the worker that had it.
     pub worker: WorkerId,
-    /// What the worker calls itself.
+    /// The worker's name.
     pub name: Arc<str>,
-    /// The job that it is of.
+    /// Its job.
     pub job: JobId,
-    /// The trial set of the batch that it is of.
+    /// The trial set of its batch.
     pub trial_set: TrialSet,
     /// Index of the individual among the batch's genotypes.
     pub individual: u32,
     /// The trials.
     pub trials: Range<u32>,
-    /// Time since the worker was sent it.
+    /// Time since its assignment.
     pub assigned_for: Duration,
     /// Time since its end; zero if it has not ended.
     pub ended_for: Duration,
-    /// For how long the worker computed it; zero unless there is a result.
+    /// The worker's computing time; zero without a result.
     pub busy: Duration,
-    /// What has become of it.
+    /// Its outcome.
     pub fate: Fate,
 }
 
@@ -85,7 +85,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// Remembers an assignment that has ended. `busy`: how long it was computed.
+    /// Records an ended assignment. `busy`: its computing time.
     pub fn add(
         &mut self,
         now: Instant,
@@ -107,14 +107,14 @@ impl Timeline {
 }
 
 impl TimelineEntry {
-    /// What it is a part of, in messages.
+    /// The name of its batch in messages.
     pub fn batch(&self) -> String {
         format!("{}, {}", self.job, name_of(self.trial_set))
     }
 }
 
 impl Engine {
-    /// The assignments of lately. Those that gave no result are remembered for longest.
+    /// The recent assignments. Those without a result are kept for longest.
     pub fn timeline(&self, now: Instant) -> Vec<TimelineEntry> {
         let Timeline { ended, broken } = &self.timeline;
         let of_ended = |ended: &Ended| {

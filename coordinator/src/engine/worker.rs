@@ -20,43 +20,43 @@ use super::{
     job::JobWork,
 };
 
-/// A worker is given so much work ahead, so that it computes while results and
-/// new items travel: longer than a round trip and the coordinator's own delays.
+/// Work ahead per worker, so that it computes while results and new items travel: longer than a
+/// round trip and the coordinator's own delays.
 const WORK_AHEAD: Duration = Duration::from_millis(50);
-/// [`Worker::load`] of a worker with as many items as slots.
+/// The [`Worker::load`] of a worker with as many items as slots.
 pub const FULL_LOAD: u64 = 1 << 20;
 
-/// [`Worker::usable_speed`] of a slot of pace 1.
+/// The [`Worker::usable_speed`] of a slot of pace 1.
 pub const SPEED_UNIT: u64 = 1 << 10;
 
 /// A connected worker.
 #[derive(Debug)]
 pub struct Worker {
-    /// Who it is.
+    /// Its introduction.
     pub introduction: Introduction,
-    /// What it calls itself, for those who remember it after it is gone.
+    /// Its name, shared with records that outlive the connection.
     pub shared_name: Arc<str>,
-    /// When it last gave a sign of life.
+    /// Time of its last message.
     pub last_heard: Instant,
-    /// What keeps items from it.
+    /// The reasons why it gets no items.
     pub obstacles: Obstacles,
-    /// When it last returned something.
+    /// Time of its last result.
     pub last_result: Option<Instant>,
     /// Jobs whose specification it has, each with the trial set of the batch whose
     /// distribution it has.
     pub known_jobs: BTreeMap<JobId, Option<TrialSet>>,
-    /// What it has been given and has not answered; oldest first, as ids grow.
+    /// Its assignments without a result, oldest first because ids grow.
     pub in_flight: InFlight,
-    /// What it was computing when it was found to be stalled. Others have been given it, but
-    /// its results are still welcome.
+    /// Its items in progress when it stalled. Other workers have copies, but its results are
+    /// still welcome.
     pub written_off: BTreeMap<AssignmentId, AssignedItem>,
-    /// What was taken back from it lately, as the answer may be under way.
+    /// Assignments taken back from it lately, whose results may be on their way.
     pub recalled: VecDeque<(AssignmentId, AssignedItem)>,
-    /// What it computed.
+    /// Its computing time.
     pub time: WorkerTime,
     /// Time per item, s; smoothed.
     item_s: Option<f64>,
-    /// How much longer than others it takes for the same work; smoothed.
+    /// Its time for an item, relative to the mean of all workers, > 0; smoothed.
     pub pace: f64,
     n_learnt: u32,
 }
@@ -64,20 +64,20 @@ pub struct Worker {
 /// The queue of a batch that an item comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// What has to be computed.
+    /// Items without a result.
     Queue,
-    /// The same, but workers were lost with it: a worker has one such item at a time.
+    /// Items without a result that are suspects; a worker has one such item at a time.
     Suspects,
-    /// What is computed only to be compared.
+    /// Items to compute only for comparison.
     Audits,
 }
 
 /// An item that a worker has.
 #[derive(Debug, Clone)]
 pub struct AssignedItem {
-    /// The job that it is of.
+    /// Its job.
     pub job: JobId,
-    /// The trial set of the batch that it is of.
+    /// The trial set of its batch.
     pub trial_set: TrialSet,
     /// The item.
     pub item: Item,
@@ -87,12 +87,12 @@ pub struct AssignedItem {
     pub assigned: Instant,
     /// When it should be done.
     pub expected: Instant,
-    /// Time that the job was charged for it.
+    /// Time that its job was charged for it.
     pub charge: Duration,
 }
 
 impl AssignedItem {
-    /// Whether it is computed only to be compared.
+    /// Whether it is computed only for comparison.
     pub fn is_audit(&self) -> bool {
         self.source == Source::Audits
     }
@@ -118,12 +118,12 @@ impl Worker {
         }
     }
 
-    /// What it calls itself.
+    /// Its name.
     pub fn name(&self) -> &str {
         &self.introduction.name
     }
 
-    /// Items it computes at the same time.
+    /// Number of items that it computes at the same time.
     pub fn n_slots(&self) -> usize {
         self.introduction.n_slots
     }
@@ -133,7 +133,7 @@ impl Worker {
         self.introduction.experiments.matches(&job.name)
     }
 
-    /// Whether it has an item that workers were lost with.
+    /// Whether it has a suspect.
     pub fn has_suspect(&self) -> bool {
         self.in_flight.values().any(|assigned| assigned.source == Source::Suspects)
     }
@@ -158,12 +158,12 @@ impl Worker {
         self.is_usable() && self.n_held() < self.n_credits()
     }
 
-    /// Items that it computes, or will.
+    /// Number of items in progress or waiting at the worker.
     fn n_held(&self) -> usize {
         self.in_flight.len() + self.written_off.len()
     }
 
-    /// Items in flight that wait for a slot.
+    /// Number of items in flight that wait for a slot.
     pub fn n_waiting(&self) -> usize {
         self.n_held().saturating_sub(self.n_slots()).min(self.in_flight.len())
     }
@@ -173,9 +173,8 @@ impl Worker {
         (self.n_held() as u64 * FULL_LOAD) / self.n_slots() as u64
     }
 
-    /// When it would be done with another item, for sorting: slots without an item first, then
-    /// by what it holds and how long it takes for that; from [`FULL_LOAD`] on if every slot has
-    /// an item.
+    /// Sort key: when it would finish one more item. Workers with idle slots come first, the
+    /// others follow by their items and pace, from [`FULL_LOAD`] on.
     pub fn finish_rank(&self) -> u64 {
         let load = self.load();
         if load < FULL_LOAD {
@@ -190,7 +189,7 @@ impl Worker {
         (self.pace * 64.0) as u32
     }
 
-    /// Slots that may have an item.
+    /// Number of slots that may get an item.
     pub fn n_usable_slots(&self) -> usize {
         match self.availability() {
             Availability::Free => self.n_slots(),
@@ -199,13 +198,13 @@ impl Worker {
         }
     }
 
-    /// How much its usable slots compute, in units of 1 / [`SPEED_UNIT`]; whole, so that a sum
+    /// Speed of its usable slots, in units of 1 / [`SPEED_UNIT`]. An integer, so that the sum
     /// over workers that come and go stays exact.
     pub fn usable_speed(&self) -> u64 {
         (self.n_usable_slots() as f64 / self.pace * SPEED_UNIT as f64) as u64
     }
 
-    /// Those that have none.
+    /// Number of usable slots without an item.
     pub fn n_idle_slots(&self) -> usize {
         self.n_usable_slots().saturating_sub(self.n_held())
     }
@@ -218,14 +217,14 @@ impl Worker {
         *item_s = (*item_s + 0.1 * (busy_s - *item_s)).max(1e-6);
         if let Some(expected) = expected {
             let ratio = busy_s / expected.as_secs_f64().max(1e-9);
-            // The mean of the first few, then of the last few.
+            // The mean of the first few results, then a moving mean.
             self.n_learnt += 1;
             let gain = (1.0 / f64::from(self.n_learnt)).max(0.1);
             self.pace = (self.pace + gain * (ratio - self.pace)).clamp(1e-2, 1e2);
         }
     }
 
-    /// Remembers what was taken back.
+    /// Keeps a recalled assignment, whose result may still arrive.
     pub fn remember_recalled(&mut self, assignment_id: AssignmentId, assignment: AssignedItem) {
         if self.recalled.len() >= 2 * self.n_slots() {
             self.recalled.pop_front();
@@ -233,13 +232,13 @@ impl Worker {
         self.recalled.push_back((assignment_id, assignment));
     }
 
-    /// What was taken back under this id, if it is remembered.
+    /// The recalled assignment of this id, if it is still kept.
     pub fn take_recalled(&mut self, assignment_id: AssignmentId) -> Option<AssignedItem> {
         let index = self.recalled.iter().position(|(id, _)| *id == assignment_id)?;
         self.recalled.remove(index).map(|(_, assignment)| assignment)
     }
 
-    /// What people see of it.
+    /// Its status, for people.
     pub fn status(&self, id: WorkerId, now: Instant) -> WorkerStatus {
         let Introduction { name, version, n_slots, experiments, .. } = self.introduction.clone();
         let (results_per_s, idle_share) = self.time.recent(now);

@@ -1,4 +1,4 @@
-//! Audits: what one worker computed of a batch, computed again by one of another name.
+//! Audits: a worker of another name recomputes items of a batch.
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
@@ -11,13 +11,14 @@ use crate::ids::{AssignmentId, JobId};
 
 use super::super::{Engine, item::Item};
 
-/// The names of workers whose word is in doubt, and for how many questions.
+/// The names of workers with a result in doubt, each with its number of open questions.
 pub type Doubted = BTreeMap<Arc<str>, usize>;
 
 /// The audits of a batch.
 #[derive(Debug, Default)]
 pub struct Audits {
-    /// Items that another worker has to confirm, by the name of the first; none is empty.
+    /// Items that another worker has to confirm, by the name of the first worker; no queue is
+    /// empty.
     waiting: BTreeMap<Arc<str>, VecDeque<Item>>,
     /// Audits that workers compute.
     pub in_flight: BTreeSet<AssignmentId>,
@@ -27,32 +28,33 @@ pub struct Audits {
 }
 
 impl Audits {
-    /// Queues an audit of what workers of a name computed.
+    /// Queues an audit of an item that workers named `first` computed.
     pub fn push(&mut self, first: &Arc<str>, item: Item) {
         self.waiting.entry(Arc::clone(first)).or_default().push_back(item);
     }
 
-    /// Whether none waits.
+    /// Whether no audit waits.
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty()
     }
 
-    /// How many wait for a worker.
+    /// Number of audits that wait for a worker.
     pub fn n_waiting(&self) -> usize {
         self.waiting.values().map(VecDeque::len).sum()
     }
 
-    /// Whether one waits for a worker of this name.
+    /// Whether an audit waits that a worker of this name may do.
     pub fn has_for(&self, name: &str) -> bool {
         self.waiting.keys().any(|first| **first != *name)
     }
 
-    /// Whether there is one of values whose worker is not in doubt already.
+    /// Whether a worker of this name may do an audit of values whose worker is not in doubt
+    /// already.
     pub fn has_clear_for(&self, name: &str, doubted: &Doubted) -> bool {
         self.waiting.keys().any(|first| **first != *name && !doubted.contains_key(first))
     }
 
-    /// Takes the first such audit.
+    /// Takes the first audit that a worker of this name may do, of a worker that is not in doubt.
     pub fn pop_for(&mut self, name: &str, doubted: &Doubted) -> Option<Item> {
         let mut waiting = self.waiting.iter_mut();
         let (first, items) =
@@ -65,24 +67,24 @@ impl Audits {
         item
     }
 
-    /// One has agreed: with an auditor, and with whoever computed the item first.
+    /// Records that an audit has agreed: it confirms the auditor, and the first worker if known.
     pub fn count(&mut self, auditor: Arc<str>, first: Option<&Arc<str>>) {
         self.n_agreed += 1;
         self.confirmed.insert(auditor);
         self.confirmed.extend(first.map(Arc::clone));
     }
 
-    /// How many have agreed.
+    /// Number of audits that have agreed.
     pub fn n_agreed(&self) -> usize {
         self.n_agreed
     }
 
-    /// Whether one has agreed with a worker of this name.
+    /// Whether an audit has agreed with a worker of this name.
     pub fn has_confirmed(&self, name: &str) -> bool {
         self.confirmed.contains(name)
     }
 
-    /// Forgets those of what workers of a name computed.
+    /// Forgets audits of results by workers of this name.
     pub fn discard(&mut self, name: &str) {
         self.waiting.remove(name);
         self.confirmed.remove(name);
@@ -90,9 +92,8 @@ impl Audits {
 }
 
 impl Engine {
-    /// Whether the results of an item are compared with another worker's. Depends
-    /// on nothing but the place of the individual, so that the same individuals are
-    /// audited whoever computes them.
+    /// Whether a second worker audits an item. Depends only on the place of the individual, so
+    /// that the choice does not depend on workers.
     pub(in crate::engine) fn is_audited(&self, id: JobId, item: &Item) -> bool {
         let Some(batch) = self.batch(id) else { return false };
         let (kind, number) = match id {
@@ -112,7 +113,7 @@ impl Engine {
     }
 }
 
-/// A number of a kind; of kind 0, the number itself.
+/// Mixes a kind into a number; kind 0 leaves the number as it is.
 fn mix_in(number: u64, kind: u64) -> u64 {
     number ^ kind.wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }

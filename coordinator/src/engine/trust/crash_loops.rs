@@ -1,8 +1,8 @@
-//! Workers that are lost, and lost again before they return a result.
+//! Limits the damage by workers that crash again and again without a result.
 //!
-//! A worker that comes back after a loss is given one item until it has returned a result,
-//! so that a loop of crashes holds up one item at a time. It waits for longer and longer
-//! before that, unless nobody else can compute.
+//! A worker that reconnects after a loss gets one item until it has returned a result, so that a
+//! loop of crashes holds up one item at a time. Before that item it rests, each time for longer,
+//! unless no other worker can compute.
 
 use std::{
     collections::BTreeMap,
@@ -11,14 +11,14 @@ use std::{
 
 use super::super::worker::Worker;
 
-/// Time after a first loss in which a worker is given nothing; doubles with each.
+/// Rest after a first loss, in which a worker gets nothing; doubles with each loss.
 const FIRST_REST: Duration = Duration::from_millis(500);
-/// The longest.
+/// The longest rest.
 const REST_MAX: Duration = Duration::from_secs(30);
-/// A worker that stays away for so long is forgotten.
+/// Time of absence after which a worker's losses are forgotten.
 const MEMORY: Duration = Duration::from_secs(600);
 
-/// Names above which those of long ago are forgotten.
+/// Number of names above which old losses are forgotten.
 const N_REMEMBERED: usize = 1024;
 
 /// Losses by the worker's name, since its last result.
@@ -47,13 +47,13 @@ impl CrashLoops {
 
     /// A worker has returned a result.
     pub fn on_result(&mut self, worker: &Worker) {
-        // Few have an entry: this is called for every result.
+        // Fast, because it runs for every result: few workers have an entry.
         if worker.obstacles.is_on_probation {
             self.by_name.remove(worker.name());
         }
     }
 
-    /// When a worker that joins may be given an item, if it was lost before.
+    /// When a joining worker may get an item, if it was lost before.
     pub fn rest(&self, name: &str) -> Option<Instant> {
         let CrashLoop { n_losses, last } = self.by_name.get(name)?;
         let doublings = (n_losses - 1).min(10);

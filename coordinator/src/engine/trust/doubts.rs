@@ -1,4 +1,4 @@
-//! Turns trouble with workers into questions for the referee.
+//! Turns failures, losses and disagreements into questions for the referee.
 
 use std::time::Instant;
 
@@ -15,11 +15,12 @@ use super::{
     questions::{Doubt, Party, place, wrong},
 };
 
-/// Questions of a job, at a time, about items that workers were lost with.
+/// Most open questions per job about items that were in progress when workers were lost.
 const LOSS_QUESTIONS_MAX: usize = 4;
 
 impl Engine {
-    /// A worker says that an item fails. If it does, it fails everywhere: the referee knows.
+    /// A worker reports that an item fails. A true failure happens everywhere, so the referee can
+    /// check it.
     pub(in crate::engine) fn on_failure_reported(
         &mut self,
         now: Instant,
@@ -32,7 +33,7 @@ impl Engine {
         if let Some(confirmed) = self.confirms(job, &item, &reporter, &message) {
             return self.fail(now, job, &item, &confirmed);
         }
-        // A worker whose word is in doubt already says nothing new.
+        // A worker that is in doubt already adds no new question.
         let is_doubted = self.is_doubted(id);
         if assignment.is_audit() || is_doubted || self.batch(job).is_none() {
             self.retry(now, assignment, NoResult::TakenBack);
@@ -42,8 +43,8 @@ impl Engine {
         }
     }
 
-    /// Two workers differ about the same trial, so one of them is faulty: the referee
-    /// knows which. Neither gets work meanwhile.
+    /// Two workers differ about the same trial, so one of them is faulty, and the referee finds
+    /// out which. Neither gets work meanwhile.
     pub(in crate::engine) fn on_disagreement(
         &mut self,
         now: Instant,
@@ -62,7 +63,7 @@ impl Engine {
                 wrong(&second_values, &first_values, &place(&item, batch.request.trial_set));
             return self.put_in_quarantine(now, &second, &reason);
         }
-        // What they differ about will be compared again when it is clear who is right.
+        // The rest of their results is compared again after the verdict.
         if self.is_doubted(first) || self.is_doubted(second.id) {
             return;
         }
@@ -71,8 +72,8 @@ impl Engine {
         self.ask_referee(job, item, Doubt::Disagreement { parties });
     }
 
-    /// Whether an item is to be computed by the referee because workers were lost with it. It
-    /// computes one at a time, and so is no help against many.
+    /// Whether the referee may compute an item because workers were lost while they computed it.
+    /// The referee computes one item at a time, so it cannot help with many.
     pub(in crate::engine) fn may_ask_about_losses(&self, job: JobId, item: &Item) -> bool {
         let is_open =
             self.batch(job).is_some_and(|batch| batch.duplicable(item).as_ref() == Some(item));
@@ -80,12 +81,12 @@ impl Engine {
         is_open && n_asked < LOSS_QUESTIONS_MAX
     }
 
-    /// Whether the referee is asked about a worker's word already.
+    /// Whether an open question concerns a worker already.
     fn is_doubted(&self, id: WorkerId) -> bool {
         self.workers.get(&id).is_some_and(|worker| worker.obstacles.question.is_some())
     }
 
-    /// A connected worker, as one whose word may be in doubt.
+    /// A connected worker as the party of a question.
     pub(in crate::engine) fn party(&self, id: WorkerId) -> Party {
         Party { id, name: self.workers[&id].name().into() }
     }

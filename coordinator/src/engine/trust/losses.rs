@@ -1,10 +1,10 @@
-//! Which items workers were computing when they were lost.
+//! Records the items that were in progress when workers were lost.
 //!
-//! A worker whose stream broke while it computed something may have been taken down
-//! by it, or killed for another reason, or only cut off. One loss says nothing. An item
-//! that was being computed at two of them is a *suspect*: no worker is given two suspects
-//! at a time, so that the next loss points at one. Whether a suspect really takes down
-//! what computes it is for the referee to say.
+//! If a worker's stream breaks, an item may have taken the worker down, something else may have
+//! killed it, or only the network may have failed. One loss proves nothing. An item that was in
+//! progress at two losses is a *suspect*. A worker gets only one suspect at a time, so that the
+//! next loss points at one item. The referee then finds out whether the suspect takes its process
+//! down.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,42 +15,42 @@ use std::{
 
 use super::super::item::Item;
 
-/// Losses within this time are one: machines, racks and networks fail as a whole, and so
-/// several copies of an item may be lost at once, or one copy after the other.
+/// Losses within this time count once: machines, racks and networks fail as a whole, and may take
+/// several copies of an item with them.
 const SAME_LOSS: Duration = Duration::from_secs(1);
-/// Losses that make an item a suspect.
+/// Number of losses that make an item a suspect.
 const SUSPECT: usize = 2;
 
 /// The losses of workers that computed items of a batch.
 #[derive(Debug, Default)]
 pub struct LossRecord {
-    /// By individual and trial, where there are any.
+    /// Losses by individual and trial.
     by_trial: BTreeMap<(u32, u32), Vec<Loss>>,
-    /// The same by the process that was lost.
+    /// Individuals and trials by the lost process.
     by_process: BTreeMap<NonZeroU64, Vec<(u32, u32)>>,
 }
 
-/// What is done with an item whose worker was lost.
+/// How the engine continues with an item whose worker was lost.
 #[derive(Debug, PartialEq, Eq)]
 pub enum AfterLoss {
-    /// Another worker is given it.
+    /// Another worker gets it.
     Retry,
-    /// The same, but not before this: if it takes one worker down after the other, that
-    /// must not go fast.
+    /// Another worker gets it, but not before this time: an item that takes workers down must not
+    /// take many in a short time.
     Wait(Instant),
-    /// It is a suspect, and the loss points at it: the referee is asked.
+    /// It is a suspect, and the loss points at it: the referee computes it.
     Ask,
 }
 
 #[derive(Debug)]
 struct Loss {
     at: Instant,
-    /// Whose return takes it back.
+    /// The lost process; if it reconnects, the loss is forgotten.
     process: Option<NonZeroU64>,
 }
 
 impl LossRecord {
-    /// A worker was lost that computed an item, and `is_alone` nothing else.
+    /// A worker was lost while it computed an item. `is_alone`: whether it computed nothing else.
     pub fn add(
         &mut self,
         now: Instant,
@@ -91,14 +91,15 @@ impl LossRecord {
         losses.max().unwrap_or(0)
     }
 
-    /// Individuals with trials that were being computed at a loss and that satisfy a condition.
+    /// Number of individuals with trials that were in progress at a loss and that satisfy a
+    /// condition.
     pub fn n_individuals(&self, is_counted: impl Fn(u32, u32) -> bool) -> usize {
         let trials =
             self.by_trial.keys().filter(|&&(individual, trial)| is_counted(individual, trial));
         trials.map(|&(individual, _)| individual).collect::<BTreeSet<u32>>().len()
     }
 
-    /// A process is back, so that nothing has taken it down.
+    /// A process has reconnected, so no item has taken it down.
     pub fn on_process_joined(&mut self, process: NonZeroU64) {
         for trial in self.by_process.remove(&process).unwrap_or_default() {
             if let Some(losses) = self.by_trial.get_mut(&trial) {

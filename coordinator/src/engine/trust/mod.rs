@@ -1,8 +1,8 @@
-//! Finds out whom to believe when workers disagree, fail or disappear.
+//! Decides which worker to believe when workers disagree, fail or disappear.
 //!
-//! The rest of the engine reports trouble. Consequences are items that wait ([`ItemState::Held`],
-//! [`ItemState::Delayed`]), workers that get nothing ([`Availability`]), items that are computed
-//! for the sake of trust ([`Engine::next_check`]), and batches that wait for an audit.
+//! The rest of the engine reports trouble here. The consequences: items wait
+//! ([`ItemState::Held`], [`ItemState::Delayed`]), workers get nothing ([`Availability`]), workers
+//! compute items only to check others ([`Engine::next_check`]), and batches wait for an audit.
 //!
 //! [`ItemState::Held`]: super::item::ItemState::Held
 //! [`ItemState::Delayed`]: super::item::ItemState::Delayed
@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | a worker reports a failure, or two return different bits | `doubts.rs` | a question for the referee (`questions.rs`) |
 //! | workers are lost with the same item | `losses.rs` | the item becomes a suspect, and then a question |
-//! | a worker is lost, whatever it had returned | `crash_loops.rs` | it gets its next item later, and one only |
+//! | a worker is lost, with or without results | `crash_loops.rs` | it gets its next item later, and only one |
 //! | the referee answers | `verdicts.rs` | the item fails its job, or a worker is quarantined (`quarantine.rs`) |
 //! | a result comes in | `audits.rs`, `unaudited.rs` | a second worker computes a share of the results, too |
 
@@ -47,27 +47,27 @@ pub use self::{
     unaudited::Unaudited,
 };
 
-/// An audit waits for so long for a second worker to come, or to come back: else one that
-/// lies would only have to be the first that is there after the coordinator's start.
+/// Time that an audit waits for a second worker to connect or reconnect. Without this wait, a
+/// lying worker would only have to connect first after the coordinator's start.
 const AUDITOR_GRACE: Duration = Duration::from_secs(30);
 
-/// What is known of the workers' reliability.
+/// The state of everything that concerns the workers' reliability.
 #[derive(Debug)]
 pub struct Trust {
-    /// What the referee is asked.
+    /// The questions for the referee.
     pub questions: Questions,
-    /// The workers that questions are about.
+    /// The workers that open questions concern.
     doubted: Doubted,
     /// The workers that are proved faulty.
     pub quarantine: Quarantine,
     /// The workers that were lost, and have returned no result since.
     pub crash_loops: CrashLoops,
-    /// When there were last two workers that can audit each other, or the engine began.
+    /// The last time at which two workers could audit each other, or the engine's start.
     auditors_seen: Instant,
 }
 
 impl Trust {
-    /// Nothing is known yet.
+    /// The state of a new engine.
     pub fn new(now: Instant) -> Self {
         Self {
             questions: Questions::default(),
@@ -78,16 +78,15 @@ impl Trust {
         }
     }
 
-    /// Whether a second worker, for audits, may still come.
+    /// Whether audits still wait for a second worker to connect.
     pub fn awaits_auditor(&self, now: Instant) -> bool {
         now < self.auditors_seen + AUDITOR_GRACE
     }
 }
 
 impl Engine {
-    /// The worker that is to compute something of a job's batch for the sake of trust: an audit
-    /// of values whose worker is not in doubt already, or an item that workers were lost with,
-    /// one at a time.
+    /// The worker for the next check of a job's batch: an audit of values whose worker is not in
+    /// doubt already, or a suspect, one at a time.
     pub(super) fn next_check(
         &self,
         work: &JobWork,
@@ -116,7 +115,7 @@ impl Engine {
         batch.audits.pop_for(name, &self.trust.doubted)
     }
 
-    /// Notes when there were last two workers that can audit each other.
+    /// Updates the last time at which two workers could audit each other.
     pub(super) fn note_auditors(&mut self, now: Instant) {
         let mut auditors = self.workers.values().filter(|worker| worker.may_audit());
         let first = auditors.next().map(Worker::name);

@@ -1,13 +1,13 @@
-//! Workers that are proved faulty, and are given nothing until an operator says otherwise.
+//! Workers that are proved faulty, and get no items until an operator readmits them.
 
 use std::{collections::BTreeMap, num::NonZeroU64};
 
 use super::super::Introduction;
 
-/// Most workers that are remembered; of more, only the connections get nothing.
+/// Most names in quarantine; further faulty workers get nothing only until they reconnect.
 const N_MAX: usize = 4096;
 
-/// The faulty workers, by name: one that is started again is the same machine.
+/// The faulty workers, by name, because a restarted worker still runs on the same machine.
 #[derive(Debug, Default)]
 pub struct Quarantine {
     by_name: BTreeMap<String, Entry>,
@@ -15,13 +15,13 @@ pub struct Quarantine {
 
 #[derive(Debug)]
 struct Entry {
-    /// So that its process does not come back under another name.
+    /// Recognises its process if it reconnects under another name.
     process: Option<NonZeroU64>,
     reason: String,
 }
 
 impl Quarantine {
-    /// Adds a worker; whether it was not there, and there is room.
+    /// Adds a worker; returns whether it is new and there was room.
     pub fn add(&mut self, name: &str, process: Option<NonZeroU64>, reason: &str) -> bool {
         let is_new = !self.by_name.contains_key(name) && self.by_name.len() < N_MAX;
         if !is_new {
@@ -32,7 +32,7 @@ impl Quarantine {
         is_new
     }
 
-    /// Lets a worker out of quarantine; whether it was there.
+    /// Lets a worker out of quarantine; returns whether it was there.
     pub fn remove(&mut self, name: &str) -> bool {
         self.by_name.remove(name).is_some()
     }
@@ -42,8 +42,8 @@ impl Quarantine {
         self.entry(introduction).map(|(_, entry)| &*entry.reason)
     }
 
-    /// The name under which a worker is in quarantine, if it is: that under which it is
-    /// readmitted.
+    /// The name under which a worker is in quarantine, if it is; operators readmit it by this
+    /// name.
     pub fn name(&self, introduction: &Introduction) -> Option<&str> {
         self.entry(introduction).map(|(name, _)| &**name)
     }

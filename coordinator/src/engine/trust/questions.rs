@@ -1,8 +1,8 @@
-//! What the referee is asked, and why.
+//! The questions for the referee, and their reasons.
 //!
-//! The simulation is deterministic: an item fails everywhere or nowhere, and a trial comes
-//! to the same bits everywhere. So the referee's answer settles what an item comes to,
-//! and with that, whose word was wrong.
+//! The simulation is deterministic: an item fails everywhere or nowhere, and a trial gives the
+//! same bits everywhere. So the referee's result is authoritative, and shows which worker was
+//! wrong.
 
 use std::{
     collections::BTreeMap,
@@ -19,63 +19,63 @@ use crate::{
 
 use super::super::{Command, OpenQuestion, batch::name_of, item::Item, known_results::same_bits};
 
-/// Processes that an item must take down before it is to blame: one may be killed by
-/// chance, or by a system that is short of memory.
+/// Number of processes that an item must take down before it is to blame: something else may kill
+/// one, such as a system that is short of memory.
 const N_DEATHS: u32 = 3;
-/// Time between them: what kills one by chance is over by then.
+/// Time between these attempts, by which other causes have passed.
 const DEATH_DELAY: Duration = Duration::from_secs(5);
-/// Time after which a referee that could not answer is asked again; doubles with each.
+/// Time before another attempt if the referee could not answer; doubles with each attempt.
 const FIRST_DELAY: Duration = Duration::from_secs(1);
-/// The longest.
+/// The longest time before another attempt.
 const DELAY_MAX: Duration = Duration::from_secs(60);
 
-/// Something that the referee is asked, or will be.
+/// A question for the referee.
 #[derive(Debug)]
 pub struct Question {
-    /// The job that it is about.
+    /// The item's job.
     pub job: JobId,
     /// The item.
     pub item: Item,
-    /// What the referee evaluates.
+    /// The request to the referee.
     pub request: RefereeRequest,
-    /// What it is about.
+    /// Why the engine asks.
     pub doubt: Doubt,
-    /// When the referee is to be asked again, if it could not answer.
+    /// When to ask again, if the referee could not answer.
     ask_again: Option<Instant>,
-    /// Why it could not.
+    /// Why the referee could not answer.
     pub trouble: Option<String>,
     n_delays: u32,
     n_deaths: u32,
 }
 
-/// Why the referee is asked.
+/// Why the engine asks the referee.
 #[derive(Debug)]
 pub enum Doubt {
-    /// A worker says that the item fails.
+    /// A worker reports that the item fails.
     Failure {
         /// The worker.
         reporter: Party,
-        /// What it says.
+        /// The worker's message.
         message: String,
     },
     /// Workers were lost while they computed the item.
     Losses,
     /// Two workers' values for a trial differ.
     Disagreement {
-        /// The two, and the numbers that each has returned for the trial.
+        /// The two workers, and the numbers that each has returned for the trial.
         parties: [(Party, Vec<f64>); 2],
     },
-    /// No individual of a generation has a finite fitness, as the workers say. Evolution ends
-    /// with that, so it takes more than their word.
+    /// No individual of a generation has a finite fitness, according to the workers. This would
+    /// end evolution, so the referee checks it.
     NoFitness,
 }
 
-/// A worker whose word is in doubt; it may have left.
+/// A worker whose result is in doubt; it may have left.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Party {
     /// Its connection.
     pub id: WorkerId,
-    /// What it calls itself.
+    /// Its name.
     pub name: Arc<str>,
 }
 
@@ -85,7 +85,7 @@ impl Question {
         Self { job, item, request, doubt, ask_again: None, trouble: None, n_delays: 0, n_deaths: 0 }
     }
 
-    /// The workers whose word is in doubt.
+    /// The workers whose results are in doubt.
     pub fn parties(&self) -> Vec<&Party> {
         match &self.doubt {
             Doubt::Failure { reporter, .. } => vec![reporter],
@@ -94,7 +94,7 @@ impl Question {
         }
     }
 
-    /// The workers whose word is wrong, and in what, as the item comes to these values, or fails
+    /// The workers that are wrong, each with its error, if the item has these values, or fails
     /// for this reason.
     pub fn refuted(&self, finding: Result<&[f64], &str>) -> Vec<(&Party, String)> {
         let place = self.place();
@@ -126,7 +126,7 @@ impl Question {
         place(&self.item, self.request.trial_set)
     }
 
-    /// It, for people.
+    /// The question, for people.
     pub fn activity(&self) -> OpenQuestion {
         let doubt = match &self.doubt {
             Doubt::Failure { reporter, message } => {
@@ -144,8 +144,8 @@ impl Question {
         OpenQuestion { individual: self.item.individual, doubt, trouble: self.trouble.clone() }
     }
 
-    /// Whether its item is given to no worker until it is answered. What workers have
-    /// computed is not waited for; what the referee cannot answer at present is not either.
+    /// Whether its item is withheld from workers until the answer. Not if workers have computed
+    /// the item, and not while the referee cannot answer.
     pub fn holds(&self) -> bool {
         matches!(self.doubt, Doubt::Failure { .. } | Doubt::Losses) && self.trouble.is_none()
     }
@@ -158,7 +158,7 @@ impl Question {
         self.trouble = Some(trouble);
     }
 
-    /// The referee's process died over it; whether that is the item's fault.
+    /// The referee's process died over the item; returns whether the item is to blame.
     pub fn on_death(&mut self, now: Instant) -> bool {
         self.n_deaths += 1;
         self.ask_again = Some(now + DEATH_DELAY);
@@ -187,17 +187,17 @@ impl Questions {
         (id, command)
     }
 
-    /// Takes a question out.
+    /// Removes a question.
     pub fn take(&mut self, id: QuestionId) -> Option<Question> {
         self.open.remove(&id)
     }
 
-    /// Puts a question back that was taken out.
+    /// Puts a removed question back.
     pub fn put_back(&mut self, id: QuestionId, question: Question) {
         self.open.insert(id, question);
     }
 
-    /// The commands that ask again what could not be answered.
+    /// The commands that repeat questions that the referee could not answer.
     pub fn asked_again(&mut self, now: Instant) -> Vec<Command> {
         let ask = |(&id, question): (&QuestionId, &mut Question)| {
             question.ask_again.take_if(|at| *at <= now)?;
@@ -206,13 +206,13 @@ impl Questions {
         self.open.iter_mut().filter_map(ask).collect()
     }
 
-    /// Those about a job.
+    /// The questions about a job.
     pub fn about(&self, job: JobId) -> impl Iterator<Item = (QuestionId, &Question)> {
         let ours = self.open.iter().filter(move |(_, question)| question.job == job);
         ours.map(|(&id, question)| (id, question))
     }
 
-    /// Number of those about a job that are asked for a reason.
+    /// Number of questions about a job with a reason that satisfies `is_reason`.
     pub fn n_about(&self, job: JobId, is_reason: impl Fn(&Doubt) -> bool) -> usize {
         self.about(job).filter(|(_, question)| is_reason(&question.doubt)).count()
     }
@@ -234,7 +234,7 @@ pub fn place(item: &Item, trial_set: TrialSet) -> String {
     }
 }
 
-/// What is wrong with numbers that a worker returned for a place, by the first that differs.
+/// Describes the first wrong number of a worker's result.
 pub fn wrong(returned: &[f64], right: &[f64], place: &str) -> String {
     let mut pairs = returned.iter().zip(right);
     let (returned, right) = pairs

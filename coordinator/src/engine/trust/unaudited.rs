@@ -1,20 +1,20 @@
-//! Since when nobody has confirmed a worker's results.
+//! Records since which generation no audit has confirmed a worker's results.
 
 use std::{collections::BTreeMap, ops::RangeInclusive, sync::Arc};
 
-/// Names that are remembered; the latest ones, where there are more.
+/// Most names to keep; the latest ones, if there are more.
 const NAMES_MAX: usize = 10_000;
 
-/// The generations of an experiment that workers have contributed to since an audit agreed
-/// with them last, by the worker's name.
+/// For each worker's name, the generations of an experiment to which it has contributed since its
+/// last successful audit.
 #[derive(Debug, Default)]
 pub struct Unaudited {
     by_name: BTreeMap<Arc<str>, RangeInclusive<u64>>,
 }
 
 impl Unaudited {
-    /// A generation is complete. `names`: who has contributed to it, and whether an audit has
-    /// agreed with one of the values meanwhile.
+    /// A generation is complete. `names`: the workers that contributed to it, and whether an
+    /// audit has agreed with each.
     pub fn add(&mut self, generation: u64, names: impl Iterator<Item = (Arc<str>, bool)>) {
         for (name, is_confirmed) in names {
             if is_confirmed {
@@ -25,13 +25,13 @@ impl Unaudited {
             }
         }
         if self.by_name.len() > NAMES_MAX {
-            // Names of processes that are gone, for the most part.
+            // Most of these are names of processes that are gone.
             self.by_name.retain(|_, generations| *generations.end() == generation);
         }
     }
 
-    /// Takes out the generations that a worker's unconfirmed values are in; from the first to
-    /// the last, it may have left out some.
+    /// Removes and returns the range of generations with unconfirmed values of a worker, which
+    /// may have contributed to only some of them.
     pub fn take(&mut self, name: &str) -> Option<RangeInclusive<u64>> {
         self.by_name.remove(name)
     }

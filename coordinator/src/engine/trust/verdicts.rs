@@ -1,4 +1,4 @@
-//! Asking the referee, and what follows from its answers.
+//! Asks the referee, and draws the consequences of its answers.
 
 use std::{
     collections::BTreeSet,
@@ -23,12 +23,11 @@ use super::{
 impl Engine {
     /// The referee has answered a question.
     pub fn on_verdict(&mut self, now: Instant, id: QuestionId, verdict: Verdict) {
-        // It may have been withdrawn.
+        // The question may have been withdrawn.
         let Some(mut question) = self.trust.questions.take(id) else { return };
         let is_of_losses = matches!(question.doubt, Doubt::Losses);
         match verdict {
-            // Of an item that no worker was lost with, that is no proof: the system may be
-            // short of memory.
+            // Without losses of workers, this proves nothing: the system may be short of memory.
             Verdict::Died(trouble) | Verdict::Unavailable(trouble) if !is_of_losses => {
                 let is_first = question.trouble.is_none();
                 question.postpone(now, trouble);
@@ -37,7 +36,7 @@ impl Engine {
                 }
                 self.trust.questions.put_back(id, question);
             }
-            // The next loss asks again.
+            // The next loss leads to another question.
             Verdict::Unavailable(_) => self.release(&question),
             Verdict::Died(how) if question.on_death(now) => {
                 let failure = format!("it takes its process down ({how})");
@@ -50,8 +49,8 @@ impl Engine {
         self.assign(now);
     }
 
-    /// Has the referee evaluate an item of a job's batch, and gives the item to no worker
-    /// meanwhile. Those whose word is in doubt get nothing.
+    /// Has the referee evaluate an item of a job's batch, and withholds the item from workers
+    /// meanwhile. Workers whose results are in doubt get nothing.
     pub(in crate::engine) fn ask_referee(&mut self, job: JobId, item: Item, doubt: Doubt) {
         let Some(work) = self.jobs.get_mut(&job) else { return };
         let Some(batch) = &mut work.batch else { return };
@@ -66,7 +65,7 @@ impl Engine {
         match question.doubt {
             Doubt::Disagreement { .. } => batch.n_disagreements += 1,
             Doubt::NoFitness => {}
-            // An audit's is known.
+            // The result of an audited item is known.
             Doubt::Failure { .. } | Doubt::Losses if batch.is_known(&item) => {}
             Doubt::Failure { .. } | Doubt::Losses => batch.hold(item),
         }
@@ -82,14 +81,14 @@ impl Engine {
         self.commands.push_back(command);
     }
 
-    /// Asks again what the referee could not answer.
+    /// Repeats questions that the referee could not answer.
     pub(in crate::engine) fn ask_again(&mut self, now: Instant) {
         self.commands.extend(self.trust.questions.asked_again(now));
     }
 
-    /// Whether a failure that a worker reports is reported in the same words by others, while
-    /// the referee cannot be asked: by workers with most of the slots, as fewer may be
-    /// faulty, and of two names at least.
+    /// Whether other workers confirm a reported failure in the same words, while the referee
+    /// cannot answer. It takes workers with most of the slots, because fewer may be faulty, and
+    /// at least two names.
     pub(in crate::engine) fn confirms(
         &self,
         job: JobId,
@@ -126,7 +125,7 @@ impl Engine {
         is_confirmed.then(|| format!("{} workers report: {message}", names.len()))
     }
 
-    /// Forgets questions about a job that are no longer of interest.
+    /// Withdraws questions about a job that no longer matter.
     pub(in crate::engine) fn withdraw_questions(
         &mut self,
         job: JobId,
@@ -140,8 +139,8 @@ impl Engine {
         }
     }
 
-    /// The item is the same everywhere: it comes to these values, or fails for this reason.
-    /// Whoever says something else is faulty.
+    /// Settles a question: the item has these values everywhere, or fails for this reason
+    /// everywhere. Workers that returned anything else are faulty.
     fn settle(
         &mut self,
         now: Instant,
@@ -160,7 +159,7 @@ impl Engine {
             Err(failure) => return self.fail(now, job, item, failure),
         };
         progress.n_without_fitness += u32::from(matches!(question.doubt, Doubt::NoFitness));
-        // What a third worker returned meanwhile may be wrong, too.
+        // A third worker's result since then may be wrong, too.
         while let Some(progress) = self.batch_mut(job)
             && let Err(disagreement) = progress.known.compare(item, values)
             && disagreement.first != REFEREE
@@ -182,7 +181,7 @@ impl Engine {
         self.batch_with_mut(question.job, question.request.trial_set)
     }
 
-    /// Whoever was in doubt because of a question is not any more.
+    /// Ends the doubt about the workers of a question.
     fn end_doubt(&mut self, id: QuestionId, question: &Question) {
         for party in question.parties() {
             if let Some(n_questions) = self.trust.doubted.get_mut(&party.name) {
@@ -212,8 +211,8 @@ impl Engine {
         }
     }
 
-    /// A worker is proved faulty: it gets nothing until an operator says otherwise, and what
-    /// it computed for batches that are not complete counts no more.
+    /// A worker is proved faulty: it gets nothing until an operator readmits it, and its results
+    /// for incomplete batches no longer count.
     pub(in crate::engine) fn put_in_quarantine(
         &mut self,
         now: Instant,
@@ -260,8 +259,8 @@ impl Engine {
         self.update_worker(id, |worker| worker.recalled.clear());
     }
 
-    /// Forgets the values of a faulty worker in all batches, and says which earlier ones it
-    /// may have spoilt.
+    /// Forgets the values of a faulty worker in all batches, and notes which earlier generations
+    /// it may have spoilt.
     fn discard(&mut self, name: &str) {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
@@ -280,7 +279,7 @@ impl Engine {
         }
     }
 
-    /// Lets a worker out of quarantine; whether it was there.
+    /// Lets a worker out of quarantine; returns whether it was there.
     pub fn on_readmitted(&mut self, now: Instant, name: &str) -> bool {
         let workers = self.workers.iter();
         let its = workers
@@ -291,7 +290,7 @@ impl Engine {
             return false;
         }
         for id in its {
-            // It may be there under another name as well.
+            // The process may be in quarantine under another name as well.
             let reason = self.trust.quarantine.reason(&self.workers[&id].introduction);
             let reason = reason.map(str::to_owned);
             self.update_worker(id, |worker| worker.obstacles.quarantined = reason);
