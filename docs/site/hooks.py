@@ -3,8 +3,8 @@
 - A link to a Markdown file, such as ../CONTRIBUTING.md, leads to a page with its text.
 - A link to another text file leads to a page that shows the file, a link to a folder to a page
   that lists its files, with what their first lines say.
-- Reference pages are made of what the programs are made of: every command's help, the protocol
-  and the Python API. A link to one of their sources leads to the page.
+- Reference pages are made of what the programs are made of: every command's help, the protocol,
+  the Python API and the tests of faults. A link to one of their sources leads to the page.
 
 The pages in docs/ stay readable where the repository is hosted: their links are plain.
 """
@@ -21,6 +21,24 @@ HELP = "client/src/commands/snapshots/swarmctl__commands__tests__the_manual.snap
 PROTOCOL = "proto/swarm/v1"
 PAGES = {"README.md": "start.md", "CHANGELOG.md": "CHANGELOG.md", "CONTRIBUTING.md": "CONTRIBUTING.md"}
 PYTHON = ["python/swarmevo/__init__.py", "python/swarmevo/analysis/__init__.py"]
+FAULTS = "tests/fleet/faults"
+# Where else faults are caused.
+OTHER_FAULTS = [
+    "coordinator/tests/api/engine/proof.rs",
+    "coordinator/tests/api/engine/trouble.rs",
+    "coordinator/tests/api/referee.rs",
+    "coordinator/tests/api/hostile_workers.rs",
+    "coordinator/tests/api/hostile_clients.rs",
+    "crates/model/src/shared_store/tests.rs",
+    "crates/model/src/store/tests.rs",
+    "tests/fleet/starved.rs",
+    "tests/fleet/budgets.rs",
+    "tests/fleet/protocol.rs",
+    "tests/fleet/steering.rs",
+    "tests/fleet/evaluation.rs",
+    "tests/fleet/explain.rs",
+    "tests/soak.rs",
+]
 
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)(?P<path>[^)\s#]+)(?P<anchor>#[^)\s]*)?(?=[)\s])")
 FENCE = re.compile(r"^(```+|~~~+).*?^\1", re.MULTILINE | re.DOTALL)
@@ -36,6 +54,7 @@ FIRST_COMMENT = {
     ".rs": r"((?://! .*\n)+)",
     ".sh": r"#!.*\n((?:# .*\n)+)",
 }
+TEST = re.compile(r"#\[(?:tokio::)?test[^\]]*\]\s*(?:#\[[^\]]*\]\s*)*(?:async )?fn (\w+)")
 UNLISTED = re.compile(r"(^|/)(target|node_modules|__pycache__|secrets|\.[^/]*)(/|$)|\.so$")
 
 # The address in the site of a file of the repository that is not in docs/.
@@ -44,8 +63,14 @@ _pages: dict[str, str] = {}
 
 def on_files(files, config):
     _pages.clear()
-    made = {"commands.md": commands(), "protocol.md": protocol(), "python-api.md": python_api()}
+    made = {
+        "commands.md": commands(),
+        "protocol.md": protocol(),
+        "python-api.md": python_api(),
+        "faults.md": faults(),
+    }
     _pages[HELP] = "commands.md"
+    _pages[FAULTS] = "faults.md"
     _pages.update(dict.fromkeys(PYTHON, "python-api.md"))
     _pages[PROTOCOL] = "protocol.md"
     for file in (ROOT / PROTOCOL).glob("*.proto"):
@@ -185,4 +210,20 @@ def python_api():
         for node in ast.parse((ROOT / source).read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ImportFrom) and node.module != "_core":
                 parts += [f"::: {module}.{node.module}.{alias.name}" for alias in node.names]
+    return "\n\n".join(parts) + "\n"
+
+
+def faults():
+    """Every test of a fault: its name, which is a sentence, under the subject of its file."""
+    parts = [
+        "# Faults and their tests\n\nThe name of each test, as a sentence. "
+        "[What happens at a fault](reliability.md)."
+    ]
+    files = sorted((ROOT / FAULTS).glob("*.rs")) + [ROOT / path for path in OTHER_FAULTS]
+    for path in files:
+        names = TEST.findall(path.read_text(encoding="utf-8"))
+        if not names:
+            raise ValueError(f"{path} has no tests: is the list of faults out of date?")
+        sentences = "\n".join(f"- {name.replace('_', ' ').capitalize()}" for name in names)
+        parts.append(f"## {subject(path).rstrip('.')}\n\n`{path.relative_to(ROOT)}`\n\n{sentences}")
     return "\n\n".join(parts) + "\n"

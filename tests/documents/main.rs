@@ -4,7 +4,6 @@
 mod logs;
 mod pages;
 mod programs;
-mod reliability;
 mod targets;
 mod tasks;
 mod versions;
