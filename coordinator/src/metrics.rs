@@ -17,7 +17,7 @@ metrics! {
     BUILD = Gauge "swarm_coordinator_build_info" ["version", "fingerprint"]
         "1; the labels say which release runs, and with which simulation.";
     WORKERS = Gauge "swarm_workers" ["state"]
-        "Connected workers: available for work, draining (they leave when they have finished what they compute), waiting (they get nothing for a while, because they returned nothing or their word is in doubt), or distrusted (in quarantine: they returned what is wrong).";
+        "Connected workers: available for work, draining (they finish their items and leave), waiting (they get no items for a while, because they returned nothing or their result is in doubt), or distrusted (in quarantine, because they returned a wrong result).";
     SLOTS = Gauge "swarm_slots" []
         "Items that all connected workers together compute at the same time.";
     SLOT_TIME = Counter "swarm_slot_seconds_total" []
@@ -27,9 +27,9 @@ metrics! {
     WORKERS_JOINED = Counter "swarm_workers_joined_total" []
         "Workers that have connected; one that comes back counts again.";
     WORKERS_LEFT = Counter "swarm_workers_left_total" []
-        "Workers that have left after they had said so.";
+        "Workers that announced their end and left.";
     WORKERS_LOST = Counter "swarm_workers_lost_total" []
-        "Workers whose connection broke, that fell silent, or that were dropped.";
+        "Workers whose connection broke, that fell silent, or that the coordinator dropped.";
     ITEMS_ASSIGNED = Counter "swarm_items_assigned_total" []
         "Items given to workers, duplicates included.";
     ITEMS_COMPUTED = Counter "swarm_items_computed_total" []
@@ -37,23 +37,23 @@ metrics! {
     ITEMS_FAILED = Counter "swarm_items_failed_total" []
         "Items that a worker could not compute.";
     ITEMS_REQUEUED = Counter "swarm_items_requeued_total" []
-        "Items without a result, given to another worker because theirs failed, was lost or is in doubt.";
+        "Items given to another worker because the first one failed, was lost or is in doubt.";
     ITEMS_RECALLED = Counter "swarm_items_recalled_total" []
-        "Items taken back from a worker because another has the result, or computes it sooner.";
+        "Items taken back from a worker because another one has the result, or computes it sooner.";
     EPISODES = Counter "swarm_episodes_total" []
-        "Episodes whose fitness has become known; twice only if the first worker was faulty.";
+        "Episodes with a known fitness; an episode counts twice only if its first worker was faulty.";
     WORKERS_QUARANTINED = Counter "swarm_workers_quarantined_total" []
         "Workers that were proved faulty.";
     WORKERS_STALLED = Counter "swarm_workers_stalled_total" []
-        "Times that a worker finished nothing for long while others did, or could have.";
+        "Times that a worker returned nothing for long while others returned results or were idle.";
     REFEREE_QUESTIONS = Counter "swarm_referee_questions_total" []
-        "Items that the referee was asked about, because a worker's word was in doubt.";
+        "Items sent to the referee because a worker's result was in doubt.";
     REFEREE_VERDICTS = Counter "swarm_referee_verdicts_total" ["verdict"]
         "Answers of the referee: values, failed, died (its process, over the item) or unavailable.";
     REFEREE_BUSY_TIME = Counter "swarm_referee_busy_seconds_total" []
         "Time that the referee has spent on items.";
     COMMIT_DURATION = Histogram "swarm_commit_duration_seconds" []
-        "Time to write a completed generation out and to store it, until it is on disk.";
+        "Time to serialise a completed generation and write it to disk.";
     STORE_AVAILABLE = Gauge "swarm_store_available" []
         "1, or 0 if the latest write did not reach the disk.";
     CALLS = Counter "swarm_grpc_calls_total" ["method", "code"]
@@ -61,7 +61,7 @@ metrics! {
     STATE = Gauge "swarm_experiment_state" ["experiment", "name", "state"]
         "1 for the state, running or paused, of an unfinished experiment.";
     GENERATIONS_WANTED = Gauge "swarm_experiment_generations_wanted" ["experiment", "name"]
-        "Generations that the experiment is to have.";
+        "Generations that the experiment will have.";
     GENERATIONS_COMPLETED = Gauge "swarm_experiment_generations_completed" ["experiment", "name"]
         "Generations that are on disk.";
     BEST_FITNESS = Gauge "swarm_experiment_best_fitness" ["experiment", "name"]
@@ -73,11 +73,11 @@ metrics! {
     IDLE = Gauge "swarm_experiment_barrier_idle_ratio" ["experiment", "name"]
         "Share of the slots' time, 0 to 1, that did not go into results during the latest completed generation.";
     EXPERIMENT_EPISODES = Counter "swarm_experiment_episodes_total" ["experiment", "name"]
-        "Episodes of the experiment whose fitness has become known.";
+        "Episodes of the experiment with a known fitness.";
     ITEMS_QUEUED = Gauge "swarm_experiment_items_queued" ["experiment", "name"]
         "Items that wait for a worker; 0 while the experiment is paused.";
     ITEMS_IN_FLIGHT = Gauge "swarm_experiment_items_in_flight" ["experiment", "name"]
-        "Items that workers have and have not answered, duplicates included.";
+        "Items that workers hold and have not answered, duplicates included.";
 }
 
 /// Bounds of the buckets for commits: a fast disk takes less than 1 ms, a busy one

@@ -16,15 +16,15 @@ metrics! {
     CONNECTIONS = Counter "swarm_worker_connections_total" []
         "Connections that the coordinator welcomed; all but the first are reconnections.";
     CONNECTIONS_FAILED = Counter "swarm_worker_connections_failed_total" []
-        "Attempts to connect that came to nothing.";
+        "Attempts to connect that failed.";
     SLOTS = Gauge "swarm_worker_slots" []
         "Items computed at the same time.";
     SLOTS_BUSY = Gauge "swarm_worker_slots_busy" []
-        "Slots that compute.";
+        "Slots that are computing.";
     ITEMS_QUEUED = Gauge "swarm_worker_items_queued" []
         "Items that wait for a slot.";
     ITEMS = Counter "swarm_worker_items_total" ["outcome"]
-        "Items done with: computed, failed, or dropped because the coordinator took them back.";
+        "Finished items: computed, failed, or dropped because the coordinator took them back.";
     EPISODES = Counter "swarm_worker_episodes_total" []
         "Episodes of the computed items.";
     ROBOT_STEPS = Counter "swarm_worker_robot_steps_total" []
