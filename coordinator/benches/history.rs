@@ -1,7 +1,7 @@
-//! What the history of an experiment takes on disk, and how long an individual takes to come
-//! back, per algorithm, at the size of experiment A: 100 individuals of 445 genes, 5 trials.
-//! Fitness is made up; everything else is what a coordinator does. An argument selects
-//! algorithms by a part of their name.
+//! Measures the size of an experiment's history on disk, and the time to recover an individual,
+//! per algorithm, at the size of experiment A: 100 individuals of 445 genes, 5 trials. The
+//! fitness is invented; everything else is as in a coordinator. An argument selects algorithms by
+//! a part of their name.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::{env, fs, path::Path, time::Instant};
@@ -129,7 +129,7 @@ fn measure(algorithm: &str, n_generations: u64) {
     );
 }
 
-/// Until an individual is there, its network decoded, from a database that nobody has opened.
+/// Time to recover an individual and decode its network, from a closed database.
 fn seconds(directory: &Path, address: &str) -> f64 {
     let started = Instant::now();
     let reader = BlockingReader::open(directory).expect("it is sound");

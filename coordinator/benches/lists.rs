@@ -1,7 +1,7 @@
-//! How long lists take in a data directory with ten thousand experiments of the size of A, from
-//! request to answer: all of them, those that run, those of a name, and the first open of the
-//! database. An argument is another number of experiments; with TMPDIR=/dev/shm they are written
-//! much faster.
+//! Measures lists in a data directory with ten thousand experiments of the size of A, from
+//! request to answer: all experiments, running ones, those of a name, and the first open of the
+//! database. An argument gives another number of experiments; TMPDIR=/dev/shm makes their
+//! creation much faster.
 #![allow(clippy::disallowed_methods, reason = "a benchmark measures time")]
 
 use std::{env, time::Instant};

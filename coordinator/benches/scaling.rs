@@ -1,4 +1,4 @@
-//! How well a fleet is used, from one worker to ten thousand: the real engine
+//! Measures how well the engine uses a fleet of one to ten thousand workers: the real engine
 //! drives simulated workers in virtual time. Prints the tables of
 //! `docs/notebook/2026-11-fleet.md`.
 
@@ -23,13 +23,13 @@ const EXPERIMENT: JobId = JobId::Experiment(ExperimentId(1));
 const LEASE: Duration = Duration::from_secs(10);
 const N_TRIALS: u32 = 5;
 const N_GENERATIONS: u64 = 8;
-/// The first ones teach the engine how long things take.
+/// Number of first generations, which teach the engine the durations of items.
 const N_TEACHING: u64 = 4;
 const CALL_OVERHEAD: f64 = 0.4;
-/// Trials take up to so much more or less than on average.
+/// Largest relative deviation of a trial's duration from the mean.
 const DISPERSION: f64 = 0.3;
 
-/// What things cost.
+/// The durations in the model.
 #[derive(Debug, Clone, Copy)]
 struct Costs {
     /// A trial on a worker of speed 1.
@@ -97,8 +97,8 @@ impl Costs {
         ideal.as_secs_f64() / ideal.max(one_trial).as_secs_f64()
     }
 
-    /// The same for whoever knows all speeds, but not how long each trial takes, and gives all
-    /// trials out at once: with the margin for long trials that turns out best.
+    /// The shortest time of a scheduler that knows all speeds, but not the duration of each
+    /// trial, and assigns all trials at once, with the best margin for long trials.
     fn with_known_speeds(self, population_size: usize, n_workers: usize) -> f64 {
         let margins = (0..=8).map(|half| f64::from(half) / 2.0);
         let times = margins.map(|margin| self.planned_time(population_size, n_workers, margin));
@@ -106,8 +106,8 @@ impl Costs {
         self.work(population_size).div_f64(total_speed(n_workers)).as_secs_f64() / best
     }
 
-    /// Seconds that a generation takes if every worker gets as many trials as it is expected to
-    /// compute in one and the same time, and so many standard deviations more.
+    /// Duration of a generation, s, if every worker gets as many trials as it should compute in
+    /// the same time, plus `margin` standard deviations.
     fn planned_time(self, population_size: usize, n_workers: usize, margin: f64) -> f64 {
         let n_needed = population_size * N_TRIALS as usize;
         // A uniform distribution's standard deviation is its width / sqrt(12).
@@ -141,8 +141,7 @@ impl Costs {
         longest * self.trial.as_secs_f64() + 2.0 * self.latency.as_secs_f64()
     }
 
-    /// The time that generations would take if no slot were ever idle, by the time
-    /// that they take.
+    /// The duration of generations without idle slots, divided by their real duration.
     fn efficiency(
         self,
         config: EngineConfig,

@@ -1,4 +1,4 @@
-//! Asks a running coordinator whether it is healthy, as container engines want it.
+//! Asks a running coordinator whether it is healthy; for container engines.
 
 use std::{
     error::Error,
@@ -34,55 +34,55 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Why a coordinator does not count as healthy.
 #[derive(Debug, thiserror::Error)]
 pub enum Unhealthy {
-    /// It listens on a port that nobody told.
+    /// The port is unknown.
     #[error("--listen {0} takes any free port; name the one that the coordinator listens on")]
     UnknownPort(SocketAddr),
     /// The certificate cannot be used.
     #[error("the TLS files cannot be used: {0}")]
     Pin(#[from] PinError),
-    /// Nobody listens.
+    /// No program listens on the address.
     #[error("no coordinator listens on {address}: {source}")]
     Absent {
-        /// Where it should.
+        /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// Whoever listens is not the coordinator with this certificate.
+    /// The server at the address is not the coordinator with this certificate.
     #[error(
         "no TLS with the coordinator on {address}: {source}; does it run with --tls-cert and \
-         --tls-key, and these very files? One that was renewed takes a restart"
+         --tls-key, and with the same files? It reads a renewed certificate only at its start"
     )]
     Tls {
-        /// Where.
+        /// The address.
         address: SocketAddr,
-        /// What is wrong.
+        /// The error.
         source: io::Error,
     },
     /// The call failed.
     #[error("the coordinator on {address} does not answer: {reason}; {hint}")]
     Call {
-        /// Where.
+        /// The address.
         address: SocketAddr,
-        /// What is wrong.
+        /// The reason.
         reason: String,
-        /// What may be the matter.
+        /// A possible cause.
         hint: &'static str,
     },
-    /// It answers, but not for long.
+    /// It answers that it does not serve.
     #[error("the coordinator on {0} does not serve")]
     NotServing(SocketAddr),
     /// It took too long.
     #[error("no answer on {address} within {} s", PATIENCE.as_secs())]
     Silent {
-        /// Where.
+        /// The address.
         address: SocketAddr,
     },
 }
 
-/// Asks the coordinator that listens there, with that TLS, through its health
-/// service. It has to show its own certificate, and if it asks for a client's, is
-/// shown that, too. Under an address that stands for all, it is asked over loopback.
+/// Asks the coordinator at this address, with this TLS, through its health service. The
+/// coordinator has to show its own certificate. If it requires a client certificate, this check
+/// shows the same one. An unspecified address, such as 0.0.0.0, is reached over loopback.
 pub async fn health_check(listen: SocketAddr, tls: Option<&Tls>) -> Result<(), Unhealthy> {
     timeout(PATIENCE, ask(listen, tls)).await.unwrap_or(Err(Unhealthy::Silent { address: listen }))
 }
@@ -119,19 +119,19 @@ async fn ask(address: SocketAddr, tls: Option<&Tls>) -> Result<(), Unhealthy> {
     }
 }
 
-/// Where to reach a coordinator that listens there.
+/// Addresses at which a coordinator that listens on `listen` can be reached.
 fn reachable(listen: SocketAddr) -> Vec<SocketAddr> {
     let (v4, v6) = (IpAddr::from(Ipv4Addr::LOCALHOST), IpAddr::from(Ipv6Addr::LOCALHOST));
     let hosts = match listen.ip() {
         IpAddr::V4(Ipv4Addr::UNSPECIFIED) => vec![v4],
-        // It takes both, and the machine may have no IPv6 loopback.
+        // Such a socket accepts IPv4 and IPv6, and the machine may have no IPv6 loopback.
         IpAddr::V6(Ipv6Addr::UNSPECIFIED) => vec![v6, v4],
         host => vec![host],
     };
     hosts.into_iter().map(|host| SocketAddr::new(host, listen.port())).collect()
 }
 
-/// gRPC over a connection that is there already.
+/// gRPC over an existing connection.
 async fn channel<IO>(io: IO) -> Result<Channel, tonic::transport::Error>
 where
     IO: AsyncRead + AsyncWrite + Send + Unpin + 'static,

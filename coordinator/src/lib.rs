@@ -1,21 +1,20 @@
-//! The coordinator: owns every experiment's evolution, hands genotypes to
-//! workers, keeps every completed generation.
+//! The coordinator: owns every experiment's evolution, sends genotypes to workers, stores every
+//! completed generation.
 //!
-//! - the crate `evolution`: which genotypes to evaluate next (pure)
-//! - the crate `model`: the database, and what can be read of it
-//! - [`engine`]: which worker computes what (pure, synchronous)
-//! - `runs`: what an experiment does next, from its submission to its end (pure,
-//!   synchronous)
-//! - `driver`: the loop that carries out what engine and runs decide
-//! - `control`: what clients can have a running coordinator do
+//! - the crate `evolution`: draws the genotypes to evaluate next (pure)
+//! - the crate `model`: the database, and the calls that read it
+//! - [`engine`]: schedules items on workers (pure, synchronous)
+//! - `runs`: the life of an experiment, from its submission to its end (pure, synchronous)
+//! - `driver`: the loop that carries out the commands of engine and runs
+//! - `control`: the operations that a running coordinator offers to clients
 //! - `rpc`: gRPC services, which only translate
 //! - `server`: listening, TLS, tokens, limits on connections and calls
-//! - [`local`]: experiments that the calling process computes by itself
-//! - `health_check`: asks another process's coordinator how it is
+//! - [`local`]: experiments that the calling process computes itself
+//! - `health_check`: asks a coordinator in another process whether it is healthy
 //! - [`referee`]: evaluates single items, in a process of its own
-//! - [`metrics`]: what can be scraped
-//! - `memory`: what an experiment takes of it
-//! - [`limits`]: every bound on what the network can ask for
+//! - [`metrics`]: the values for Prometheus
+//! - `memory`: estimates the memory of an experiment
+//! - [`limits`]: all bounds on requests from the network
 //! - [`program`]: the command line of the program
 
 mod byte_budget;
@@ -35,7 +34,7 @@ mod runs;
 mod server;
 
 use model::{codec, failpoint, queries, shared_store, submission, text};
-/// What the store keeps, and what names it.
+/// The store, and the names of its contents.
 pub use model::{group, ids, labels, priority, store};
 
 pub use health_check::{Unhealthy, health_check};

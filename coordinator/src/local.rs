@@ -1,5 +1,5 @@
-//! An experiment that the calling process computes by itself, without a fleet: found, stored and
-//! gone on with in the database of a data directory, as a coordinator does it.
+//! Experiments that the calling process computes itself, without a fleet. Like a coordinator, it
+//! finds, stores and continues them in the database of a data directory.
 
 use std::{path::Path, time::Duration};
 
@@ -22,7 +22,7 @@ use crate::{
 
 pub use crate::runs::completion;
 
-/// Generations that are read at once.
+/// Number of generations to read at once.
 const PAGE_LEN: u32 = 100;
 
 /// An experiment in a data directory, which no other process changes meanwhile.
@@ -32,20 +32,20 @@ pub struct LocalRun {
     id: ExperimentId,
 }
 
-/// A generation to be committed.
+/// A generation to commit.
 #[derive(Debug)]
 pub struct Done<'a> {
-    /// Evolution after it.
+    /// The state of evolution after it.
     pub evolution: &'a Evolution,
-    /// What it was told.
+    /// Its fitness, as evolution learnt it.
     pub told: &'a Told,
-    /// What was worth a word when evolution learnt from it.
+    /// Notices from the update of evolution.
     pub notices: &'a [String],
-    /// How long it took.
+    /// Its duration.
     pub duration: Duration,
-    /// Threads, or whatever computes beside others.
+    /// Number of threads or processes that compute in parallel.
     pub n_workers: u64,
-    /// Whether it was the last one, and why.
+    /// Why the run is over, if this is the last generation.
     pub completed: Option<&'a str>,
 }
 
@@ -58,18 +58,18 @@ pub enum LocalRunError {
     /// The database cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// What is stored cannot be gone on with.
-    #[error("experiment {0} cannot go on: {1}; begin anew in another data directory")]
+    /// The stored state does not allow the experiment to continue.
+    #[error("experiment {0} cannot go on: {1}; start again in another data directory")]
     Unsound(ExperimentId, String),
-    /// There are too many.
+    /// The limit of unfinished experiments is reached.
     #[error("{UNFINISHED_MAX} experiments of this data directory are unfinished; take another one")]
     TooMany,
 }
 
 impl LocalRun {
-    /// Finds the experiment of a file's text in a data directory: one of the same bits that is
-    /// unfinished, has completed, or has completed fewer generations; else begins it. Keeps others
-    /// out of the directory until it is dropped.
+    /// Opens the experiment of a file's text in a data directory: an identical one that is
+    /// unfinished, has completed, or has completed fewer generations; otherwise a new one. Locks
+    /// the directory until it is dropped.
     pub fn open(directory: &Path, config_json: String) -> Result<Self, LocalRunError> {
         let new = Submission { config_json, ..Submission::default() }.check(&|| true)?.new;
         let mut store = Store::open(directory)?;
@@ -92,7 +92,7 @@ impl LocalRun {
         self.id
     }
 
-    /// As it stands.
+    /// Its present record.
     pub fn record(&self) -> Result<ExperimentRecord, StoreError> {
         let found = self.store.experiment(self.id)?;
         found
@@ -100,7 +100,7 @@ impl LocalRun {
             .ok_or_else(|| StoreError::Corrupt(format!("experiment {} is gone", self.id)))
     }
 
-    /// Evolution after the latest generation.
+    /// The state of evolution after the latest generation.
     pub fn evolution(&self) -> Result<Evolution, LocalRunError> {
         let (record, checkpoint) = self.store.resumable(self.id)?;
         restore_evolution(&record, &checkpoint).map_err(|why| LocalRunError::Unsound(self.id, why))
@@ -124,7 +124,7 @@ impl LocalRun {
         }
     }
 
-    /// Stores a generation with everything that belongs to it. Returns its row.
+    /// Stores a generation with its state, fitness log and champion. Returns its row.
     pub fn commit(&mut self, done: &Done<'_>) -> Result<GenerationRecord, LocalRunError> {
         let Done { evolution, told, notices, duration, n_workers, completed } = *done;
         let unsound = |why: String| LocalRunError::Unsound(self.id, why);
@@ -160,13 +160,13 @@ impl LocalRun {
         Ok(generation)
     }
 
-    /// Ends it: no later generation could learn anything.
+    /// Ends the experiment as failed, because no later generation could learn anything.
     pub fn fail(&mut self, reason: &str) -> Result<(), StoreError> {
         self.store.set_state(self.id, clock::unix_ms(), ExperimentState::Failed, reason)
     }
 }
 
-/// As evolution has it.
+/// The same mean as in `evolution`.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -189,7 +189,7 @@ mod tests {
         file.to_string()
     }
 
-    /// Goes on until so many generations are done; the last one of them all is judged.
+    /// Computes up to generation `until`; judges the champion after the last of `n_generations`.
     fn compute(run: &mut LocalRun, until: u64, n_generations: u64) {
         let mut evolution = run.evolution().unwrap();
         while evolution.n_generations() < until {
@@ -244,7 +244,7 @@ mod tests {
         let mut run = LocalRun::open(directory.path(), file(1000)).unwrap();
         let mut evolution = run.evolution().unwrap();
         let fitness_of = |generation: u64, n: usize| -> Vec<Vec<f64>> {
-            // Somebody without finite fitness is another difference.
+            // An individual without finite fitness counts as a difference.
             let first = if generation == 9 { f64::NAN } else { 0.25 };
             (0..n).map(|i| vec![if i == 0 { first } else { 0.25 }]).collect()
         };

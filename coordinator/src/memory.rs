@@ -1,5 +1,5 @@
-//! How much of the coordinator's memory an experiment takes, estimated from its size,
-//! so that together they take no more than there is.
+//! Estimates the coordinator's memory for an experiment from the experiment's size, so that all
+//! together fit.
 
 use std::fmt;
 
@@ -8,25 +8,25 @@ use experiment_file::Keeps;
 
 use crate::store::Summary;
 
-/// Bytes per gene of a generation, as measured at the most: the genotypes, the draws
-/// behind them, and those of the generation before, which the allocator has not given
-/// back yet. A population that is kept is copied and written out as text, too.
+/// Bytes per gene of a generation, the largest measured value: the genotypes, their random draws,
+/// and those of the previous generation, which the allocator has not returned yet. An algorithm
+/// that keeps its population also copies it and writes it as text.
 const BYTES_PER_GENE: u64 = 32;
 const BYTES_PER_GENE_OF_MATRIX: u64 = 48;
 const BYTES_PER_GENE_OF_POPULATION: u64 = 104;
-/// Bytes per entry of a matrix, which is copied, decomposed and written out as text.
+/// Bytes per entry of a matrix, including its copy, its decomposition and its text.
 const BYTES_PER_ENTRY: u64 = 96;
-/// Bytes per trial: its fitness, who evaluated it, and a copy.
+/// Bytes per trial: its fitness, the id of its worker, and a copy.
 const BYTES_PER_TRIAL: u64 = 32;
-/// Bytes per individual: where its genes and results are, its item.
+/// Bytes per individual: pointers to its genes and results, its item.
 const BYTES_PER_INDIVIDUAL: u64 = 256;
-/// Copies of the configuration: the text, its values, and what workers are sent.
+/// Copies of the configuration: the text, its values, and the message to workers.
 const CONFIG_COPIES: u64 = 4;
-/// Bytes of everything else.
+/// Bytes of everything else in an experiment.
 const BYTES_PER_EXPERIMENT: u64 = 64 << 10;
 
-/// Bytes that an experiment takes at the most, about; one of another release, which does not
-/// run, may count as nearly nothing.
+/// An estimate of the most bytes that an experiment takes. An experiment of another release,
+/// which does not run, may count as nearly nothing.
 pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
     let algorithm = summary;
     let description = ALGORITHMS.iter().find(|description| description.name == algorithm.algorithm);
@@ -53,25 +53,25 @@ pub fn estimate(summary: &Summary, genotype_len: u64) -> u64 {
     .fold(0, u64::saturating_add)
 }
 
-/// An experiment that finds too little memory.
+/// A lack of memory for an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shortage {
-    /// Bytes that it takes.
+    /// Bytes that the experiment takes.
     pub needed: u64,
     /// Bytes that other unfinished experiments take.
     pub in_use: u64,
-    /// Bytes that all may take together.
+    /// Bytes that all experiments may take together.
     pub budget: u64,
 }
 
 impl Shortage {
-    /// Why there is no room for `needed` bytes, if there is none.
+    /// Checks that there is room for `needed` bytes.
     pub fn check(needed: u64, in_use: u64, budget: u64) -> Result<(), Self> {
         let is_short = needed > budget.saturating_sub(in_use);
         if is_short { Err(Self { needed, in_use, budget }) } else { Ok(()) }
     }
 
-    /// Whether there will never be room.
+    /// Whether the experiment alone exceeds the budget.
     pub fn is_final(&self) -> bool {
         self.needed > self.budget
     }
@@ -118,8 +118,8 @@ mod tests {
         estimate(&summary(algorithm, population_size, n_trials), genotype_len) >> 20
     }
 
-    /// Of a coordinator process with a worker over three generations, less what it
-    /// takes without an experiment: 268, 799 and 401 MiB.
+    /// Measured over three generations with a worker, less the memory of a coordinator without
+    /// experiments: 268, 799 and 401 MiB.
     #[test]
     fn the_estimates_are_not_below_what_was_measured() {
         assert_eq!(mib("SNES", 20_000, 1, 424), 264);

@@ -1,5 +1,4 @@
-//! The coordinator's metrics: what there is, and its values when somebody scrapes
-//! them. `docs/metrics.md` has the same list.
+//! The coordinator's metrics, and their values at a scrape. `docs/metrics.md` has the same list.
 
 use swarm_telemetry::{Histogram, Metric, Scrape, metrics};
 use tokio::sync::oneshot;
@@ -80,15 +79,15 @@ metrics! {
         "Items that workers hold and have not answered, duplicates included.";
 }
 
-/// Bounds of the buckets for commits: a fast disk takes less than 1 ms, a busy one
-/// tenths of a second; one that is full takes until it is not.
+/// Upper bounds of the buckets for commits, s: a fast disk takes less than 1 ms, a busy one
+/// tenths of a second. A full disk takes until there is space.
 const COMMIT_BOUNDS_S: [f64; 13] =
     [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0];
 
-/// What is measured as it happens; everything else is asked for.
+/// Values that are measured as they happen; all others are read at a scrape.
 #[derive(Debug, Clone)]
 pub struct Instruments {
-    /// Time per commit, s.
+    /// Durations of commits, s.
     pub commit_duration: Histogram,
     /// Calls of all services.
     pub calls: Calls,
@@ -103,16 +102,16 @@ impl Default for Instruments {
     }
 }
 
-/// Where the values come from.
+/// The sources of the values.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// To the driver.
+    /// The channel to the driver.
     pub events: EventSender,
-    /// Whether it can be written.
+    /// The store, which knows whether its latest write succeeded.
     pub store: SharedStore,
-    /// What it has done.
+    /// The referee, which counts its answers.
     pub referee: Referee,
-    /// What is measured.
+    /// The values measured as they happen.
     pub instruments: Instruments,
 }
 

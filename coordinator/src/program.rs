@@ -110,12 +110,12 @@ fn fraction(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&fraction) { Ok(fraction) } else { Err("not within 0..=1".to_owned()) }
 }
 
-/// Runs the program with the words of its command line, the first of which is its name.
+/// Runs the program with its command line, which begins with the program's name.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = Args::parse_from(words);
     match args.command {
         Some(Command::Referee) => evaluate_items(),
-        // The referee's threads are its own.
+        // The referee makes its own threads.
         None => match runtime(0) {
             Ok(runtime) => block_on(runtime, run(&args)),
             Err(starved) => {
@@ -126,7 +126,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// The process of a referee.
+/// Runs the referee's process.
 fn evaluate_items() -> ExitCode {
     match referee::serve_stdio() {
         Ok(()) => ExitCode::SUCCESS,
@@ -168,7 +168,7 @@ async fn report_health(args: &Args) -> ExitCode {
     };
     match health.await {
         Ok(()) => {
-            // The exit code says it, too, where nobody reads the line.
+            // The exit code also says it, for callers that do not read the line.
             let _ = writeln!(io::stdout(), "healthy: the coordinator on {} serves", args.listen);
             ExitCode::SUCCESS
         }
@@ -179,14 +179,14 @@ async fn report_health(args: &Args) -> ExitCode {
     }
 }
 
-/// The time, to compare dates with.
+/// The present time, to compare with dates.
 #[expect(clippy::disallowed_methods, reason = "certificates expire by the clock")]
 fn now() -> SystemTime {
     SystemTime::now()
 }
 
 async fn serve(args: &Args) -> anyhow::Result<()> {
-    // Before anything else, so that an early signal is not lost.
+    // First of all, so that no early signal is lost.
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     let lease = Duration::from_secs(args.lease.into());
@@ -211,7 +211,7 @@ async fn serve(args: &Args) -> anyhow::Result<()> {
         info!("coordinator stops");
     }
     expiries.abort();
-    // Whatever the reason, it is the last line of the log.
+    // The last line of the log gives the reason in every case.
     coordinator.shutdown().await;
     Ok(ended?)
 }

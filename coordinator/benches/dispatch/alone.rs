@@ -1,4 +1,4 @@
-//! What the parts of a generation cost when nothing else happens.
+//! Measures the parts of a generation one at a time.
 
 use std::{
     fs::File,
@@ -24,7 +24,7 @@ pub struct Alone {
     pub evolution: f64,
     /// The checkpoint as bytes, and the transaction.
     pub commit: f64,
-    /// Appending as many bytes to a file, and waiting for the disk.
+    /// Append as many bytes to a file, and wait for the disk.
     pub sync: f64,
 }
 

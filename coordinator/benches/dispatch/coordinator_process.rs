@@ -20,13 +20,13 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(1);
 pub struct CoordinatorProcess {
     child: Child,
     address: String,
-    /// Where its pages are.
+    /// The address of its pages.
     pub pages: SocketAddr,
     data_dir: TempDir,
 }
 
 impl CoordinatorProcess {
-    /// Starts one that knows nothing.
+    /// Starts a coordinator with an empty data directory.
     pub fn start() -> Self {
         let data_dir = TempDir::new().expect("a temporary directory");
         let (address, pages) = (free_address().to_string(), free_address());
@@ -39,7 +39,7 @@ impl CoordinatorProcess {
         self.child.wait().expect("it is ours");
     }
 
-    /// Starts it again after [`kill`](Self::kill); returns when that was.
+    /// Restarts it after [`kill`](Self::kill); returns the time of the restart.
     #[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
     pub fn restart(&mut self) -> Instant {
         let now = Instant::now();

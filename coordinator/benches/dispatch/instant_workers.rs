@@ -1,5 +1,4 @@
-//! Workers that compute nothing: they answer items as soon as these arrive, and
-//! note when that was.
+//! Workers that compute nothing: they answer items at once, and record the times.
 
 use std::{
     collections::BTreeMap,
@@ -26,12 +25,12 @@ use tokio_stream::wrappers::ReceiverStream;
 use super::CoordinatorProcess;
 
 const RETRY_INTERVAL: Duration = Duration::from_millis(1);
-/// Answers that wait for the network.
+/// Number of answers that may wait for the network.
 const OUTBOX_LEN: usize = 64;
-/// What a worker accepts at once.
+/// Most bytes of a message to a worker.
 const MESSAGE_LEN_MAX: usize = 64 << 20;
 
-/// Some workers; they leave when this is dropped.
+/// A set of workers, which leave when this is dropped.
 pub struct InstantWorkers {
     _tasks: JoinSet<()>,
     diary: Arc<Diary>,
@@ -40,7 +39,7 @@ pub struct InstantWorkers {
 /// A generation as the workers saw it.
 #[derive(Debug, Clone, Copy)]
 pub struct Round {
-    /// When the first item came.
+    /// When the first item arrived.
     pub started: Instant,
     /// When the last answer was given.
     ended: Instant,
@@ -69,7 +68,7 @@ impl InstantWorkers {
         Self { _tasks: tasks, diary }
     }
 
-    /// Generations `first` to `last`, as soon as they are over.
+    /// Waits for generations `first` to `last`, and returns them.
     pub async fn rounds(&self, first: u64, last: u64) -> Vec<Round> {
         let mut latest = self.diary.latest.subscribe();
         latest.wait_for(|latest| *latest > Some(last)).await.expect("the diary is ours");
@@ -77,12 +76,12 @@ impl InstantWorkers {
         (first..=last).map(|generation| rounds[&generation]).collect()
     }
 
-    /// The generation that they are at.
+    /// The present generation.
     pub fn latest(&self) -> u64 {
         self.diary.latest.borrow().unwrap_or_default()
     }
 
-    /// The first generation that they see, as soon as it has begun.
+    /// Waits for the first generation, and returns it as soon as it has begun.
     pub async fn first_round(&self) -> Round {
         let mut latest = self.diary.latest.subscribe();
         latest.wait_for(Option::is_some).await.expect("the diary is ours");
@@ -114,7 +113,7 @@ impl Diary {
     }
 }
 
-/// One stream, until it ends.
+/// Runs one stream until it ends.
 async fn work(url: &str, name: String, n_slots: u32, diary: &Diary) -> anyhow::Result<()> {
     let (outbox, requests) = mpsc::channel(OUTBOX_LEN);
     let hello = work_request::Message::Hello(v1::Hello {

@@ -1,7 +1,6 @@
-//! How fast the coordinator hands out work and takes results: the coordinator as
-//! a process of its own, and workers that answer at once, over gRPC on loopback.
-//! Prints the tables of `docs/notebook/2026-11-fleet.md`; an argument selects lines by a
-//! part of their name.
+//! Measures how fast the coordinator assigns items and handles results: a coordinator process,
+//! and workers that answer at once, over gRPC on loopback. Prints the tables of
+//! `docs/notebook/2026-11-fleet.md`; an argument selects lines by a part of their name.
 
 mod alone;
 mod coordinator_process;
@@ -17,12 +16,12 @@ use coordinator_process::CoordinatorProcess;
 use instant_workers::{InstantWorkers, median};
 use open_pages::OpenPages;
 
-/// Each line is measured so often, with a new coordinator each time.
+/// Number of measurements per line, each with a new coordinator.
 const N_REPEATS: usize = 5;
 /// Both shipped files of experiment A have 445 genes.
 const SNES: &str = include_str!("../../../configs/leader_selection_snes.json");
 const GA: &str = include_str!("../../../configs/leader_selection_ga.json");
-/// More generations than anybody waits for, so that nothing ends by itself.
+/// So many generations that no run ends by itself.
 const FOREVER: u64 = 1_000_000;
 
 #[tokio::main(flavor = "current_thread")]
@@ -111,8 +110,8 @@ fn experiment(file: &str, population_size: u32, generations: u64) -> String {
     config.to_string()
 }
 
-/// With two workers of eight slots and a large population: while a generation is
-/// evaluated, and altogether.
+/// Items per second with two workers of eight slots and a large population: during the evaluation
+/// of a generation, and overall.
 async fn items_per_s() -> (f64, f64) {
     const POPULATION_SIZE: u32 = 10_000;
     let coordinator = CoordinatorProcess::start();

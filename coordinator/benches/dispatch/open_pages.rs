@@ -1,4 +1,4 @@
-//! Pages that are open in browsers: what they ask, as often as they ask it.
+//! Sends the requests of pages that are open in browsers, as often as they do.
 
 use std::{
     net::SocketAddr,
@@ -15,12 +15,12 @@ use tokio::{
     time,
 };
 
-/// Between two looks at what does not come by itself.
+/// Interval between requests for values that no stream brings.
 const LOOK_EVERY: Duration = Duration::from_secs(2);
-/// Until all pages have what was there before them.
+/// Time until all pages have loaded the earlier data.
 const LOADING: Duration = Duration::from_secs(5);
 
-/// Some pages, read by a thread of their own; they are closed when this is dropped.
+/// Open pages, read by a thread of their own; dropping this closes them.
 pub struct OpenPages {
     close: watch::Sender<bool>,
     reader: Option<JoinHandle<()>>,
@@ -68,7 +68,7 @@ impl Drop for OpenPages {
     }
 }
 
-/// Asks for something, and reads the answer to its end.
+/// Sends a request, and reads the whole answer.
 async fn get(address: SocketAddr, path: &'static str) -> io::Result<()> {
     let mut stream = TcpStream::connect(address).await?;
     let request =

@@ -108,7 +108,9 @@ pub enum ControlError {
     #[error("{0}")]
     EvaluationFailed(String),
     /// The parent of an imported fork is missing.
-    #[error("this experiment is a fork, and this coordinator does not have its parent: import the parent first")]
+    #[error(
+        "this experiment is a fork, and this coordinator does not have its parent: import the parent first"
+    )]
     NoParent,
     /// A query without an answer.
     #[error(transparent)]

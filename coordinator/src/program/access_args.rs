@@ -1,4 +1,4 @@
-//! The options for tokens and TLS, and reading the files that they name.
+//! The options for tokens and TLS; reads the files that they name.
 
 use std::path::PathBuf;
 

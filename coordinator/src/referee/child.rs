@@ -1,4 +1,5 @@
-//! The referee's process: a worker whose coordinator is at its standard input and output.
+//! The referee's process: a worker that talks to its coordinator through standard input and
+//! output.
 
 use std::{
     collections::BTreeMap,
@@ -22,18 +23,21 @@ use swarm_proto::{
 use super::stream::{Arrived, invalid};
 use crate::{codec, ids::JobId};
 
-/// Answers requests until standard input ends, then stops computing and returns. Fails
-/// if what arrives is no request, or if nobody reads the answers.
+/// Answers requests until standard input ends, then stops computing and returns.
+///
+/// # Errors
+///
+/// If the input contains an invalid request, or if the output is closed.
 pub fn serve_stdio() -> io::Result<()> {
-    // Where there is no such file, as on other systems, all goes well without. First:
-    // if memory runs out, this process is to go and not the coordinator.
+    // If memory runs out, the system should kill this process and not the coordinator. Other
+    // systems have no such file, and work without it.
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
-    // What `ps` and `top` call it.
+    // The name in `ps` and `top`.
     let _ = fs::write("/proc/self/comm", "swarm-referee");
     let is_over = Arc::new(AtomicBool::new(false));
     let (sender, requests) = mpsc::sync_channel(1);
     let over = Arc::clone(&is_over);
-    // Reads while an item is computed, and so finds out that nobody waits for it.
+    // Reads during a computation, to notice when the coordinator goes away.
     thread::Builder::new().name("requests".into()).spawn(move || {
         let (mut input, mut arrived) = (io::stdin().lock(), Arrived::default());
         loop {
@@ -45,15 +49,15 @@ pub fn serve_stdio() -> io::Result<()> {
             }
         }
     })?;
-    // Has a stack of the size of a worker's slots, not of a main thread: an item whose
-    // recursion is too deep for one is too deep for the other.
+    // The stack has the size of a worker's slots, not of a main thread, so that too deep a
+    // recursion fails in both.
     let computing = thread::Builder::new()
         .name("slot-0".into())
         .spawn(move || answer(&requests, &mut io::stdout(), &is_over))?;
     computing.join().unwrap_or_else(|_| Err(io::Error::other("answering panicked")))
 }
 
-/// The next message; none if the stream ends before it.
+/// The next message; `None` if the stream has ended.
 fn read(input: &mut impl Read, arrived: &mut Arrived) -> io::Result<Option<v1::WorkResponse>> {
     let mut bytes = [0; 1 << 16];
     loop {
@@ -67,7 +71,7 @@ fn read(input: &mut impl Read, arrived: &mut Arrived) -> io::Result<Option<v1::W
     }
 }
 
-/// The compiled specifications of jobs, or why there is none.
+/// The compiled specifications of jobs, or why they do not compile.
 type Jobs = BTreeMap<JobId, Result<SpecifiedSimulation, String>>;
 
 /// Computes and answers, one item at a time.
@@ -102,14 +106,14 @@ fn answer(
                     say(output, work_request::Message::Results(results))?;
                 }
             }
-            _ => return Err(invalid("a message is none for a referee")),
+            _ => return Err(invalid("the message is of a kind that a referee does not handle")),
         }
     }
     Ok(())
 }
 
-/// The results of assignments of a job; none after it was stopped, and the reason is what arrives
-/// next.
+/// The results of assignments of a job; `None` if the computation was stopped; the next event
+/// says why.
 fn compute(
     job: &Result<SpecifiedSimulation, String>,
     assignments: v1::Assignments,

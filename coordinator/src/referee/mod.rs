@@ -1,14 +1,13 @@
 //! The referee: a child process of the coordinator that evaluates single items.
 //!
-//! The simulation is deterministic, and the coordinator has it, too: what an item
-//! really comes to, be it numbers or a failure, needs no worker's word. It is a process
-//! of its own because an item may take the process that computes it down; the
-//! coordinator then learns of it as [`Verdict::Died`].
+//! The simulation is deterministic, and the coordinator contains it, so it can compute the true
+//! result of an item itself, be it numbers or a failure. The referee is a process of its own
+//! because an item may take its process down; the coordinator sees that as [`Verdict::Died`].
 //!
-//! - [`Referee`] starts the process when there is an item, asks it one item at a time,
-//!   starts it again after a death, and ends it after a time without items;
-//! - [`serve_stdio`] is the process itself: `coordinator referee` and
-//!   `swarmctl referee`, which nobody types;
+//! - [`Referee`] starts the process for an item, sends it one item at a time, restarts it after a
+//!   death, and ends it after a time without items;
+//! - [`serve_stdio`] is the process itself: `coordinator referee` and `swarmctl referee`, which
+//!   only programs start;
 //! - the two speak the workers' protocol through its standard input and output (`stream`);
 //!   `process` is one process as its supervisor sees it.
 //!
@@ -29,7 +28,7 @@ pub use supervisor::Referee;
 
 use crate::engine::SharedGenotype;
 
-/// The program that a referee process runs: [`serve_stdio`] has to be behind it.
+/// The program of a referee process, which must call [`serve_stdio`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RefereeProgram {
     /// The executable file; a name without a slash is looked up in `PATH`.
@@ -39,8 +38,8 @@ pub struct RefereeProgram {
 }
 
 impl RefereeProgram {
-    /// The program of this process, with the argument `referee`: right in `coordinator`
-    /// and in `swarmctl`, not in other programs that use this library.
+    /// The program of this process, with the argument `referee`. Correct in `coordinator` and
+    /// `swarmctl`, but not in other programs that use this library.
     pub fn this_program() -> Self {
         // Opens the file that runs here, even if an upgrade has replaced it on disk.
         Self { path: "/proc/self/exe".into(), args: vec!["referee".into()] }
@@ -50,41 +49,39 @@ impl RefereeProgram {
 /// An item to evaluate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RefereeRequest {
-    /// The experiment in its canonical form, the text that workers get. The last few texts are
-    /// compiled once, as long as the process lives.
+    /// The experiment in its canonical form, the text that workers get. The process keeps the
+    /// last few texts compiled.
     pub specification: Arc<str>,
-    /// Genes; reach the simulation bit by bit as they are here.
+    /// Genes, which reach the simulation without any change of bits.
     pub genotype: SharedGenotype,
-    /// Which worlds and noise.
+    /// The trial set.
     pub trial_set: TrialSet,
-    /// Which trials of the set.
+    /// The trials of the set.
     pub trials: Range<u32>,
-    /// What to compute of each trial.
+    /// The kind of result for each trial.
     pub output: Output,
 }
 
-/// What has become of an item.
+/// The outcome of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// It can be computed, and comes to this: a number per trial, or the measures of
-    /// each trial one after the other, as the request's `output` says.
+    /// The item's numbers: one per trial, or the measures of each trial one after the other, as
+    /// the request's `output` says.
     Values(Vec<f64>),
-    /// It cannot be computed, in the words in which every worker says so. A
+    /// The item cannot be computed; the text is the message that every worker reports. A
     /// specification that does not compile is such a failure, and so is a panic.
     Failed(String),
-    /// It took the process down; the text has the signal or the exit code. Whoever kills
-    /// the process from outside while it computes (the system that is out of memory, or
-    /// a person) causes the same.
+    /// The process died during the item; the text has the signal or the exit code. A kill from
+    /// outside (by a system without memory, or by a person) looks the same.
     Died(String),
-    /// Nothing is known about the item, and it is not to blame; the text says why and
-    /// what to do. Either the process cannot be started, or does not behave like a
-    /// referee, or was told to stop (SIGTERM, SIGINT or SIGHUP, as when the machine shuts
-    /// down).
+    /// The referee could not answer, and the item is not to blame; the text says why and what to
+    /// do. The process cannot be started, does not behave like a referee, or was told to stop
+    /// (SIGTERM, SIGINT or SIGHUP, as at a shutdown of the machine).
     Unavailable(String),
 }
 
 impl Verdict {
-    /// The same with another text, if it has one.
+    /// The same verdict with another text, if it has one.
     pub fn map_text(self, change: impl FnOnce(String) -> String) -> Self {
         match self {
             Self::Values(values) => Self::Values(values),
@@ -95,17 +92,17 @@ impl Verdict {
     }
 }
 
-/// What a referee has done since it was made.
+/// Statistics of a referee since its creation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RefereeStats {
-    /// Time in which an item was with the process, including the time to start it.
+    /// Time spent on items, including starts of the process.
     pub busy: Duration,
-    /// Verdicts that were [`Verdict::Values`].
+    /// Number of verdicts [`Verdict::Values`].
     pub n_values: u64,
-    /// Verdicts that were [`Verdict::Failed`].
+    /// Number of verdicts [`Verdict::Failed`].
     pub n_failed: u64,
-    /// Verdicts that were [`Verdict::Died`].
+    /// Number of verdicts [`Verdict::Died`].
     pub n_died: u64,
-    /// Verdicts that were [`Verdict::Unavailable`].
+    /// Number of verdicts [`Verdict::Unavailable`].
     pub n_unavailable: u64,
 }

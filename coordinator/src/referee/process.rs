@@ -1,4 +1,4 @@
-//! One referee process, as the coordinator sees it: it is started, asked, and lost.
+//! One referee process, as the coordinator sees it: its start, its answers, its end.
 
 use std::{
     collections::VecDeque,
@@ -26,18 +26,18 @@ use crate::{
     ids::{EvaluationId, JobId},
 };
 
-/// Compiled specifications that a process keeps.
+/// Number of compiled specifications that a process keeps.
 const SPECIFICATIONS_MAX: usize = 4;
-/// Time for a new process to say that it is ready. Only a machine without memory or
+/// Time for a new process to report that it is ready. Only a machine that lacks memory or
 /// processors needs seconds.
 const START_TIMEOUT: Duration = Duration::from_secs(30);
-/// Time for a process to end after its standard input or output has.
+/// Time for a process to end after its standard input or output is closed.
 const END_TIMEOUT: Duration = Duration::from_secs(5);
-/// Time for what a process has written before its end to be read.
+/// Time to read the last output of a process.
 const LAST_WORDS_TIMEOUT: Duration = Duration::from_millis(500);
-/// Bytes of a line of its standard error; longer ones are broken.
+/// Bytes per line of its standard error; longer lines are split.
 const LINE_LEN_MAX: u64 = 1024;
-/// Lines of its standard error that are logged; the others are dropped.
+/// Number of lines of its standard error to log; the rest is dropped.
 const LINES_MAX: usize = 100;
 
 /// A process that is ready for an item. Dropping it kills the process.
@@ -47,38 +47,38 @@ pub(super) struct Process {
     input: ChildStdin,
     output: ChildStdout,
     arrived: Arrived,
-    /// The specifications that the process has, by the job that stands for each; the one used
-    /// last is the last.
+    /// The specifications that the process has, each with the job id that stands for it, least
+    /// recently used first.
     specifications: VecDeque<(JobId, Arc<str>)>,
     n_specifications_sent: u64,
     n_items_sent: u64,
-    /// One task, that logs what it writes to standard error.
+    /// One task, which logs the process's standard error.
     log: JoinSet<()>,
 }
 
 impl Process {
-    /// Starts a process and waits until it is ready. The error says why there is none,
-    /// and what to do.
+    /// Starts a process and waits until it is ready. The error says what went wrong, and what to
+    /// do.
     pub(super) async fn start(program: &RefereeProgram) -> Result<Self, String> {
         let name = program.path.display();
         let mut command = Command::new(&program.path);
         command.args(&program.args);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // The coordinator's settings: some are secrets, and one that is invalid, but
-        // replaced by an option, would keep the process from starting.
+        // Removes the coordinator's settings: some are secrets, and an invalid one that an option
+        // replaces would keep the process from starting.
         for (variable, _) in env::vars_os() {
             if variable.to_string_lossy().starts_with("SWARM_") {
                 command.env_remove(variable);
             }
         }
         command.kill_on_drop(true);
-        // Ctrl-C in the coordinator's terminal is for the coordinator.
+        // Only the coordinator reacts to Ctrl-C in its terminal.
         command.process_group(0);
         let mut child = command.spawn().map_err(|error| {
             format!(
-                "the referee process {name} cannot be started ({error}); \
-                 give the coordinator more of what that says is short, be it memory, processes \
-                 or open files; if its program has been moved, start the coordinator again"
+                "the referee process {name} cannot be started ({error}); raise the coordinator's \
+                 limit that the error names, such as memory, processes or open files; if its \
+                 program has been moved, start the coordinator again"
             )
         })?;
         let (Some(input), Some(output), Some(errors)) =
@@ -125,15 +125,15 @@ impl Process {
         }
     }
 
-    /// Whether it can be given an item: it may have been killed while it had none.
+    /// Whether the process still runs: it may have been killed while it had no item.
     pub(super) fn is_alive(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// Has an item evaluated. The process is given back if it can take another one.
+    /// Evaluates an item. Returns the process if it can take another one.
     pub(super) async fn evaluate(mut self, request: &RefereeRequest) -> (Verdict, Option<Self>) {
         let messages = self.messages(request);
-        // A process that has gone does not read; what it leaves behind says how it went.
+        // A dead process does not read; its exit status says how it ended.
         let _ = self.input.write_all(&messages).await;
         let results = match self.next_message().await {
             Ok(Some(work_request::Message::Results(v1::ItemResults { results }))) => results,
@@ -141,7 +141,7 @@ impl Process {
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
                 return (self.death().await, None);
             }
-            Ok(_) => return (nonsense("it does not answer what it was asked"), None),
+            Ok(_) => return (nonsense("it does not answer the request"), None),
             Err(error) => return (nonsense(&error.to_string()), None),
         };
         let result = results.into_iter().find(|result| result.assignment_id == self.n_items_sent);
@@ -149,12 +149,12 @@ impl Process {
             Some(Outcome::Fitness(v1::TrialFitness { values })) => Verdict::Values(values),
             Some(Outcome::Measures(v1::TrialMeasures { values })) => Verdict::Values(values),
             Some(Outcome::Failure(v1::ItemFailure { message })) => Verdict::Failed(message),
-            None => return (nonsense("it does not answer what it was asked"), None),
+            None => return (nonsense("it does not answer the request"), None),
         };
         (verdict, Some(self))
     }
 
-    /// What the process says next; none if its output has ended.
+    /// The process's next message; `None` if its output has ended.
     async fn next_message(&mut self) -> io::Result<Option<work_request::Message>> {
         loop {
             if let Some(v1::WorkRequest { message }) = self.arrived.take()? {
@@ -167,8 +167,8 @@ impl Process {
         }
     }
 
-    /// The messages by which an item is computed: with its specification if the process does not
-    /// have it, in place of the one that was used least recently.
+    /// The messages that request an item. They include its specification if the process lacks it;
+    /// it replaces the least recently used one.
     fn messages(&mut self, request: &RefereeRequest) -> Vec<u8> {
         let RefereeRequest { specification, genotype, trial_set, trials, output } = request;
         let mut bytes = Vec::new();
@@ -209,7 +209,7 @@ impl Process {
         bytes
     }
 
-    /// What it means that the output has ended within an item.
+    /// The verdict if the output ends within an item.
     async fn death(&mut self) -> Verdict {
         let Some(status) = self.exit_status().await else {
             return nonsense("it closed its output and did not end");
@@ -227,19 +227,19 @@ impl Process {
         Verdict::Died(format!("took the process that computed it down ({status})"))
     }
 
-    /// How the process ended; none if it goes on.
+    /// How the process ended; `None` if it still runs.
     async fn exit_status(&mut self) -> Option<ExitStatus> {
         let status = timeout(END_TIMEOUT, self.child.wait()).await.ok()?.ok()?;
-        // Its last words say more than the status.
+        // Its last output says more than the status.
         let _ = timeout(LAST_WORDS_TIMEOUT, self.log.join_next()).await;
         Some(status)
     }
 
-    /// Ends it.
+    /// Ends the process.
     pub(super) async fn end(self) {
         let Self { mut child, input, .. } = self;
         drop(input);
-        // If that takes too long, dropping it kills it.
+        // If the process takes too long to end, dropping it kills it.
         let _ = timeout(END_TIMEOUT, child.wait()).await;
     }
 }
@@ -251,7 +251,7 @@ fn nonsense(what: &str) -> Verdict {
     ))
 }
 
-/// Writes what a process says on standard error to the log.
+/// Writes a process's standard error to the log.
 async fn log_lines(errors: ChildStderr) {
     let mut errors = BufReader::new(errors);
     let mut line = Vec::new();

@@ -1,22 +1,22 @@
-//! The messages of `worker.proto` in a stream of bytes, each after its length, as prost writes it.
+//! Messages of `worker.proto` in a stream of bytes, each after its length, in prost's encoding.
 
 use std::io;
 
 use prost::Message;
 
-/// Bytes of a message. A specification has at most 1 MiB, and a genotype, of up to a
-/// gene per network parameter, some 9 MB; the results of an evaluation have 16 MiB.
+/// Most bytes of a message. A specification has at most 1 MiB, a genotype with a gene per network
+/// parameter some 9 MB, and the results of an evaluation 16 MiB.
 const MESSAGE_LEN_MAX: usize = 64 << 20;
-/// Bytes of the longest length.
+/// Most bytes of an encoded length.
 const LENGTH_LEN_MAX: usize = 10;
 
-/// What has arrived of a stream, and is to be read.
+/// Bytes of a stream that have arrived and are not read yet.
 #[derive(Debug, Default)]
 pub(super) struct Arrived(pub(super) Vec<u8>);
 
 impl Arrived {
-    /// Takes the first message; none if not all of it is there. What is no message is
-    /// `InvalidData`.
+    /// Takes the first message; `None` if it has not arrived completely. Fails with `InvalidData`
+    /// if it is not a message.
     pub(super) fn take<M: Message + Default>(&mut self) -> io::Result<Option<M>> {
         let mut rest = &self.0[..];
         let len = match prost::decode_length_delimiter(&mut rest) {
@@ -32,13 +32,13 @@ impl Arrived {
         Ok(Some(message))
     }
 
-    /// The stream has ended: `UnexpectedEof` within a message.
+    /// Checks the end of the stream: fails with `UnexpectedEof` within a message.
     pub(super) fn end(&self) -> io::Result<()> {
         if self.0.is_empty() { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 }
 
-/// An error of what the other side has written.
+/// An error about invalid data from the other side.
 pub(super) fn invalid(message: impl Into<String>) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, message.into())
 }

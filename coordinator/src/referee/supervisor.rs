@@ -1,4 +1,4 @@
-//! Starts the referee process when there is an item, and ends it when there is none.
+//! Starts the referee process for an item, and ends it after a time without items.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, Weak},
@@ -21,29 +21,30 @@ pub struct Referee {
 struct Shared {
     program: RefereeProgram,
     idle_time: Duration,
-    /// Locked while there is an item: the others wait here, first come, first served.
+    /// Locked during an item; others wait for the lock, first come, first served.
     state: tokio::sync::Mutex<State>,
     stats: Mutex<RefereeStats>,
 }
 
 #[derive(Debug, Default)]
 struct State {
-    /// None before the first item, after a death, and after a time without items.
+    /// `None` before the first item, after a death, and after a time without items.
     process: Option<Process>,
-    /// Ends the process in a while.
+    /// Ends the process after a time without items.
     idle_timer: JoinSet<()>,
 }
 
 impl Referee {
-    /// Starts nothing yet. `idle_time`: how long the process is kept without an item.
+    /// A referee without a process yet. `idle_time`: how long to keep the process without an
+    /// item.
     pub fn new(program: RefereeProgram, idle_time: Duration) -> Self {
         let (state, stats) = Default::default();
         Self { shared: Arc::new(Shared { program, idle_time, state, stats }) }
     }
 
-    /// Evaluates an item, after those that were asked for before it; the caller limits
-    /// how many these are, and how long it waits: items may take minutes. Dropping the
-    /// future forgets the item, and kills the process if it is computing it.
+    /// Evaluates an item, after all earlier ones. Items may take minutes, so the caller limits
+    /// their number and the time to wait. Dropping the future drops the item, and kills the
+    /// process if it is computing the item.
     pub async fn evaluate(&self, request: &RefereeRequest) -> Verdict {
         let Shared { program, idle_time, state, .. } = &*self.shared;
         let mut state = state.lock().await;
@@ -52,8 +53,8 @@ impl Referee {
         // Taken out, so that it is killed if this future is dropped.
         let (verdict, process) = match state.process.take_if(|process| process.is_alive()) {
             Some(process) => match process.evaluate(request).await {
-                // It may have been killed just before it was given the item: only the
-                // death of a process that was started for it is the item's.
+                // The process may have been killed just before it got the item. Only the death of
+                // a process that was started for the item counts against the item.
                 (Verdict::Died(_), _) => evaluate_afresh(program, request).await,
                 evaluated => evaluated,
             },
@@ -69,13 +70,13 @@ impl Referee {
         verdict
     }
 
-    /// What has been done so far.
+    /// Statistics so far.
     pub fn stats(&self) -> RefereeStats {
         *self.shared.stats()
     }
 }
 
-/// Has an item evaluated by a process that has not had any other.
+/// Evaluates an item in a new process.
 async fn evaluate_afresh(
     program: &RefereeProgram,
     request: &RefereeRequest,
@@ -102,7 +103,7 @@ impl Shared {
     }
 }
 
-/// Counts, when it is dropped, the time that has passed since.
+/// Adds the time since its creation to the statistics when it is dropped.
 struct BusyTime<'a> {
     shared: &'a Shared,
     since: Instant,
@@ -114,7 +115,7 @@ impl Drop for BusyTime<'_> {
     }
 }
 
-/// Waits, then ends the process, unless it is aborted because there is an item.
+/// Waits, then ends the process, unless an item aborts this task.
 async fn end_idle(shared: Weak<Shared>, idle_time: Duration) {
     sleep(idle_time).await;
     let Some(shared) = shared.upgrade() else { return };

@@ -1,4 +1,4 @@
-//! Bundles in pieces: a message has a limit, and a bundle is larger.
+//! Sends and receives bundles in pieces, because a bundle is larger than the limit of a message.
 
 use std::pin::Pin;
 
@@ -19,14 +19,14 @@ const PIECE_LEN: usize = 1 << 20;
 /// A bundle on its way to a client.
 pub type Pieces = Pin<Box<dyn Stream<Item = Result<ExportExperimentResponse, Status>> + Send>>;
 
-/// Sends a bundle. `place`: kept until it is sent, so that few are in memory.
+/// Sends a bundle. `place`: kept until the end, so that few bundles are in memory.
 pub fn send(bytes: Vec<u8>, place: OwnedSemaphorePermit) -> Pieces {
     let (outbox, inbox) = mpsc::channel(1);
     tokio::spawn(async move {
         let _place = place;
         for piece in bytes.chunks(PIECE_LEN) {
             let message = Ok(ExportExperimentResponse { piece: piece.to_vec() });
-            // A client that does not read any more holds memory.
+            // A client that stops reading holds memory.
             if !matches!(timeout(WATCH_PATIENCE, outbox.send(message)).await, Ok(Ok(()))) {
                 return;
             }

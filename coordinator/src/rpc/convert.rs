@@ -1,4 +1,4 @@
-//! Wire types to core types and back.
+//! Converts wire types to core types and back.
 
 use std::time::Duration;
 
@@ -18,16 +18,16 @@ use crate::{
     text::printable,
 };
 
-/// What a worker is told about time.
+/// The durations in `Welcome`.
 #[derive(Debug, Clone, Copy)]
 pub struct WelcomeTimes {
     /// Between heartbeats.
     pub heartbeat_interval: Duration,
-    /// Silence after which a worker loses its items.
+    /// Time of silence after which a worker loses its items.
     pub lease: Duration,
 }
 
-/// What a worker is told, as a message, or as the status that ends its stream.
+/// A message to a worker, or the status that ends its stream.
 pub fn to_wire(message: ToWorker, times: WelcomeTimes) -> Result<WorkResponse, Status> {
     let message = match message {
         ToWorker::Welcome(id) => Message::Welcome(v1::Welcome {

@@ -1,4 +1,4 @@
-//! `EvaluationService`: one genotype, many trials, every step measured.
+//! `EvaluationService`: evaluates genotypes in many trials, and measures every step.
 
 use std::pin::Pin;
 
@@ -25,7 +25,7 @@ use super::{client, convert, shutting_down};
 /// The service.
 #[derive(Debug)]
 pub struct Evaluations {
-    /// Has the fleet evaluate.
+    /// The handle to the coordinator.
     pub control: Control,
     /// Ends all streams.
     pub shutdown: CancellationToken,
@@ -46,14 +46,15 @@ impl EvaluationService for Evaluations {
         let priority = priority.map_or(Ok(Priority::default()), convert::priority)?;
         let order = EvaluationOrder { config_json, genotype, n_trials: trial_count, priority };
         let checked = control.check_evaluation(order).await?;
-        // There is always room for what is measured, and to say how it ends.
+        // Reserved, so that there is always room for the first message, and for the error that
+        // ends the stream.
         let (outbox, inbox) = mpsc::channel(2);
         let final_slot = outbox.clone().try_reserve_owned().expect("a new channel has room");
         let (control, shutdown) = (self.control.clone(), self.shutdown.clone());
         tokio::spawn(async move {
             let status = tokio::select! {
                 () = shutdown.cancelled() => shutting_down(),
-                // Dropping the rest tells the driver.
+                // Dropping the rest tells the driver that the client has gone.
                 () = outbox.closed() => return,
                 result = evaluate(&control, checked, &outbox) => match result {
                     Ok(()) => return,
@@ -87,7 +88,7 @@ impl EvaluationService for Evaluations {
     }
 }
 
-/// The trials that a client names, or what is wrong with them.
+/// The trials that a client names, or the mistake in them.
 fn trial_set(trials: Option<EvolutionTrials>) -> Result<TrialSet, Status> {
     match trials.and_then(|message| message.trials) {
         Some(Trials::Generation(generation)) => Ok(TrialSet::Generation(generation)),
@@ -116,11 +117,11 @@ async fn evaluate(
     Ok(())
 }
 
-/// Waits for a client to read, but not for ever: it holds memory meanwhile.
+/// Waits for a client to read, for a limited time, because the client holds memory meanwhile.
 async fn send(outbox: &Outbox, message: Message) -> Result<(), Status> {
     let response = EvaluateResponse { message: Some(message) };
     let sent = timeout(WATCH_PATIENCE, outbox.send(Ok(response))).await;
     sent.map_err(|_| Status::aborted("the client does not read; ask again"))?
-        // It has gone, and so does the caller.
+        // The client has gone, so the caller stops, too.
         .map_err(|_| Status::cancelled("the client has gone"))
 }

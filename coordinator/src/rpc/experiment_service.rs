@@ -1,4 +1,4 @@
-//! `ExperimentService`: submit, look, watch, steer.
+//! `ExperimentService`: submits, reads, watches and steers experiments.
 
 use std::{pin::Pin, sync::Arc};
 
@@ -33,13 +33,13 @@ use super::{bundles, client, convert, explain, status};
 /// The service.
 #[derive(Debug)]
 pub struct Experiments {
-    /// One for each bundle that is in memory.
+    /// One permit for each bundle in memory.
     pub bundles: Arc<Semaphore>,
-    /// For everything that is to be done.
+    /// Carries out all changes.
     pub control: Control,
     /// Answers the calls that only read.
     pub reader: Reader,
-    /// What streams and bundles are read from.
+    /// The source of streams and bundles.
     pub store: SharedStore,
     /// Ends all streams.
     pub shutdown: CancellationToken,
@@ -50,7 +50,7 @@ type Explanations = Pin<Box<dyn Stream<Item = Result<WatchExplanationResponse, S
 type News = Pin<Box<dyn Stream<Item = Result<WatchNewsResponse, Status>> + Send>>;
 
 impl Experiments {
-    /// A place for a bundle in memory.
+    /// Waits for a permit for a bundle.
     async fn place(&self) -> Result<OwnedSemaphorePermit, Status> {
         let place = Arc::clone(&self.bundles).acquire_owned().await;
         place.map_err(|_| status::shutting_down())
@@ -79,7 +79,7 @@ impl Experiments {
         let fork_of =
             request.fork_of.map(|point| (ExperimentId(point.experiment_id), point.generation));
         if fork_of.is_some() && request.resume_unfinished {
-            return Err(Status::invalid_argument("a fork resumes nothing that is unfinished"));
+            return Err(Status::invalid_argument("fork and resume_unfinished exclude each other"));
         }
         let existing =
             Existing { resume_unfinished: request.resume_unfinished, reuse: request.reuse };
@@ -162,9 +162,9 @@ impl Experiments {
     }
 }
 
-/// The service by its calls: those that read are the reader's; those that change an experiment
-/// name what they take from the request, what the answer has, and what the coordinator does; all
-/// others are functions of their own.
+/// Implements the service call by call. Calls that only read go to the reader. A call that
+/// changes an experiment lists its arguments from the request, the fields of its answer, and the
+/// operation of the coordinator. All other calls are functions of their own.
 macro_rules! service {
     (
         reads { $($read:ident($asked:ident) -> $answer:ident;)* }
@@ -209,7 +209,7 @@ macro_rules! service {
                     &self,
                     request: Request<$request>,
                 ) -> Result<Response<$response>, Status> {
-                    // The function of that name above, not this one.
+                    // Calls the function of that name above, not this one.
                     Experiments::$other(self, request).await
                 }
             )*

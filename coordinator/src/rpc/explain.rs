@@ -1,4 +1,4 @@
-//! What an experiment is doing, as a message.
+//! Converts explanations of experiments to messages.
 
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ fn question(question: engine::OpenQuestion) -> RefereeQuestion {
     RefereeQuestion { individual, doubt, trouble: trouble.unwrap_or_default() }
 }
 
-/// A batch of an experiment; none if it is an evaluation's.
+/// A batch of an experiment; `None` for a batch of an evaluation.
 fn round(activity: BatchActivity) -> Option<Round> {
     let ms = |duration: Duration| duration.as_millis() as u64;
     Some(Round {

@@ -16,7 +16,7 @@ use super::convert;
 /// The service.
 #[derive(Debug)]
 pub struct Fleet {
-    /// Asks the driver.
+    /// The handle to the coordinator.
     pub control: Control,
 }
 

@@ -24,7 +24,7 @@ use swarm_transport::listening::Peer;
 
 use crate::control::Client;
 
-/// Who sent a request, as far as clients take turns.
+/// The client of a request, by which clients take turns.
 fn client<T>(request: &Request<T>) -> Client {
     let peer = request.extensions().get::<Peer>();
     Client(peer.map(|peer| peer.address().ip().to_canonical()))

@@ -1,4 +1,4 @@
-//! What pages ask of a running coordinator, answered as clients are.
+//! Answers the requests of pages, as for clients.
 
 use swarm_proto::v1::{Experiment, ExplainExperimentResponse, SubmitExperimentRequest, Worker};
 use swarm_web::{Action, Assignment, Control as WebControl};

@@ -1,4 +1,4 @@
-//! What went wrong, as gRPC statuses.
+//! Converts errors to gRPC statuses.
 
 use experiment_file::ConfigError;
 use tonic::Status;
@@ -8,8 +8,7 @@ use crate::{
     limits::PROBLEMS_LEN_MAX,
 };
 
-/// For clients and workers that are connected, or connect, while the coordinator
-/// stops.
+/// The status for clients and workers while the coordinator stops.
 pub fn shutting_down() -> Status {
     ControlError::ShuttingDown.into()
 }
@@ -46,7 +45,7 @@ impl From<ControlError> for Status {
     }
 }
 
-/// All problems, one per line, as far as there is room.
+/// The problems, one per line, up to the limit of a header.
 fn problems(error: &ConfigError) -> String {
     let mut text = String::new();
     for (i, problem) in error.problems.iter().enumerate() {

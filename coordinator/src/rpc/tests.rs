@@ -1,4 +1,4 @@
-//! Watchers that do not read, and lists.
+//! Tests of watchers that do not read, and of lists.
 
 use std::{sync::Arc, time::Duration};
 

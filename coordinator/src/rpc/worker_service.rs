@@ -39,8 +39,8 @@ use super::{
     shutting_down,
 };
 
-/// What a message takes while it is encoded, compared with its length: itself, and a buffer
-/// that grows.
+/// Memory of a message while it is encoded, relative to its length: the message itself, and a
+/// growing buffer.
 const COPIES: usize = 3;
 
 /// Room for long messages to workers.
@@ -56,15 +56,15 @@ impl Default for WorkerOutflow {
 /// The service.
 #[derive(Debug)]
 pub struct Workers {
-    /// To the driver.
+    /// The channel to the driver.
     pub events: EventSender,
-    /// For what is sent.
+    /// Room for messages to workers.
     pub outflow: WorkerOutflow,
-    /// What `Welcome` says.
+    /// The durations in `Welcome`.
     pub times: WelcomeTimes,
     /// Ends all streams.
     pub shutdown: CancellationToken,
-    /// Of lines about workers that are refused, who may come back at once.
+    /// Limits the log lines about refused workers, which may reconnect at once.
     pub refusals: Mutex<Throttle>,
 }
 
@@ -113,10 +113,10 @@ impl WorkerService for Workers {
 
         let (times, room) = (self.times, self.outflow.0.clone());
         let outbound = unfold((inbox, room, None), move |(mut inbox, room, place)| async move {
-            // The message before has been taken.
+            // The worker has taken the previous message.
             drop(place);
             let message = inbox.recv().await?;
-            // A long one waits for room until the worker has taken it.
+            // A long message waits for room, which it holds until the worker has taken it.
             let place = match message.payload_len() {
                 0..=SHORT_LEN => None,
                 len => room.take(COPIES * len).await,
@@ -127,7 +127,7 @@ impl WorkerService for Workers {
     }
 }
 
-/// Passes on what a worker says until its stream ends.
+/// Passes a worker's messages on until its stream ends.
 async fn listen(
     id: WorkerId,
     mut inbound: Streaming<WorkRequest>,
@@ -141,7 +141,7 @@ async fn listen(
         };
         let message = match received {
             Ok(Some(WorkRequest { message: Some(message) })) => message,
-            // A message of a kind that this version does not know.
+            // A kind of message that this version does not know.
             Ok(Some(WorkRequest { message: None })) => continue,
             Ok(None) => break "it closed its stream".to_owned(),
             Err(status) => {

@@ -1,5 +1,5 @@
-//! What clients and the engine change about experiments, on its way to the store:
-//! for each experiment one write at a time, in the order in which things happened.
+//! Changes of experiments by clients and the engine, on their way to the store: one write at a
+//! time per experiment, in the order of the changes.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -11,54 +11,54 @@ use crate::{
 
 use super::RequestId;
 
-/// Writes under way and those that wait. As long as the requests that lead to them:
+/// Changes that are being written or wait. Their number is bounded by that of requests, because
 /// each client waits for its own.
 #[derive(Debug, Default)]
 pub struct ChangeQueue {
-    /// Per experiment, none empty; the first is being written.
+    /// A queue per experiment, none empty; the first change is being written.
     pending: BTreeMap<ExperimentId, VecDeque<PendingChange>>,
 }
 
 /// A change that is not stored yet.
 #[derive(Debug)]
 pub struct PendingChange {
-    /// Of which experiment.
+    /// The experiment.
     pub experiment: ExperimentId,
-    /// What to write.
+    /// The change.
     pub change: Change,
-    /// The requests to answer when it is written.
+    /// The requests to answer after the write.
     pub requests: Vec<RequestId>,
 }
 
-/// What a client may want of an unfinished experiment.
+/// A client's request to change an unfinished experiment.
 #[derive(Debug, Clone)]
 pub enum Request {
-    /// That it ends.
+    /// End it.
     Cancel,
-    /// That it waits to be resumed; the text says why.
+    /// Pause it until a client resumes it; the text says why.
     Pause(String),
-    /// That it goes on.
+    /// Resume it.
     Resume,
-    /// That its share of the fleet is another.
+    /// Change its priority.
     SetPriority(Priority),
-    /// Nothing but an answer, once everything that was wanted before is stored.
+    /// Change nothing; answer once all earlier changes are stored.
     Settle,
 }
 
 /// A change of an unfinished experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Change {
-    /// Another state, and why.
+    /// A new state, and its reason.
     State(ExperimentState, String),
-    /// Another share of the fleet.
+    /// A new priority.
     Priority(Priority),
-    /// A line among its events.
+    /// A notice among its events.
     Notice(String),
 }
 
 impl ChangeQueue {
-    /// Adds a change after all others of its experiment; returns it if it is to be
-    /// written at once.
+    /// Adds a change after all others of its experiment; returns it if the caller should write it
+    /// now.
     pub fn push(&mut self, pending: PendingChange) -> Option<Change> {
         let queue = self.pending.entry(pending.experiment).or_default();
         let change = queue.is_empty().then(|| pending.change.clone());
@@ -66,14 +66,14 @@ impl ChangeQueue {
         change
     }
 
-    /// Has a request answered when the last change so far of an experiment is written;
-    /// false if there is none.
+    /// Lets a request wait for the last pending change of an experiment; false if no change is
+    /// pending.
     pub fn join(&mut self, id: ExperimentId, request: RequestId) -> bool {
         let last = self.pending.get_mut(&id).and_then(VecDeque::back_mut);
         last.map(|last| last.requests.push(request)).is_some()
     }
 
-    /// The changes of an experiment that are not known to be stored, in order.
+    /// The pending changes of an experiment, in order.
     pub fn pending(&self, id: ExperimentId) -> impl Iterator<Item = &Change> {
         self.pending.get(&id).into_iter().flatten().map(|pending| &pending.change)
     }
@@ -92,7 +92,7 @@ impl ChangeQueue {
 }
 
 impl Change {
-    /// What it is called in the log.
+    /// Its name in the log.
     pub fn name(&self) -> &'static str {
         match self {
             Self::State(ExperimentState::Running, _) => "resumption",
@@ -103,7 +103,7 @@ impl Change {
         }
     }
 
-    /// Writes it. `now_ms`: milliseconds since 1970 UTC.
+    /// Writes the change to the store. `now_ms`: milliseconds since 1970 UTC.
     pub fn write(
         &self,
         store: &mut Store,

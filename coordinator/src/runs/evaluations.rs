@@ -1,5 +1,5 @@
-//! Evaluations: work that nobody stores. The client that asked waits for the result;
-//! if it has gone, the work is dropped.
+//! Evaluations, whose results are not stored. A client waits for them; if it has gone, the
+//! coordinator drops the work.
 
 use std::sync::Arc;
 
@@ -7,21 +7,21 @@ use crate::{engine::Batch, ids::EvaluationId, priority::Priority};
 
 use super::{Command, Runs};
 
-/// Genotypes to be evaluated; everything about them has been checked.
+/// Genotypes to evaluate, completely checked.
 #[derive(Debug)]
 pub struct Evaluation {
     /// The experiment's name.
     pub name: Arc<str>,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
-    /// What is to be evaluated.
+    /// The genotypes and trials.
     pub batch: Batch,
-    /// Its share of the fleet.
+    /// Its priority.
     pub priority: Priority,
 }
 
 impl Runs {
-    /// A client wants genotypes evaluated. Returns what the evaluation is called.
+    /// A client requests an evaluation. Returns the evaluation's id.
     pub fn on_evaluation_requested(&mut self, evaluation: Evaluation) -> EvaluationId {
         let Evaluation { name, spec, batch, priority } = evaluation;
         self.n_evaluations += 1;
@@ -34,8 +34,8 @@ impl Runs {
         id
     }
 
-    /// An evaluation has its numbers, of each genotype those of all trials one after the
-    /// other, or has failed.
+    /// An evaluation has ended, with the numbers of each genotype, one trial after the other, or
+    /// has failed.
     pub fn on_evaluation_finished(
         &mut self,
         id: EvaluationId,

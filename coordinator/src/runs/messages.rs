@@ -1,4 +1,4 @@
-//! What goes into the life of runs and what comes out of it, as plain data.
+//! The inputs and outputs of [`Runs`](super::Runs), as plain data.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::{
 
 use super::{Change, ReadyToCommit, Round};
 
-/// What the driver has to do. Those that name a job are for the engine.
+/// A request to the driver. Commands with a job are for the engine.
 #[derive(Debug)]
 pub enum Command {
     /// Make a job known to the engine.
@@ -25,15 +25,15 @@ pub enum Command {
         name: Arc<str>,
         /// The canonical configuration, for workers.
         spec: Arc<str>,
-        /// Its share of the fleet.
+        /// Its priority.
         priority: Priority,
-        /// Whether it waits to be resumed.
+        /// Whether it is paused.
         is_paused: bool,
     },
     /// Read a run's evolution from the store, draw its next generation and report
     /// [`Runs::on_loaded`](super::Runs::on_loaded).
     Load {
-        /// Of which run.
+        /// The run.
         run: RunId,
         /// Its configuration.
         config: Arc<ExperimentConfig>,
@@ -57,11 +57,11 @@ pub enum Command {
         /// The job.
         job: JobId,
     },
-    /// Change a job's share of the fleet.
+    /// Change a job's priority.
     SetPriority {
         /// The job.
         job: JobId,
-        /// Its new share.
+        /// Its new priority.
         priority: Priority,
     },
     /// Have the fleet drop all work of a job.
@@ -69,66 +69,68 @@ pub enum Command {
         /// The job.
         job: JobId,
     },
-    /// Draw conclusions, which may take long, and report [`Runs::on_concluded`](super::Runs::on_concluded).
+    /// Conclude a round, which may take long, and report
+    /// [`Runs::on_concluded`](super::Runs::on_concluded).
     Conclude {
-        /// For which run.
+        /// The run.
         run: RunId,
         /// Its configuration.
         config: Arc<ExperimentConfig>,
-        /// What was evaluated.
+        /// The evaluated round.
         round: Round,
         /// The fitness.
         evaluated: EvaluatedBatch,
     },
     /// Store a generation and report [`Runs::on_committed`](super::Runs::on_committed).
     Commit {
-        /// Of which run.
+        /// The run.
         run: RunId,
         /// Its configuration.
         config: Arc<ExperimentConfig>,
-        /// The generation; what comes next has been taken out.
+        /// The generation, without its next round.
         ready: Box<ReadyToCommit>,
     },
     /// Store a change and report [`Runs::on_change_written`](super::Runs::on_change_written).
     WriteChange {
-        /// Of which experiment.
+        /// The experiment.
         experiment: ExperimentId,
-        /// What to write.
+        /// The change.
         change: Change,
     },
     /// Answer a client.
     Answer {
         /// Its request.
         request: RequestId,
-        /// Whether the store has what it wanted; if not, the coordinator stops.
+        /// Whether the change is stored; if not, the coordinator is stopping.
         is_stored: bool,
     },
-    /// Tell readers of the log that a run has failed or been cancelled.
+    /// Log that a run has failed or been cancelled.
     PublishEnd {
-        /// Of which experiment.
+        /// The experiment.
         experiment: ExperimentId,
         /// Failed or cancelled.
         state: ExperimentState,
         /// For the experiment's owner.
         reason: String,
     },
-    /// Tell readers of the log that a run waits for memory.
+    /// Log that a run waits for memory.
     PublishWait {
-        /// Of which experiment.
+        /// The experiment.
         experiment: ExperimentId,
-        /// How much is missing.
+        /// The missing memory.
         shortage: Shortage,
     },
-    /// Answer whoever wants an evaluation.
+    /// Answer the client of an evaluation.
     AnswerEvaluation {
         /// The evaluation.
         evaluation: EvaluationId,
-        /// Per genotype the numbers of all trials, one trial after the other, or why there are none.
+        /// For each genotype, the numbers of all trials, one trial after the other; or why the
+        /// evaluation failed.
         result: Result<Vec<Vec<f64>>, String>,
     },
 }
 
-/// One run of an experiment; after it has been given more generations, it is another.
+/// One run of an experiment; an extended experiment is a new run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunId {
     /// The experiment.
@@ -137,17 +139,17 @@ pub struct RunId {
     pub run_epoch: u64,
 }
 
-/// A client's request that waits for an answer; given by the caller.
+/// A client's request that waits for an answer; the caller chooses the id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RequestId(pub u64);
 
-/// What became of a commit.
+/// The outcome of a commit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CommitOutcome {
     /// It is on disk.
     Stored,
-    /// The experiment has ended in the store, or the coordinator stops; nothing is
-    /// lost.
+    /// Nothing was stored, because the experiment has ended in the store, or the coordinator
+    /// stops; nothing is lost.
     NotWanted,
     /// It can never be stored; the text says why.
     Failed(String),

@@ -1,36 +1,33 @@
 //! The life of runs: a synchronous state machine.
 //!
-//! A *run* is an experiment on its way through generations, from its submission
-//! (or the coordinator's start) to its end. The driver calls a handler for
-//! everything that happens and then carries out the [`Command`]s that it collects
-//! with [`Runs::poll_command`]. There is no I/O and no clock, so a test can take
-//! runs through any history.
+//! A *run* is an experiment on its way through generations, from its submission (or the
+//! coordinator's start) to its end. The driver calls a handler for every event, and then carries
+//! out the [`Command`]s that [`Runs::poll_command`] returns. There is no I/O and no clock, so a
+//! test can take runs through any history.
 //!
 //! The rules:
-//! - A run goes round: the fleet evaluates a batch, conclusions are drawn from it,
-//!   and the generation is committed while the next batch is evaluated. One
-//!   generation per run is committed at a time; one that is complete before waits,
-//!   and nothing after it is evaluated. So generations are stored in order.
-//! - If the coordinator dies before a generation is stored, it and the one after it
-//!   are evaluated again, to the same bits.
-//! - A run ends when its last generation is stored, when a client cancels it or when
-//!   it cannot go on. The fleet drops its work at once. A generation that is being
-//!   committed at that moment is stored first, then the end; one that only waits is
-//!   not stored.
-//! - Everything else that clients and the engine change about an experiment goes
-//!   through the [`ChangeQueue`]: one write at a time per experiment, in the order
-//!   in which things happened. Each client is answered once its change is stored.
-//! - An experiment can be reopened before the end of its former run is reported
-//!   here. Each run has an epoch of its own, and what belongs to another is ignored.
-//! - Only the last commit of a former run may still be on its way then: whoever reopens
-//!   what has failed or was cancelled waits until that end is stored and reported here
+//! - A run is a cycle: the fleet evaluates a batch, the driver concludes it, and commits the
+//!   generation while the fleet evaluates the next batch. A run commits one generation at a time.
+//!   If the next generation is complete before that commit, it waits, and the fleet evaluates
+//!   nothing after it. So generations are stored in order.
+//! - If the coordinator dies before a generation is stored, the fleet evaluates it and the next
+//!   one again, to the same bits.
+//! - A run ends when its last generation is stored, when a client cancels it, or when it fails.
+//!   The fleet drops its work at once. A commit in progress at that moment comes first, then the
+//!   end; a generation that waits for its commit is not stored.
+//! - Everything else that clients and the engine change about an experiment goes through the
+//!   [`ChangeQueue`]: one write at a time per experiment, in the order in which things happened.
+//!   Each client gets its answer once its change is stored.
+//! - An experiment can be reopened before the end of its former run is reported here. Each run
+//!   has an epoch of its own, and ignores events of other epochs.
+//! - Only the last commit of a former run may still be on its way then: a client that reopens a
+//!   failed or cancelled experiment waits until that end is stored and reported here
 //!   ([`Request::Settle`]).
-//! - A run is loaded, which is to say that its evolution is read from the store and its
-//!   first generation drawn, as soon as its estimated memory fits into the budget beside
-//!   that of the runs that are loaded. Until then it waits; its owner is told.
-//! - After [`Runs::on_shutdown`] nothing new is begun; what is being stored is
-//!   stored.
-//! - Evaluations, which nobody stores, only pass through: a batch and an answer.
+//! - Loading a run means to read its evolution from the store and to draw its first generation. A
+//!   run is loaded as soon as its estimated memory fits into the budget beside the loaded runs.
+//!   Until then it waits, and a notice tells its owner.
+//! - After [`Runs::on_shutdown`] nothing new starts; writes in progress are finished.
+//! - Evaluations, whose results are not stored, only pass through: a batch and an answer.
 
 mod change_queue;
 mod evaluations;
@@ -62,16 +59,16 @@ pub use stats::RunStats;
 use change_queue::ChangeQueue;
 use run::{Committing, End, Run, Stage};
 
-/// Why an experiment is over that a client cancelled.
+/// The reason of a cancelled experiment.
 const CANCELLED: &str = "cancelled by a client";
 
 /// The state machine.
 #[derive(Debug)]
 pub struct Runs {
-    /// Bytes that all loaded runs together may take.
+    /// Bytes of memory for all loaded runs together.
     memory_budget: u64,
     runs: BTreeMap<ExperimentId, Run>,
-    /// Runs begun so far; also the epoch of the latest.
+    /// Number of runs so far; also the epoch of the latest.
     n_begun: u64,
     /// Evaluations in progress.
     evaluations: BTreeSet<EvaluationId>,
@@ -82,7 +79,7 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// No runs. `memory_budget`: bytes that all together may take.
+    /// A state without runs. `memory_budget`: bytes of memory for all runs together.
     pub fn new(memory_budget: u64) -> Self {
         Self {
             memory_budget,
@@ -96,13 +93,13 @@ impl Runs {
         }
     }
 
-    /// The next thing to do, if any. Call until there is none after every handler.
+    /// The next command, if any. Call it after every handler until it returns `None`.
     pub fn poll_command(&mut self) -> Option<Command> {
         self.commands.pop_front()
     }
 
-    /// A stored, unfinished experiment is to run: it is new, or has been reopened, or
-    /// the coordinator has started.
+    /// Starts a run for a stored, unfinished experiment: a new or reopened one, or one from
+    /// before the coordinator's start.
     pub fn on_submitted(&mut self, runnable: Runnable) {
         let Runnable { id, config, spec, memory, latest, priority, is_paused } = runnable;
         if self.is_stopping {
@@ -119,7 +116,7 @@ impl Runs {
         self.report_shortage(id);
     }
 
-    /// Has the runs loaded that wait and for which there is memory, the oldest first.
+    /// Loads waiting runs as long as there is memory, the oldest first.
     fn load_what_fits(&mut self) {
         if self.is_stopping {
             return;
@@ -145,18 +142,18 @@ impl Runs {
         self.change(PendingChange { experiment: id, change, requests: Vec::new() });
     }
 
-    /// What a run waits for, if it waits for memory.
+    /// The missing memory of a run that waits for memory.
     pub fn shortage(&self, id: ExperimentId) -> Option<Shortage> {
         let run = self.runs.get(&id).filter(|run| run.is_waiting())?;
         Shortage::check(run.memory, self.memory_in_use(), self.memory_budget).err()
     }
 
-    /// Bytes of the runs that are loaded.
+    /// Bytes that all loaded runs take.
     fn memory_in_use(&self) -> u64 {
         self.runs.values().filter(|run| run.has_memory()).map(|run| run.memory).sum()
     }
 
-    /// A run's evolution has been read from the store; or why that is not possible.
+    /// A run's evolution was read from the store, or reading failed.
     pub fn on_loaded(&mut self, run_id: RunId, loaded: Result<Round, String>) {
         if self.is_stopping {
             return;
@@ -167,7 +164,7 @@ impl Runs {
         }
         match loaded {
             Ok(round) => self.evaluate(run_id.experiment, round),
-            // Nothing is lost yet: it is paused until somebody has looked.
+            // Nothing is lost yet, so the run is paused until a person has looked.
             Err(reason) => {
                 run.stage = Stage::Unreadable;
                 self.commands.push_back(Command::PauseJob { job: run_id.experiment.into() });
@@ -177,8 +174,8 @@ impl Runs {
         }
     }
 
-    /// An experiment can be reopened while changes that were asked of its former run
-    /// are still on their way to the store. They hold for the new run, too.
+    /// Applies changes of the former run that are still on their way to the store; they hold for
+    /// the new run, too.
     fn apply_former_requests(&mut self, id: ExperimentId, former: Option<Run>) {
         let mut end = None;
         for change in self.changes.pending(id) {
@@ -217,7 +214,7 @@ impl Runs {
         self.commands.push_back(Command::Conclude { run, config, round, evaluated });
     }
 
-    /// Conclusions have been drawn from a batch; or why that is not possible.
+    /// A round was concluded, or concluding failed.
     pub fn on_concluded(&mut self, run_id: RunId, conclusion: Result<Next, String>) {
         if self.is_stopping {
             return;
@@ -235,7 +232,7 @@ impl Runs {
         }
     }
 
-    /// A commit is over.
+    /// A commit has ended.
     pub fn on_committed(&mut self, run_id: RunId, outcome: CommitOutcome) {
         let id = run_id.experiment;
         let Some(run) = self.find(run_id) else { return };
@@ -249,7 +246,7 @@ impl Runs {
         }
         match outcome {
             CommitOutcome::Stored if !is_last => self.commit_next(id),
-            // The store knows all there is to know.
+            // The store has the whole state.
             CommitOutcome::Stored | CommitOutcome::NotWanted => {
                 self.runs.remove(&id);
                 self.commands.push_back(Command::EndJob { job: id.into() });
@@ -268,7 +265,7 @@ impl Runs {
         }
     }
 
-    /// Somebody has to look at a run before it goes on; the engine has paused the job.
+    /// A person has to look at a run before it continues; the engine has paused the job.
     pub fn on_job_suspended(&mut self, id: ExperimentId, reason: String) {
         let paused = Change::State(ExperimentState::Paused, reason.clone());
         for change in [Change::Notice(reason), paused] {
@@ -276,8 +273,8 @@ impl Runs {
         }
     }
 
-    /// A client wants something of an experiment. One without a run has ended, or
-    /// waits for another version of the program; only the store is concerned.
+    /// A client wants to change an experiment. An experiment without a run has ended, or waits
+    /// for another version of the program, so only the store changes.
     pub fn on_request(&mut self, id: ExperimentId, request: Request, request_id: RequestId) {
         let run = self.runs.get_mut(&id);
         let is_active = run.as_ref().is_some_and(|run| run.end.is_none());
@@ -320,8 +317,8 @@ impl Runs {
         self.change(PendingChange { experiment: id, change, requests: vec![request_id] });
     }
 
-    /// The write of a change is over. `is_stored`: false if the coordinator stops
-    /// before the store takes it.
+    /// The write of a change has ended. `is_stored`: false if the coordinator stopped before the
+    /// write.
     pub fn on_change_written(&mut self, id: ExperimentId, is_stored: bool) {
         let (requests, next) = self.changes.on_written(id);
         for request in requests {
@@ -330,7 +327,7 @@ impl Runs {
         self.write(id, next);
     }
 
-    /// The coordinator stops: nothing new is begun.
+    /// The coordinator stops: nothing new starts.
     pub fn on_shutdown(&mut self) {
         self.is_stopping = true;
     }
@@ -349,8 +346,8 @@ impl Runs {
         run.stage = Stage::Evaluating(round);
     }
 
-    /// Commits the generation that is ready, if there is one and the one before is
-    /// stored, and has the next one evaluated meanwhile.
+    /// Commits the next complete generation, if the previous one is stored, and has the fleet
+    /// evaluate the one after it meanwhile.
     fn commit_next(&mut self, id: ExperimentId) {
         let is_stopping = self.is_stopping;
         let Some(run) = self.runs.get_mut(&id) else { return };
@@ -370,7 +367,7 @@ impl Runs {
         }
     }
 
-    /// Ends a run; a generation that is being committed is stored first.
+    /// Ends a run, after a commit in progress.
     fn end(&mut self, id: ExperimentId, end: End) {
         let Some(run) = self.runs.get_mut(&id) else { return };
         if run.end.is_none() {
@@ -383,8 +380,8 @@ impl Runs {
         }
     }
 
-    /// Forgets a run and has its end stored. If its last generation has been stored
-    /// meanwhile, the experiment is completed, and the store keeps that.
+    /// Forgets a run and stores its end. If its last generation was stored meanwhile, the
+    /// experiment is completed, and the store keeps that state.
     fn finish(&mut self, id: ExperimentId, End { state, reason }: End) {
         let Some(run) = self.runs.remove(&id) else { return };
         let (experiment, requests) = (id, run.cancellations);
@@ -394,7 +391,7 @@ impl Runs {
         self.load_what_fits();
     }
 
-    /// Has a change stored after all that came before it.
+    /// Stores a change after all earlier ones.
     fn change(&mut self, pending: PendingChange) {
         let id = pending.experiment;
         let to_write = self.changes.push(pending);

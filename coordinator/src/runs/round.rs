@@ -1,6 +1,6 @@
-//! What the fleet evaluates for a run at once, and what comes of it: a generation,
-//! from time to time candidates for the champion on held-out trials, and at the end
-//! the champion on trials that select nothing.
+//! Rounds, and their conclusions. A round is a generation, a re-evaluation of candidates for the
+//! champion on held-out trials, or at the end the judgement of the champion on trials that select
+//! nothing.
 
 use std::sync::Arc;
 
@@ -14,56 +14,56 @@ use evolution::{
     Population, Reevaluation, Told,
 };
 
-/// A batch that the fleet evaluates, and what it is for.
+/// A batch that the fleet evaluates, with its purpose.
 #[derive(Debug)]
 pub enum Round {
     /// The next generation.
     Generation(Arc<Evolution>, evolution::Generation),
-    /// Candidates on a block of held-out trials, after a generation from which evolution
-    /// has updated and which is not committed yet.
+    /// Candidates on a block of held-out trials, after a generation that evolution has learnt
+    /// from and that is not committed yet.
     Reevaluation(Box<UpdatedEvolution>, Box<Reevaluation>),
     /// The champion on trials that select nothing, after the last generation, which is
     /// not committed yet.
     Judgement(Box<ReadyToCommit>, Box<Judgement>),
 }
 
-/// What comes after a round.
+/// The step after a round.
 #[derive(Debug)]
 pub enum Next {
-    /// Another round, before anything is committed.
+    /// Another round, before the commit.
     Evaluate(Box<Round>),
     /// The generation is complete.
     Commit(Box<ReadyToCommit>),
 }
 
-/// Evolution after it has learnt from a generation.
+/// The state of evolution after it has learnt from a generation.
 #[derive(Debug, Clone)]
 pub struct UpdatedEvolution {
     evolution: Evolution,
     generation: GenerationRecord,
-    /// What it was told.
+    /// The fitness that it learnt from.
     told: Told,
     notices: Vec<String>,
-    /// Why evolution is over, if it is; empty: all generations are done.
+    /// Why evolution is over, if it is; empty if all generations are done.
     completed: Option<String>,
 }
 
-/// A generation that can be committed.
+/// A generation that is ready to commit.
 #[derive(Debug)]
 pub struct ReadyToCommit {
     /// Its row of the history.
     pub generation: GenerationRecord,
     /// Its entry in the fitness log.
     pub told: Told,
-    /// Evolution after it.
+    /// The state of evolution after it.
     pub evolution: Arc<Evolution>,
-    /// The champion so far.
+    /// The present champion.
     pub champion: Option<Champion>,
     /// The last link of the digest chain that covers everything so far, hexadecimal.
     pub digest: String,
     /// Lines for the log and the experiment's events.
     pub notices: Vec<String>,
-    /// Why evolution is over, if it is; empty: all generations are done.
+    /// Why evolution is over, if it is; empty if all generations are done.
     pub completed: Option<String>,
     /// The next round, unless evolution is over.
     pub next: Option<Round>,
@@ -77,7 +77,7 @@ impl Round {
         Self::Generation(evolution, generation)
     }
 
-    /// Which worlds and noise.
+    /// The trial set of the round.
     pub fn trial_set(&self) -> TrialSet {
         match self {
             Self::Generation(_, generation) => TrialSet::Generation(generation.index),
@@ -86,7 +86,7 @@ impl Round {
         }
     }
 
-    /// The genotypes to be evaluated.
+    /// The genotypes to evaluate.
     pub fn genotypes(&self) -> Population {
         match self {
             Self::Generation(_, generation) => Arc::clone(&generation.genotypes),
@@ -95,7 +95,7 @@ impl Round {
         }
     }
 
-    /// What the genotypes are drawn from, if workers can draw them.
+    /// The distribution of the genotypes, if workers can draw from it.
     pub fn distribution(&self) -> Option<Arc<[u8]>> {
         match self {
             Self::Generation(evolution, _) => evolution.distribution().map(Into::into),
@@ -112,8 +112,7 @@ impl Round {
         }
     }
 
-    /// Draws conclusions from the fitness of the batch. Fails if evolution cannot
-    /// go on.
+    /// Concludes the round with the fitness of its batch. Fails if evolution cannot continue.
     pub fn conclude(
         self,
         config: &ExperimentConfig,
@@ -121,7 +120,7 @@ impl Round {
     ) -> Result<Next, EvolutionError> {
         match self {
             Self::Generation(evolution, generation) => {
-                // By now, the generation before is usually stored, and nothing is copied.
+                // Usually, the previous generation is stored by now, and nothing is copied.
                 let evolution = Arc::unwrap_or_clone(evolution);
                 let updated = learn(config, evolution, generation, evaluated)?;
                 Ok(match updated.evolution.reevaluation() {
@@ -178,9 +177,9 @@ impl UpdatedEvolution {
         self.evolution.n_generations().is_multiple_of(config.algorithm.champion_every)
     }
 
-    /// `with_champion`: evolution after a re-evaluation. If that was an extra one, at
-    /// the end, it is not what a longer run goes on from: more generations must
-    /// give the same bits as if they had been asked for at once.
+    /// `with_champion`: evolution after a re-evaluation. A longer run does not continue from an
+    /// extra re-evaluation at the end: later generations must have the same bits as in a run of
+    /// that length from the beginning.
     fn into_ready(self, with_champion: Option<Evolution>) -> ReadyToCommit {
         let Self { evolution, generation, told, notices, completed } = self;
         let digest = match &with_champion {
@@ -225,7 +224,7 @@ fn learn(
     Ok(UpdatedEvolution { evolution, generation, told, notices, completed })
 }
 
-/// Why a run is over after a generation, if it is; empty: all generations are done.
+/// Why a run is over after a generation, if it is; empty if all generations are done.
 pub fn completion(config: &ExperimentConfig, summary: &GenerationSummary) -> Option<String> {
     let algorithm = &config.algorithm;
     let (n_generations, mean) = (summary.generation + 1, summary.statistics.mean.get());
@@ -235,7 +234,7 @@ pub fn completion(config: &ExperimentConfig, summary: &GenerationSummary) -> Opt
     (n_generations >= algorithm.generations).then(String::new)
 }
 
-/// A champion after a re-evaluation, for the log.
+/// Describes a champion after a re-evaluation, for the log.
 pub fn describe(champion: &Champion) -> String {
     let held_out = match &champion.held_out {
         Some(held_out) => format!(
@@ -256,7 +255,7 @@ pub fn describe(champion: &Champion) -> String {
     }
 }
 
-/// What a champion is worth, for the log.
+/// Describes a champion's judgement, for the log.
 pub fn describe_judgement(champion: &Champion) -> String {
     match &champion.judged {
         Some(judged) => format!(

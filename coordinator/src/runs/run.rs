@@ -1,4 +1,4 @@
-//! One run and where it stands.
+//! One run and its stage.
 
 use std::{mem, sync::Arc};
 
@@ -16,27 +16,26 @@ use super::{ReadyToCommit, RequestId, Round, RunId};
 pub struct Run {
     /// Its configuration.
     pub config: Arc<ExperimentConfig>,
-    /// Bytes that it takes once it is loaded, about.
+    /// Estimated bytes that it takes once it is loaded.
     pub memory: u64,
-    /// Tells this run from former ones of the same experiment, before more
-    /// generations were asked for.
+    /// Distinguishes this run from former ones of the same experiment, before it was reopened.
     pub run_epoch: u64,
     /// The latest generation that is on disk.
     pub latest: Option<GenerationRecord>,
-    /// Where the generation stands that comes after the one being committed.
+    /// The stage of the generation after the one in commit.
     pub stage: Stage,
-    /// The generation that is being committed.
+    /// The generation in commit.
     pub committing: Option<Committing>,
-    /// How it ends, as soon as the generation that is being committed is stored.
+    /// How it ends, once the generation in commit is stored.
     pub end: Option<End>,
     /// The requests that wait for its end.
     pub cancellations: Vec<RequestId>,
 }
 
-/// Where a generation stands that is not being committed yet.
+/// The stage of a generation before its commit.
 #[derive(Debug)]
 pub enum Stage {
-    /// There is no memory for it yet.
+    /// It waits for memory.
     Waiting,
     /// Its evolution cannot be read from the store; it is paused.
     Unreadable,
@@ -44,24 +43,24 @@ pub enum Stage {
     Loading,
     /// The fleet evaluates a batch.
     Evaluating(Round),
-    /// Conclusions are being drawn.
+    /// A task concludes the round.
     Concluding,
-    /// It waits for the commit before it.
+    /// It waits for the previous commit.
     ReadyToCommit(Box<ReadyToCommit>),
-    /// There is none: the last one is being committed.
+    /// No generation is left: the last one is in commit.
     NoneLeft,
 }
 
-/// A generation that is being committed.
+/// A generation in commit.
 #[derive(Debug)]
 pub struct Committing {
     /// Its row of the history.
     pub generation: GenerationRecord,
-    /// Whether the experiment is completed by it.
+    /// Whether it completes the experiment.
     pub is_last: bool,
 }
 
-/// How a run ends otherwise than by completing its generations.
+/// The end of a run that does not complete its generations.
 #[derive(Debug)]
 pub struct End {
     /// Failed or cancelled.
@@ -71,7 +70,7 @@ pub struct End {
 }
 
 impl Run {
-    /// A run that waits to be loaded. `memory`: bytes that it takes then.
+    /// A run that waits to be loaded. `memory`: bytes that it takes once loaded.
     pub fn new(
         config: ExperimentConfig,
         run_epoch: u64,
@@ -90,7 +89,7 @@ impl Run {
         }
     }
 
-    /// What it is called; `experiment`: its experiment.
+    /// Its id; `experiment`: its experiment.
     pub fn id(&self, experiment: ExperimentId) -> RunId {
         RunId { experiment, run_epoch: self.run_epoch }
     }
@@ -105,8 +104,7 @@ impl Run {
         !matches!(self.stage, Stage::Waiting | Stage::Unreadable)
     }
 
-    /// Takes the round that the fleet has evaluated, if there is one: conclusions are
-    /// drawn from it now.
+    /// Takes the round that the fleet has evaluated, if any, to conclude it.
     pub fn take_round(&mut self) -> Option<Round> {
         match mem::replace(&mut self.stage, Stage::Concluding) {
             Stage::Evaluating(round) => Some(round),
@@ -117,7 +115,7 @@ impl Run {
         }
     }
 
-    /// Takes the generation that is ready to be committed, if there is one.
+    /// Takes the generation that is ready to commit, if any.
     pub fn take_ready(&mut self) -> Option<Box<ReadyToCommit>> {
         match mem::replace(&mut self.stage, Stage::NoneLeft) {
             Stage::ReadyToCommit(ready) => Some(ready),

@@ -1,4 +1,4 @@
-//! An experiment that can run: just submitted, or as the store has it.
+//! Experiments that can run, newly submitted or restored from the store.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use crate::{
     store::{ExperimentState, GenerationRecord, StoredExperiment, Summary},
 };
 
-/// An experiment that can run. Its evolution is read from the store once there is
-/// memory for it.
+/// An experiment that can run. The driver reads its evolution from the store once there is memory
+/// for it.
 #[derive(Debug)]
 pub struct Runnable {
     /// Its id.
@@ -23,13 +23,13 @@ pub struct Runnable {
     pub config: ExperimentConfig,
     /// The canonical configuration, for workers.
     pub spec: Arc<str>,
-    /// Bytes that it takes while it runs, about.
+    /// Estimated bytes that it takes while it runs.
     pub memory: u64,
-    /// The latest generation that is stored.
+    /// The latest stored generation.
     pub latest: Option<GenerationRecord>,
-    /// Its share of the fleet.
+    /// Its priority.
     pub priority: Priority,
-    /// Whether it waits to be resumed.
+    /// Whether it is paused.
     pub is_paused: bool,
 }
 
@@ -46,7 +46,7 @@ impl Runnable {
         Self { id, spec, config, memory, latest: None, priority, is_paused: false }
     }
 
-    /// An experiment as the store has it, or what contradicts what.
+    /// Restores an experiment from the store, or says which stored values contradict each other.
     pub fn restore(experiment: &StoredExperiment, checkpoint: &Checkpoint) -> Result<Self, String> {
         let (id, (config, _)) = (experiment.id, restore(experiment, checkpoint)?);
         let is_paused = experiment.state == ExperimentState::Paused;

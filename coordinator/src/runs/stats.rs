@@ -1,24 +1,24 @@
-//! How runs stand, as numbers.
+//! Statistics of runs.
 
 use crate::{ids::ExperimentId, store::GenerationRecord};
 
 use super::Runs;
 
-/// How a run stands.
+/// Statistics of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunStats {
     /// Its experiment.
     pub experiment: ExperimentId,
     /// Name of the experiment.
     pub name: String,
-    /// Generations that it is to have.
+    /// Number of generations that it should have.
     pub generations_wanted: u64,
     /// The latest generation that is on disk.
     pub latest: Option<GenerationRecord>,
 }
 
 impl Runs {
-    /// How all runs stand, in the order of their experiments.
+    /// Statistics of all runs, in the order of their experiments.
     pub fn stats(&self) -> Vec<RunStats> {
         let stats = self.runs.iter().map(|(&experiment, run)| RunStats {
             experiment,

@@ -1,17 +1,17 @@
-//! Who may talk to the coordinator, and whether others can listen in.
+//! Access to the coordinator: tokens and encryption.
 
 use std::{fmt, net::SocketAddr};
 
 use swarm_transport::{Identity, Token, listening::TLS_HANDSHAKE_TIMEOUT};
 use tonic::transport::{Certificate, ServerTlsConfig};
 
-/// Who may talk to the coordinator, and whether others can listen in. The
-/// default, everybody and yes, is for loopback alone.
+/// Access to the coordinator: tokens and encryption. The default has neither, and is for loopback
+/// only.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
-    /// What peers have to know, if anything.
+    /// The tokens that peers must send, if any.
     pub tokens: Option<Tokens>,
-    /// How the way to them is encrypted, if it is.
+    /// The configuration of TLS, if connections are encrypted.
     pub tls: Option<Tls>,
     /// Whether to serve a network without TLS.
     pub plaintext: bool,
@@ -45,20 +45,20 @@ pub struct Tls {
 /// Why access as configured is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AccessError {
-    /// Everybody on a network could use the coordinator.
+    /// Anybody on the network could use the coordinator.
     #[error(
         "refused to listen on {0}, which is not loopback, without tokens; pass \
          --client-token-file and --worker-token-file, and --tls-cert and --tls-key (or \
          --plaintext on a network whose every member you trust)"
     )]
     NoTokens(SocketAddr),
-    /// Everybody on a network could read the tokens.
+    /// Anybody on the network could read the tokens.
     #[error(
         "refused to listen on {0}, which is not loopback, without TLS; pass --tls-cert and \
          --tls-key, or --plaintext on a network whose every member you trust"
     )]
     NoTls(SocketAddr),
-    /// A worker could do what a client can.
+    /// A worker could act as a client.
     #[error("the client token and the worker token are the same; make two")]
     SameTokens,
 }
@@ -88,12 +88,13 @@ impl Tokens {
         Ok(Self { client, worker })
     }
 
-    /// What clients have to know.
+    /// The token of clients.
     pub fn client(&self) -> &Token {
         &self.client
     }
 
-    /// Whose token this is. Looks at both, whatever it finds.
+    /// The role of a token. Always compares both tokens, so that the time does not reveal a
+    /// match.
     pub fn role_of(&self, presented: &[u8]) -> Option<Role> {
         let is_client = self.client.matches(presented);
         let is_worker = self.worker.matches(presented);
@@ -106,7 +107,7 @@ impl Tokens {
 }
 
 impl Tls {
-    /// As the server wants it.
+    /// The configuration for the server.
     pub fn to_tonic(&self) -> ServerTlsConfig {
         let config = ServerTlsConfig::new()
             .identity(self.identity.to_tonic())

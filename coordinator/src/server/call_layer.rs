@@ -1,5 +1,4 @@
-//! Something that is done around every call of all services: a tower layer, made of
-//! what happens at a call's beginning.
+//! A tower layer that runs a [`Guard`] around every call of all services.
 
 use std::{
     convert::Infallible,
@@ -13,16 +12,16 @@ use http_body_util::BodyExt as _;
 use tonic::{Status, body::Body};
 use tower::{Layer, Service};
 
-/// What is done around every call.
+/// Code that runs around every call.
 pub trait Guard: Clone {
     /// Lives as long as a call: until its answer has been read, or given up.
     type Call: Watch + Send + 'static;
 
-    /// A call begins; an error is its answer, and it gets no further.
+    /// Called at the beginning of a call; an error becomes the call's answer.
     fn begin(&self, request: &mut Request<Body>) -> Result<Self::Call, Status>;
 }
 
-/// What is seen of a call's answer.
+/// Observes the answer of a call.
 pub trait Watch {
     /// The headers of the answer, and its trailers.
     fn on_headers(&mut self, _headers: &HeaderMap) {}
@@ -32,7 +31,7 @@ pub trait Watch {
 #[derive(Debug, Clone)]
 pub struct CallLayer<G>(pub G);
 
-/// Services with something around.
+/// Services inside a guard.
 #[derive(Debug, Clone)]
 pub struct Guarded<G, S> {
     guard: G,

@@ -1,4 +1,4 @@
-//! Counts the calls of all services, by method and by how they ended.
+//! Counts the calls of all services, by method and status.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -12,7 +12,7 @@ use tonic::{Code, Status, body::Body};
 
 use super::call_layer::{Guard, Watch};
 
-/// Method of a call that no service has: callers choose their paths.
+/// Stands for a method that no service has, because callers choose their paths.
 const UNKNOWN: &str = "unknown";
 
 /// The calls that have ended.
@@ -27,7 +27,7 @@ pub struct Calls {
 pub struct Call {
     calls: Calls,
     method: String,
-    /// As answered; a call that is given up before has none.
+    /// The answered status; `None` if the call is abandoned before.
     code: Option<Code>,
 }
 
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
     use crate::server::call_layer::CallLayer;
 
-    /// Calls a method that answers with a status in the headers, or without any.
+    /// Calls a method that answers with a status in the headers, or without a status.
     async fn call(calls: &Calls, path: &str, code: Option<Code>) -> Response<Body> {
         let request = Request::builder().uri(path).body(Body::empty()).unwrap();
         let answer = service_fn(|_: Request<Body>| {

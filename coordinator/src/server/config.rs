@@ -1,4 +1,4 @@
-//! How to run a coordinator, and why it does not start or does not go on.
+//! The configuration of a coordinator, and the errors that keep it from starting or running.
 
 use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
 
@@ -7,42 +7,41 @@ use swarm_telemetry::ListenError;
 use super::access::{Access, AccessError};
 use crate::{limits::MEMORY_BUDGET_MIB, referee::RefereeProgram, store::StoreError};
 
-/// How to run a coordinator.
+/// The configuration of a coordinator.
 #[derive(Debug, Clone)]
 pub struct CoordinatorConfig {
     /// Address to listen on; port 0 takes a free one.
     pub listen: SocketAddr,
     /// Directory of the database.
     pub data_dir: PathBuf,
-    /// Whether other programs that want the data directory are told the address.
+    /// Whether to announce the address to other programs that want the data directory.
     pub is_announced: bool,
-    /// Whether unfinished experiments go on at once; else each does when somebody resumes it or
-    /// submits it again.
+    /// Whether to continue unfinished experiments at once; otherwise each continues when a client
+    /// resumes or resubmits it.
     pub takes_up_unfinished: bool,
-    /// How often workers give a sign of life.
+    /// Time between heartbeats of a worker.
     pub heartbeat_interval: Duration,
-    /// Silence after which a worker loses its items.
+    /// Time of silence after which a worker loses its items.
     pub lease: Duration,
-    /// Share of the individuals, 0 to 1, that two workers compute, so that a faulty
-    /// one is found.
+    /// Share of the individuals, 0 to 1, that two workers compute, to find faulty workers.
     pub audit_fraction: f64,
     /// Bytes of memory that all unfinished experiments may take together, as estimated.
     pub memory_budget: u64,
-    /// The program that checks single results: [`serve_stdio`](crate::referee::serve_stdio)
-    /// has to be behind it.
+    /// The program that checks single results, which must call
+    /// [`serve_stdio`](crate::referee::serve_stdio).
     pub referee: RefereeProgram,
-    /// Who may connect.
+    /// Tokens and encryption.
     pub access: Access,
-    /// Where pages are served, if anywhere; port 0 takes a free one.
+    /// Address for the pages, if any; port 0 takes a free one.
     pub web_listen: Option<SocketAddr>,
-    /// Where metrics can be scraped, if anywhere; port 0 takes a free one.
+    /// Address for metrics, if any; port 0 takes a free one.
     pub metrics_listen: Option<SocketAddr>,
 }
 
 impl CoordinatorConfig {
-    /// The usual times: a heartbeat every 2 s, a lease of 10 s; no audits, no metrics.
-    /// Access is open, and so for loopback only. The referee is this program, with the
-    /// argument `referee`.
+    /// The defaults: a heartbeat every 2 s, a lease of 10 s, no audits, no metrics. Access is
+    /// open, so it is for loopback only. The referee is this program, with the argument
+    /// `referee`.
     pub fn new(listen: SocketAddr, data_dir: PathBuf) -> Self {
         Self {
             listen,
@@ -64,18 +63,18 @@ impl CoordinatorConfig {
 /// Why a coordinator does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// The address is open to more than this machine, and access to everybody.
+    /// The address is reachable from other machines, and access is open to everybody.
     #[error(transparent)]
     Access(#[from] AccessError),
     /// The certificate, its key or the authorities cannot be used.
     #[error("the TLS files cannot be used: {0}")]
     Tls(String),
-    /// The address cannot be listened on.
+    /// Listening on the address failed.
     #[error("cannot listen on {address}: {source}; is another coordinator running there?")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// Metrics cannot be served.
@@ -84,25 +83,25 @@ pub enum StartError {
     /// The store cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// There are no threads for it.
+    /// The system gives the program no threads.
     #[error("the system gives this program no threads: {0}")]
     Runtime(io::Error),
-    /// A thread ended that must not.
+    /// A thread panicked.
     #[error("opening the store panicked; please report this")]
     Panicked,
 }
 
-/// Why a running coordinator cannot go on. What it has committed is safe; started
-/// again, it goes on from there.
+/// Why a running coordinator cannot continue. Its commits are safe; after a restart, it continues
+/// from there.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// A bug.
     #[error(
         "the driver ended ({0}); please report this. \
-         Started again, the coordinator goes on from the last completed generation"
+         After a restart, the coordinator continues from the last completed generation"
     )]
     Driver(String),
-    /// Another coordinator uses the data directory, and goes on there.
+    /// Another coordinator has taken over the data directory.
     #[error("{0}")]
     TakenOver(String),
     /// The database is damaged.

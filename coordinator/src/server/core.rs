@@ -1,4 +1,4 @@
-//! A coordinator but for what listens: store, driver, and the services on them.
+//! A coordinator without listeners: store, driver, and the services on them.
 
 use std::sync::{Arc, Mutex};
 
@@ -25,7 +25,7 @@ use crate::{
     store::Store,
 };
 
-/// A driver on a store, and what clients have it do.
+/// A driver on a store, and the handle through which clients use it.
 #[derive(Debug)]
 pub struct Core {
     pub store: SharedStore,
@@ -33,9 +33,9 @@ pub struct Core {
     /// Ends the driver and all streams.
     pub shutdown: CancellationToken,
     pub instruments: Instruments,
-    /// One task; none once its end is known.
+    /// One task; empty once its end is known.
     pub driver: JoinSet<()>,
-    /// What serves the doors.
+    /// The tasks that serve the doors.
     doors: JoinSet<Result<(), tonic::transport::Error>>,
     events: EventSender,
     room: Room,
@@ -44,7 +44,7 @@ pub struct Core {
 }
 
 impl Core {
-    /// Starts a driver that knows no experiment yet.
+    /// Starts a driver without experiments.
     pub async fn start(store: SharedStore, config: &CoordinatorConfig) -> Result<Self, StartError> {
         let shutdown = CancellationToken::new();
         let (events, event_queue) = driver::channel();
@@ -88,7 +88,7 @@ impl Core {
         })
     }
 
-    /// What there is to scrape.
+    /// The sources of the metrics.
     pub fn metrics(&self) -> Source {
         Source {
             events: self.events.clone(),
@@ -128,8 +128,8 @@ impl Core {
         }
     }
 
-    /// Opens a way to the services for this process alone, until it is stopped. There is no port,
-    /// and no token.
+    /// Opens a connection to the services for this process only, until the coordinator stops. It
+    /// needs no port and no token.
     pub fn open_door(&mut self) -> Door {
         let (door, visitors) = Door::new();
         let (calls, shutdown) = (self.instruments.calls.clone(), self.shutdown.clone());
@@ -139,13 +139,13 @@ impl Core {
         door
     }
 
-    /// Ends the driver: what is being stored is stored.
+    /// Ends the driver, after writes in progress.
     pub async fn stop(&mut self) {
         self.shutdown.cancel();
         if let Some(Err(error)) = self.driver.join_next().await {
             error!("the driver panicked: {error}; please report this");
         }
-        // If that takes too long, dropping the task ends it.
+        // If the driver takes too long, dropping the task ends it.
         let closing = async { while self.doors.join_next().await.is_some() {} };
         let _ = timeout(SHUTDOWN_GRACE, closing).await;
     }

@@ -1,4 +1,4 @@
-//! A way to the services of a coordinator for the process that it is in: a pipe, no port.
+//! A pipe to the services of a coordinator in the same process, without a port.
 
 use std::{io, time::Duration};
 
@@ -11,27 +11,26 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::{Channel, Endpoint};
 use tower::service_fn;
 
-/// Bytes that wait in a pipe, each way.
+/// Capacity of a pipe in each direction, bytes.
 const PIPE_LEN: usize = 256 << 10;
 
-/// Where connections come in.
+/// The incoming connections of a door.
 pub type Visitors = ReceiverStream<io::Result<DuplexStream>>;
 
-/// A way to the services of a coordinator in this process.
+/// The client's end of pipes to a coordinator in this process.
 #[derive(Debug, Clone)]
 pub struct Door(mpsc::Sender<io::Result<DuplexStream>>);
 
 impl Door {
-    /// A door, and who comes in by it.
+    /// A door, and its incoming connections.
     pub fn new() -> (Self, Visitors) {
         let (sender, visitors) = mpsc::channel(1);
         (Self(sender), ReceiverStream::new(visitors))
     }
 
-    /// A channel whose calls take no longer than `timeout`, if there is one. It connects with the
-    /// first call.
+    /// A channel whose calls take at most `timeout`, if given. It connects at the first call.
     pub fn channel(&self, timeout: Option<Duration>) -> Channel {
-        // Nobody looks the name up.
+        // The name is never resolved.
         let endpoint = Endpoint::from_static("http://this-process");
         let endpoint = match timeout {
             Some(timeout) => endpoint.timeout(timeout),

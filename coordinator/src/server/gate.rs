@@ -1,4 +1,4 @@
-//! Stands before all services: lets in who knows the right token, and not too many.
+//! The gate before all services: it checks tokens, and limits the number of calls.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -22,7 +22,7 @@ use crate::{
     limits::{CLIENT_CALLS_MAX, WORKERS_MAX},
 };
 
-/// Decides who may pass.
+/// Decides which calls may pass.
 #[derive(Debug, Clone)]
 pub struct Gate {
     tokens: Option<Arc<Tokens>>,
@@ -31,8 +31,7 @@ pub struct Gate {
     log: Arc<Mutex<Throttle>>,
 }
 
-/// A call that was let in, and its place among those at the same time. Probes take
-/// none.
+/// An admitted call, with its permit among simultaneous calls. Health probes take no permit.
 #[derive(Debug)]
 pub struct Admitted {
     _place: Option<OwnedSemaphorePermit>,
@@ -41,7 +40,7 @@ pub struct Admitted {
 impl Watch for Admitted {}
 
 impl Gate {
-    /// Asks for tokens, if there are any.
+    /// A gate that requires tokens, if given.
     pub fn new(tokens: Option<Tokens>) -> Self {
         Self {
             tokens: tokens.map(Arc::new),
@@ -95,8 +94,8 @@ impl Gate {
     }
 }
 
-/// Whose token a call takes. None: probes must not need a secret. A service that
-/// nobody thought of here takes the client's.
+/// The role whose token a call needs. `None` for health probes, which must not need a secret.
+/// Services that are not listed here need the client's token.
 fn role_for(path: &str) -> Option<Role> {
     match path.trim_start_matches('/').split('/').next() {
         Some(health_server::SERVICE_NAME) => None,
@@ -130,7 +129,7 @@ impl Guard for Gate {
                 )),
             })
             .inspect_err(|status| self.log_refusal(peer.as_ref(), path, status))?;
-        // What was checked is not needed any more, and must not be seen any more.
+        // Removes the checked token, which no service may see.
         request.headers_mut().remove(AUTHORIZATION);
         if let Some(peer) = peer {
             request.extensions_mut().insert(peer);

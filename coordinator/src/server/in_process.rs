@@ -1,4 +1,4 @@
-//! A data directory that this process asks as it would ask a coordinator.
+//! Serves a data directory within this process, with the services of a coordinator.
 
 use std::{
     net::Ipv4Addr,
@@ -14,11 +14,11 @@ use crate::{
     store::{self, Holder, Store},
 };
 
-/// How often the database is looked at that another program may write to.
+/// Interval between looks at a database that another program may write to.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
-/// The services of a coordinator on a data directory, for this process alone. Nothing listens,
-/// and there are no workers.
+/// The services of a coordinator on a data directory, for this process only, without listeners
+/// and workers.
 #[derive(Debug)]
 pub struct InProcess {
     data_dir: PathBuf,
@@ -44,7 +44,7 @@ impl InProcess {
     async fn on(data_dir: &Path, store: SharedStore) -> Result<Self, StartError> {
         let listen = (Ipv4Addr::LOCALHOST, 0).into();
         let config = CoordinatorConfig {
-            // Whoever asks here owns the machine, too.
+            // Callers in this process have full access already.
             memory_budget: u64::MAX,
             ..CoordinatorConfig::new(listen, data_dir.into())
         };
@@ -53,18 +53,18 @@ impl InProcess {
         Ok(Self { data_dir: data_dir.into(), core, door })
     }
 
-    /// The way to its services.
+    /// The door to its services.
     pub fn door(&self) -> &Door {
         &self.door
     }
 
-    /// The other program that may write to the database, and computes what is unfinished in it.
+    /// The other program that may write to the database and computes its unfinished experiments.
     pub async fn holder(&self) -> Option<Holder> {
         let path = self.data_dir.clone();
         task::spawn_blocking(move || store::holder(&path)).await.ok().flatten()
     }
 
-    /// Stops: what is being stored is stored.
+    /// Stops, after writes in progress.
     pub async fn shutdown(mut self) {
         self.core.stop().await;
     }

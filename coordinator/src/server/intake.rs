@@ -1,5 +1,5 @@
-//! How much of long messages may be on its way in: a message is read when there is room for
-//! all of it, and for what it becomes.
+//! Bounds the memory of incoming long messages: a message is read once there is room for all of
+//! it, and for its decoded form.
 
 use std::{
     pin::Pin,
@@ -16,7 +16,7 @@ use crate::{
     limits::{INTAKE_LEN_MAX, MESSAGE_TIME, SHORT_LEN},
 };
 
-/// What a message takes, compared with its length: a buffer that grew, and what is decoded.
+/// Memory of a message relative to its length: a buffer that grew, and the decoded form.
 const COPIES: usize = 3;
 /// Bytes before a message: whether it is compressed, and its length.
 const HEAD_LEN: usize = 5;
@@ -25,18 +25,18 @@ const HEAD_LEN: usize = 5;
 #[derive(Debug, Clone)]
 pub struct Intake(ByteBudget);
 
-/// A call's messages, of which the long ones wait for room.
+/// The messages of a call; long ones wait for room.
 struct Arriving {
     body: Body,
     room: ByteBudget,
-    /// What has arrived of the head of the next message.
+    /// The arrived bytes of the head of the next message.
     head: Vec<u8>,
     /// Bytes of the message that are still to come.
     n_left: usize,
-    /// What has arrived and waits for room.
+    /// Arrived bytes that wait for room.
     held: Option<Bytes>,
     waiting: Option<Pin<Box<dyn Future<Output = Option<TakenBytes>> + Send>>>,
-    /// For the message that arrives, or has arrived last.
+    /// The room of the message that arrives, or arrived last.
     place: Option<TakenBytes>,
     deadline: Option<Pin<Box<Sleep>>>,
 }
@@ -48,7 +48,7 @@ impl Default for Intake {
 }
 
 impl Intake {
-    /// The same messages, for which there is room.
+    /// Wraps a body, so that its messages wait for room.
     pub fn wrap(&self, body: Body) -> Body {
         Body::new(Arriving {
             body,
@@ -64,7 +64,7 @@ impl Intake {
 }
 
 impl Arriving {
-    /// Looks at what has arrived. Returns the length of the last message that begins in it.
+    /// Scans arrived bytes. Returns the length of the last message that begins in them.
     fn scan(&mut self, mut bytes: &[u8]) -> Option<usize> {
         let mut begun = None;
         while !bytes.is_empty() {
@@ -85,13 +85,13 @@ impl Arriving {
         begun
     }
 
-    /// A message begins: room for the one before is not needed any more.
+    /// Begins a message, and releases the room of the previous one.
     fn begin(&mut self, len: usize) {
         (self.place, self.deadline) = (None, None);
         if len <= SHORT_LEN {
             return;
         }
-        // A longer one is refused after its head.
+        // A longer message is refused after its head.
         let room = self.room.take(COPIES * len.min(TO_COORDINATOR_LEN_MAX));
         self.waiting = Some(Box::pin(room));
     }
@@ -151,7 +151,7 @@ mod tests {
 
     use super::*;
 
-    /// A body of messages, in frames of this many bytes, and what sends more.
+    /// A body of messages, in frames of this many bytes, and the sender for more.
     fn body(intake: &Intake, messages: &[usize], frame_len: usize) -> (Body, mpsc::Sender<Bytes>) {
         let mut bytes = Vec::new();
         for &len in messages {

@@ -46,16 +46,16 @@ pub struct Coordinator {
     web_addr: Option<SocketAddr>,
     core: Core,
     door: Door,
-    /// One task; none once its end is known.
+    /// One task; empty once its end is known.
     server: JoinSet<Result<(), tonic::transport::Error>>,
-    /// Ends when it is dropped.
+    /// Dropping it ends the task.
     _metrics: JoinSet<Infallible>,
-    /// Ends at shutdown, or when it is dropped.
+    /// Shutdown or dropping it ends the task.
     pages: JoinSet<()>,
 }
 
 impl Coordinator {
-    /// Opens the store, goes on with unfinished experiments, listens.
+    /// Opens the store, continues unfinished experiments, and listens.
     pub async fn start(config: CoordinatorConfig) -> Result<Self, StartError> {
         let Access { tokens, tls, .. } = config.access.clone();
         config.access.check(config.listen)?;
@@ -129,12 +129,12 @@ impl Coordinator {
         self.web_addr
     }
 
-    /// The way to its services for this process.
+    /// The door to its services for this process.
     pub fn door(&self) -> &Door {
         &self.door
     }
 
-    /// Waits for a part of it to end, which none does before [`Self::shutdown`].
+    /// Waits for a part of it to end. Before [`Self::shutdown`], that is an error.
     pub async fn failure(&mut self) -> RunError {
         tokio::select! {
             unusable = self.core.store.unusable() => match unusable {
@@ -154,12 +154,11 @@ impl Coordinator {
         }
     }
 
-    /// Stops: what is being stored is stored, streams are ended. Nothing that
-    /// was committed is lost; generations that were being evaluated are evaluated
-    /// again at the next start.
+    /// Stops: finishes writes in progress, and ends all streams. No commit is lost; after a
+    /// restart, the fleet evaluates unfinished generations again.
     pub async fn shutdown(mut self) {
         self.core.stop().await;
-        // If that takes too long, dropping the task ends it.
+        // If the server takes too long, dropping the task ends it.
         let servers = async { tokio::join!(self.server.join_next(), self.pages.join_next()) };
         let _ = tokio::time::timeout(SHUTDOWN_GRACE, servers).await;
     }
@@ -196,7 +195,7 @@ async fn open(data_dir: PathBuf) -> Result<SharedStore, StartError> {
     Ok(SharedStore::new(store))
 }
 
-/// What is wrong with the TLS files.
+/// Why the TLS files cannot be used.
 fn cause(error: &tonic::transport::Error) -> String {
     let source = || std::error::Error::source(error).map(ToString::to_string);
     tls_diagnosis(error).or_else(source).unwrap_or_else(|| error.to_string())

@@ -1,5 +1,5 @@
-//! How much of long answers may wait for their readers. One that nobody reads is dropped, so
-//! that it takes no memory, and with it what would have followed.
+//! Bounds the memory of long answers that wait for their readers. An answer that nobody reads is
+//! dropped with the rest of its stream, so that it takes no memory.
 
 use std::{
     pin::Pin,
@@ -16,28 +16,27 @@ use crate::{
     limits::{OUTFLOW_LEN_MAX, SHORT_LEN, WATCH_PATIENCE},
 };
 
-/// Bytes that are handed to the connection at once: what it holds for a peer that does not
-/// read.
+/// Bytes that the connection gets at once, and so holds for a peer that does not read.
 const PIECE_LEN: usize = 32 << 10;
 
 /// Room for long answers.
 #[derive(Debug, Clone)]
 pub struct Outflow(ByteBudget);
 
-/// An answer, or a stream of them, and what of it waits.
+/// The waiting part of an answer, or of a stream of answers.
 struct Unread {
     body: Body,
     rest: Bytes,
     place: Option<TakenBytes>,
-    /// When a piece was last taken.
+    /// Time at which the last piece was taken.
     taken: Instant,
     is_watched: bool,
 }
 
-/// None: it was dropped, as nobody read it.
+/// `None` if it was dropped because nobody read it.
 type Shared = Mutex<Option<Unread>>;
 
-/// Hands it out in pieces.
+/// Hands an answer out in pieces.
 struct Pieces {
     room: ByteBudget,
     unread: Arc<Shared>,
@@ -50,7 +49,7 @@ impl Default for Outflow {
 }
 
 impl Outflow {
-    /// The same answer in pieces, if there is room for it.
+    /// Wraps an answer, to send it in pieces if there is room for it.
     pub fn wrap(&self, body: Body) -> Body {
         let (rest, taken) = (Bytes::new(), Instant::now());
         let unread = Unread { body, rest, place: None, taken, is_watched: false };
@@ -60,7 +59,7 @@ impl Outflow {
 }
 
 impl Unread {
-    /// The next piece of what waits.
+    /// The next waiting piece.
     fn piece(&mut self) -> Frame<Bytes> {
         self.taken = Instant::now();
         Frame::data(self.rest.split_to(PIECE_LEN.min(self.rest.len())))
@@ -104,14 +103,14 @@ impl http_body::Body for Pieces {
         Poll::Ready(Some(Ok(unread.piece())))
     }
 
-    /// A refusal is in the headers of an answer: clients take no frame after them.
+    /// A refusal is in the headers of an answer, and clients accept no frame after them.
     fn is_end_stream(&self) -> bool {
         let shared = lock(&self.unread);
         shared.as_ref().is_some_and(|unread| unread.rest.is_empty() && unread.body.is_end_stream())
     }
 }
 
-/// Drops what nobody reads.
+/// Drops an answer that nobody reads.
 async fn watch(unread: Weak<Shared>) {
     loop {
         let due = {

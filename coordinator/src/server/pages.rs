@@ -12,7 +12,7 @@ use tracing::error;
 use super::{Access, StartError, Tls, Tokens};
 use crate::rpc::Experiments;
 
-/// What is known before the database is open.
+/// The parts of the site that exist before the database is open.
 pub struct Builder {
     token: Option<Token>,
     tls: Option<Arc<rustls::ServerConfig>>,
@@ -28,7 +28,7 @@ impl Builder {
         })
     }
 
-    /// `news` changes when something has been written.
+    /// `news` changes after each write to the database.
     pub fn site(
         self,
         data_dir: &Path,

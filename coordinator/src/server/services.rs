@@ -1,4 +1,4 @@
-//! The gRPC server: all services, behind what every call has to pass.
+//! The gRPC server: all services, behind the gate and the limits for every call.
 
 use std::io;
 
@@ -45,7 +45,7 @@ pub struct Services {
     pub room: Room,
 }
 
-/// Room for long messages and answers: one for all ways to the services.
+/// Room for long messages and answers, shared by all connections to the services.
 #[derive(Debug, Clone, Default)]
 pub struct Room {
     intake: Intake,
@@ -74,8 +74,8 @@ pub fn builder() -> Server {
 }
 
 impl Services {
-    /// Serves until shutdown. Every call is counted, and then has to pass the gate; its
-    /// messages and answers wait for room if they are long.
+    /// Serves until shutdown. It counts every call, and passes it through the gate; long messages
+    /// and answers wait for room.
     pub async fn serve<IO>(
         self,
         server: Server,
@@ -112,7 +112,7 @@ impl Services {
     }
 }
 
-/// Says of every service that it serves.
+/// The health service, which reports every service as serving.
 async fn health() -> HealthServer<impl Health> {
     let (reporter, health) = health_reporter();
     reporter.set_serving::<EvaluationServiceServer<Evaluations>>().await;
@@ -122,8 +122,8 @@ async fn health() -> HealthServer<impl Health> {
     health
 }
 
-/// Describes the services, also under the former name, which some tools still ask
-/// for: Evans, older grpcurl.
+/// Describes the services, also under the former name of reflection, which Evans and older
+/// grpcurl request.
 fn reflection() -> (
     v1::ServerReflectionServer<impl v1::ServerReflection>,
     v1alpha::ServerReflectionServer<impl v1alpha::ServerReflection>,

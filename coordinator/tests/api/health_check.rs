@@ -1,4 +1,4 @@
-//! Whom a health check believes, and what it says otherwise.
+//! Health checks, of the right coordinator and of other servers.
 
 use std::{fs, io::Write as _, net::SocketAddr};
 
@@ -10,8 +10,8 @@ use swarm_transport::{Identity, Token, certificates};
 use tempfile::TempDir;
 use tokio::net::TcpListener;
 
-/// A coordinator's TLS, for a name that is not its address: no client would find
-/// it under that. Whether it asks for certificates of its own authority.
+/// A coordinator's TLS, for a name that is not its address, so that ordinary clients would refuse
+/// it. The argument: whether it requires certificates of its own authority.
 fn tls(asks_for_certificates: bool) -> Tls {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
@@ -44,7 +44,8 @@ async fn a_coordinator_is_healthy_wherever_it_listens_with_tls_and_without() {
             let data = tempfile::tempdir().unwrap();
             let coordinator = match start(listen, &data, tls.as_ref()).await {
                 Err(StartError::Listen { .. }) if listen.starts_with('[') => {
-                    // Past the capture of a test's output; `.ci/run` lists these lines.
+                    // Bypasses the capture of a test's output, because `.ci/run` lists these
+                    // lines.
                     let _ = std::io::stderr().write_all(b"\nSKIPPED: this machine has no IPv6\n");
                     continue;
                 }
@@ -72,7 +73,7 @@ async fn one_that_is_asked_in_another_way_than_it_serves_is_not_healthy() {
     assert!(error.to_string().contains("--tls-cert"), "{error}");
     coordinator.shutdown().await;
 
-    // It asks for certificates of an authority that is not its own's.
+    // It requires certificates of another authority than its own.
     let strict = Tls { client_authorities: own.client_authorities, ..other };
     let data = tempfile::tempdir().unwrap();
     let coordinator = start("127.0.0.1:0", &data, Some(&strict)).await.unwrap();

@@ -1,4 +1,4 @@
-//! A coordinator, and clients that submit anything at all.
+//! A coordinator, and clients that submit arbitrary requests.
 
 use std::net::Ipv4Addr;
 
@@ -21,7 +21,7 @@ async fn start() -> (Coordinator, ExperimentServiceClient<Channel>, tempfile::Te
     (coordinator, client, data)
 }
 
-/// Values for which no key was made; none that asks for much work.
+/// Values that fit no key; none requires much work.
 fn value() -> impl Strategy<Value = Value> {
     let numbers = prop_oneof![
         Just(json!(0)),
@@ -76,7 +76,7 @@ fn damaged() -> impl Strategy<Value = String> {
     })
 }
 
-/// Submits, and ends what was accepted.
+/// Submits a file, and cancels the experiment if it was accepted.
 async fn submit(
     mut client: ExperimentServiceClient<Channel>,
     request: SubmitExperimentRequest,

@@ -1,4 +1,4 @@
-//! A coordinator, and workers that send anything at all.
+//! A coordinator, and workers that send arbitrary messages.
 #![allow(clippy::needless_update, reason = "messages get more fields as the protocol grows")]
 
 use std::{
@@ -37,12 +37,12 @@ use tonic::{
 
 /// Only a coordinator that hangs takes so long.
 const DEADLINE: Duration = Duration::from_secs(60);
-/// More than the coordinator may hold, whatever it is sent.
+/// More memory than any messages may make the coordinator hold.
 const RESIDENT_KB_MAX: u64 = 1 << 20;
 
 static N_PANICS: AtomicUsize = AtomicUsize::new(0);
 
-/// A coordinator in this process, on whose panics the test fails.
+/// A coordinator in this process; its panics fail the test.
 struct Stage {
     coordinator: Coordinator,
     experiments: ExperimentServiceClient<Channel>,
@@ -95,10 +95,10 @@ impl Stage {
         RawWorker::connect(&format!("http://{}", self.coordinator.local_addr())).await
     }
 
-    /// Lets a good worker do what is left to be done.
+    /// Lets a correct worker finish the experiment.
     async fn settle(&self, experiment_id: u64) -> ExperimentState {
         let mut worker = self.worker().await;
-        // Of a name that no other has: one may be in quarantine.
+        // With a unique name, because others may be in quarantine.
         let hello = Hello { name: "honest".to_owned(), ..hello() };
         worker.say(work_request::Message::Hello(hello)).await;
         let working = async {
@@ -174,7 +174,7 @@ impl RawWorker {
     }
 
     async fn send(&self, bytes: Vec<u8>) {
-        // If the coordinator has had enough of it, that is an answer, too.
+        // If the coordinator has ended the stream, that is an answer, too.
         let _ = self.outbox.send(bytes).await;
     }
 
@@ -187,7 +187,7 @@ impl RawWorker {
         self.say(work_request::Message::Results(ItemResults { results: vec![result] })).await;
     }
 
-    /// Says no more, and reads until the coordinator has heard all of it.
+    /// Sends nothing more, and reads until the coordinator has read everything.
     async fn finish(self) {
         let Self { outbox, opening } = self;
         drop(outbox);
@@ -204,7 +204,7 @@ impl RawWorker {
     }
 }
 
-/// Sends bytes as they are.
+/// Sends raw bytes.
 #[derive(Clone, Copy)]
 struct RawCodec;
 
@@ -280,8 +280,8 @@ fn number() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// A message that means something, with any values. Items are numbered from 1, so
-/// a small number is likely to be that of an item that the worker holds.
+/// A valid message with arbitrary values. Items are numbered from 1, so a small number probably
+/// names an item of the worker.
 fn message() -> impl Strategy<Value = work_request::Message> {
     let outcome = prop_oneof![
         4 => vec(number(), N_TRIALS as usize)
@@ -307,7 +307,7 @@ fn message() -> impl Strategy<Value = work_request::Message> {
     ]
 }
 
-/// Bytes: of a message, of one that was damaged on its way, or any.
+/// Bytes of a message, of a damaged message, or arbitrary ones.
 fn bytes() -> impl Strategy<Value = Vec<u8>> {
     let message = message().prop_map(|m| WorkRequest { message: Some(m) }.encode_to_vec());
     let damaged = (message, vec((any::<prop::sample::Index>(), any::<u8>()), 0..4), any::<bool>());

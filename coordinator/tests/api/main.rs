@@ -12,7 +12,7 @@ use std::{net::SocketAddr, path::PathBuf};
 
 use coordinator::{CoordinatorConfig, referee::RefereeProgram};
 
-/// The usual configuration, for a coordinator in a program that is not one.
+/// The usual configuration, for a coordinator inside a test program.
 fn config(listen: SocketAddr, data_dir: PathBuf) -> CoordinatorConfig {
     let path = env!("CARGO_BIN_EXE_coordinator").into();
     let referee = RefereeProgram { path, args: vec!["referee".into()] };

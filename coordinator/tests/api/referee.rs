@@ -1,5 +1,5 @@
-//! What the referee's process says about items, and what becomes of it when an item, or
-//! somebody else, takes it down.
+//! The referee's verdicts, and its behaviour when an item, or something else, takes its process
+//! down.
 
 use std::{
     ffi::OsString,
@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use tokio::time::{sleep, timeout};
 
 const COORDINATOR: &str = env!("CARGO_BIN_EXE_coordinator");
-/// No idle time that a test waits for.
+/// A long idle time, which no test reaches.
 const LONG: Duration = Duration::from_secs(600);
 /// Only a referee that hangs takes so long.
 const DEADLINE: Duration = Duration::from_secs(60);
@@ -61,7 +61,7 @@ fn coordinator() -> RefereeProgram {
     RefereeProgram { path: COORDINATOR.into(), args: vec!["referee".into()] }
 }
 
-/// What a shell makes of a line, in which `$0` is the coordinator's program.
+/// A referee program that is a line of shell, in which `$0` is the coordinator's program.
 fn shell(line: &str) -> RefereeProgram {
     let args = ["-c", line, COORDINATOR].map(OsString::from);
     RefereeProgram { path: "/bin/sh".into(), args: args.into() }
@@ -127,7 +127,7 @@ fn send_signal(signal: &str, id: u32) {
     assert!(status.success());
 }
 
-/// The process on its own, with this on its standard input.
+/// Runs the process alone, with this standard input.
 fn run_process(input: &[u8]) -> Ended {
     let mut child = Command::new(COORDINATOR)
         .arg("referee")
@@ -143,8 +143,8 @@ fn run_process(input: &[u8]) -> Ended {
 #[tokio::test]
 async fn values_are_those_of_the_simulation_to_the_bit() {
     let referee = Referee::new(coordinator(), LONG);
-    // More experiments than are kept compiled, twice, and in an order in which some are
-    // still there and others are not.
+    // More experiments than the process keeps compiled, twice, in an order in which it still has
+    // some of them.
     for seed in [0, 1, 2, 3, 4, 5, 0, 5, 3, 4, 1, 1] {
         let config = config(|config| config.seed = seed);
         let simulation = Simulation::compile(&config).unwrap();
@@ -209,8 +209,8 @@ async fn a_process_that_is_killed_while_it_computes_has_died_and_the_next_item_i
     let traced = Traced::new(LONG);
     assert!(matches!(traced.referee.evaluate(&short()).await, Verdict::Values(_)));
     let item = endless();
-    // A process that had another item before may have died of something else, so a new
-    // one tries; if that dies, too, it is the item's doing.
+    // A process that had another item before may have died of something else, so a new one tries.
+    // If that dies, too, the item is to blame.
     let (verdict, id) = tokio::join!(traced.referee.evaluate(&item), async {
         let first = traced.computing().await;
         send_signal("-KILL", first);
@@ -229,7 +229,7 @@ async fn a_process_that_is_killed_while_it_computes_has_died_and_the_next_item_i
 
 #[tokio::test]
 async fn an_item_that_takes_every_process_down_does_so_here_and_others_do_not() {
-    // Poison: whoever computes for longer than a second is killed by the system.
+    // Poison: the system kills any process that computes for longer than a second.
     let referee = Referee::new(shell("ulimit -t 1; exec $0 referee"), LONG);
     let poison = endless();
     for _ in 0..2 {
@@ -266,7 +266,7 @@ async fn a_process_without_items_ends_after_its_time() {
     let traced = Traced::new(Duration::from_millis(300));
     let mut ids = Vec::new();
     for _ in 0..2 {
-        // Within the time it stays.
+        // Within its idle time.
         for _ in 0..3 {
             assert!(matches!(traced.referee.evaluate(&short()).await, Verdict::Values(_)));
             ids.push(traced.process_id().unwrap());

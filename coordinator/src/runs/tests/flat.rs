@@ -1,9 +1,9 @@
-//! What becomes of runs whose fitness tells nobody apart, or next to nobody.
+//! Runs in which all, or nearly all, individuals have equal fitness.
 
 use super::{super::round::*, world};
 use crate::engine::EvaluatedBatch;
 
-/// What a run says, and why it fails if it does, where all trials have the fitness that is given.
+/// The notices of a run, and why it fails if it does, with the given fitness per individual.
 fn run(name: &str, generations: u64, fitness: fn(usize) -> f64) -> (Vec<String>, Option<String>) {
     let mut config = world::config(1, generations);
     config.algorithm.name = name.into();

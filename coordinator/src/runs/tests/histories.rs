@@ -1,12 +1,11 @@
-//! Any history whatsoever: submissions, requests, failures, crashes and a slow disk,
-//! in any order.
+//! Random histories: submissions, requests, failures, crashes and a slow disk, in any order.
 
 use proptest::{collection::vec, prelude::*, sample::Index};
 
 use super::{super::*, world::World};
 use crate::priority::Priority;
 
-/// Something that happens; the index says to which of those to which it can happen.
+/// An event; the index chooses among the possible targets.
 #[derive(Debug, Clone)]
 enum Step {
     Submit(u64),
@@ -59,7 +58,7 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// One of some ids.
+/// Chooses one of the ids.
 fn pick(index: &Index, ids: impl Iterator<Item = ExperimentId>) -> Option<ExperimentId> {
     let ids: Vec<_> = ids.collect();
     (!ids.is_empty()).then(|| *index.get(&ids))
@@ -76,7 +75,8 @@ fn take(world: &mut World, step: Step) {
                 world.reopen(id);
             }
         }
-        // What has ended is refused before it gets here, unless it ends meanwhile.
+        // Requests for ended experiments are refused earlier, unless the experiment ends
+        // meanwhile.
         Step::Request(index, request) => {
             if let Some(id) = pick(&index, world.store.keys().copied()) {
                 world.request(id, request);
@@ -161,7 +161,7 @@ proptest! {
         }
         world.settle();
         world.check_settled();
-        // Those that are paused, or wait for them, can still be completed.
+        // Paused experiments, and those that wait for them, can still be completed.
         for id in world.store.keys().copied().collect::<Vec<_>>() {
             world.request(id, Request::Resume);
         }

@@ -1,4 +1,4 @@
-//! What becomes of runs when things happen too late, or at the same time.
+//! Runs with late and simultaneous events.
 
 mod flat;
 mod histories;
@@ -18,7 +18,7 @@ fn committing() -> (World, ExperimentId) {
     (world, id)
 }
 
-/// Has so many rounds evaluated and concluded.
+/// Evaluates and concludes `n_rounds` rounds.
 fn finish_rounds(world: &mut World, id: ExperimentId, n_rounds: usize) {
     for _ in 0..n_rounds {
         world.finish_batch(id);
@@ -177,7 +177,7 @@ fn two_clients_cancel_and_both_are_answered() {
     }
 }
 
-/// A world whose only run has its last generation stored, and does not know it.
+/// A world whose only run has stored its last generation, but has not heard of it.
 fn completed_unnoticed() -> (World, ExperimentId) {
     let mut world = World::new();
     let id = world.submit(1);

@@ -1,5 +1,5 @@
-//! A world for runs to live in: a store, a fleet and clients, each as slow as a test
-//! wants. Whatever the runs do with it is checked against the rules.
+//! A simulated environment for runs: a store, a fleet and clients, each as slow as a test wants.
+//! It checks all commands of the runs against the rules.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -10,25 +10,25 @@ use sim_core::TrialSet;
 use super::super::*;
 use crate::{ids::JobId, priority::Priority, store::GenerationRecord};
 
-/// Runs, and all that is around them.
+/// Runs and their environment.
 pub struct World {
     pub runs: Runs,
     pub store: BTreeMap<ExperimentId, Stored>,
-    /// What the engine knows.
+    /// The engine's jobs.
     pub jobs: BTreeMap<ExperimentId, Job>,
     pub loads: Vec<RunId>,
     pub conclusions: Vec<(RunId, Arc<ExperimentConfig>, Round, EvaluatedBatch)>,
     pub commits: Vec<CommitTask>,
     pub changes: Vec<ChangeTask>,
-    /// All requests; answered: whether what they wanted is stored.
+    /// All requests; after an answer, whether the change is stored.
     pub answers: BTreeMap<RequestId, Option<bool>>,
 }
 
-/// Bytes that a run takes; there is memory for two.
+/// Bytes per run; there is memory for two.
 const MEMORY: u64 = 5;
 const MEMORY_BUDGET: u64 = 2 * MEMORY + 1;
 
-/// An experiment as the store has it.
+/// A stored experiment.
 pub struct Stored {
     pub config: ExperimentConfig,
     pub state: ExperimentState,
@@ -47,7 +47,7 @@ pub struct Job {
 pub struct CommitTask {
     pub run: RunId,
     pub ready: Box<ReadyToCommit>,
-    /// None as long as the disk is busy with it.
+    /// `None` while the disk is busy with it.
     pub outcome: Option<CommitOutcome>,
 }
 
@@ -55,7 +55,7 @@ pub struct CommitTask {
 pub struct ChangeTask {
     pub experiment: ExperimentId,
     pub change: Change,
-    /// None as long as the disk is busy with it; then whether it is stored.
+    /// `None` while the disk is busy with it; then whether it is stored.
     pub outcome: Option<bool>,
 }
 
@@ -86,8 +86,8 @@ pub fn evolution(config: &ExperimentConfig) -> Evolution {
     Evolution::new(config, std::slice::from_ref(&(0..3)), "test")
 }
 
-/// What the fleet makes of a batch: always the same, and so little noise that no
-/// candidates are close.
+/// The fleet's results for a batch: deterministic, with so little noise that no candidates are
+/// close.
 pub fn evaluated(genotypes: &[Vec<f64>], n_trials: u32) -> EvaluatedBatch {
     let fitness = |genes: &Vec<f64>| {
         (0..n_trials).map(|trial| genes.iter().sum::<f64>() + 1e-6 * f64::from(trial)).collect()
@@ -104,7 +104,7 @@ pub fn evaluated(genotypes: &[Vec<f64>], n_trials: u32) -> EvaluatedBatch {
     }
 }
 
-/// Evolution after so many generations that nothing has disturbed.
+/// Evolution after `n_generations` undisturbed generations.
 pub fn undisturbed(config: &ExperimentConfig, n_generations: u64) -> Evolution {
     let mut current = evolution(config);
     let mut longer = config.clone();
@@ -204,7 +204,7 @@ impl World {
         self.carry_out();
     }
 
-    /// The fleet finishes a job's batch. Returns of how many genotypes.
+    /// The fleet finishes a job's batch. Returns the number of its genotypes.
     pub fn finish_batch(&mut self, id: ExperimentId) -> Option<usize> {
         let (genotypes, n_trials) = self.jobs.get_mut(&id)?.batch.take()?;
         self.runs.on_batch_evaluated(id, evaluated(&genotypes, n_trials));
@@ -212,7 +212,7 @@ impl World {
         Some(genotypes.len())
     }
 
-    /// Conclusions are drawn.
+    /// A conclusion ends.
     pub fn finish_conclusion(&mut self, i: usize) {
         let (run, config, round, evaluated) = self.conclusions.remove(i);
         let conclusion = round.conclude(&config, &evaluated).map_err(|error| error.to_string());
@@ -220,7 +220,7 @@ impl World {
         self.carry_out();
     }
 
-    /// The disk is done with a commit; the driver does not know yet.
+    /// The disk finishes a commit; the driver does not know yet.
     pub fn write_commit(&mut self, i: usize) {
         let CommitTask { run, ready, outcome } = &mut self.commits[i];
         if outcome.is_some() {
@@ -237,7 +237,7 @@ impl World {
         *outcome = Some(CommitOutcome::Stored);
     }
 
-    /// The disk does not take a commit.
+    /// A commit fails.
     pub fn fail_commit(&mut self, i: usize, failure: CommitOutcome) {
         self.commits[i].outcome.get_or_insert(failure);
     }
@@ -251,7 +251,7 @@ impl World {
         }
     }
 
-    /// The disk is done with a change; the driver does not know yet.
+    /// The disk finishes a change; the driver does not know yet.
     pub fn write_change(&mut self, i: usize) {
         let ChangeTask { experiment, change, outcome } = &mut self.changes[i];
         if outcome.is_some() {
@@ -294,7 +294,7 @@ impl World {
         self.carry_out();
     }
 
-    /// The coordinator is killed and started again. What is written is there.
+    /// The coordinator is killed and restarted. Everything written is still there.
     pub fn crash(&mut self) {
         self.runs = Runs::new(MEMORY_BUDGET);
         self.jobs.clear();
@@ -312,8 +312,8 @@ impl World {
         }
     }
 
-    /// The coordinator is stopped and started again. `is_disk_good`: whether what is
-    /// under way can still be written.
+    /// The coordinator is stopped and restarted. `is_disk_good`: whether pending writes still
+    /// succeed.
     pub fn stop(&mut self, is_disk_good: bool) {
         self.runs.on_shutdown();
         while !self.commits.is_empty() || !self.changes.is_empty() {
@@ -336,7 +336,7 @@ impl World {
         self.crash();
     }
 
-    /// All that is under way comes to its end, except work of paused jobs.
+    /// Finishes all pending work, except that of paused jobs.
     pub fn settle(&mut self) {
         loop {
             let mut jobs = self.jobs.iter().filter(|(_, job)| !job.is_paused);
@@ -359,14 +359,14 @@ impl World {
         }
     }
 
-    /// Carries out what the test has caused, and all that follows.
+    /// Carries out the test's commands, and everything that follows.
     pub fn settle_after_commands(&mut self) {
         self.carry_out();
         self.settle();
         self.check_settled();
     }
 
-    /// What must hold when nothing is under way.
+    /// Checks the invariants that hold when no work is pending.
     pub fn check_settled(&self) {
         assert!(self.answers.values().all(Option::is_some), "every client is answered");
         let unfinished = self.store.iter().filter(|(_, stored)| stored.state.is_unfinished());

@@ -1,4 +1,4 @@
-//! The engine's rules one by one: workers that compute when the test says so.
+//! The engine's rules one by one, with workers that compute on the test's command.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use coordinator::{
 use super::{EXPERIMENT, LEASE, MODEL, SECOND, assert_right, auditing_fleet, fleet};
 use crate::simulated_fleet::{SimulatedFleet, fitness};
 
-/// Its engine neither splits nor duplicates, so that items can be counted.
+/// A fleet whose engine neither splits nor duplicates items, so that a test can count them.
 pub(super) fn plain_fleet() -> SimulatedFleet {
     let config = EngineConfig { split: false, duplicate: false, ..EngineConfig::new(LEASE) };
     SimulatedFleet::new(MODEL, config)

@@ -1,4 +1,4 @@
-//! A fleet that is divided among experiments: workers that take some names only.
+//! A fleet that is divided among experiments: workers take only some names.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ fn experiment(number: u64) -> JobId {
     JobId::Experiment(ExperimentId(number))
 }
 
-/// The jobs that each worker has been given items of, by the timeline.
+/// The jobs of each worker's items, from the timeline.
 fn jobs_of(fleet: &SimulatedFleet) -> BTreeMap<WorkerId, Vec<JobId>> {
     let mut jobs: BTreeMap<WorkerId, Vec<JobId>> = BTreeMap::new();
     for entry in fleet.timeline() {
@@ -97,8 +97,8 @@ fn an_audit_that_no_second_worker_may_do_is_waived() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Whatever the workers take: what somebody takes is completed to the same values, by none
-    /// but those who take it.
+    /// With any patterns of workers: an experiment that a worker takes is completed to the same
+    /// values, and only by workers that take it.
     #[test]
     fn every_experiment_that_somebody_takes_is_completed(
         patterns in prop::collection::vec("(\\*|experiment-[1-3?])", 1..6),

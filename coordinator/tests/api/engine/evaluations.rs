@@ -11,7 +11,7 @@ use sim_core::{Output, TrialSet};
 use super::{EXPERIMENT, LEASE, MODEL, fleet};
 use crate::simulated_fleet::SimulatedFleet;
 
-/// Numbers of a measured trial.
+/// Number of values of a measured trial.
 const N_VALUES: usize = 1001;
 const EVALUATION: JobId = JobId::Evaluation(EvaluationId(1));
 

@@ -1,5 +1,5 @@
-//! The engine under fleets in virtual time: nothing is lost, nothing counts
-//! twice, nothing grows without bound, whatever happens to the workers.
+//! The engine with fleets in virtual time: whatever happens to the workers, nothing is lost,
+//! counts twice or grows without bound.
 
 mod by_hand;
 mod divided;
@@ -171,7 +171,7 @@ fn fast_workers_get_more_of_short_trials_and_all_end_together() {
     let model = FleetModel { trial, latency, ..MODEL };
     let idle_share = |config| {
         let mut fleet = SimulatedFleet::new(model, config);
-        // One is three times as fast as another.
+        // One worker is three times as fast as the other.
         for worker in 0..40 {
             fleet.join(1, 0.5 + f64::from(worker) / 40.0);
         }
@@ -199,7 +199,7 @@ fn experiments_share_the_fleet_by_priority() {
     }
     for (id, weight) in [(low, 100), (high, 300)] {
         fleet.submit(id, weight);
-        // Items of different lengths: it is time that is shared.
+        // The items have different lengths, because jobs share time, not items.
         if id == low { fleet.ask(id, 0, 6000, 1) } else { fleet.ask(id, 0, 3000, 4) }
     }
     assert!(fleet.run_until(HOUR, is_finished));
@@ -224,7 +224,7 @@ fn workers_serve_another_experiment_while_one_is_at_its_barrier() {
     let before = fleet.n_items_sent;
     fleet.run_for(SECOND);
     assert!(fleet.n_items_sent > before);
-    // Nobody saves up turns while it has nothing to do.
+    // A job saves up no turns while it has no items.
     fleet.ask(a, 1, 2, 1);
     assert!(fleet.run_until(SECOND, |fleet| fleet.evaluated.len() == 2));
     assert_eq!(fleet.evaluated[1].0, a);
@@ -279,7 +279,7 @@ fn audits_are_waived_when_there_is_no_second_worker() {
     assert!(fleet.run_until(HOUR, is_finished));
     assert_eq!(fleet.evaluated[0].1.n_unaudited, 5);
     assert!(fleet.now() >= 30 * SECOND, "a second one may be about to come");
-    // A second one that leaves in the middle of it.
+    // A second worker, which leaves in the middle of the batch.
     let second = fleet.join(1, 0.1);
     fleet.ask(EXPERIMENT, 1, 5, 1);
     fleet.run_for(2 * SECOND);
@@ -348,9 +348,8 @@ fn happening() -> impl Strategy<Value = Happening> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
-    /// No item is lost, none accepted twice, the engine's state never
-    /// contradicts itself (it is checked after every event), and what a worker
-    /// holds is bounded.
+    /// No item is lost or accepted twice, the engine's state never contradicts itself (it is
+    /// checked after every event), and each worker's number of items is bounded.
     #[test]
     fn any_history_evaluates_the_same_fitness(
         history in prop::collection::vec(happening(), 0..60),
@@ -391,8 +390,8 @@ proptest! {
     }
 }
 
-/// Two copies of an item are lost within a second, and so it waits twice. Found by the
-/// property above.
+/// Two copies of an item are lost within a second, so the item waits twice. The property above
+/// found this case.
 #[test]
 fn an_item_of_which_two_copies_are_lost_is_queued_once() {
     let config = EngineConfig { audit_fraction: 0.3, ..EngineConfig::new(LEASE) };

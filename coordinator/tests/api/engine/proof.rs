@@ -1,4 +1,4 @@
-//! Trouble with workers, one rule at a time: the referee and other workers settle it by proof.
+//! Worker faults, one rule at a time: the referee and other workers settle them by proof.
 
 use coordinator::{
     engine::{Assignment, EngineConfig},
@@ -44,7 +44,7 @@ fn an_item_that_takes_its_workers_down_is_asked_of_the_referee_and_is_given_to_n
     }
     assert_eq!((fleet.held(id).len(), fleet.n_questions), (0, 1));
     fleet.run_for(SECOND);
-    // The workers were killed by something else: the referee has computed it.
+    // Something else killed the workers, since the referee has computed the item.
     assert_evaluated(&fleet, 1, 1);
     assert!(fleet.failed.is_empty() && fleet.quarantined.is_empty());
 }
@@ -130,7 +130,7 @@ fn a_failure_that_the_referee_contradicts_puts_its_reporter_in_quarantine() {
     assert_eq!(fleet.quarantined.len(), 1);
     let (name, reason) = &fleet.quarantined[0];
     assert!(name == "worker-1" && reason.contains("I cannot"), "{reason}");
-    // It is known when it comes back.
+    // It is recognised when it reconnects.
     let liar = fleet.restart(liar).unwrap();
     assert!(fleet.held(liar).is_empty() && fleet.status()[1].quarantined.is_some());
     while fleet.step(honest) {}
@@ -195,7 +195,7 @@ fn without_a_referee_workers_with_fewer_slots_confirm_no_failure() {
     assert_evaluated(&fleet, 1, 1);
 }
 
-/// A worker that joined by hand finds the fitness of all that it holds to be NaN.
+/// A worker that joined by hand returns NaN for all of its items.
 fn find_no_fitness(fleet: &mut SimulatedFleet, id: WorkerId) {
     while let Some(assignment) = fleet.held(id).first() {
         let values = vec![f64::NAN; assignment.trials.len()];
@@ -279,8 +279,8 @@ fn a_result_of_the_wrong_length_is_proof_enough() {
     assert!(fleet.quarantined[0].1.contains("1 values for 2 trials"), "{:?}", fleet.quarantined);
 }
 
-/// Three workers with an item each; the first has finished its own, and has been
-/// given the third's as well, which is late.
+/// Three workers with an item each. The first has finished its own, and has got a copy of the
+/// third's, which is late.
 fn fleet_with_a_late_item() -> (SimulatedFleet, [WorkerId; 3], Assignment) {
     let mut fleet = fleet();
     let workers = [fleet.join_by_hand(1), fleet.join_by_hand(1), fleet.join_by_hand(1)];
@@ -299,7 +299,7 @@ fn the_first_of_two_results_wins_and_the_other_worker_drops_the_item() {
     let (mut fleet, [first, _, third], late) = fleet_with_a_late_item();
     fleet.step(first);
     assert!(fleet.held(third).iter().all(|assignment| assignment.id != late.id));
-    // Its answer was under way already.
+    // Its answer was already on its way.
     fleet.answer(third, late.id, Ok(vec![fitness(&late.genotype, 0)]));
     assert_eq!(fleet.n_questions, 0);
     fleet.run_by_hand();
@@ -374,7 +374,7 @@ fn a_worker_that_comes_back_after_a_loss_is_given_one_item_until_it_returns_some
     assert_eq!(fleet.held(id).len(), 1);
     fleet.step(id);
     assert!(fleet.held(id).len() > 1);
-    // It is all there is.
+    // It is the only worker.
     let id = fleet.restart(id).unwrap();
     fleet.drain(other);
     fleet.run_for(SECOND / 5);
@@ -450,7 +450,7 @@ fn an_item_computed_by_two_is_audited_in_parts_by_others() {
     let whole = fleet.held(faulty)[0].clone();
     assert_eq!(whole.trials, 0..5);
     let other = fleet.join_by_hand(2);
-    // Nobody knows how long an item takes; it is late after a while.
+    // Without any result, the duration of an item is unknown; it counts as late after a while.
     fleet.run_for(6 * SECOND);
     let copies = fleet.held(other);
     assert_eq!(copies[0].trials.start, 0);
@@ -461,7 +461,7 @@ fn an_item_computed_by_two_is_audited_in_parts_by_others() {
     for _ in 0..100 {
         fleet.run_for(SECOND / 2);
         fleet.step(other);
-        // Audits of its own it does right.
+        // It computes its audits correctly.
         let held = fleet.held(faulty);
         assert!(held.iter().all(|assignment| !assignment.trials.contains(&4)), "its own");
         fleet.step(faulty);

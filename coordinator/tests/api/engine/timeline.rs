@@ -1,4 +1,4 @@
-//! What people see of who computed what.
+//! The timeline of the workers' recent work.
 
 use std::collections::BTreeMap;
 

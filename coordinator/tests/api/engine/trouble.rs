@@ -1,6 +1,5 @@
-//! Workers that hang, lie, fail, babble, crash and flap, in any mixture up to 49 % of the
-//! slots: the batch comes to the same values, in a time that the honest slots can be
-//! held to.
+//! Workers that hang, lie, fail, babble, crash and flap, in any mixture up to 49 % of the slots:
+//! the batch has the same values, in a time that the honest slots can achieve.
 
 use std::time::Duration;
 
@@ -10,14 +9,14 @@ use proptest::prelude::*;
 use super::{EXPERIMENT, LEASE, MODEL, SECOND, assert_right, fleet};
 use crate::simulated_fleet::{Conduct, FleetModel, SimulatedFleet};
 
-/// How a worker is in the way.
+/// A worker's fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trouble {
-    /// As it computes.
+    /// It computes wrongly.
     Of(Conduct),
-    /// It is killed and started again so often.
+    /// It is killed and restarted at this interval.
     Crashes(Duration),
-    /// Its stream breaks so often.
+    /// Its stream breaks at this interval.
     Flaps(Duration),
 }
 
@@ -64,7 +63,7 @@ impl Nuisance {
     }
 }
 
-/// Time that three generations take. The referee is not there before `referee_from`.
+/// The duration of three generations. The referee is unavailable before `referee_from`.
 fn time(
     honest: &[usize],
     troubles: &[(Trouble, usize)],
@@ -96,7 +95,7 @@ fn time(
         }
         assert_right(&fleet, n_individuals, n_trials);
     }
-    // Nobody was called faulty who is not.
+    // No honest worker was called faulty.
     for (name, reason) in &fleet.quarantined {
         let index: usize = name["worker-".len()..].parse().unwrap();
         let trouble = troubles.get(index - 1).map(|(trouble, _)| trouble);

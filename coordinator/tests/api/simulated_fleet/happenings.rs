@@ -1,4 +1,4 @@
-//! What happens in the course of time, and what workers and commands make of it.
+//! Events in virtual time, and how workers and commands react to them.
 
 use super::*;
 
@@ -56,7 +56,7 @@ impl SimulatedFleet {
                     assert_eq!(known, Some(&distribution(trial_set)), "what it draws from");
                 }
                 for assignment in items {
-                    // The engine blames a loss on what it gave first.
+                    // The engine blames a loss on the items that it assigned first.
                     let is_next = assignment.id > worker.last_assignment;
                     assert!(is_next, "sent in the order given: {:?}", assignment.id);
                     worker.last_assignment = assignment.id;

@@ -1,8 +1,8 @@
 //! A fleet in virtual time: the real engine, and workers that take as long as
 //! they say, over a network with latency. No sockets, no sleeping.
 //!
-//! A worker that [joins by hand](SimulatedFleet::join_by_hand) has neither latency nor a
-//! time of its own: it computes when the test says so.
+//! A worker that [joins by hand](SimulatedFleet::join_by_hand) has neither latency nor a time of
+//! its own: it computes on the test's command.
 
 mod happenings;
 
@@ -27,13 +27,13 @@ use coordinator::{
 use evolution::Population;
 use sim_core::{Output, TrialSet};
 
-/// What everybody says of a genotype that cannot be computed.
+/// The failure that all workers report for a genotype that cannot be computed.
 const FAILURE: &str = "it overflowed";
-/// What a call of the simulation costs beside its trials, in trials.
+/// Overhead of a call of the simulation, in trials.
 const CALL_OVERHEAD: f64 = 0.4;
 const TICK: Duration = Duration::from_millis(100);
 
-/// What the fleet is made of.
+/// The parameters of the fleet.
 #[derive(Debug, Clone, Copy)]
 pub struct FleetModel {
     /// One way between coordinator and worker.
@@ -43,33 +43,33 @@ pub struct FleetModel {
     /// Trials take from 1 - dispersion to 1 + dispersion times that, by genotype
     /// and trial.
     pub dispersion: f64,
-    /// Whether a worker leaves off an item that it is told to drop; else it
-    /// finishes it first.
+    /// Whether a worker stops an item that it is told to drop; otherwise it finishes the item
+    /// first.
     pub stops: bool,
     /// Whether the engine's state is checked after every event.
     pub checks: bool,
 }
 
-/// Stands for what the genotypes of a trial set are drawn from; as long as five of them.
+/// Stands for the distribution of a trial set's genotypes; as long as five of them.
 fn distribution(trial_set: TrialSet) -> Arc<[u8]> {
     let generation = trial_set.generation().expect("nothing else is drawn");
     generation.to_le_bytes().repeat(5).into()
 }
 
-/// What a worker does with its items.
+/// How a worker treats its items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Conduct {
     /// It computes them.
     Honest,
-    /// It makes its values up, as no other does.
+    /// It invents its values, different from those of all others.
     Lies,
-    /// The same, on the last trial of an item only.
+    /// It invents the value of the last trial of an item only.
     LiesAtTheEnd,
-    /// It says that they fail.
+    /// It reports that they fail.
     Fails,
     /// It returns nothing, but its heart beats.
     Hangs,
-    /// It returns something of the wrong length.
+    /// It returns a result of the wrong length.
     Babbles,
 }
 
@@ -82,7 +82,7 @@ struct Worker {
     last_assignment: AssignmentId,
     distributions: BTreeMap<JobId, Arc<[u8]>>,
     running: BTreeMap<AssignmentId, JobId>,
-    /// Computed, but wanted no more.
+    /// Items in progress that the engine has dropped.
     dropped: BTreeSet<AssignmentId>,
     stalled_until: Duration,
     is_silent: bool,
@@ -93,7 +93,7 @@ struct Worker {
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Happening {
     Tick,
-    /// A message of these commands' numbers reaches a worker.
+    /// The message with this index reaches a worker.
     Arrival(WorkerId, usize),
     Computed(WorkerId, AssignmentId),
     Result(WorkerId, AssignmentId),
@@ -103,27 +103,27 @@ enum Happening {
     Verdict(QuestionId),
 }
 
-/// The fleet, the engine, and what became of experiments.
+/// The fleet, the engine, and the outcomes of experiments.
 pub struct SimulatedFleet {
     pub engine: Engine,
     pub evaluated: Vec<(JobId, EvaluatedBatch)>,
     pub failed: Vec<(JobId, String)>,
     /// Names and reasons.
     pub quarantined: Vec<(String, String)>,
-    /// Genotypes that take whatever computes them down.
+    /// Genotypes that take down the worker that computes them.
     pub poisonous: BTreeSet<u64>,
-    /// How many times longer than a result that takes.
+    /// Time until that, relative to the time of a result.
     pub poison_takes: u32,
     /// Genotypes that cannot be computed.
     pub failing: BTreeSet<u64>,
     pub has_referee: bool,
-    /// Whether the referee finds the fitness of everything to be NaN.
+    /// Whether the referee returns NaN for every fitness.
     pub has_no_fitness: bool,
-    /// Questions that the referee was asked.
+    /// Number of questions to the referee.
     pub n_questions: usize,
     pub n_items_sent: usize,
     pub n_items_dropped: usize,
-    /// Items whose genotype the worker draws.
+    /// Number of items whose genotype the worker draws.
     pub n_items_drawn: usize,
     pub n_distributions_sent: usize,
     /// Time that workers computed, in all.
@@ -138,7 +138,7 @@ pub struct SimulatedFleet {
     n_messages: usize,
     workers: BTreeMap<WorkerId, Worker>,
     n_processes: u64,
-    /// When the referee is done with what it was asked.
+    /// When the referee has answered all questions.
     referee_busy_until: Duration,
     verdicts: BTreeMap<QuestionId, Verdict>,
 }
@@ -153,7 +153,7 @@ pub fn population(n: usize) -> Population {
     (0..n).map(|i| vec![i as f64]).collect()
 }
 
-/// A number in 0..1 that looks random.
+/// A pseudo-random number in 0..1.
 pub fn uniform(seed: u64) -> f64 {
     let x = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -162,7 +162,7 @@ pub fn uniform(seed: u64) -> f64 {
 }
 
 impl FleetModel {
-    /// How long an item takes a worker of speed 1.
+    /// Duration of an item on a worker of speed 1.
     fn time(&self, genotype: &[f64], trials: &Range<u32>) -> Duration {
         let trials = trials.clone().map(|trial| {
             let place = (genotype[0] as u64) << 16 | u64::from(trial);
@@ -217,7 +217,7 @@ impl SimulatedFleet {
         self.now
     }
 
-    /// The same, as the engine counts it.
+    /// The same as an instant, for the engine.
     pub fn instant(&self) -> Instant {
         self.origin + self.now
     }
@@ -226,12 +226,12 @@ impl SimulatedFleet {
         self.workers.keys().copied().collect()
     }
 
-    /// Who computed what lately.
+    /// The recent work of every worker.
     pub fn timeline(&self) -> Vec<TimelineEntry> {
         self.engine.timeline(self.instant())
     }
 
-    /// What the engine says about the workers.
+    /// The engine's status of the workers.
     pub fn status(&self) -> Vec<WorkerStatus> {
         self.engine.worker_status(self.instant())
     }
@@ -247,13 +247,13 @@ impl SimulatedFleet {
         self.connect(introduction, speed, conduct, false)
     }
 
-    /// A worker connects that computes when [`Self::step`] says so.
+    /// A worker connects that computes on [`Self::step`].
     pub fn join_by_hand(&mut self, n_slots: usize) -> WorkerId {
         let introduction = self.introduction(n_slots);
         self.connect(introduction, 1.0, Conduct::Honest, true)
     }
 
-    /// The same for a worker that takes only experiments whose name matches.
+    /// A worker connects that takes only experiments with a matching name.
     pub fn join_for(&mut self, experiments: &str, speed: f64) -> WorkerId {
         let experiments = NamePattern::new(experiments);
         let introduction = Introduction { experiments, ..self.introduction(1) };
@@ -304,7 +304,7 @@ impl SimulatedFleet {
         self.carry_out();
     }
 
-    /// A worker's stream breaks, and it comes back at once.
+    /// A worker's stream breaks, and the worker reconnects at once.
     pub fn flap(&mut self, id: WorkerId) -> Option<WorkerId> {
         let Worker { introduction, speed, conduct, is_by_hand, .. } = self.workers.remove(&id)?;
         self.engine.on_worker_left(self.instant(), id);
@@ -322,13 +322,13 @@ impl SimulatedFleet {
         Some(self.connect(Introduction { process, ..introduction }, speed, conduct, is_by_hand))
     }
 
-    /// What a worker that joined by hand has not computed.
+    /// The assignments that a worker that joined by hand has not computed.
     pub fn held(&self, id: WorkerId) -> Vec<Assignment> {
         let queue = self.workers.get(&id).map(|worker| &worker.queue);
         queue.into_iter().flatten().map(|(_, assignment)| assignment.clone()).collect()
     }
 
-    /// The oldest item of a worker that joined by hand is computed; whether there was one.
+    /// Computes the oldest item of a worker that joined by hand; returns whether it had one.
     pub fn step(&mut self, id: WorkerId) -> bool {
         let worker = self.workers.get_mut(&id);
         let Some((_, assignment)) = worker.and_then(|worker| worker.queue.pop_front()) else {
@@ -349,7 +349,7 @@ impl SimulatedFleet {
         self.answer_with(id, assignment, Output::Fitness, outcome);
     }
 
-    /// The same, with numbers of either kind.
+    /// A worker that joined by hand answers an assignment with numbers of either kind.
     pub fn answer_with(
         &mut self,
         id: WorkerId,
@@ -372,7 +372,7 @@ impl SimulatedFleet {
         while ids.iter().filter(|&&id| self.step(id)).count() > 0 {}
     }
 
-    /// A worker computes nothing for a while, but its heart beats.
+    /// A worker computes nothing for a while, but sends heartbeats.
     pub fn stall(&mut self, id: WorkerId, time: Duration) {
         let until = self.now + time;
         if let Some(worker) = self.workers.get_mut(&id) {
@@ -381,7 +381,7 @@ impl SimulatedFleet {
         }
     }
 
-    /// A worker is not heard of any more.
+    /// A worker falls silent.
     pub fn silence(&mut self, id: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.is_silent = true;
@@ -421,19 +421,18 @@ impl SimulatedFleet {
         self.tell(|engine, now| engine.on_tick(now));
     }
 
-    /// What a job is doing.
+    /// The activity of a job.
     pub fn activity(&self, id: JobId) -> JobActivity {
         self.engine.activity(self.instant(), id)
     }
 
-    /// Lets something happen to the engine.
+    /// Calls a handler of the engine, and carries out its commands.
     pub fn tell(&mut self, event: impl FnOnce(&mut Engine, Instant)) {
         event(&mut self.engine, self.origin + self.now);
         self.carry_out();
     }
 
-    /// Lets time pass until a condition holds; whether it did before the time was
-    /// over.
+    /// Lets time pass until a condition holds; returns whether it did within `limit`.
     pub fn run_until(&mut self, limit: Duration, mut is_met: impl FnMut(&Self) -> bool) -> bool {
         let end = self.now + limit;
         while !is_met(self) {
