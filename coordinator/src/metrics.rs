@@ -22,15 +22,15 @@ metrics! {
     SLOT_TIME = Counter "swarm_slot_seconds_total" []
         "Time that slots have existed, summed over slots.";
     BUSY_TIME = Counter "swarm_slot_busy_seconds_total" []
-        "Part of swarm_slot_seconds_total that went into results.";
+        "Part of swarm_slot_seconds_total that led to results.";
     WORKERS_JOINED = Counter "swarm_workers_joined_total" []
-        "Workers that have connected; one that comes back counts again.";
+        "Workers that have connected; a worker that reconnects counts again.";
     WORKERS_LEFT = Counter "swarm_workers_left_total" []
         "Workers that announced their end and left.";
     WORKERS_LOST = Counter "swarm_workers_lost_total" []
         "Workers whose connection broke, that fell silent, or that the coordinator dropped.";
     ITEMS_ASSIGNED = Counter "swarm_items_assigned_total" []
-        "Items given to workers, duplicates included.";
+        "Items assigned to workers, including duplicates.";
     ITEMS_COMPUTED = Counter "swarm_items_computed_total" []
         "Items for which a worker returned fitness.";
     ITEMS_FAILED = Counter "swarm_items_failed_total" []
@@ -70,7 +70,7 @@ metrics! {
     GENERATION_DURATION = Gauge "swarm_experiment_generation_duration_seconds" ["experiment", "name"]
         "Time from the first to the last item of the latest completed generation.";
     IDLE = Gauge "swarm_experiment_barrier_idle_ratio" ["experiment", "name"]
-        "Share of the slots' time, 0 to 1, that did not go into results during the latest completed generation.";
+        "Share of the slots' time, 0 to 1, that led to no results during the latest completed generation.";
     EXPERIMENT_EPISODES = Counter "swarm_experiment_episodes_total" ["experiment", "name"]
         "Episodes of the experiment with a known fitness.";
     ITEMS_QUEUED = Gauge "swarm_experiment_items_queued" ["experiment", "name"]

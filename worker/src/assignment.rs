@@ -1,4 +1,4 @@
-//! What the coordinator asks for, and what becomes of it.
+//! Assignments from the coordinator, and their results.
 
 use std::{borrow::Cow, ops::Range, sync::Arc, time::Duration};
 
@@ -12,9 +12,9 @@ pub(crate) struct Assignment {
     /// The coordinator's number, which the result carries.
     pub(crate) id: u64,
     pub(crate) job: JobId,
-    /// Which worlds and noise the trials meet.
+    /// The trial set.
     pub(crate) trial_set: TrialSet,
-    /// What is returned for a trial.
+    /// The kind of result for each trial.
     pub(crate) output: Output,
     pub(crate) trials: Range<u32>,
     pub(crate) genotype: Genotype,
@@ -23,14 +23,15 @@ pub(crate) struct Assignment {
 /// Where an assignment's genes come from.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Genotype {
-    /// They were sent; unchecked.
+    /// The coordinator sent them; unchecked.
     Sent(Vec<f64>),
-    /// They are drawn from what the coordinator sent, as the genes of this individual.
+    /// The worker draws them from the distribution that the coordinator sent, for this
+    /// individual.
     Drawn(Arc<Distribution>, u32),
 }
 
 impl Genotype {
-    /// The genes, or why there are none.
+    /// The genes, or why the worker cannot draw them.
     pub(crate) fn genes(&self) -> Result<Cow<'_, [f64]>, String> {
         match self {
             Self::Sent(genes) => Ok(Cow::Borrowed(genes)),
@@ -48,10 +49,10 @@ impl Genotype {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ItemResult {
     pub(crate) assignment_id: u64,
-    /// What the numbers of the outcome are.
+    /// The kind of numbers in the outcome.
     pub(crate) output: Output,
-    /// The numbers of all trials, one trial after the other; or why there are none.
+    /// The numbers of all trials, one trial after the other; or why the item failed.
     pub(crate) outcome: Result<Vec<f64>, String>,
-    /// Time that the computation took.
+    /// Duration of the computation.
     pub(crate) duration: Duration,
 }

@@ -1,5 +1,4 @@
-//! Between the wire and the simulation: the only place of a worker that knows
-//! the shape of both.
+//! Converts between wire and simulation; no other module of a worker knows the types of both.
 
 use std::sync::{Arc, OnceLock};
 
@@ -18,14 +17,14 @@ use crate::{
     stats::Stats,
 };
 
-/// Results in one message, so that no message outgrows what a coordinator accepts.
+/// Most results in one message, so that a coordinator accepts the message.
 pub(crate) const RESULTS_PER_MESSAGE_MAX: usize = 256;
-/// Numbers in one message of several results: 4 MiB.
+/// Most numbers in one message of several results: 4 MiB.
 const VALUES_PER_MESSAGE_MAX: usize = 1 << 19;
 
-/// Makes a specification computable. It is compiled once, by the slot that computes
-/// its first assignment; a specification that does not compile fails each of them.
-/// `stats`: where robots' steps are counted.
+/// Makes a specification computable. The slot that computes its first assignment compiles it,
+/// once; a specification that does not compile fails each of its assignments. `stats`: counts
+/// robots' steps.
 pub(crate) fn evaluator(config_json: String, isa: Isa, stats: Arc<Stats>) -> Evaluator {
     let compiled = OnceLock::new();
     Arc::new(move |assignment: &Assignment, keep_going: &dyn Fn() -> bool| {
@@ -47,7 +46,7 @@ pub(crate) fn evaluator(config_json: String, isa: Isa, stats: Arc<Stats>) -> Eva
     })
 }
 
-/// What assignments have in common.
+/// The common part of assignments.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Common {
     pub(crate) job: JobId,
@@ -55,7 +54,7 @@ pub(crate) struct Common {
     output: Output,
 }
 
-/// Reads what assignments have in common, or says what is wrong with it.
+/// Reads the common part of assignments, or describes the mistake in it.
 pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
     let job = codec::read_job(assignments.job).ok_or("the assignment names no job")?;
     let trial_set = codec::read_trial_set(assignments.trial_set)?;
@@ -64,7 +63,7 @@ pub(crate) fn common(assignments: &v1::Assignments) -> Result<Common, String> {
     Ok(Common { job, trial_set, output })
 }
 
-/// Reads an assignment, or fails it: the coordinator is not trusted to be right.
+/// Reads an assignment, or fails it, because the coordinator's messages may be wrong.
 /// `distribution`: the latest of the job.
 pub(crate) fn assignment(
     common: &Common,

@@ -1,5 +1,5 @@
-//! The specifications that came last, compiled: the jobs of a client that evolves by itself have
-//! the same one, generation by generation.
+//! A cache of compiled specifications: a client that runs its own evolution sends the same one
+//! with every generation.
 
 use std::{
     num::NonZeroUsize,
@@ -11,7 +11,7 @@ use sim_core::Isa;
 
 use crate::{convert, pool::Evaluator, stats::Stats};
 
-/// Specifications that are remembered beside those of jobs that go on.
+/// Number of specifications to keep beside those of present jobs.
 const REMEMBERED: NonZeroUsize = NonZeroUsize::new(4).expect("it is not 0");
 
 /// Makes specifications computable.
@@ -22,12 +22,12 @@ pub(crate) struct Evaluators {
 }
 
 impl Evaluators {
-    /// `stats`: where robots' steps are counted.
+    /// `stats`: counts robots' steps.
     pub(crate) fn new(isa: Isa, stats: Arc<Stats>) -> Self {
         Self { isa, stats, latest: Mutex::new(LruCache::new(REMEMBERED)) }
     }
 
-    /// What computes a specification; equal ones are compiled once.
+    /// The evaluator of a specification; equal specifications are compiled once.
     pub(crate) fn get(&self, config_json: &str) -> Evaluator {
         let mut latest = self.latest.lock().expect("nothing panics while it holds them");
         let new = || convert::evaluator(config_json.to_owned(), self.isa, Arc::clone(&self.stats));

@@ -1,7 +1,7 @@
-//! A worker: it computes the fitness of genotypes for a coordinator, and keeps
-//! nothing that matters.
+//! A worker: it computes the fitness of genotypes for a coordinator, and stores nothing that
+//! matters.
 //!
-//! [`run`] is the whole of it: connect, serve, reconnect, until told to stop.
+//! [`run`] is the whole worker: it connects, serves and reconnects until it is told to stop.
 
 mod assignment;
 mod convert;
@@ -34,7 +34,7 @@ pub use crate::{
     stats::{Stats, StatsSnapshot},
 };
 
-/// How to be a worker, and whose.
+/// The configuration of a worker.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
     /// Where the coordinator listens, such as `http://127.0.0.1:7700`.
@@ -44,30 +44,31 @@ pub struct WorkerConfig {
     /// Number of items computed at the same time, each on a thread of its own,
     /// 1 to [`SLOTS_MAX`].
     pub slots: usize,
-    /// The experiments whose items it takes: a pattern of their names, up to
-    /// [`WORKER_NAME_LEN_MAX`] bytes, in which `*` stands for any text and `?` for one
-    /// character. Empty: all.
+    /// Pattern for the names of the experiments whose items it takes, up to
+    /// [`WORKER_NAME_LEN_MAX`] bytes: `*` stands for any text and `?` for one character. Empty:
+    /// all.
     pub experiments: String,
     /// Upper bound of the random delay before the first reconnection; it doubles
     /// with every further one that fails.
     pub retry_delay_min: Duration,
     /// Largest upper bound of that delay.
     pub retry_delay_max: Duration,
-    /// What the coordinator may ask for.
+    /// The token and certificates for the coordinator.
     pub credentials: Credentials,
-    /// Vector instructions to compute with. They decide how fast it is, and no bit.
+    /// Vector instructions to compute with. They change the speed, and no bit of a result.
     pub isa: Isa,
-    /// Counts what it does.
+    /// Counters of its work.
     pub stats: Arc<Stats>,
-    /// Where [`health_check`] looks whether there is a session with the coordinator.
+    /// File that shows [`health_check`] whether the worker has a session with the coordinator.
     pub session_file: Option<PathBuf>,
-    /// Ends items of scripts that it is still computing after `shutdown`, as they may take any
-    /// time; other workers compute them again.
+    /// Ends items of scripts that are still in progress after `shutdown`, because they may take
+    /// any time; other workers recompute them.
     pub give_up: CancellationToken,
 }
 
 impl WorkerConfig {
-    /// A worker that reconnects within 250 ms at first, and within 10 s at last.
+    /// The defaults: the delay before a reconnection is up to 250 ms at first, and up to 10 s
+    /// later.
     pub fn new(coordinator: impl Into<String>, name: impl Into<String>, slots: usize) -> Self {
         Self {
             coordinator: coordinator.into(),
@@ -85,15 +86,14 @@ impl WorkerConfig {
     }
 }
 
-/// How long a worker that a signal stops goes on with items of scripts.
+/// Time for which a worker continues items of scripts after a signal to stop.
 pub const FINISHING_TIME: Duration = Duration::from_millis(700);
 
-/// Why a worker gave up. What may pass (a coordinator that is down, a broken
-/// connection) is retried and never gets here.
+/// Why a worker gave up. It retries after passing problems (a coordinator that is down, a broken
+/// connection), which never become this error.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkerError {
-    /// The coordinator's address is none, or the credentials do not fit it. Fix the
-    /// input.
+    /// The coordinator's address is invalid, or the credentials do not fit it. Fix the input.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// A name that the protocol cannot carry. Fix the input.
@@ -131,8 +131,7 @@ pub enum WorkerError {
         /// The first line of the server's answer.
         banner: String,
     },
-    /// The coordinator wants another token, or another certificate. Fix the
-    /// credentials.
+    /// The coordinator requires another token or certificate. Fix the credentials.
     #[error("the coordinator at {address} does not let this worker in: {refusal}")]
     Denied {
         /// Address of the coordinator.
@@ -145,7 +144,7 @@ pub enum WorkerError {
     SessionFile {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The operating system gave no thread.
@@ -167,18 +166,24 @@ impl WorkerError {
     }
 }
 
-/// Works for the coordinator until `shutdown` is cancelled: then it finishes
-/// what it is computing, delivers that, and returns. [`WorkerConfig::give_up`] ends items of scripts.
+/// Works for the coordinator until `shutdown` is cancelled. Then it finishes its items in
+/// progress, delivers their results, and returns. [`WorkerConfig::give_up`] ends items of
+/// scripts.
 ///
-/// A coordinator that is not up, or goes away, is tried again without end, after
-/// random delays that grow; only another service, where a coordinator has never been
-/// reached, ends the worker.
+/// If the coordinator is down or goes away, the worker tries again without limit, after growing
+/// random delays. If another service answers at the address, and the worker has never reached a
+/// coordinator there, it gives up.
+///
+/// # Errors
+///
+/// If the configuration is invalid, if the coordinator refuses the worker's version or
+/// credentials, or if the system gives no threads.
 pub async fn run(config: WorkerConfig, shutdown: CancellationToken) -> Result<(), WorkerError> {
     let evaluators = Evaluators::new(config.isa, Arc::clone(&config.stats));
     run_with(config, shutdown, |config_json| evaluators.get(&config_json)).await
 }
 
-/// [`run`] with another way to make a specification computable.
+/// [`run`] with another way to make specifications computable.
 async fn run_with(
     config: WorkerConfig,
     shutdown: CancellationToken,
@@ -189,7 +194,7 @@ async fn run_with(
     let pool = Pool::start(config.slots, Arc::clone(&config.stats))?;
     let config = WorkerConfig { slots: pool.n_slots(), ..config };
     let stats = &config.stats;
-    // 0 means that it is not known.
+    // 0 means unknown.
     let process_id = rand::random::<u64>().max(1);
     let mut backoff = Backoff::new(config.retry_delay_min, config.retry_delay_max);
     let mut was_connected = false;
@@ -220,7 +225,8 @@ async fn run_with(
                     }
                 };
                 stats.on_disconnected();
-                // What is left was assigned on this stream: it is not ours any more.
+                // The remaining assignments belong to the ended stream, so other workers compute
+                // them.
                 pool.cancel(|_| true);
                 match ended {
                     Ended::Drained => return Ok(()),
@@ -302,7 +308,8 @@ fn link(config: &WorkerConfig) -> Result<Link, WorkerError> {
     link.endpoint = link
         .endpoint
         .connect_timeout(Duration::from_secs(5))
-        // A coordinator whose machine vanished closes nothing: only pings find out.
+        // If the coordinator's machine vanishes, only pings find out, because nothing closes the
+        // connection.
         .http2_keep_alive_interval(Duration::from_secs(10))
         .keep_alive_timeout(Duration::from_secs(10))
         .keep_alive_while_idle(true);
@@ -344,7 +351,7 @@ mod tests {
             let address = format!("http://{}", listener.local_addr().unwrap());
             thread::spawn(move || {
                 for stream in listener.incoming() {
-                    // A worker that is gone needs no answer.
+                    // A worker that has gone needs no answer.
                     let _ = stream.and_then(|mut stream| stream.write_all(line));
                 }
             });

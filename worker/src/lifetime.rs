@@ -1,33 +1,33 @@
-//! When a worker ends by itself: it has been idle for long, or its time is up.
+//! Ends a worker that has been idle for long, or whose time is up.
 //!
-//! The decision is a plain struct: time and what the worker has done are arguments.
+//! The decision is a plain struct: the time and the worker's statistics are arguments.
 
 use std::time::{Duration, Instant};
 
 use crate::StatsSnapshot;
 
-/// What is left for delivering results and closing the connection.
+/// Time to deliver results and to close the connection.
 const MARGIN: Duration = Duration::from_secs(5);
-/// Items like the longest so far, as which the last ones may take as long.
+/// Time for the last items, in multiples of the longest item so far.
 const N_LONGEST: u32 = 2;
 
-/// Bounds on a worker's life; none: it lives until it is told to stop.
+/// Bounds on a worker's life; without any, the worker lives until it is told to stop.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Lifetime {
-    /// Time without an item after which it ends.
+    /// Time without an item after which the worker ends.
     pub idle_timeout: Option<Duration>,
-    /// Time since its start at which it has ended.
+    /// Time since its start by which the worker has ended.
     pub time_limit: Option<Duration>,
 }
 
 /// Why a worker ends by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expired {
-    /// It has had no item for long.
+    /// It has had no item for the idle timeout.
     Idle,
-    /// Its time limit is near: it is time to finish its items.
+    /// Its time limit is near, so it has to finish its items.
     TimeIsNear,
-    /// Its time limit is there: it has no time to finish them.
+    /// Its time limit is reached, with no time left to finish its items.
     TimeIsUp,
 }
 
@@ -36,9 +36,9 @@ pub enum Expired {
 pub struct Watchdog {
     lifetime: Lifetime,
     started: Instant,
-    /// Since when it has had no item, as far as was seen.
+    /// Time of the last look at which it had an item.
     idle_since: Instant,
-    /// Items that were done when it was looked at.
+    /// Number of ended items at the last look.
     n_done: u64,
 }
 
@@ -55,14 +55,14 @@ impl Watchdog {
         Self { lifetime, started: now, idle_since: now, n_done: 0 }
     }
 
-    /// How long one may wait before looking again.
+    /// Longest time until the next look.
     pub fn interval(&self) -> Duration {
         let shortest = self.lifetime.idle_timeout.into_iter().chain(self.lifetime.time_limit).min();
         let interval = shortest.unwrap_or(Duration::MAX) / 8;
         interval.clamp(Duration::from_millis(10), Duration::from_secs(1))
     }
 
-    /// Looks at what the worker does; says if it is to end.
+    /// Looks at the worker's statistics; returns why it should end, if it should.
     pub fn look(&mut self, now: Instant, stats: &StatsSnapshot) -> Option<Expired> {
         let n_done = stats.n_items_computed + stats.n_items_failed + stats.n_items_dropped;
         if stats.n_items_queued + stats.n_slots_busy > 0 || n_done != self.n_done {
@@ -70,7 +70,7 @@ impl Watchdog {
         }
         if let Some(limit) = self.lifetime.time_limit {
             let age = now - self.started;
-            // A short life is not all farewell.
+            // In a short life, the farewell takes only a part.
             let needed = (N_LONGEST * stats.longest_item + MARGIN).min(limit / 2);
             if age >= limit {
                 return Some(Expired::TimeIsUp);
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(dog.look(start + 9 * SECOND, &busy(1, SECOND)), None);
         assert_eq!(dog.look(start + 18 * SECOND, &none), None);
         assert_eq!(dog.look(start + 19 * SECOND, &none), Some(Expired::Idle));
-        // An item that came and went between two looks.
+        // An item that arrived and ended between two looks.
         let done = StatsSnapshot { n_items_computed: 1, ..none };
         assert_eq!(dog.look(start + 20 * SECOND, &done), None);
         assert_eq!(dog.look(start + 30 * SECOND, &done), Some(Expired::Idle));

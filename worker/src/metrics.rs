@@ -1,5 +1,4 @@
-//! The worker's metrics: what there is, and its values when somebody scrapes them.
-//! `docs/metrics.md` has the same list.
+//! The worker's metrics, and their values at a scrape. `docs/metrics.md` has the same list.
 
 use sim_core::Isa;
 use swarm_telemetry::{Metric, Scrape, metrics};
@@ -33,12 +32,12 @@ metrics! {
         "Time that slots have computed, summed over slots.";
 }
 
-/// What a worker is, for as long as it runs.
+/// The constant properties of a worker.
 #[derive(Debug, Clone)]
 pub struct Identity {
     /// Its name.
     pub name: String,
-    /// Items it computes at the same time.
+    /// Number of items that it computes at the same time.
     pub slots: usize,
     /// Its vector instructions.
     pub isa: Isa,

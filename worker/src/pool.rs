@@ -1,5 +1,5 @@
-//! The threads that compute: one assignment per slot at a time, apart from the threads
-//! that talk to the network.
+//! The computing threads: each slot computes one assignment at a time, apart from the threads of
+//! the network.
 
 use std::{
     collections::VecDeque,
@@ -22,8 +22,8 @@ use crate::{
     stats::{Made, Stats},
 };
 
-/// Computes the numbers of an assignment, or says why it cannot. Asks now and then
-/// whether to go on; none if it was told not to.
+/// Computes the numbers of an assignment, or says why it cannot. It regularly calls its argument
+/// to learn whether to continue, and returns `None` if not.
 pub(crate) type Evaluator =
     Arc<dyn Fn(&Assignment, &dyn Fn() -> bool) -> Result<Option<Vec<f64>>, String> + Send + Sync>;
 
@@ -34,12 +34,12 @@ pub(crate) struct Queued {
     pub(crate) reply: Reply,
 }
 
-/// Where results go; if nobody listens there any more, nowhere. Once all assignments of a
-/// channel are done or dropped, the channel ends.
+/// The channel for results. The channel ends once all of its assignments are done or dropped;
+/// results without a receiver are dropped.
 pub(crate) type Reply = mpsc::Sender<ItemResult>;
 
-/// A fixed number of threads that share a bounded queue. Dropping the pool drops
-/// the queue; the threads end once they have finished what they are computing.
+/// A fixed number of threads that share a bounded queue. Dropping the pool drops the queue; each
+/// thread ends after its assignment in progress.
 #[derive(Debug)]
 pub(crate) struct Pool {
     shared: Arc<Shared>,
@@ -57,9 +57,9 @@ struct Shared {
 #[derive(Default)]
 struct Queue {
     waiting: VecDeque<Queued>,
-    /// What the slots are computing.
+    /// The assignments in progress.
     running: Vec<Arc<Running>>,
-    /// Slots that wait to be woken.
+    /// Number of slots that wait for an assignment.
     n_idle: usize,
     closed: bool,
 }
@@ -67,7 +67,7 @@ struct Queue {
 /// An assignment in a slot.
 struct Running {
     assignment: Assignment,
-    /// Whether its result is not wanted any more.
+    /// Whether its result is no longer needed.
     cancelled: AtomicBool,
 }
 
@@ -79,13 +79,12 @@ impl fmt::Debug for Queue {
 }
 
 impl Pool {
-    /// Starts `slots` threads, or as many as the system gives, of which there has to be one;
-    /// the queue holds as many assignments as the coordinator may send ahead. `stats`: where
-    /// they are counted.
+    /// Starts `slots` threads, or as many as the system gives, but at least one. The queue holds
+    /// as many assignments as the coordinator may send ahead. `stats`: counts assignments.
     pub(crate) fn start(slots: usize, stats: Arc<Stats>) -> io::Result<Self> {
         let (queue, changed) = (Mutex::default(), Condvar::new());
         let shared = Arc::new(Shared { queue, changed, stats });
-        // Built first, so that the threads that did start end if one does not.
+        // Built first, so that started threads end if a later one cannot start.
         let mut pool = Self { shared, capacity: 0, n_slots: 0 };
         for slot in 0..slots {
             let shared = Arc::clone(&pool.shared);
@@ -103,7 +102,7 @@ impl Pool {
         Ok(pool)
     }
 
-    /// Assignments that are computed at the same time.
+    /// Number of assignments that are computed at the same time.
     pub(crate) fn n_slots(&self) -> usize {
         self.n_slots
     }
@@ -113,13 +112,13 @@ impl Pool {
         self.capacity
     }
 
-    /// Assignments that wait for a slot.
+    /// Number of assignments that wait for a slot.
     pub(crate) fn n_queued(&self) -> usize {
         self.shared.lock().waiting.len()
     }
 
-    /// Queues assignments, all at once, so that idle slots are woken once; gives those back
-    /// that there is no room for.
+    /// Queues assignments, all at once to wake idle slots only once; returns those for which
+    /// there is no room.
     pub(crate) fn submit(&self, queued: Vec<Queued>) -> Vec<Queued> {
         let mut queue = self.shared.lock();
         let n_waiting = queue.waiting.len();
@@ -132,8 +131,7 @@ impl Pool {
         queued.collect()
     }
 
-    /// Drops all assignments that wait, and returns their number. What is being computed
-    /// goes on.
+    /// Drops all waiting assignments, and returns their number. Assignments in progress continue.
     pub(crate) fn drop_queued(&self) -> usize {
         let mut queue = self.shared.lock();
         let dropped = mem::take(&mut queue.waiting);
@@ -141,8 +139,8 @@ impl Pool {
         dropped.len()
     }
 
-    /// Drops the assignments that match, whether they wait or are being computed, and
-    /// returns their number. They have no result.
+    /// Drops the assignments that match, waiting or in progress, and returns their number. They
+    /// have no result.
     pub(crate) fn cancel(&self, matches: impl Fn(&Assignment) -> bool) -> usize {
         let mut queue = self.shared.lock();
         let n_before = queue.waiting.len();
@@ -169,12 +167,12 @@ impl Shared {
         self.queue.lock().expect("nothing panics while it holds the queue")
     }
 
-    /// The queue has changed.
+    /// Updates the statistics after a change of the queue.
     fn report(&self, queue: &Queue) {
         self.stats.on_queue(queue.waiting.len(), queue.running.len());
     }
 
-    /// A slot's life.
+    /// The loop of a slot's thread.
     fn work(&self) {
         while let Some((running, evaluator, reply)) = self.next() {
             let result = compute(&running, &evaluator, &self.stats);
@@ -183,14 +181,14 @@ impl Shared {
             self.report(&queue);
             drop(queue);
             if let Some(result) = result {
-                // An error means that the stream of this assignment is gone: nobody
-                // wants the result.
+                // An error means that the stream of this assignment has ended, so the result has
+                // no receiver.
                 let _ = reply.blocking_send(result);
             }
         }
     }
 
-    /// Waits for an assignment; none once the pool is closed.
+    /// Waits for an assignment; `None` once the pool is closed.
     fn next(&self) -> Option<(Arc<Running>, Evaluator, Reply)> {
         let mut queue = self.lock();
         while queue.waiting.is_empty() && !queue.closed {
@@ -206,8 +204,8 @@ impl Shared {
     }
 }
 
-/// Computes one assignment; no result if it is cancelled meanwhile. A panic is the
-/// assignment's failure, not the worker's.
+/// Computes one assignment; without a result if it is cancelled meanwhile. A panic fails the
+/// assignment, not the worker.
 #[expect(
     clippy::disallowed_methods,
     reason = "reports how long an assignment took; decides nothing"
@@ -265,7 +263,7 @@ mod tests {
         assert!(pool.submit(vec![queued]).is_empty(), "the queue has room");
     }
 
-    /// All results of a channel that ends, by item.
+    /// All results of a channel until its end, by item.
     fn collect(mut results: mpsc::Receiver<ItemResult>) -> Vec<(u64, Result<Vec<f64>, String>)> {
         let mut all = Vec::new();
         while let Some(result) = results.blocking_recv() {
@@ -275,8 +273,7 @@ mod tests {
         all
     }
 
-    /// An evaluator that says when it starts an item and waits for permission to
-    /// finish it.
+    /// An evaluator that reports when it starts an item, and waits for permission to finish it.
     fn gated() -> (Evaluator, std_mpsc::Receiver<u64>, std_mpsc::Sender<()>) {
         let (started, starts) = std_mpsc::channel();
         let (permit, permits) = std_mpsc::channel();

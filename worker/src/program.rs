@@ -102,13 +102,13 @@ Exit codes:
   71   the system gives it too few threads or file descriptors, or too little memory
   130  ended at once by a second signal";
 
-/// Runs the program with the words of its command line, the first of which is its name.
+/// Runs the program with its command line, which begins with the program's name.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args = Args::parse_from(words);
     if let (true, Some(file)) = (args.health_check, &args.session_file) {
         return report_health(file);
     }
-    // One at least computes.
+    // At least one thread computes.
     match runtime(1) {
         Ok(runtime) => block_on(runtime, work(args)),
         Err(starved) => {
@@ -186,13 +186,13 @@ async fn work(args: Args) -> ExitCode {
     }
 }
 
-/// The time, to compare dates with.
+/// The present time, to compare with dates.
 #[expect(clippy::disallowed_methods, reason = "certificates expire by the clock")]
 fn now() -> SystemTime {
     SystemTime::now()
 }
 
-/// Has the worker finish when its life is over, and ends the process if that takes too long.
+/// Tells the worker to finish when its life is over, and ends the process if that takes too long.
 async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: CancellationToken) {
     let mut watchdog = Watchdog::new(lifetime, Instant::now().into_std());
     loop {
@@ -202,7 +202,9 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
             Some(Expired::Idle) => "idle for the time of --idle-timeout",
             Some(Expired::TimeIsNear) => "near the end of --time-limit",
             Some(Expired::TimeIsUp) => {
-                warn!("the time of --time-limit is over before all items are done: others do them");
+                warn!(
+                    "the time of --time-limit is over before all items are done: other workers compute them"
+                );
                 std::process::exit(0);
             }
         };
@@ -213,11 +215,11 @@ async fn watch_over(lifetime: Lifetime, stats: Arc<Stats>, shutdown: Cancellatio
     }
 }
 
-/// Says in one line how the worker is.
+/// Prints in one line whether the worker is healthy.
 fn report_health(session_file: &Path) -> ExitCode {
     match health_check(session_file) {
         Ok(session) => {
-            // The exit code says it, too, where nobody reads the line.
+            // The exit code also says it, for callers that do not read the line.
             let _ = writeln!(io::stdout(), "healthy: {session}");
             ExitCode::SUCCESS
         }
@@ -228,7 +230,7 @@ fn report_health(session_file: &Path) -> ExitCode {
     }
 }
 
-/// The first signal asks the worker to finish, items of scripts within [`FINISHING_TIME`]; the
+/// The first signal tells the worker to finish, items of scripts within [`FINISHING_TIME`]; the
 /// second ends the process.
 fn stop_on_signals(shutdown: CancellationToken, give_up: CancellationToken) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;

@@ -34,13 +34,14 @@ use crate::{
     pool::{Evaluator, Pool, Queued, Reply},
 };
 
-/// Messages that wait for the network.
+/// Most messages that wait for the network.
 const OUTBOUND_MESSAGES_MAX: usize = 16;
-/// How long results of items that take less than this wait for others at the most.
+/// Longest time for which results wait for others; also the duration below which an item counts
+/// as short.
 const HELD_MAX: Duration = Duration::from_millis(1);
-/// How long the coordinator may take to answer `Hello`.
+/// Time for the coordinator to answer `Hello`.
 const WELCOME_TIMEOUT: Duration = Duration::from_secs(10);
-/// How long it may take to confirm the end of a drained stream.
+/// Time for the coordinator to confirm the end of a drained stream.
 const GOODBYE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A stream whose `Welcome` has arrived.
@@ -50,28 +51,28 @@ pub(crate) struct Session {
     outbound: mpsc::Sender<WorkRequest>,
 }
 
-/// Why there is no session.
+/// Why a session could not be opened.
 #[derive(Debug)]
 pub(crate) enum OpenError {
-    /// There never will be one; with the coordinator's reason.
+    /// The versions differ, so it never will be; with the coordinator's reason.
     VersionMismatch(String),
-    /// Not with these credentials; with the coordinator's reason.
+    /// The coordinator does not accept the credentials; with the coordinator's reason.
     Denied(String),
-    /// The coordinator said no, for now.
+    /// The coordinator refused for now.
     Refused(String),
-    /// Nobody answered.
+    /// The coordinator did not answer.
     Unreachable(String),
 }
 
 /// How a session ended.
 #[derive(Debug)]
 pub(crate) enum Ended {
-    /// As asked; all results are delivered.
+    /// The worker ended it, and all results are delivered.
     Drained,
     /// The stream broke.
     Lost {
         reason: String,
-        /// Whether the session was good for anything before.
+        /// Whether the session was of any use before.
         worked: bool,
     },
 }
@@ -118,9 +119,9 @@ impl Session {
         self.welcome.worker_id
     }
 
-    /// Computes what the coordinator sends, until the stream breaks, or until
-    /// `shutdown` and everything that was being computed then is delivered, or dropped if it is
-    /// an item of a script when `give_up` is cancelled.
+    /// Computes the coordinator's assignments until the stream breaks, or until `shutdown`. After
+    /// `shutdown`, it first delivers the results of items in progress; `give_up` drops items of
+    /// scripts.
     pub(crate) async fn serve(
         self,
         pool: &Pool,
@@ -147,7 +148,7 @@ impl Session {
         let mut has_given_up = false;
 
         while !(all_computed && state.ready.is_empty()) {
-            // Results that the network does not take stop the intake of more.
+            // While the network does not accept results, the worker accepts no more assignments.
             let has_room = state.ready.len() < RESULTS_PER_MESSAGE_MAX;
             tokio::select! {
                 biased;
@@ -163,7 +164,7 @@ impl Session {
                 }
                 _ = heartbeat.tick() => {
                     worked = true;
-                    // If there is no room, what waits there is a sign of life too.
+                    // Without room, the waiting messages are signs of life, too.
                     let _ = outbound.try_send(convert::heartbeat());
                 }
                 message = inbound.message(), if has_room => match message {
@@ -171,7 +172,7 @@ impl Session {
                         worked = true;
                         state.on_message(message);
                     }
-                    // A kind of message from the future.
+                    // A kind of message of a later version.
                     Ok(Some(WorkResponse { message: None })) => {}
                     Ok(None) => {
                         let reason = "the coordinator closed the stream".into();
@@ -195,7 +196,7 @@ impl Session {
             }
         }
 
-        // Closing our side tells the coordinator; its closing tells us that it
+        // Closing our side tells the coordinator that we are done. When it closes its side, it
         // has read everything.
         drop(outbound);
         let goodbye = async { while let Ok(Some(_)) = inbound.message().await {} };
@@ -219,26 +220,26 @@ async fn room(
 
 const STOPPED_READING: &str = "the coordinator stopped reading";
 
-/// What assignments of a job need beside themselves.
+/// The data that all assignments of a job share.
 struct Job {
     evaluator: Evaluator,
-    /// Whether items may take any time, as a script says what is done in them.
+    /// Whether items may take any time, because a script runs in them.
     has_script: bool,
-    /// What genotypes of its latest generation are drawn from.
+    /// The distribution of its latest generation.
     distribution: Option<Arc<Distribution>>,
 }
 
-/// The state of a session: specifications, and results to be sent.
+/// The state of a session: specifications, and results to send.
 struct SessionState<'a> {
     pool: &'a Pool,
     evaluator: &'a (dyn Fn(String) -> Evaluator + Sync),
-    /// The jobs whose specification has come, and not their end.
+    /// The jobs whose specification has arrived, and that have not ended.
     jobs: BTreeMap<JobId, Job>,
-    /// Where slots put results; none once no more assignments are taken.
+    /// The channel for results; `None` once the worker accepts no more assignments.
     reply: Option<Reply>,
     /// Results that wait for the network.
     ready: Vec<v1::ItemResult>,
-    /// Until when they wait for others.
+    /// Until when `ready` results wait for others.
     held_until: Option<Instant>,
 }
 
@@ -263,8 +264,8 @@ impl SessionState<'_> {
         }
     }
 
-    /// Results of short items wait until there are as many of them as items in the queue, so
-    /// that few messages are sent and slots do not run out of items.
+    /// Results of short items wait until there are as many results as items in the queue. So the
+    /// worker sends few messages, and slots do not run out of items.
     fn on_computed(&mut self, computed: impl Iterator<Item = ItemResult>) {
         let mut are_short = true;
         let computed = computed.inspect(|result| are_short &= result.duration < HELD_MAX);
@@ -289,7 +290,7 @@ impl SessionState<'_> {
                 let Some(job) = codec::read_job(job).and_then(|id| self.jobs.get_mut(&id)) else {
                     return;
                 };
-                // Without one, the assignments that need it fail.
+                // Without a distribution, the assignments that need it fail.
                 job.distribution = Distribution::from_bytes(&distribution).ok().map(Arc::new);
             }
             Message::Assignments(assignments) => self.on_assignments(assignments),
@@ -308,8 +309,8 @@ impl SessionState<'_> {
         }
     }
 
-    /// Queues assignments, and fails those that cannot be queued. While the worker
-    /// drains they are dropped: the coordinator had not yet heard of it.
+    /// Queues assignments, and fails those that cannot be queued. While the worker drains, it
+    /// drops them, because the coordinator sent them before it knew.
     fn on_assignments(&mut self, assignments: v1::Assignments) {
         let Some(reply) = &self.reply else { return };
         let common = convert::common(&assignments).and_then(|common| {
@@ -361,7 +362,7 @@ fn describe(status: &Status) -> String {
     append_causes(text.into(), status.source())
 }
 
-/// An error and its causes, each said once.
+/// The text of an error and its causes, without repetitions.
 pub(crate) fn with_causes(error: &dyn Error) -> String {
     append_causes(error.to_string(), error.source())
 }

@@ -1,5 +1,5 @@
-//! A file that says whether a worker has a session with its coordinator, for the
-//! health checks of container engines.
+//! A file that shows whether a worker has a session with its coordinator, for the health checks
+//! of container engines.
 
 use std::{
     fs::{self, File},
@@ -14,25 +14,25 @@ use std::{
 use tokio::time::{MissedTickBehavior, interval};
 use tracing::warn;
 
-/// How often the file's date is renewed.
+/// Interval at which the file is written again.
 const RENEWAL: Duration = Duration::from_secs(2);
-/// The age of a file whose worker has stopped or hangs.
+/// Age above which the file's worker has stopped or hangs.
 const AGE_MAX: Duration = Duration::from_secs(30);
 
-/// A file that exists while there is a session, and is written again and again.
+/// A file that exists during a session, and is rewritten regularly.
 #[derive(Debug)]
 pub(crate) struct SessionFile(PathBuf);
 
 /// Why a worker does not count as healthy.
 #[derive(Debug, thiserror::Error)]
 pub enum Unhealthy {
-    /// There is no file.
+    /// The file does not exist.
     #[error(
         "the worker has no session with its coordinator ({} does not exist); its log says why",
         .0.display()
     )]
     NoSession(PathBuf),
-    /// The file is old.
+    /// The file is too old.
     #[error(
         "the worker hangs or was killed: {} was written {age_s} s ago, not {} s",
         path.display(), RENEWAL.as_secs()
@@ -48,12 +48,12 @@ pub enum Unhealthy {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-/// What a worker with this session file has a session with.
+/// The text of a worker's session file, which names the session's coordinator.
 pub fn health_check(path: &Path) -> Result<String, Unhealthy> {
     let error = |source: io::Error| match source.kind() {
         io::ErrorKind::NotFound => Unhealthy::NoSession(path.into()),
@@ -61,7 +61,7 @@ pub fn health_check(path: &Path) -> Result<String, Unhealthy> {
     };
     let session = fs::read_to_string(path).map_err(error)?;
     let written = fs::metadata(path).and_then(|metadata| metadata.modified()).map_err(error)?;
-    // A clock that was set back makes the file one from the future.
+    // If the clock was set back, the file's date lies in the future.
     let age = written.elapsed().unwrap_or_else(|ahead| ahead.duration());
     if age > AGE_MAX {
         return Err(Unhealthy::Old { path: path.into(), age_s: age.as_secs() });
@@ -70,15 +70,15 @@ pub fn health_check(path: &Path) -> Result<String, Unhealthy> {
 }
 
 impl SessionFile {
-    /// Makes sure that the file can be written. There is none at first.
+    /// Checks that the file can be written, and removes it: there is no session yet.
     pub(crate) fn new(path: PathBuf) -> io::Result<Self> {
         File::create(&path)?;
         fs::remove_file(&path)?;
         Ok(Self(path))
     }
 
-    /// Has the file say so while a session lasts. It is written by the task that
-    /// serves the session, so a session that hangs lets it grow old.
+    /// Keeps the file up to date during a session. The session's own task writes it, so the file
+    /// of a hanging session grows old.
     pub(crate) async fn during<T>(&self, text: &str, session: impl Future<Output = T>) -> T {
         let line = format!("{text}\n");
         let write = |file: &File| file.write_all_at(line.as_bytes(), 0);
@@ -93,7 +93,7 @@ impl SessionFile {
                 biased;
                 ended = &mut session => break ended,
                 _ = renewal.tick() => if let Some(file) = &file {
-                    // One that cannot be written grows old, and is noticed.
+                    // A file that cannot be written grows old, which the health check notices.
                     let _ = write(file);
                 },
             }
@@ -142,7 +142,7 @@ mod tests {
         let file = SessionFile::new(path.clone()).unwrap();
         let session = async {
             written(&path).await;
-            // Nothing writes it before this one waits again.
+            // The file is not written again before this task waits again.
             let long_ago = SystemTime::UNIX_EPOCH;
             File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
             let error = health_check(&path).unwrap_err();

@@ -1,4 +1,4 @@
-//! What a worker has done and is doing, in numbers; nothing depends on them.
+//! Statistics of a worker's past and present work; no decision depends on them.
 
 use std::{
     sync::atomic::{
@@ -8,8 +8,8 @@ use std::{
     time::Duration,
 };
 
-/// What a worker has done since it began, and what it is doing. Counted where it
-/// happens, read at any time.
+/// A worker's work since its start, and its present work. Counted where it happens, read at any
+/// time.
 #[derive(Debug, Default)]
 pub struct Stats {
     is_connected: AtomicBool,
@@ -26,10 +26,10 @@ pub struct Stats {
     n_slots_busy: AtomicUsize,
 }
 
-/// What came of an assignment.
+/// The outcome of an assignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Made {
-    /// Results of so many episodes.
+    /// Results of `n_episodes` episodes.
     Fitness { n_episodes: u64 },
     /// It cannot be computed.
     Failure,
@@ -40,34 +40,34 @@ pub(crate) enum Made {
 /// [`Stats`] at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StatsSnapshot {
-    /// Whether the coordinator has welcomed it and the stream goes on.
+    /// Whether it has a session with the coordinator.
     pub is_connected: bool,
-    /// Streams that the coordinator welcomed.
+    /// Number of streams that the coordinator welcomed.
     pub n_connections: u64,
-    /// Attempts to connect that failed.
+    /// Number of failed attempts to connect.
     pub n_connections_failed: u64,
-    /// Items that gave results.
+    /// Number of items with results.
     pub n_items_computed: u64,
-    /// Items that could not be computed.
+    /// Number of items that could not be computed.
     pub n_items_failed: u64,
-    /// Items that the coordinator took back while they were computed.
+    /// Number of items that the coordinator took back during their computation.
     pub n_items_dropped: u64,
-    /// Episodes of all items that gave results.
+    /// Number of episodes of all items with results.
     pub n_episodes: u64,
-    /// Environment steps of those, summed over robots.
+    /// Environment steps of these episodes, summed over robots.
     pub n_robot_steps: u64,
-    /// Time that slots have computed, summed over slots.
+    /// Computing time, summed over slots.
     pub busy: Duration,
-    /// Time that the longest item so far has taken.
+    /// Duration of the longest item so far.
     pub longest_item: Duration,
-    /// Items that wait for a slot.
+    /// Number of items that wait for a slot.
     pub n_items_queued: usize,
-    /// Slots that compute.
+    /// Number of slots that compute.
     pub n_slots_busy: usize,
 }
 
 impl Stats {
-    /// The numbers as they are now.
+    /// The present numbers.
     pub fn snapshot(&self) -> StatsSnapshot {
         StatsSnapshot {
             is_connected: self.is_connected.load(SeqCst),

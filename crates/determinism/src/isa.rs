@@ -1,5 +1,5 @@
-//! Which vector instructions the simulation uses. They decide how fast it is, and
-//! nothing else: every level computes the same bits.
+//! The vector instructions that the simulation uses. They change only its speed: every level
+//! computes the same bits.
 
 use std::fmt;
 use std::str::FromStr;
@@ -43,12 +43,12 @@ impl Isa {
         }
     }
 
-    /// Runs an operation that is compiled for this level.
+    /// Runs an operation, compiled for this level.
     pub fn run<Op: WithSimd>(self, operation: Op) -> Op::Output {
         self.0.dispatch(operation)
     }
 
-    /// Lanes of f32 per vector.
+    /// Number of f32 lanes per vector.
     pub fn vector_len(self) -> usize {
         struct VectorLen;
         impl WithSimd for VectorLen {
@@ -73,7 +73,7 @@ impl fmt::Display for Isa {
     }
 }
 
-/// This processor has no such level.
+/// The error of [`Isa::from_str`]: this processor lacks the level, or no level has this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("this processor offers {available}, not {name:?}")]
 pub struct UnknownIsa {

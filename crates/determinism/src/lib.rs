@@ -1,10 +1,9 @@
 //! Numbers with the same bits on every machine.
 //!
-//! - [`random`]: random streams that are addressed by what they are for;
-//! - [`Isa`]: the vector instructions that a computation uses, which decide how
-//!   fast it is and change no bit.
+//! - [`random`]: random streams, each addressed by its purpose;
+//! - [`Isa`]: the vector instructions of a computation, which change its speed and no bit.
 //!
-//! A stream's values depend on its address alone, not on who reads it or when:
+//! A stream's values depend on its address alone, not on the reader or the time of reading:
 //!
 //! ```
 //! use determinism::random::{Purpose, Stream};

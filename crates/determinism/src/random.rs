@@ -1,24 +1,22 @@
-//! Random streams addressed by what they are for.
+//! Random streams, each addressed by its purpose.
 //!
-//! A stream is ChaCha8 whose 256-bit key *is* its address, four little-endian
-//! 64-bit words `[seed, trial set, trial, purpose]`, and whose 64-bit stream
-//! number is the robot. A trial set ([`TrialSet`]) is the word g for generation g,
-//! g | 2^63 for its held-out trials, and 2^62 for evaluations. Streams of different addresses are independent, no
-//! stream depends on who draws from it or when, and any other program with a
-//! ChaCha8 can reproduce every number of a run.
+//! A stream is ChaCha8 whose 256-bit key *is* its address, four little-endian 64-bit words
+//! `[seed, trial set, trial, purpose]`, and whose 64-bit stream number is the robot. A trial set
+//! ([`TrialSet`]) is the word g for generation g, g | 2^63 for its held-out trials, and 2^62 for
+//! evaluations. Streams of different addresses are independent, and no stream depends on other
+//! readers or on time. Any other program with a ChaCha8 can reproduce every number of a run.
 //!
 //! The index of an individual is not part of an address: individuals of a
 //! generation meet the same worlds and the same noise (common random numbers).
 //!
-//! Derived values, so that they too can be reproduced elsewhere:
+//! Derived values, specified so that other programs can reproduce them, too:
 //! - `u64`: two consecutive 32-bit outputs, low word first;
 //! - uniform in \[0, 1): `(u64 >> 11) * 2^-53`;
 //! - an integer below n: `floor(uniform * n)`;
-//! - standard normal: the quantile function (Wichura 1988, AS 241, PPND16) of
-//!   `(k + 0.5) * 2^-52` with `k = u64 >> 12`. One draw gives one normal, so draws stay
-//!   countable; and its logarithm comes from `libm`, where the crates for
-//!   distributions would use the platform's as soon as any dependency asks for
-//!   their `std` feature.
+//! - standard normal: the quantile function (Wichura 1988, AS 241, PPND16) of `(k + 0.5) * 2^-52`
+//!   with `k = u64 >> 12`. One draw gives one normal, so draws stay countable. The logarithm
+//!   comes from `libm`; crates for distributions would use the platform's as soon as any
+//!   dependency enables their `std` feature.
 
 use std::fmt;
 
@@ -28,8 +26,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::Isa;
 
-/// What a stream is for. The numbers are part of the format of a run: never
-/// reuse one for something else.
+/// The purpose of a stream. The numbers are part of the format of a run: never reuse one for
+/// another purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u64)]
 pub enum Purpose {
@@ -40,9 +38,9 @@ pub enum Purpose {
     /// Robots affected by a perturbation; stream = its place in
     /// `PerturbationsConfig` of the experiment file.
     Perturbation = 3,
-    /// Which valid frame a receiver takes; stream = robot, one draw per step.
+    /// Choice of a receiver among valid frames; stream = robot, one draw per step.
     Reception = 4,
-    /// Which symbol a message becomes; stream = robot, one draw per step.
+    /// Choice of the symbol of a message; stream = robot, one draw per step.
     Quantisation = 5,
     /// Stochastic decoding; stream = robot, per step one draw per stochastic
     /// output neuron (threshold) or output (softmax), in the order of outputs.
@@ -53,38 +51,38 @@ pub enum Purpose {
     SensorNoise = 7,
     /// Movement of lights; stream = light.
     LightMovement = 8,
-    /// Which synapses exist; seed = `topology.seed`, stream = index of the group. Delays, of
-    /// neurons and then of nodes of encoders; stream = 2^32.
+    /// Choice of the synapses that exist; seed = `topology.seed`, stream = index of the group.
+    /// Delays, of neurons and then of nodes of encoders; stream = 2^32.
     Connections = 9,
     /// Weights outside the genotype; as [`Connections`](Self::Connections). Weights of
     /// decoders; stream = 2^32 + output.
     FixedWeights = 10,
-    /// What the script of a task draws; stream = 0.
+    /// Draws of a task's script; stream = 0.
     Script = 12,
     /// Spikes of Poisson encoders; stream = robot, per step and substep one draw per node.
     Encoding = 13,
-    /// What robots draw whose actions a script decides; stream = robot.
+    /// Draws of robots whose actions a script decides; stream = robot.
     Control = 14,
     /// Movement of ground areas; stream = area.
     AreaMovement = 15,
-    /// What robots draw whose sensors a script reads; stream = robot.
+    /// Draws of robots whose sensors a script reads; stream = robot.
     Sensing = 16,
     /// Variation in evolution; trial = 0, stream = index of the population.
     Evolution = 11,
 }
 
-/// Which worlds and which noise trials meet: trial t of one set is another world
+/// A set of trials, which determines their worlds and noise: trial t of one set has another world
 /// than trial t of any other set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum TrialSet {
-    /// The trials that generation g of an evolution is selected by, g from 0.
+    /// The trials that select in generation g of an evolution, g from 0.
     Generation(u64),
-    /// The held-out trials by which candidates are compared after generation g:
-    /// worlds and noise that evolution never meets.
+    /// The held-out trials that compare candidates after generation g: worlds and noise that
+    /// evolution never meets.
     HeldOut {
         /// Generation g.
         generation: u64,
-        /// Candidates that are close meet several blocks of them, counted from 0.
+        /// Index of the block, from 0; candidates that are close meet several blocks.
         block: u8,
     },
     /// The trials that judge the champion after generation g, the last one: they
@@ -95,7 +93,7 @@ pub enum TrialSet {
 }
 
 impl TrialSet {
-    /// The generation that the trials belong to; none for evaluations.
+    /// The generation of the trials; `None` for evaluations.
     pub const fn generation(self) -> Option<u64> {
         match self {
             Self::Generation(generation)
@@ -162,7 +160,7 @@ impl fmt::Display for TrialSet {
     }
 }
 
-/// A random stream; see the module's text for its address and its values.
+/// A random stream; the [module](self) describes addresses and values.
 #[derive(Debug, Clone)]
 pub struct Stream(ChaCha8Rng);
 
@@ -203,14 +201,14 @@ impl Stream {
         self.uniform() < p
     }
 
-    /// Passes over `n` draws of any kind.
+    /// Skips `n` draws of any kind.
     pub fn skip(&mut self, n: usize) {
         for _ in 0..n {
             self.0.next_u64();
         }
     }
 
-    /// Goes to draw `n` of the stream, from 0, wherever it is.
+    /// Moves to draw `n` of the stream, counted from 0, forwards or backwards.
     pub fn seek(&mut self, n: u64) {
         self.0.set_word_pos(2 * u128::from(n));
     }
@@ -220,16 +218,16 @@ impl Stream {
         standard_normal_quantile(self.probability())
     }
 
-    /// Fills `values` with what [`normal`](Self::normal) would draw one by one, to
-    /// the bit, in less than half the time.
+    /// Fills `values` with the draws of repeated calls of [`normal`](Self::normal), to the bit,
+    /// in less than half the time.
     pub fn fill_normal(&mut self, values: &mut [f64]) {
         self.fill_probability(values);
         standard_normal_quantiles(values);
     }
 
-    /// Fills `values` with numbers that are uniform in (0, 1), and that
-    /// [`standard_normal_quantiles`] makes those of [`fill_normal`](Self::fill_normal): for
-    /// what draws few numbers each from many streams.
+    /// Fills `values` with uniform numbers in (0, 1), which [`standard_normal_quantiles`] turns
+    /// into those of [`fill_normal`](Self::fill_normal). For callers that draw few numbers each
+    /// from many streams.
     pub fn fill_probability(&mut self, values: &mut [f64]) {
         values.fill_with(|| self.probability());
     }
@@ -242,9 +240,9 @@ impl Stream {
     }
 }
 
-/// The index that a uniform `u` in \[0, 1) draws with probabilities proportional
-/// to `weights`: the smallest i with w_0 + ... + w_i > u * total. `weights` are
-/// not negative, and one at least is positive.
+/// Samples an index with probabilities proportional to `weights`, from a uniform `u` in \[0, 1):
+/// the smallest i with w_0 + ... + w_i > u * total. `weights` are not negative, and at least one
+/// is positive.
 pub fn sample(weights: &[f64], u: f64) -> usize {
     let total = weights.iter().fold(0.0, |sum, weight| sum + weight);
     let mut sum = 0.0;
@@ -258,7 +256,7 @@ pub fn sample(weights: &[f64], u: f64) -> usize {
 const TWO_POW_MINUS_53: f64 = 1.0 / (1u64 << 53) as f64;
 const TWO_POW_MINUS_52: f64 = 1.0 / (1u64 << 52) as f64;
 
-/// Replaces probabilities in (0, 1) by the quantiles of N(0, 1) there.
+/// Replaces probabilities in (0, 1) by the corresponding quantiles of N(0, 1).
 pub fn standard_normal_quantiles(probabilities: &mut [f64]) {
     Isa::best().run(StandardNormalQuantiles(probabilities));
 }
@@ -283,7 +281,7 @@ fn standard_normal_quantile(p: f64) -> f64 {
     if q < 0.0 { -magnitude } else { magnitude }
 }
 
-/// Whether `p` = q + 0.5 is not in a tail: 85 of 100 are not.
+/// Whether `p` = q + 0.5 is in the central region, as 85 % of uniform probabilities are.
 fn is_central(q: f64) -> bool {
     q.abs() <= 0.425
 }
@@ -294,8 +292,8 @@ fn central_quantile(q: f64) -> f64 {
     q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
 }
 
-/// Replaces probabilities by their quantiles. All of them are taken to be central
-/// first: without a branch, the compiler computes several at once.
+/// Replaces probabilities by their quantiles. First it treats all of them as central: without
+/// branches, the compiler vectorises the loop.
 struct StandardNormalQuantiles<'a>(&'a mut [f64]);
 
 impl WithSimd for StandardNormalQuantiles<'_> {
@@ -446,7 +444,7 @@ mod tests {
         assert_eq!(first.len(), 6);
     }
 
-    /// Part of the format of a run, as the numbers of purposes are.
+    /// These words are part of the format of a run, as are the numbers of purposes.
     #[test]
     fn trial_sets_have_their_words() {
         for (trial_set, word) in [

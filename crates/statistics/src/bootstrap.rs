@@ -1,5 +1,5 @@
-//! Bootstrap intervals: how far a statistic varies if the runs are drawn again from those
-//! that there are (percentile method; Efron & Tibshirani 1993, section 13.3).
+//! Bootstrap intervals: the variation of a statistic when the runs are resampled with replacement
+//! (percentile method; Efron & Tibshirani 1993, section 13.3).
 
 use rand::RngExt as _;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng as _};
@@ -7,30 +7,30 @@ use serde::Serialize;
 
 use super::quantile;
 
-/// Number of times that the runs are drawn again.
+/// Number of resamples.
 const N_RESAMPLES: usize = 10_000;
-/// The same runs give the same interval.
+/// Fixed, so that the same runs give the same interval.
 const SEED: u64 = 0;
 
-/// The least number of runs whose interval is more than these runs themselves.
+/// Smallest sample that has an interval.
 const LEAST: usize = 3;
 
 /// A statistic and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
-    /// Of the sample itself.
+    /// The statistic of the sample itself.
     pub value: f64,
-    /// Lower and upper end; none if a sample has fewer than three runs, which say nothing of
-    /// what others would be.
+    /// Lower and upper end of the interval; `None` if a sample has fewer than three runs, which
+    /// are too few to resample.
     pub ci95: Option<[f64; 2]>,
 }
 
-/// A statistic of a sample. `statistic` may reorder what it is given.
+/// A statistic of a sample, with its interval. `statistic` may reorder its argument.
 pub fn interval(values: &[f64], statistic: impl Fn(&mut [f64]) -> f64) -> Interval {
     resample([values, &[]], |values, _| statistic(values))
 }
 
-/// A statistic of two samples, each drawn again by itself.
+/// A statistic of two samples, which are resampled independently.
 pub fn interval_of_two(
     first: &[f64],
     second: &[f64],
@@ -39,7 +39,7 @@ pub fn interval_of_two(
     resample([first, second], statistic)
 }
 
-/// A sample without runs is one that the statistic does not look at.
+/// An empty sample is one that the statistic ignores.
 fn resample(
     [first, second]: [&[f64]; 2],
     statistic: impl Fn(&mut [f64], &mut [f64]) -> f64,

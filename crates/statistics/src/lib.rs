@@ -1,5 +1,5 @@
-//! Statistics that compare runs: robust summaries of few runs, their bootstrap intervals,
-//! and whether one algorithm is better than another (Agarwal et al. 2021, "Deep
+//! Statistics that compare runs: robust summaries of few runs, their bootstrap intervals, and
+//! tests of whether one algorithm is better than another (Agarwal et al. 2021, "Deep
 //! reinforcement learning at the edge of the statistical precipice").
 
 mod bootstrap;
@@ -23,13 +23,13 @@ pub fn interquartile_mean(values: &mut [f64]) -> f64 {
     mean(kept)
 }
 
-/// The mean; finite if all values are, whatever their sum. NaN without values.
+/// The mean; finite if all values are, even if their sum overflows. NaN without values.
 pub fn mean(values: &[f64]) -> f64 {
     let plain = || values.iter().sum::<f64>() / values.len() as f64;
     evolution::finite_mean(values).map_or_else(plain, f64::from)
 }
 
-/// A quantile of sorted values, by linear interpolation between them, p in [0, 1]. NaN
+/// The quantile at p, in [0, 1], of sorted values, by linear interpolation between them. NaN
 /// without values.
 fn quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
@@ -37,7 +37,7 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
     let low = (place as usize).min(last);
     let high = (low + 1).min(last);
     let share = place - low as f64;
-    // Infinities stand for what never happened: their difference is no number.
+    // Infinities stand for events that never happened; their difference would be NaN.
     match sorted[low] == sorted[high] || share == 0.0 {
         true => sorted[low],
         false => evolution::between(sorted[low], sorted[high], share),

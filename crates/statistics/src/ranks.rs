@@ -1,19 +1,20 @@
-//! Which of two samples is larger, by ranks.
+//! Compares two samples by ranks.
 
 use std::f64::consts::SQRT_2;
 
-/// A smaller sample than this has an exact p-value, if no values are equal.
+/// Largest size of the smaller sample for an exact p-value, if no values are equal.
 const EXACT_MAX: usize = 8;
 
-/// The probability that a value of `a` is larger than one of `b`, where equal values count
-/// half: A of Vargha & Delaney 2000. NaN if a sample is empty.
+/// The probability, in \[0, 1\], that a value of `a` is larger than one of `b`; equal values
+/// count half. This is A of Vargha & Delaney 2000. NaN if a sample is empty.
 pub fn probability_of_improvement(a: &[f64], b: &[f64]) -> f64 {
     statistic(a, b) / (a.len() * b.len()) as f64
 }
 
-/// The two-sided p-value of the Mann-Whitney U test, of whether two samples come from one
-/// distribution: exact if one has at most 8 values and none are equal, else by the normal
-/// approximation with corrections for ties and continuity. None if a sample is empty.
+/// The two-sided p-value of the Mann-Whitney U test that two samples come from the same
+/// distribution. Exact if one sample has at most 8 values and no values are equal, otherwise by
+/// the normal approximation with corrections for ties and continuity. `None` if a sample is
+/// empty.
 pub fn mann_whitney(a: &[f64], b: &[f64]) -> Option<f64> {
     if a.is_empty() || b.is_empty() {
         return None;
@@ -37,7 +38,7 @@ fn statistic(a: &[f64], b: &[f64]) -> f64 {
     a.iter().map(wins).sum()
 }
 
-/// How many values each group of equal values has.
+/// The size of each group of equal values.
 fn ties(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut all = [a, b].concat();
     all.sort_by(f64::total_cmp);
@@ -45,15 +46,15 @@ fn ties(a: &[f64], b: &[f64]) -> Vec<f64> {
     groups.filter(|&n| n > 1.0).collect()
 }
 
-/// Twice the probability of a U of at least `u`: the share of the ways to choose `n` of
-/// `n + m` ranks. `ways[k][s]`: to choose k of them with the sum s above the least.
+/// Twice the probability of a U of at least `u`, as a share of the ways to choose `n` of `n + m`
+/// ranks. `ways[k][s]`: the number of ways to choose k ranks whose sum is s above the smallest.
 fn exact(u: usize, n: usize, m: usize) -> f64 {
     let mut ways = vec![vec![0.0; n * m + 1]; n + 1];
     ways[0][0] = 1.0;
     for rank in 0..n + m {
-        // From many to few, so that a rank is chosen once.
+        // Downwards in k, so that each rank is chosen at most once.
         for k in (1..=n.min(rank + 1)).rev() {
-            // With k - 1 below it, this rank is so far above the least that it can be.
+            // This rank's distance above its smallest possible value, with k - 1 ranks below it.
             let above = rank + 1 - k;
             let (fewer, more) = ways.split_at_mut(k);
             for s in above..=n * m {

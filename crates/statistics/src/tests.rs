@@ -1,4 +1,5 @@
-//! Against rliable and scipy: `crates/statistics/tests/fixtures/make.py` wrote what they compute.
+//! Compares with rliable and scipy, whose results `crates/statistics/tests/fixtures/make.py`
+//! wrote.
 
 use serde::Deserialize;
 
@@ -15,7 +16,7 @@ struct Summary {
     values: Vec<f64>,
     median: f64,
     iqm: f64,
-    /// Of the median.
+    /// The interval of the median.
     median_ci95: [f64; 2],
     iqm_ci95: [f64; 2],
 }
@@ -37,8 +38,8 @@ fn close(found: f64, expected: f64, tolerance: f64) -> bool {
     (found - expected).abs() <= tolerance * expected.abs().max(1e-12)
 }
 
-/// Whether both ends agree, but for what two sets of random draws differ by: a part of the
-/// width. For a statistic of few possible values that is a step from one to the next.
+/// Whether both ends agree, up to the difference of two sets of random draws: a part of the
+/// width, or, for a statistic with few possible values, a step between two of them.
 fn agree(found: Interval, expected: [f64; 2], part: f64) -> bool {
     let width = (expected[1] - expected[0]).abs().max(1e-12);
     found.ci95.unwrap().iter().zip(expected).all(|(found, end)| (found - end).abs() <= part * width)

@@ -124,7 +124,7 @@ fn an_end_that_cannot_be_stored_is_stored_once_it_can() {
     // Its client is not kept waiting for long, and not told that nobody is there.
     let cancelled = coordinator.swarmctl(&["cancel", &id.to_string()]);
     assert_eq!(cancelled.code, Some(1), "{cancelled:#?}");
-    assert!(cancelled.stderr.contains("does not take it"), "{}", cancelled.stderr);
+    assert!(cancelled.stderr.contains("did not store the change"), "{}", cancelled.stderr);
     let waits = format!("the end of experiment {id} waits");
     coordinator.process.wait_for("complaint", |line| message_contains(line, &waits));
     let list = coordinator.swarmctl(&["list"]).expect_success().json();

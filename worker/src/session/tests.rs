@@ -1,4 +1,4 @@
-//! Sessions against a coordinator that the test plays.
+//! Sessions with a coordinator that the test plays.
 
 mod stage;
 
@@ -21,7 +21,7 @@ use stage::{MakesEvaluators, Stage, job, of_experiment, serve};
 
 const LONG: Duration = Duration::from_secs(3600);
 
-/// Fitness that depends on everything that an assignment says.
+/// Fitness that depends on every field of an assignment.
 fn arithmetic(config_json: String) -> Evaluator {
     Arc::new(move |assignment, _| {
         let factor: f64 = config_json.parse().map_err(|_| format!("`{config_json}`?"))?;
@@ -34,8 +34,8 @@ fn arithmetic(config_json: String) -> Evaluator {
     })
 }
 
-/// Evaluators that say when they start an item, and wait for a permit each to answer
-/// with its number, unless they have been stopped.
+/// Evaluators that report when they start an item, wait for a permit, and then answer with the
+/// item's number, unless they have been stopped.
 fn gated() -> (impl MakesEvaluators, mpsc::UnboundedReceiver<u64>, std_mpsc::Sender<()>) {
     let (started, starts) = mpsc::unbounded_channel();
     let (permit, permits) = std_mpsc::channel();
@@ -153,7 +153,7 @@ async fn an_item_that_cannot_be_computed_fails_alone() {
     let results = coordinator.results(2).await;
     assert_eq!(failure(&results[0]), "panicked: division by swarm");
     assert_eq!(fitness(&results[1]), [1.0]);
-    // No specification; and trials whose numbers do not exist.
+    // An assignment without a specification, and one with too large trial numbers.
     coordinator.send_assignments(2, [3]).await;
     assert!(failure(&coordinator.results(1).await[0]).contains("experiment 2"));
     let endless = v1::Assignment {
@@ -206,7 +206,7 @@ async fn dropped_items_are_not_computed() {
     coordinator
         .send(Message::DropAssignments(v1::DropAssignments { assignment_ids: vec![2, 4, 99] }))
         .await;
-    // Answered at once, so that what was sent before has been read.
+    // The worker answers this at once, so it has read everything sent before.
     coordinator.send_assignments(9, [5]).await;
     assert_eq!(coordinator.results(1).await[0].assignment_id, 5);
     permit.send(()).unwrap();
@@ -249,7 +249,7 @@ async fn what_is_being_computed_is_stopped_when_nobody_wants_it_any_more() {
         assert_eq!(starts.recv().await, Some(1));
         coordinator.send(message).await;
         coordinator.send_assignments(2, [2]).await;
-        // Answered at once, so that what was sent before has been read.
+        // The worker answers this at once, so it has read everything sent before.
         coordinator.send_assignments(9, [3]).await;
         assert_eq!(coordinator.results(1).await[0].assignment_id, 3);
         permit.send(()).unwrap();
@@ -313,7 +313,7 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
     assert_eq!(starts.recv().await, Some(1));
     stage.shutdown.cancel();
     assert!(matches!(coordinator.next().await, Some(work_request::Message::Draining(_))));
-    // Sent before the coordinator knew.
+    // Sent before the coordinator knew of the draining.
     coordinator.send_assignments(1, [3]).await;
     permit.send(()).unwrap();
     assert_eq!(fitness(&coordinator.results(1).await[0]), [1.0]);
@@ -326,7 +326,7 @@ async fn a_worker_told_to_stop_delivers_what_it_is_computing_and_nothing_else() 
 async fn a_worker_that_gives_up_drops_items_of_scripts_and_finishes_others() {
     let (start, mut starts) = mpsc::unbounded_channel();
     let dropped = Arc::new(AtomicBool::new(false));
-    // The item of the script ends when it is dropped; the other one, when that has happened.
+    // The script's item ends when it is dropped; the other one ends after that.
     let evaluator = move |config_json: String| -> Evaluator {
         let (start, dropped) = (start.clone(), Arc::clone(&dropped));
         let is_script = config_json.contains("script");

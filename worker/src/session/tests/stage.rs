@@ -13,7 +13,7 @@ use tonic::{Request, Response, transport::Server};
 use super::*;
 use crate::{WorkerError, run_with};
 
-/// A worker's stream, seen from the coordinator.
+/// The coordinator's side of a worker's stream.
 pub(super) struct Conversation {
     pub(super) requests: Streaming<WorkRequest>,
     pub(super) responses: mpsc::Sender<Result<WorkResponse, Status>>,
@@ -44,7 +44,7 @@ impl Conversation {
         self.responses.send(Ok(response)).await.unwrap();
     }
 
-    /// The next message; none at the end of the stream.
+    /// The next message; `None` at the end of the stream.
     pub(super) async fn next(&mut self) -> Option<work_request::Message> {
         let request = self.requests.message().await.unwrap();
         request.map(|request| request.message.expect("a worker sends no empty messages"))
@@ -122,7 +122,7 @@ pub(super) fn of_experiment(experiment: u64, assignments: Vec<v1::Assignment>) -
     }
 }
 
-/// What makes a specification computable.
+/// A function that makes specifications computable.
 pub(super) trait MakesEvaluators: Fn(String) -> Evaluator + Send + Sync + 'static {}
 impl<F: Fn(String) -> Evaluator + Send + Sync + 'static> MakesEvaluators for F {}
 
@@ -141,7 +141,7 @@ impl Stage {
         Self { conversations: serve(listener), ..Self::worker(address, slots, evaluator) }
     }
 
-    /// A worker whose coordinator is somebody else's affair.
+    /// A worker whose coordinator the test provides.
     pub(super) fn worker(
         address: SocketAddr,
         slots: usize,
