@@ -16,6 +16,12 @@ const table = listTable(view, chosen, () => drawActions());
 
 const search = element("input", { type: "search", value: view.parts.q, placeholder: "Words, state=running, KEY=VALUE, -not", title: "words of name, group, algorithm, state and labels; state=failed, seed=3 or a label KEY=VALUE are exact; - before a word: not", "aria-label": "search", oninput: () => view.set({ q: search.value }) });
 const grouping = element("select", { id: "by", onchange: () => view.set({ by: grouping.value, open: "" }) });
+// Narrow screens have no headings to press.
+const orders = [{ name: "id", title: "Experiment", isGreatFirst: true }, ...COLUMNS.filter((column) => column.value)].flatMap(({ name, title, isGreatFirst }) => {
+  const rising = [name, `${title} ▲`], falling = [`-${name}`, `${title} ▼`];
+  return isGreatFirst ? [falling, rising] : [rising, falling];
+});
+const sorting = element("select", { id: "sort", onchange: () => view.set({ sort: sorting.value }) }, ...orders.map(([value, text]) => element("option", { value }, text)));
 const archived = element("input", { type: "checkbox", id: "archived", checked: view.parts.archived !== "", onchange: () => view.set({ archived: archived.checked ? "1" : "" }) });
 const archivedText = element("span");
 const boxes = COLUMNS.map((column) => {
@@ -30,7 +36,7 @@ const actions = element("div", { className: "row actions" });
 
 main.replaceChildren(
   element("header", { className: "row" }, element("h1", {}, "Experiments"), states, element("span", { className: "space" }), search,
-    element("label", {}, "by ", grouping), columns, element("label", {}, archived, archivedText)),
+    element("label", { className: "narrow" }, "sorted by ", sorting), element("label", {}, "by ", grouping), columns, element("label", {}, archived, archivedText)),
   element("div", { className: "row bar" }, count, exports({ table: () => table.rowsToSave(), name: () => "experiments" }), element("span", { className: "space" }), actions),
   element("div", { className: "panel scroll" }, table.node));
 
@@ -38,6 +44,7 @@ main.replaceChildren(
 function drawAround() {
   const all = [...experiments.values()];
   const n_archived = all.filter((it) => it.archived).length;
+  sorting.value = view.parts.sort;
   archivedText.textContent = `archived (${n_archived})`;
   count.textContent = table.count() === all.length ? `${all.length} experiment${all.length === 1 ? '' : 's'}` : `${table.count()} of ${all.length}`;
   const names = ["", ...Object.keys(groupings(all))];

@@ -9,9 +9,10 @@ import unittest
 import urllib.parse
 import urllib.request
 
-from harness import CONFIG, DEADLINE, BrowserTest, Fleet
+from harness import CONFIG, DEADLINE, NARROW, BrowserTest, Fleet
 
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
 
 N_JUDGED, N_STILL, N_RUNNING = 10, 250, 50
 # Answer to a click in the middle, ms; the slowest depends on the machine's other work.
@@ -128,6 +129,18 @@ class Lists(BrowserTest):
         self.wait(lambda: self.ids() == [3], "the address does not keep the filter")
         self.assertEqual(self.texts("td.genes"), ["424"])
         self.assertEqual(self.texts("td.mean"), [])
+
+    def test_a_phone_without_headings_sorts_by_a_choice(self):
+        self.narrow()
+        self.open("?q=group%3Djudged")
+        self.assertFalse(self.find("th [data-column=champion]").is_displayed())
+        sorting = Select(self.find("#sort"))
+        self.assertEqual(sorting.first_selected_option.text, "Experiment ▼")
+        sorting.select_by_visible_text("Champion ▼")
+        worth = [float(text.replace("−", "-")) for text in self.texts("td.champion a")]
+        self.assertEqual(worth, sorted(worth, reverse=True))
+        self.assertIn("sort=-champion", self.browser.current_url)
+        self.assertLessEqual(self.width(), NARROW)
 
     def test_what_is_listed_is_saved_as_a_table(self):
         self.open("?q=group%3Djudged&sort=-champion&show=champion,recent,labels")
