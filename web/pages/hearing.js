@@ -17,6 +17,8 @@ export function drawHearing(context, { camera, colors, episode, poses, radius, v
   const labels = [];
   const isMany = episode.n_robots > MANY;
   const fade = isMany ? FADE_OF_MANY : FADE;
+  // A line of one pixel is drawn several times as fast as any wider one.
+  context.lineWidth = 1;
   for (let age = Math.min(fade - 1, view.step); age >= 0; age--) {
     const step = view.step - age;
     const looks = new Map();
@@ -38,8 +40,6 @@ export function drawHearing(context, { camera, colors, episode, poses, radius, v
         if (hasLabels && age === 0 && isOurs && symbol !== null && length > 4 * radius) labels.push([String(symbol), symbolColor(symbol, n, colors.isDark), ...at]);
       });
     }
-    // A line of one pixel is drawn several times as fast as any wider one.
-    context.lineWidth = age === 0 && !isMany ? 1.6 : 1;
     for (const { symbol, isOurs, path } of looks.values()) {
       context.globalAlpha = (isOurs ? 0.9 : 0.14) * (1 - (age + view.share) / fade);
       context.strokeStyle = symbolColor(symbol, n, colors.isDark);

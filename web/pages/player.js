@@ -177,7 +177,9 @@ export class Player {
       Object.assign(playButton, { textContent: sign, title });
       playButton.setAttribute("aria-label", title);
     }
-    this.speedText.textContent = `${clock.speed}/s`;
+    // A text that is set again is laid out again, which takes longer than a frame's drawing.
+    const speed = `${clock.speed}/s`;
+    if (this.speedText.textContent !== speed) this.speedText.textContent = speed;
     this.recordButton?.update();
     if (!clock.isPlaying) this.remember();
     this.redraw();
