@@ -1,5 +1,5 @@
-//! What a generation costs the coordinator, apart from waiting for its fitness:
-//! ask and tell of 100 individuals with 445 genes, the size of experiment A.
+//! Measures the coordinator's work per generation without its fitness: ask and tell of 100
+//! individuals with 445 genes, the size of experiment A.
 
 use divan::{Bencher, counter::ItemsCount};
 use evolution::{Evolution, Generation, Params, Setup};
@@ -42,7 +42,7 @@ fn xnes(bencher: Bencher) {
     generation(bencher, "xNES", Params::default());
 }
 
-/// Tells a generation and asks the next.
+/// Tells a generation and asks for the next.
 fn generation(bencher: Bencher, algorithm: &str, params: Params) {
     let setup = Setup {
         params,

@@ -1,8 +1,8 @@
-//! How close each algorithm comes to the maximum of four functions of 20 genes: what is missing
-//! after so many evaluations, median and range of five seeds.
+//! Compares the algorithms on four functions of 20 genes: the distance from the maximum after a
+//! number of evaluations, as median and range of five seeds.
 //!
 //! `cargo run -p evolution --example functions -- [INDIVIDUALS] [EVALUATIONS]`;
-//! `crates/evolution/examples/cma_functions.py` has the same of the package `cma`.
+//! `crates/evolution/examples/cma_functions.py` does the same with the package `cma`.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use evolution::{Params, Setup};
 const N_GENES: usize = 20;
 const SEEDS: [u64; 5] = [0, 1, 2, 3, 4];
 
-/// A function to be minimised, of coordinates in \[-5, 5\]; the least value is 0.
+/// A function to minimise, of coordinates in \[-5, 5\]; its minimum is 0.
 type Function = fn(&[f64]) -> f64;
 
 const FUNCTIONS: [(&str, Function); 4] = [
@@ -50,7 +50,7 @@ fn variants() -> Vec<(String, Params)> {
         ("SNES", vec![("eta_sigma", 2.0 * snes)]),
         ("xNES", vec![]),
         ("xNES", vec![("eta_sigma", snes), ("eta_B", xnes)]),
-        // These are those of `"rates": "fast"`.
+        // The rates of `"rates": "fast"`.
         ("xNES", vec![("eta_sigma", snes), ("eta_B", 2.0 * xnes)]),
         ("CMA-ES", vec![]),
         ("sep-CMA-ES", vec![]),
@@ -62,7 +62,8 @@ fn variants() -> Vec<(String, Params)> {
     .into()
 }
 
-/// What is missing of the champion and, where there is one, of the distribution's mean.
+/// The distance from the maximum, of the champion and of the distribution's mean, if there is
+/// one.
 fn run(setup: &Setup, function: Function, n_evaluations: u32) -> (f64, Option<f64>) {
     let of_genes = |genes: &[f64]| {
         let x: Vec<f64> = genes.iter().map(|gene| 10.0 * gene - 5.0).collect();

@@ -1,37 +1,37 @@
-//! Champions, and what is known of them.
+//! Champions, and the estimates of their fitness.
 //!
-//! The best of many noisy estimates is optimistic: the noise of its trials took
-//! part in choosing it. So candidates are compared on trials that no evolution
-//! has met ([`Reevaluation`](super::Reevaluation)), and what the winner is worth
-//! is measured on trials that compared nobody ([`Judgement`](super::Judgement)).
+//! The best of many noisy estimates is optimistic, because the noise of its trials took part in
+//! the choice. So a [`Reevaluation`](super::Reevaluation) compares candidates on trials that
+//! evolution has not met, and a [`Judgement`](super::Judgement) measures the winner's fitness on
+//! trials that compared no candidates.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{Genotype, Real, mean};
 
-/// A genotype worth keeping, and what is known of it.
+/// A genotype worth keeping, with the estimates of its fitness.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Champion {
-    /// Generation after which it was found.
+    /// Generation after which it became a candidate.
     pub generation: u64,
-    /// Where it comes from; checkpoints call it `origin`.
+    /// Its origin; checkpoints call it `origin`.
     #[serde(rename = "origin")]
     pub source: ChampionSource,
     /// Its genes.
     pub genotype: Genotype,
-    /// Fitness in the trials of its generation, for which it became a candidate; none
-    /// for a mean, which was not evaluated there.
+    /// Fitness in the trials of its generation, which made it a candidate; empty for a mean,
+    /// which was not evaluated there.
     pub trial_fitness: Vec<f64>,
-    /// Fitness in all the held-out trials by which it was compared with other
-    /// candidates; none before the first re-evaluation.
+    /// Fitness in all the held-out trials that compared it with other candidates; `None` before
+    /// the first re-evaluation.
     pub held_out: Option<HeldOut>,
-    /// Fitness in trials that selected nothing, at the end of a run. Evolution goes on
-    /// without it, so no checkpoint has it.
+    /// Fitness in trials that selected nothing, at the end of a run. Evolution does not need it,
+    /// so checkpoints omit it.
     #[serde(skip)]
     pub judged: Option<Judged>,
 }
 
-/// Where a champion comes from.
+/// The origin of a champion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ChampionSource {
     /// An individual of its generation, by index.
@@ -40,25 +40,25 @@ pub enum ChampionSource {
     Mean,
 }
 
-/// Fitness in held-out trials, those of several re-evaluations together. As these
-/// trials compared candidates, the winner's mean is optimistic.
+/// Fitness in the held-out trials of one or more re-evaluations. These trials compared
+/// candidates, so the winner's mean is optimistic.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Mean over the trials.
     pub mean: Real,
     /// 1.96 s / sqrt(n), s with divisor n - 1; 0 for a single trial, infinite if squares
-    /// overflow. By it, candidates are found to be close. It is no interval for what the
-    /// winner is worth.
+    /// overflow. It decides whether candidates are close. It is not an interval of the winner's
+    /// honest fitness.
     #[serde(deserialize_with = "interval_of_any_version")]
     pub ci95: Real,
     /// Number of trials n.
     pub n_trials: u64,
-    /// Generation of the latest of them.
+    /// Generation of the latest of these trials.
     pub generation: u64,
 }
 
-/// States of older versions may have NaN where sums overflowed: nothing is known of how far the
-/// mean is off, which is infinite here, as in the database.
+/// Reads states of older versions, which may have NaN where sums overflowed. This stands for an
+/// unknown error of the mean, and becomes infinity, as in the database.
 fn interval_of_any_version<'de, D: Deserializer<'de>>(state: D) -> Result<Real, D::Error> {
     let unknown = Real::new(f64::INFINITY).expect("infinity is a number");
     Ok(Real::new(f64::deserialize(state)?).unwrap_or(unknown))
@@ -86,18 +86,18 @@ impl Champion {
     }
 }
 
-/// Quantile of the normal distribution, to the digits that are stored.
+/// The 0.975 quantile of the normal distribution, with the digits of stored values.
 const Z: f64 = 1.96;
 
 impl HeldOut {
-    /// Of trials that belong to this generation; none if their mean is not finite.
+    /// The fitness in trials of this generation; `None` if the mean is not finite.
     pub fn from_values(values: &[f64], generation: u64) -> Option<Self> {
         let mean = mean(values);
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         Self::from_squares(mean, squares, values.len() as u64, generation)
     }
 
-    /// Of these trials and later ones together (Chan, Golub & LeVeque 1983); none if their
+    /// The fitness in these and later trials together (Chan, Golub & LeVeque 1983); `None` if the
     /// mean is not finite.
     pub fn with(self, later: Self) -> Option<Self> {
         let (n, n_later) = (self.n_trials as f64, later.n_trials as f64);
@@ -108,7 +108,7 @@ impl HeldOut {
         Self::from_squares(mean, squares, n_trials, later.generation)
     }
 
-    /// Whether chance alone may make this mean smaller than that of `best`, at 95 %.
+    /// Whether chance alone may explain, at 95 %, that this mean is below that of `best`.
     pub fn is_close_to(&self, best: &Self) -> bool {
         let difference = best.mean.get() - self.mean.get();
         let [own, other] = [self.ci95.get(), best.ci95.get()];

@@ -1,10 +1,10 @@
-//! Checkpoints: what evolution goes on from, as bytes.
+//! Checkpoints: the bytes from which evolution continues.
 //!
 //! A checkpoint is a *keyframe* and the entries of the [fitness log](super::Told) since. A
-//! keyframe is everything that evolution is; an entry is what it was told of one generation,
-//! from which the next state follows. Where keyframes are far apart they take little room, and
-//! going through the entries takes long: [`Evolution::is_keyframe_due`] weighs one against the
-//! other.
+//! keyframe is the whole state of evolution; an entry is the fitness of one generation, from
+//! which the next state follows. Keyframes that are far apart take little room, but then
+//! repeating the generations between them takes long: [`Evolution::is_keyframe_due`] weighs one
+//! against the other.
 //!
 //! A keyframe begins with a byte for the version of its format; the rest is in the
 //! format of postcard (fields in order, without names; numbers as little-endian IEEE 754).
@@ -20,30 +20,30 @@ use super::{
 /// Version of the format of keyframes.
 pub(crate) const VERSION: u8 = 1;
 
-/// Going through the generations between two keyframes takes about so long, ns.
+/// Target for the time to repeat the generations between two keyframes, ns.
 const REPLAY_NS: u64 = 600_000_000;
 
-/// Most generations between two keyframes, if those take no more room than
+/// Most generations between two keyframes, as long as keyframes take at most
 /// [`ROOM_PER_GENERATION`].
 const GENERATIONS_MAX: u64 = 150;
 
-/// Bytes that keyframes may take per generation, if the log takes less. For large
-/// populations and matrices this is what keeps them apart.
+/// Bytes of keyframes per generation, if the log takes less. This limit determines the distance
+/// for large populations and matrices.
 const ROOM_PER_GENERATION: u64 = 128 << 10;
 
-/// What an evolution can be restored from.
+/// The data from which an evolution can be restored.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Checkpoint {
-    /// Evolution after some generation.
+    /// The state of evolution after some generation.
     pub keyframe: Vec<u8>,
-    /// The entries of the log since, in order.
+    /// The later entries of the log, in order.
     pub log: Vec<Vec<u8>>,
-    /// Generations up to the keyframe in which all individuals had the same fitness, as far as
-    /// they are counted.
+    /// Number of latest generations before the keyframe in which all individuals had the same
+    /// fitness, up to [`FLAT_COUNTED_MAX`](crate::FLAT_COUNTED_MAX).
     pub n_flat: u64,
 }
 
-/// Why there is no evolution in a checkpoint. It is damaged, or of another version.
+/// Why a checkpoint cannot be read: it is damaged, or of another version.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// Written by another version.
@@ -51,13 +51,13 @@ pub enum CheckpointError {
     Version {
         /// Its first byte.
         found: u8,
-        /// What it would have to be.
+        /// The version that this program reads.
         supported: u8,
     },
-    /// Cut off, or no such values.
+    /// The bytes are cut off, or encode no valid values.
     #[error("it cannot be read: {0}")]
     Malformed(#[from] postcard::Error),
-    /// An entry of the log of another experiment, say.
+    /// A log entry does not fit the state, for example because it belongs to another experiment.
     #[error("the fitness of generation {generation} does not fit")]
     Misfit {
         /// Index of the generation.
@@ -69,13 +69,13 @@ pub enum CheckpointError {
 }
 
 impl Evolution {
-    /// Everything, for a keyframe.
+    /// The whole state as bytes, for a keyframe.
     pub fn keyframe(&self) -> Vec<u8> {
         encode(VERSION, self)
     }
 
-    /// Whether the latest generation is one after which a keyframe is kept. `entry_len`:
-    /// bytes of its entry in the log.
+    /// Whether a keyframe is due after the latest generation. `entry_len`: bytes of its entry in
+    /// the log.
     pub fn is_keyframe_due(&self, entry_len: usize) -> bool {
         self.n_generations.is_multiple_of(self.keyframe_interval(entry_len as u64))
     }
@@ -94,7 +94,12 @@ impl Evolution {
         for_time.max(for_room)
     }
 
-    /// The evolution that a checkpoint is of.
+    /// Restores the evolution of a checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// If the checkpoint is damaged, of another version, or combines a keyframe and a log of
+    /// different experiments.
     pub fn restore(checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
         let evolution: Self = decode(VERSION, &checkpoint.keyframe)?;
         let mut evolution = evolution.after_flat(checkpoint.n_flat);
@@ -105,18 +110,18 @@ impl Evolution {
     }
 }
 
-/// About how long asking and telling take, ns (`cargo bench -p evolution`).
+/// Estimated time to ask for and tell a generation, ns (`cargo bench -p evolution`).
 fn generation_ns(algorithm: &Algorithm, population_size: u64) -> u64 {
     let d = algorithm.n_genes() as u64;
     let drawn = 20 * population_size * d;
     match algorithm.keeps() {
         Keeps::Vectors | Keeps::Population => drawn,
-        // Of a decomposition and products with the matrix.
+        // The time of a decomposition and of products with the matrix.
         Keeps::Matrix => drawn + d * d * (d + population_size) / 2,
     }
 }
 
-/// About how many bytes a state has.
+/// Estimated size of a state, bytes.
 fn state_len(algorithm: &Algorithm, population_size: u64) -> u64 {
     let d = algorithm.n_genes() as u64;
     let n_numbers = match algorithm.keeps() {

@@ -1,23 +1,21 @@
 //! The digest chain: one hash that covers every bit of a run so far.
 //!
-//! Link -1 is SHA-256 of the UTF-8 text
-//! `swarmevo digest 1\n<fingerprint of the simulation>\n<canonical config>`, where the
-//! canonical configuration has its seed but not what cannot change a bit of a
-//! generation: the name is empty, `generations` is 0, `target_fitness` and
-//! `judgement_trials` are absent.
-//! Link g is SHA-256 of link g-1 (32 bytes), g (u64), every gene of every
-//! individual, every fitness of every trial of every individual (f64, bit for
-//! bit); numbers little-endian, individuals in index order.
+//! Link -1 is SHA-256 of the UTF-8 text `swarmevo digest 1\n<fingerprint of the
+//! simulation>\n<canonical config>`, where the canonical configuration includes the seed, but
+//! omits values that cannot change a bit of a generation: the name is empty, `generations` is 0,
+//! `target_fitness` and `judgement_trials` are absent. Link g is SHA-256 of link g-1 (32 bytes),
+//! g (u64), every gene of every individual, every fitness of every trial of every individual
+//! (f64, bit for bit); numbers little-endian, individuals in index order.
 //!
-//! A fork continues the chain of its parent. If anything is changed that link -1 covers, the
-//! parent's last link is followed by one that is SHA-256 of `swarmevo fork digest 1\n`, that
-//! link, and link -1 of the changed configuration.
+//! A fork continues the chain of its parent. If the fork changes anything that link -1 covers, an
+//! extra link follows the parent's last one: SHA-256 of `swarmevo fork digest 1\n`, the parent's
+//! last link, and link -1 of the changed configuration.
 //!
-//! Re-evaluations of candidates have a chain of their own, which hangs on that one.
-//! It starts with 32 zero bytes; after each block of held-out trials, the next link is
-//! SHA-256 of the link before it, the link of the latest generation, every gene of
-//! every candidate that met the block, every fitness of every trial of each. The
-//! judgement of the champion adds a link in the same way.
+//! Re-evaluations of candidates have a chain of their own, which depends on the first chain. It
+//! starts with 32 zero bytes. After each block of held-out trials, the next link is SHA-256 of
+//! the previous link, the link of the latest generation, every gene of every candidate that met
+//! the block, and every fitness of every trial of each. The judgement of the champion adds a link
+//! in the same way.
 
 use std::{fmt, str::FromStr};
 
@@ -33,7 +31,7 @@ use super::Genotype;
 pub struct Digest([u8; 32]);
 
 impl Digest {
-    /// Link -1. `simulation`: the fingerprint of what computes fitness.
+    /// Link -1. `simulation`: the fingerprint of the code that computes fitness.
     pub fn of_config(config: &ExperimentConfig, simulation: &str) -> Self {
         let config = Self::covered(config.clone());
         let mut hash = Sha256::new();
@@ -44,7 +42,7 @@ impl Digest {
         Self(hash.finalize().into())
     }
 
-    /// The configuration without what cannot change a bit of a generation.
+    /// The configuration without the values that cannot change a bit of a generation.
     pub fn covered(mut config: ExperimentConfig) -> ExperimentConfig {
         config.name.clear();
         config.algorithm.generations = 0;
@@ -53,8 +51,8 @@ impl Digest {
         config
     }
 
-    /// Link -1 of an evolution without an experiment file: of the text that
-    /// describes its setup.
+    /// Link -1 of an evolution without an experiment file, from the text that describes its
+    /// setup.
     pub(crate) fn of_text(setup: &str) -> Self {
         let mut hash = Sha256::new();
         hash.update("swarmevo setup digest 1\n");
@@ -62,8 +60,8 @@ impl Digest {
         Self(hash.finalize().into())
     }
 
-    /// The link on which a fork begins that continues after this one under another
-    /// configuration; `config`: link -1 of that.
+    /// The first link of a fork that continues after this link with another configuration;
+    /// `config`: link -1 of that configuration.
     #[must_use]
     pub fn forked(self, config: Self) -> Self {
         let mut hash = Sha256::new();
@@ -89,8 +87,8 @@ impl Digest {
         Self(hash.finalize().into())
     }
 
-    /// The link after this one in the chain of re-evaluations, after the
-    /// generation of link `generation`.
+    /// The link after this one in the chain of re-evaluations; `generation`: the link of the
+    /// latest generation.
     pub fn next_champion<'a>(
         self,
         generation: Self,
@@ -108,7 +106,7 @@ impl Digest {
 }
 
 impl fmt::Display for Digest {
-    /// Hexadecimal.
+    /// Writes 64 hexadecimal digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
@@ -120,7 +118,7 @@ impl fmt::Debug for Digest {
     }
 }
 
-/// Not 64 hexadecimal digits.
+/// The text is not 64 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a digest is 64 hexadecimal digits")]
 pub struct ParseDigestError;

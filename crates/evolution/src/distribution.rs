@@ -1,9 +1,9 @@
-//! What a generation is drawn from, for whoever draws its genotypes elsewhere.
+//! The distribution of a generation, with which other machines draw its genotypes.
 //!
-//! Where individuals are drawn one by one, any of them can be drawn alone: its draws have
-//! their place in the stream of the generation. That gives the same bits as
-//! [`Evolution::ask`], and takes two to four numbers per gene instead of one per gene and
-//! individual.
+//! If an algorithm draws individuals one by one, any of them can be drawn alone, because its
+//! draws have a fixed place in the stream of the generation. The result has the same bits as
+//! [`Evolution::ask`]. The distribution has two to four numbers per gene, instead of one per gene
+//! and individual.
 
 use determinism::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use super::{
     wire::{decode, encode},
 };
 
-/// What the genotypes of one generation are drawn from.
+/// The distribution of the genotypes of one generation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
     seed: u64,
@@ -25,8 +25,8 @@ pub struct Distribution {
 }
 
 impl Evolution {
-    /// What the next generation is drawn from, as bytes in the format of keyframes; none if
-    /// an algorithm does not draw individuals one by one.
+    /// The distribution of the next generation, as bytes in the format of keyframes; `None` if an
+    /// algorithm does not draw individuals one by one.
     pub fn distribution(&self) -> Option<Vec<u8>> {
         let are_single = self.populations.iter().all(Algorithm::draws_one_by_one);
         let Self { seed, population_size, n_generations, populations, .. } = self;
@@ -35,18 +35,22 @@ impl Evolution {
 }
 
 impl Distribution {
-    /// Reads what [`Evolution::distribution`] wrote.
+    /// Reads the bytes of [`Evolution::distribution`].
+    ///
+    /// # Errors
+    ///
+    /// If the bytes are damaged, or of another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, CheckpointError> {
         decode(VERSION, bytes)
     }
 
-    /// The generation that is drawn from it.
+    /// Index of the generation, from 0.
     pub fn generation(&self) -> u64 {
         self.generation
     }
 
-    /// The genotype that [`Evolution::ask`] gives the individual of this index; none if there
-    /// is no such individual.
+    /// The genotype of the individual of this index, as in [`Evolution::ask`]; `None` if the
+    /// index is too large.
     pub fn genotype(&self, individual: usize) -> Option<Genotype> {
         if individual >= self.population_size {
             return None;
@@ -60,7 +64,7 @@ impl Distribution {
     }
 }
 
-/// What a population of a generation is drawn with.
+/// The random stream of a population of a generation.
 pub(crate) fn stream_of(seed: u64, generation: u64, population: u64) -> Stream {
     Stream::new(seed, generation, 0, Purpose::Evolution, population)
 }

@@ -1,28 +1,34 @@
-//! How evolution moves: what a generation did to the distribution, and how far its trials agree.
+//! Measures how evolution moves: the change of the distribution in a generation, and the
+//! agreement of its trials.
 
 use super::{
     CheckpointError, Digest, Evolution, Told, algorithms::Strategy as _, statistics::between,
 };
 
-/// What a generation did.
+/// The change of evolution in one generation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Its link of the digest chain.
     pub digest: Digest,
-    /// Euclidean distance from the mean of the distribution before it to the one after it; none
-    /// without a distribution.
+    /// Euclidean distance between the means of the distribution before and after the generation;
+    /// `None` without a distribution.
     pub mean_step: Option<f64>,
-    /// Least, first quartile, median, third quartile and largest of the genes' standard
-    /// deviations after it; none without a distribution.
+    /// Minimum, first quartile, median, third quartile and maximum of the genes' standard
+    /// deviations after the generation; `None` without a distribution.
     pub deviations: Option<[f64; 5]>,
-    /// Mean over all pairs of trials of Spearman's rank correlation between the individuals'
-    /// fitness in the two: 1 if all trials rank them alike, 0 if selection by a trial was luck.
-    /// None with fewer than two trials, or where a trial tells nobody apart.
+    /// Spearman's rank correlation between the individuals' fitness in two trials, as the mean
+    /// over all pairs of trials, in \[-1, 1\]: 1 if all trials rank the individuals alike, 0 if
+    /// selection by a single trial is luck. `None` with fewer than two trials, or if all
+    /// individuals have equal fitness in a trial.
     pub rank_correlation: Option<f64>,
 }
 
 impl Evolution {
-    /// Goes through a generation again, and says what it did.
+    /// Repeats a generation, and measures its change of evolution.
+    ///
+    /// # Errors
+    ///
+    /// If `told` does not fit this state, or has no finite fitness.
     pub fn dynamics(&mut self, told: &Told) -> Result<Dynamics, CheckpointError> {
         let before = self.mean();
         let digest = self.replay(told)?.summary.digest;
@@ -41,7 +47,7 @@ impl Evolution {
     }
 }
 
-/// At 0, 1/4, 1/2, 3/4 and 1, by linear interpolation.
+/// The quantiles at 0, 1/4, 1/2, 3/4 and 1, by linear interpolation.
 fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
     values.sort_by(f64::total_cmp);
     let last = values.len() - 1;
@@ -52,8 +58,8 @@ fn quantiles(mut values: Vec<f64>) -> [f64; 5] {
     })
 }
 
-/// `trial_fitness[i][t]`: of individual i in trial t. Individuals whose fitness is not finite in
-/// every trial are left out.
+/// See [`Dynamics::rank_correlation`]. `trial_fitness[i][t]`: fitness of individual i in trial t.
+/// Individuals without finite fitness in every trial are ignored.
 fn rank_correlation(trial_fitness: &[Vec<f64>]) -> Option<f64> {
     let finite: Vec<&Vec<f64>> = trial_fitness
         .iter()
@@ -75,7 +81,7 @@ fn rank_correlation(trial_fitness: &[Vec<f64>]) -> Option<f64> {
     Some(sum / (n_trials * (n_trials - 1) / 2) as f64)
 }
 
-/// Ranks, equal values sharing theirs, minus their mean, scaled to length 1; none if all are
+/// Ranks minus their mean, scaled to length 1; equal values share a rank. `None` if all are
 /// equal.
 fn deviations_of_ranks(values: Vec<f64>) -> Option<Vec<f64>> {
     let rank = |value: f64| {

@@ -1,4 +1,4 @@
-//! Forks: an evolution that goes on from the state of another one, with something changed.
+//! Forks: evolutions that continue the state of another one with a changed configuration.
 
 use std::ops::Range;
 
@@ -6,34 +6,39 @@ use experiment_file::ExperimentConfig;
 
 use super::{Digest, Evolution, algorithms::Strategy as _};
 
-/// What a fork is made of.
+/// The arguments of [`Evolution::fork`].
 #[derive(Debug, Clone, Copy)]
 pub struct Fork<'a> {
-    /// The configuration under which the state came about.
+    /// The configuration that led to the state.
     pub parent: &'a ExperimentConfig,
-    /// The fingerprint of what computed fitness then.
+    /// The fingerprint of the simulation that computed the parent's fitness.
     pub parent_simulation: &'a str,
-    /// The configuration under which it goes on.
+    /// The configuration with which the fork continues.
     pub child: &'a ExperimentConfig,
-    /// The genes of each population of the child.
+    /// The ranges of genes of each population of the child.
     pub segments: &'a [Range<usize>],
-    /// The fingerprint of what computes its fitness.
+    /// The fingerprint of the simulation that computes the child's fitness.
     pub simulation: &'a str,
 }
 
-/// Everything that a state cannot carry over, one line each, by its place in the experiment
-/// file; never empty. The caller has to leave these as they are.
+/// All changes that a fork does not allow, one line each, by their place in the experiment file;
+/// never empty. The caller has to undo them.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}", problems.join("\n"))]
 pub struct ForkError {
-    /// What it is, and why.
+    /// Each change, and the reason why a fork does not allow it.
     pub problems: Vec<String>,
 }
 
 impl Evolution {
-    /// Goes on as another experiment. One of which nothing is changed that its bits depend on
-    /// has the digests of its parent; the link on which any other begins covers the parent's
-    /// last link and its own configuration. The champion stays if fitness means the same.
+    /// Continues as another experiment. If the changes affect no bits, the fork has the digests
+    /// of its parent. Otherwise its first link covers the parent's last link and its own
+    /// configuration. The champion stays if the meaning of fitness is the same.
+    ///
+    /// # Errors
+    ///
+    /// If the child's configuration changes the algorithm, the populations, their parameters or
+    /// numbers of genes, or asks for no more generations than the parent has.
     pub fn fork(self, fork: &Fork<'_>) -> Result<Self, ForkError> {
         let problems = self.problems(fork);
         if !problems.is_empty() {
@@ -102,7 +107,7 @@ impl Evolution {
     }
 }
 
-/// What of a configuration a fitness depends on, but for chance.
+/// The part of a configuration that determines fitness, apart from chance.
 fn task(config: &ExperimentConfig) -> ExperimentConfig {
     let mut config = config.clone();
     config.name.clear();

@@ -1,27 +1,26 @@
 //! A confidence interval for the mean of a skewed distribution: empirical likelihood
 //! (Owen 1988, Biometrika 75, 237-249).
 //!
-//! Fitness is bounded and often far from normal: a champion may fail one trial in
-//! thirty and be near perfect in all others. The mean plus or minus 1.96 s / sqrt(n)
-//! then misses the truth too often, and almost always on the same side. Empirical
-//! likelihood takes the trials as they are: a mean belongs to the interval if weights w_i
-//! on the n trials have that mean and are not too unequal,
-//! -2 sum ln(n w_i) <= q. The interval lies between the smallest and the largest trial,
-//! and is as lopsided as they are. q is the square of Student's t with n - 1 degrees of
+//! Fitness is bounded and often far from normal: a champion may fail one trial in thirty and be
+//! near perfect in all others. The mean plus or minus 1.96 s / sqrt(n) then misses the truth too
+//! often, and almost always on the same side. Empirical likelihood assumes no distribution: a
+//! mean belongs to the interval if weights w_i on the n trials have that mean and are not too
+//! unequal, -2 sum ln(n w_i) <= q. The interval lies between the smallest and the largest trial,
+//! and is as skewed as the trials are. q is the square of Student's t with n - 1 degrees of
 //! freedom, which is somewhat wider than the chi-squared of large n.
 
 use super::{Real, statistics::bounds};
 
 /// 0.975 quantile of the normal distribution.
 const Z: f64 = 1.959_963_984_540_054;
-/// Halvings of the range of an exponent: enough for every bit that matters.
+/// Number of halvings of the range of an exponent, enough for full precision.
 const N_HALVINGS: u32 = 60;
-/// Powers of two within which the exponent lies.
+/// Largest absolute exponent of two in the search.
 const EXPONENT_MAX: f64 = 60.0;
 
-/// The 95 % confidence interval of the mean; none without values or if one is not
-/// finite. If all values are equal, as a single one is, it is that value: what was not
-/// seen is not in it.
+/// The 95 % confidence interval of the mean; `None` without values, or if one is not finite. If
+/// all values are equal, or if there is only one, both ends are that value, because the interval
+/// never leaves the range of the values.
 pub fn interval(values: &[f64]) -> Option<(Real, Real)> {
     if values.is_empty() || values.iter().any(|value| !value.is_finite()) {
         return None;
@@ -30,14 +29,14 @@ pub fn interval(values: &[f64]) -> Option<(Real, Real)> {
     Some((Real::finite(-upper_end(&mirrored))?, Real::finite(upper_end(values))?))
 }
 
-/// The largest mean that weighted values may have.
+/// The upper end of the interval: the largest mean that weighted values may have.
 fn upper_end(values: &[f64]) -> f64 {
     let (min, max) = bounds(values);
     if min == max {
         return max;
     }
-    // Scaled by a power of two, all steps give the same bits, except for those that would
-    // overflow or lose bits at the smallest numbers. The range itself may overflow.
+    // Scaling by a power of two leaves the bits of all steps alone, unless they would overflow or
+    // underflow. The range itself may overflow.
     let range = max - min;
     let exponent =
         if range.is_finite() { libm::ilogb(range) } else { libm::ilogb(max / 2.0 - min / 2.0) + 1 };
@@ -45,8 +44,8 @@ fn upper_end(values: &[f64]) -> f64 {
     libm::scalbn(scaled_upper_end(&scaled), exponent).clamp(min, max)
 }
 
-/// Of values whose range is about 1. The likeliest weights of a larger mean than that of the
-/// sample are w_i = c / (max + d - x_i); the smaller d, the larger it is.
+/// The upper end for values whose range is about 1. Among weights with a given mean above that of
+/// the sample, the likeliest are w_i = c / (max + d - x_i); a smaller d gives a larger mean.
 fn scaled_upper_end(values: &[f64]) -> f64 {
     let (min, max) = bounds(values);
     let range = max - min;
@@ -101,8 +100,8 @@ mod tests {
         (low.get(), high.get())
     }
 
-    /// -2 ln R(mu), by its definition: the weights 1 / (n (1 + lambda (x_i - mu))) with
-    /// mean mu.
+    /// -2 ln R(mu) by its definition, with the weights 1 / (n (1 + lambda (x_i - mu))) of mean
+    /// mu.
     fn statistic(values: &[f64], mu: f64) -> f64 {
         let min = values.iter().copied().fold(f64::INFINITY, f64::min);
         let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -196,7 +195,7 @@ mod tests {
         fn values_within_a_hair_have_an_interval_like_any_others(
             steps in prop::collection::vec(0u64..1000, 2..40),
         ) {
-            // The smallest numbers that there are, and the same numbers as wholes.
+            // The smallest positive numbers, and the same numbers scaled to integers.
             let tiny: Vec<f64> = steps.iter().map(|&step| f64::from_bits(step)).collect();
             let whole: Vec<f64> = steps.iter().map(|&step| step as f64).collect();
             let (found, expected) = (ends(&tiny), ends(&whole));

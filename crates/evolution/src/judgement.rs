@@ -1,4 +1,4 @@
-//! The judgement of a champion: what it is worth, on trials that selected nothing.
+//! The judgement of a champion: its honest fitness, on trials that selected nothing.
 
 use std::sync::Arc;
 
@@ -6,20 +6,20 @@ use determinism::random::TrialSet;
 
 use super::{Champion, Digest, Population, champion::Judged, finite_mean, interval::interval};
 
-/// A champion that is to be judged.
+/// A champion to judge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     generation: u64,
     champion: Champion,
-    /// The link of the generations' digest chain on which the next one hangs.
+    /// The last link of the generations' digest chain, which the next link covers.
     of_generations: Digest,
     /// The last link of the chain of re-evaluations.
     digest: Digest,
 }
 
 impl Judgement {
-    /// After a generation. `of_generations`, `digest`: the last links of the digest chains
-    /// of generations and of re-evaluations.
+    /// Prepares the judgement after a generation. `of_generations`, `digest`: the last links of
+    /// the digest chains of generations and of re-evaluations.
     pub(crate) fn new(
         generation: u64,
         champion: Champion,
@@ -29,19 +29,19 @@ impl Judgement {
         Self { generation, champion, of_generations, digest }
     }
 
-    /// Worlds and noise.
+    /// The trials of the judgement.
     pub fn trial_set(&self) -> TrialSet {
         TrialSet::Judgement(self.generation)
     }
 
-    /// The champion's genotype, alone.
+    /// The champion's genotype, as a population of one.
     pub fn genotypes(&self) -> Population {
         Arc::new([self.champion.genotype.clone()])
     }
 
-    /// The champion with its judgement, and the last link of the digest chain of
-    /// re-evaluations, which covers that, too. `trial_fitness`: of its genotype, alone.
-    /// There is no judgement if the fitness of a trial is not finite.
+    /// The champion with its judgement, and the new last link of the digest chain of
+    /// re-evaluations. `trial_fitness[0][t]`: fitness of the genotype in trial t. The champion
+    /// stays without a judgement if the fitness of a trial is not finite.
     pub fn decide(self, trial_fitness: &[Vec<f64>]) -> (Champion, Digest) {
         let Self { generation, champion, of_generations, digest } = self;
         let genotype = [&champion.genotype[..]].into_iter();

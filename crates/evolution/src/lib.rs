@@ -29,22 +29,21 @@
 //! finite ranks last. [`ALGORITHMS`] lists the algorithms with their parameters and
 //! limits; `docs/algorithms.md` has their formulas and sources.
 //!
-//! - [`Setup`] starts an evolution of one population for any function;
-//!   [`Evolution::new`] starts that of an experiment file, with several populations
-//!   if it has them (cooperative coevolution).
-//! - [`Evolution::ask`] is a pure function of the state, so an evolution that is
-//!   restored from a [`Checkpoint`] asks for the same genotypes as the one that was
-//!   stored.
+//! - [`Setup`] starts an evolution of one population for any function; [`Evolution::new`] starts
+//!   the evolution of an experiment file, which may have several populations (cooperative
+//!   coevolution).
+//! - [`Evolution::ask`] is a pure function of the state, so an evolution restored from a
+//!   [`Checkpoint`] draws the same genotypes as the stored one.
 //! - Every random draw has an address (seed, generation, population), so results do
 //!   not depend on machine, threads or time. [`Evolution::digest`] is a hash of all
 //!   genotypes and fitness so far: equal digests mean equal runs, bit for bit.
-//! - The best of noisy evaluations is optimistic. [`Evolution::reevaluation`] names
-//!   candidates to evaluate again on held-out trials, and
-//!   [`Evolution::set_champion`] keeps the best of them. At the end of a run,
-//!   [`Evolution::judgement`] measures what it is worth on trials that selected nothing.
+//! - The best of noisy evaluations is optimistic. [`Evolution::reevaluation`] names candidates to
+//!   evaluate again on held-out trials, and [`Evolution::set_champion`] keeps the best of them.
+//!   At the end of a run, [`Evolution::judgement`] measures its honest fitness, on trials that
+//!   selected nothing.
 //!
-//! An algorithm samples and updates, no more; statistics, champion, digest and the
-//! rule for fitness that is not finite are shared.
+//! An algorithm only samples and updates; all share statistics, champion, digest and the rule for
+//! fitness that is not finite.
 
 mod algorithms;
 mod champion;
@@ -105,7 +104,7 @@ pub type Population = Arc<[Genotype]>;
 pub struct Evolution {
     seed: u64,
     population_size: usize,
-    /// Generations told so far; also the index of the next one to ask.
+    /// Number of generations told so far; also the index of the next one.
     n_generations: u64,
     /// One algorithm per population; it evolves the population's segment of the
     /// genotype.
@@ -114,39 +113,41 @@ pub struct Evolution {
     /// The best individual since the last re-evaluation.
     challenger: Option<Champion>,
     digest: Digest,
-    /// Covers every re-evaluation so far, and the generations before it.
+    /// Covers every re-evaluation so far, and all generations before the latest one.
     champion_digest: Digest,
     #[serde(skip)]
     n_flat: FlatGenerations,
 }
 
-/// A generation whose fitness is to be computed.
+/// A generation of genotypes, whose fitness the caller computes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generation {
     /// Index of the generation, from 0.
     pub index: u64,
-    /// The genotypes of all individuals: of each, the segments of all populations.
+    /// The genotypes of all individuals, each with the segments of all populations; shape
+    /// `[individual][gene]`.
     pub genotypes: Population,
-    /// What each population's algorithm drew, in the order of the segments.
+    /// The draws of each population's algorithm, in the order of the segments.
     samples: Vec<Sample>,
 }
 
-/// The fitness of a generation in short.
+/// A summary of the fitness of a generation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GenerationSummary {
     /// Index of the generation, from 0.
     pub generation: u64,
-    /// Over the individuals whose fitness is finite.
+    /// Statistics over the individuals with finite fitness.
     pub statistics: Statistics,
-    /// Individuals whose fitness is not finite; they rank last.
+    /// Number of individuals without finite fitness; they rank last.
     pub n_non_finite: usize,
-    /// Generations up to this one in which all individuals had the same fitness; 0 if some differ.
+    /// Number of latest generations, including this one, in which all individuals had the same
+    /// fitness; 0 if some differ in this one.
     pub n_flat: u64,
     /// Link of the digest chain.
     pub digest: Digest,
 }
 
-/// Why a generation cannot be learnt from.
+/// Why evolution cannot learn from a generation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EvolutionError {
     /// No individual has a finite fitness. The fitness function or the bounds of
@@ -159,16 +160,17 @@ pub enum EvolutionError {
         /// Index of the generation.
         generation: u64,
     },
-    /// It learns nothing, and its distribution is out of all bounds. [`Evolution::learn`] says
-    /// so; [`Evolution::tell`] never does, so that whatever was told once can be told again.
+    /// Evolution learns nothing, and its distribution is far wider than the genes' range. Only
+    /// [`Evolution::learn`] returns this; [`Evolution::tell`] never does, so that recorded
+    /// generations can always be told again.
     #[error(transparent)]
     Drifted(#[from] Drifted),
 }
 
 impl Evolution {
-    /// The start of an experiment's evolution. `segments`: the genes of each
-    /// population, in the order of `algorithm.populations`, none of them empty.
-    /// `simulation`: the fingerprint of what computes fitness; it is part of the
+    /// The evolution of an experiment before its first generation. `segments`: the range of genes
+    /// of each population, in the order of `algorithm.populations`, none of them empty.
+    /// `simulation`: the fingerprint of the code that computes fitness, which is part of the
     /// digest.
     ///
     /// # Panics
@@ -188,7 +190,7 @@ impl Evolution {
         Self::from_parts(config.seed, algorithm.population_size as usize, populations, digest)
     }
 
-    /// The start of an evolution; `digest`: link -1 of the chain.
+    /// An evolution before its first generation; `digest`: link -1 of the chain.
     fn from_parts(
         seed: u64,
         population_size: usize,
@@ -208,13 +210,13 @@ impl Evolution {
         }
     }
 
-    /// Generations told so far.
+    /// Number of generations told so far.
     pub fn n_generations(&self) -> u64 {
         self.n_generations
     }
 
-    /// The champion so far: the best on held-out trials, or, before the first
-    /// re-evaluation, the best individual of all. None before the first `tell`.
+    /// The present champion: the best candidate on held-out trials, or, before the first
+    /// re-evaluation, the best individual of all generations. `None` before the first `tell`.
     pub fn champion(&self) -> Option<&Champion> {
         self.champion.as_ref()
     }
@@ -224,14 +226,14 @@ impl Evolution {
         self.digest
     }
 
-    /// The last link of the re-evaluations' digest chain; it covers the
-    /// generations before them, too.
+    /// The last link of the re-evaluations' digest chain, which also covers the generations
+    /// before them.
     pub fn champion_digest(&self) -> Digest {
         self.champion_digest
     }
 
-    /// Whether another one has the same seed, as many individuals, and populations with the
-    /// same numbers of genes.
+    /// Whether both evolutions have the same seed, the same number of individuals, and
+    /// populations with the same numbers of genes.
     pub fn has_shape_of(&self, other: &Self) -> bool {
         let n_genes = |evolution: &Self| {
             evolution.populations.iter().map(Algorithm::n_genes).collect::<Vec<_>>()
@@ -240,14 +242,14 @@ impl Evolution {
             && n_genes(self) == n_genes(other)
     }
 
-    /// The mean of the distribution after the latest generation, as a genotype; none if a
+    /// The mean of the distribution after the latest generation, as a genotype; `None` if a
     /// population's algorithm has no distribution.
     pub fn mean(&self) -> Option<Genotype> {
         let means: Option<Vec<Genotype>> = self.populations.iter().map(Algorithm::mean).collect();
         means.map(|means| means.concat())
     }
 
-    /// Draws the next generation. Asking twice gives the same.
+    /// Draws the next generation. Repeated calls return the same generation.
     pub fn ask(&self) -> Generation {
         let samples: Vec<Sample> = self
             .populations
@@ -269,8 +271,18 @@ impl Evolution {
         Generation { index: self.n_generations, genotypes, samples }
     }
 
-    /// Learns from a generation that [`ask`](Self::ask) drew.
-    /// `trial_fitness[i][t]`: fitness of individual i in trial t.
+    /// Learns from a generation that [`ask`](Self::ask) drew. `trial_fitness[i][t]`: fitness of
+    /// individual i in trial t; its mean over t is the individual's fitness, and larger is
+    /// better.
+    ///
+    /// # Errors
+    ///
+    /// If no individual has a finite fitness.
+    ///
+    /// # Panics
+    ///
+    /// If `generation` is not the next one, or if `trial_fitness` does not have one row per
+    /// individual.
     pub fn tell(
         &mut self,
         generation: Generation,
@@ -317,8 +329,8 @@ impl Evolution {
         })
     }
 
-    /// The candidates to be evaluated on held-out trials, after the latest
-    /// generation; none before the first.
+    /// The candidates to evaluate on held-out trials after the latest generation; `None` before
+    /// the first one.
     pub fn reevaluation(&self) -> Option<Reevaluation> {
         let generation = self.n_generations.checked_sub(1)?;
         let incumbent = self.champion.clone().filter(|champion| champion.held_out.is_some());
@@ -334,8 +346,8 @@ impl Evolution {
         Some(Reevaluation::new(generation, candidates, self.digest, self.champion_digest))
     }
 
-    /// Makes the winner of a [`reevaluation`](Self::reevaluation) that is over the
-    /// champion. If no candidate has a finite mean, the champion stays.
+    /// Makes the winner of a finished [`reevaluation`](Self::reevaluation) the champion. If no
+    /// candidate has a finite mean, the champion stays.
     pub fn set_champion(&mut self, reevaluation: &Reevaluation) {
         let (winner, digest) = reevaluation.outcome();
         if let Some(winner) = winner {
@@ -345,8 +357,8 @@ impl Evolution {
         self.champion_digest = digest;
     }
 
-    /// The champion so far, to be judged on trials that select nothing; none before the
-    /// first generation. Evolution goes on as if nobody had judged.
+    /// The present champion, to judge on trials that select nothing; `None` before the first
+    /// generation. The judgement does not change evolution.
     pub fn judgement(&self) -> Option<Judgement> {
         let generation = self.n_generations.checked_sub(1)?;
         let champion = self.champion.clone()?;
@@ -354,18 +366,18 @@ impl Evolution {
     }
 }
 
-/// Whether an individual has a finite fitness, as its trials come to: without, a generation
-/// cannot be learnt from.
+/// Whether at least one individual has a finite mean fitness, without which evolution cannot
+/// learn from a generation.
 pub fn has_finite_fitness(trial_fitness: &[Vec<f64>]) -> bool {
     trial_fitness.iter().any(|trials| mean(trials).is_finite())
 }
 
-/// Plain mean, summed in order.
+/// The plain mean, summed in order.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The mean of every individual's trials.
+/// The mean fitness of every individual over its trials.
 fn means(trial_fitness: &[Vec<f64>]) -> Vec<f64> {
     trial_fitness.iter().map(|trials| mean(trials)).collect()
 }

@@ -1,34 +1,35 @@
-//! Lineage: whom an individual of a genetic algorithm descends from, and how long genes survive.
+//! Lineages: the ancestors of an individual of a genetic algorithm, and the survival of their
+//! genes.
 //!
-//! Nothing of it is stored: whoever draws a generation again from the state before it knows
-//! the parents of each child, and finds its genes in them.
+//! Lineages are not stored: redrawing a generation from the state before it gives the parents of
+//! each child, and the genes that the child has from each.
 
 use std::collections::BTreeMap;
 
 use super::{Evolution, Genotype, Told, distribution::stream_of, mean, ranking::ranking};
 use crate::algorithms::Strategy as _;
 
-/// Who an individual comes from, by rank in the generation before it, 0 for the best.
+/// The parents of an individual, by rank in the previous generation, 0 for the best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parents {
-    /// Nobody: it is of the first generation.
+    /// No parents, in the first generation.
     None,
-    /// It is that individual, unchanged.
+    /// One individual, copied unchanged.
     Elite(usize),
-    /// One that was not crossed.
+    /// One parent, without crossover.
     One(usize),
-    /// Two that were crossed.
+    /// Two crossed parents.
     Two(usize, usize),
 }
 
-/// From whom a gene is.
+/// The origin of a gene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GeneSource {
-    /// The first parent has the same one.
+    /// The first parent has the same gene.
     First,
-    /// The second parent has the same one, and the first has not.
+    /// The second parent has the same gene, and the first has not.
     Second,
-    /// Nobody: it mutated, or is a blend of both.
+    /// No parent: the gene mutated, or blends both.
     New,
 }
 
@@ -37,12 +38,12 @@ pub enum GeneSource {
 pub struct Birth {
     /// Its parents.
     pub parents: Parents,
-    /// Per gene, from whom it is.
+    /// The origin of each gene.
     pub sources: Vec<GeneSource>,
 }
 
 impl Birth {
-    /// Of an individual with these genes; `parent`: the genes of a rank.
+    /// The birth of an individual with these genes; `parent`: returns the genes of a rank.
     pub(crate) fn new<'a>(
         parents: Parents,
         genes: &[f64],
@@ -65,29 +66,29 @@ impl Birth {
     }
 }
 
-/// An individual in the lineage of another one, which it is itself or an ancestor of.
+/// An individual in a lineage: the traced individual itself, or one of its ancestors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ancestor {
     /// Its generation.
     pub generation: u64,
-    /// Its index there.
+    /// Its index in that generation.
     pub individual: u32,
     /// Its mean fitness.
     pub fitness: f64,
-    /// How it was born; none in the earliest generation of the lineage.
+    /// Its birth; `None` in the earliest generation of the lineage.
     pub birth: Option<BirthOf>,
-    /// Genes that the one whose lineage it is still has from it, by descent.
+    /// Number of genes that the traced individual still has from it, by descent.
     pub n_surviving: usize,
 }
 
-/// A birth, with parents by their index in the generation before.
+/// A birth, with parents by their index in the previous generation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BirthOf {
-    /// What was done.
+    /// The operator.
     pub operator: Operator,
     /// Each parent's index, and the number of genes from it.
     pub parents: Vec<(u32, usize)>,
-    /// Genes that mutated or were blended.
+    /// Number of genes that mutated or blend both parents.
     pub n_new: usize,
 }
 
@@ -104,14 +105,14 @@ pub enum Operator {
     Crossover,
 }
 
-/// The children of a generation beside their parents.
+/// The children of a generation, and their parents.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Families {
-    /// Mean fitness of each individual of the generation before.
+    /// Mean fitness of each individual of the previous generation.
     pub parents: Vec<f64>,
     /// Mean fitness of each child.
     pub children: Vec<f64>,
-    /// Per population the birth of each child: populations descend on their own.
+    /// The birth of each child per population, because each population has its own parents.
     pub births: Vec<Vec<BirthOf>>,
 }
 
@@ -119,13 +120,13 @@ pub struct Families {
 #[derive(Debug, Clone, Default)]
 pub struct Pedigree {
     first: u64,
-    /// From the generation `first` on: births, except in the first one, and fitness.
+    /// Births and fitness of each generation from `first` on; the first one has no births.
     generations: Vec<(Vec<Birth>, Vec<f64>)>,
 }
 
 impl Evolution {
-    /// The births of the next generation, per population; none if one of them has no parents
-    /// but a distribution.
+    /// The births of the next generation, per population; `None` if a population is drawn from a
+    /// distribution, without parents.
     pub fn births(&self) -> Option<Vec<Vec<Birth>>> {
         let births = self.populations.iter().enumerate().map(|(idx, population)| {
             let mut rng = stream_of(self.seed, self.n_generations, idx as u64);
@@ -134,8 +135,8 @@ impl Evolution {
         births.collect()
     }
 
-    /// The next generation beside the one before it; none where [`births`](Self::births) has
-    /// none. `before` and `told` say how fit both were.
+    /// The families of the next generation; `None` where [`births`](Self::births) is `None`.
+    /// `before`, `told`: the fitness of the latest and of the next generation.
     pub fn families(&self, before: &Told, told: &Told) -> Option<Families> {
         let parents = mean_fitness(before);
         let individual_of = ranked(&parents);
@@ -148,12 +149,12 @@ impl Evolution {
 }
 
 impl Pedigree {
-    /// Before its first generation.
+    /// An empty pedigree, before generation `first`.
     pub fn starting_at(first: u64) -> Self {
         Self { first, generations: Vec::new() }
     }
 
-    /// Adds the next generation: its births, and what was told of it.
+    /// Adds the next generation: its births and its fitness.
     pub fn push(&mut self, births: Vec<Birth>, told: &Told) {
         self.generations.push((births, mean_fitness(told)));
     }
@@ -162,7 +163,7 @@ impl Pedigree {
     /// later generations first.
     pub fn trace(&self, individual: u32) -> Vec<Ancestor> {
         let mut ancestors = Vec::new();
-        // Per individual the genes that are still traced in it.
+        // The genes that are still traced, per individual.
         let mut traced: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (place, (births, fitness)) in self.generations.iter().enumerate().rev() {
             if traced.is_empty() {
@@ -202,12 +203,12 @@ impl Pedigree {
     }
 }
 
-/// Per individual its mean fitness over the trials.
+/// The mean fitness of each individual over the trials.
 fn mean_fitness(told: &Told) -> Vec<f64> {
     told.trial_fitness.iter().map(|trials| mean(trials)).collect()
 }
 
-/// The individuals whose fitness is finite, best first: only they have children.
+/// The individuals with finite fitness, best first; only they have children.
 fn ranked(fitness: &[f64]) -> Vec<u32> {
     let finite = ranking(fitness).into_iter().filter(|&i| fitness[i].is_finite());
     finite.map(|i| i as u32).collect()

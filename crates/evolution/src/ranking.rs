@@ -1,5 +1,4 @@
-//! Ranking by fitness, and the utilities that natural evolution strategies make
-//! of it.
+//! Ranking by fitness, and the utilities of natural evolution strategies.
 
 use std::cmp::Ordering;
 
@@ -17,9 +16,8 @@ pub fn ranking(fitness: &[f64]) -> Vec<usize> {
     indices
 }
 
-/// Utility of rank k = 1..=n, best first:
-/// u_k = max(0, ln(n/2 + 1) - ln k) / sum - 1/n. They sum to 0.
-/// Wierstra et al. 2014, section 3.1.
+/// The utilities of ranks k = 1..=n, best first: u_k = max(0, ln(n/2 + 1) - ln k) / sum - 1/n,
+/// which sum to 0. Wierstra et al. 2014, section 3.1.
 fn utilities(n: usize) -> Vec<f64> {
     let reference = libm::log(n as f64 / 2.0 + 1.0);
     let raw: Vec<f64> = (1..=n).map(|k| (reference - libm::log(k as f64)).max(0.0)).collect();

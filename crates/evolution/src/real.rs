@@ -4,25 +4,25 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A number that is not NaN. What is stored and shown of fitness is made of these, so that no
-/// NaN reaches a database. Of finite fitness, statistics are finite; databases of older versions
-/// have infinite ones where sums overflowed.
+/// A number that is not NaN. Stored and displayed fitness uses this type, so that no NaN reaches
+/// a database. Statistics of finite fitness are finite; databases of older versions have infinite
+/// ones where sums overflowed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub struct Real(f64);
 
-/// There is NaN where a number is due.
+/// The value is NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("NaN where a number is due")]
 pub struct NotANumber;
 
 impl Real {
-    /// None of NaN.
+    /// `None` if `value` is NaN.
     pub const fn new(value: f64) -> Option<Self> {
         if value.is_nan() { None } else { Some(Self(value)) }
     }
 
-    /// None of a number that is NaN or infinite.
+    /// `None` if `value` is NaN or infinite.
     pub const fn finite(value: f64) -> Option<Self> {
         if value.is_finite() { Some(Self(value)) } else { None }
     }

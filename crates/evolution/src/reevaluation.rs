@@ -1,38 +1,37 @@
 //! The re-evaluation of candidates for the champion.
 //!
-//! Every candidate meets a block of held-out trials. Whoever's mean, over all
-//! held-out trials that it has ever met, is the largest leads; who is not close to
-//! the leader is out. As long as others are left, those of them (the leader
-//! included) that have met the fewest trials meet another block, up to
-//! [`BLOCKS_MAX`] in all. Then the leader is the champion.
+//! Every candidate meets a block of held-out trials. The leader is the candidate with the largest
+//! mean over all held-out trials that it has ever met. Candidates that are not close to the
+//! leader are out. While several candidates are left, those among them with the fewest trials
+//! meet another block, up to [`BLOCKS_MAX`] in all. Then the leader becomes the champion.
 
 use determinism::random::TrialSet;
 
 use super::{Champion, Digest, HeldOut, Population, ranking::ranking};
 
-/// Blocks of trials that one re-evaluation may take.
+/// Most blocks of trials in one re-evaluation.
 pub const BLOCKS_MAX: u8 = 4;
 
-/// Candidates that are compared on held-out trials, block by block.
+/// A comparison of candidates on held-out trials, block by block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reevaluation {
-    /// Generation whose held-out trials these are.
+    /// The generation of the held-out trials.
     generation: u64,
-    /// The champion so far, if it has been re-evaluated before, comes first.
+    /// The candidates; a champion that has been re-evaluated before comes first.
     candidates: Vec<Champion>,
-    /// The candidates that meet the next block, by index; none if the re-evaluation is over.
+    /// Indices of the candidates that meet the next block; empty if the re-evaluation is over.
     participants: Vec<usize>,
-    /// The fitness of all blocks so far, as [`learn`](Self::learn) takes it.
+    /// The fitness of all blocks so far, as given to [`learn`](Self::learn).
     blocks: Vec<Vec<Vec<f64>>>,
-    /// The link of the generations' digest chain on which the others hang.
+    /// The last link of the generations' digest chain, which the links of this chain cover.
     of_generations: Digest,
     /// The last link.
     digest: Digest,
 }
 
 impl Reevaluation {
-    /// Before the first block. `of_generations`, `digest`: the last links of the digest
-    /// chains of generations and of re-evaluations.
+    /// A re-evaluation before its first block. `of_generations`, `digest`: the last links of the
+    /// digest chains of generations and of re-evaluations.
     pub(crate) fn new(
         generation: u64,
         candidates: Vec<Champion>,
@@ -44,8 +43,7 @@ impl Reevaluation {
         Self { generation, candidates, participants, blocks, of_generations, digest }
     }
 
-    /// The candidates. The champion so far, if it has been re-evaluated before, comes
-    /// first.
+    /// The candidates. A champion that has been re-evaluated before comes first.
     pub fn candidates(&self) -> &[Champion] {
         &self.candidates
     }
@@ -55,17 +53,17 @@ impl Reevaluation {
         self.participants.is_empty()
     }
 
-    /// Worlds and noise of the next block.
+    /// The trials of the next block.
     pub fn trial_set(&self) -> TrialSet {
         TrialSet::HeldOut { generation: self.generation, block: self.blocks.len() as u8 }
     }
 
-    /// The genotypes of those that meet the next block.
+    /// The genotypes of the candidates that meet the next block.
     pub fn genotypes(&self) -> Population {
         self.participants.iter().map(|&i| self.candidates[i].genotype.clone()).collect()
     }
 
-    /// Takes the fitness of a block in. `trial_fitness[i][t]`: fitness of genotype i of
+    /// Learns the fitness of a block. `trial_fitness[i][t]`: fitness of genotype i of
     /// [`genotypes`](Self::genotypes) in trial t, t from 0 in each block.
     pub fn learn(&mut self, trial_fitness: &[Vec<f64>]) {
         assert_eq!(self.participants.len(), trial_fitness.len(), "one fitness per genotype");
@@ -74,7 +72,7 @@ impl Reevaluation {
         for (&i, values) in self.participants.iter().zip(trial_fitness) {
             let block = HeldOut::from_values(values, self.generation);
             let held_out = &mut self.candidates[i].held_out;
-            // Without a finite mean it has lost: it has none, and meets no further block.
+            // A candidate without a finite mean has lost, and meets no further block.
             *held_out = match *held_out {
                 Some(so_far) => block.and_then(|block| so_far.with(block)),
                 None => block,
@@ -84,13 +82,14 @@ impl Reevaluation {
         self.participants = self.next_participants();
     }
 
-    /// The fitness of all blocks so far, as [`learn`](Self::learn) took it.
+    /// The fitness of all blocks so far, as given to [`learn`](Self::learn); shape
+    /// `[block][candidate][trial]`.
     pub fn blocks(&self) -> &[Vec<Vec<f64>>] {
         &self.blocks
     }
 
-    /// The winner, once the re-evaluation is over, and the last link of the digest chain.
-    /// Of equals, the first; none if no candidate has a finite mean.
+    /// The winner, once the re-evaluation is over, and the last link of the digest chain. The
+    /// first of equal candidates wins; `None` if no candidate has a finite mean.
     pub(crate) fn outcome(&self) -> (Option<&Champion>, Digest) {
         (self.leader().map(|(leader, _)| &self.candidates[leader]), self.digest)
     }
@@ -126,7 +125,7 @@ mod tests {
     use super::*;
     use crate::ChampionSource;
 
-    /// Before the first block; `held_out`: what is known of each candidate.
+    /// A re-evaluation before its first block; `held_out`: earlier results of each candidate.
     fn reevaluation(held_out: &[Option<HeldOut>]) -> Reevaluation {
         let candidate = |(i, &held_out)| Champion {
             generation: 9,

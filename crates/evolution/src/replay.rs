@@ -1,4 +1,4 @@
-//! Going through generations again: what was evaluated for each, and what came of it.
+//! Repeats recorded generations: the evaluations of each, and its results.
 
 use determinism::random::TrialSet;
 
@@ -6,40 +6,44 @@ use super::{
     Champion, CheckpointError, Digest, Evolution, GenerationSummary, Population, Reevaluation, Told,
 };
 
-/// A generation that evolution has gone through again.
+/// A repeated generation.
 #[derive(Debug)]
 pub struct Replay<'a> {
-    /// What came of it.
+    /// Its summary.
     pub summary: GenerationSummary,
-    /// What was evaluated: the generation, then each block of the re-evaluation after it.
+    /// Its evaluations: the generation, then each block of the re-evaluation after it.
     pub rounds: Vec<Round<'a>>,
 }
 
-/// Genotypes that were evaluated at once.
+/// Genotypes that were evaluated together.
 #[derive(Debug, Clone)]
 pub struct Round<'a> {
-    /// Which worlds and noise.
+    /// The trials.
     pub trial_set: TrialSet,
     /// The genotypes.
     pub genotypes: Population,
-    /// Of each its fitness in every trial, as it was told.
+    /// The recorded fitness of each genotype in every trial; shape `[genotype][trial]`.
     pub trial_fitness: &'a [Vec<f64>],
 }
 
-/// How a run stands after its latest generation.
+/// The result of a run after its latest generation.
 #[derive(Debug)]
 pub struct Outcome<'a> {
     /// The champion, with its judgement if the run is over.
     pub champion: Option<Champion>,
     /// The last link of the digest chain that covers everything.
     pub digest: Digest,
-    /// What was evaluated because the run was over.
+    /// The evaluations at the end of the run.
     pub rounds: Vec<Round<'a>>,
 }
 
 impl Evolution {
-    /// Goes through a generation again. What was evaluated at the end of a run changes
-    /// nothing.
+    /// Repeats a recorded generation and its re-evaluation. Evaluations at the end of a run do
+    /// not change evolution.
+    ///
+    /// # Errors
+    ///
+    /// If `told` does not fit this state, or has no finite fitness.
     pub fn replay<'a>(&mut self, told: &'a Told) -> Result<Replay<'a>, CheckpointError> {
         let generation = self.ask();
         let misfit = CheckpointError::Misfit { generation: generation.index };
@@ -59,8 +63,12 @@ impl Evolution {
         Ok(Replay { summary, rounds })
     }
 
-    /// How the run stood after the latest generation, if that was its last one. `told`: what
-    /// was told of that.
+    /// The result of the run, if the latest generation is its last one. `told`: the entry of that
+    /// generation.
+    ///
+    /// # Errors
+    ///
+    /// If the end in `told` does not fit this state.
     pub fn outcome<'a>(&self, told: &'a Told) -> Result<Outcome<'a>, CheckpointError> {
         let generation = self.n_generations().saturating_sub(1);
         let misfit = || CheckpointError::Misfit { generation };
@@ -86,7 +94,7 @@ impl Evolution {
         Ok(Outcome { champion: Some(champion), digest, rounds })
     }
 
-    /// Goes through a re-evaluation again; none if its blocks are not those of one.
+    /// Repeats a re-evaluation; `None` if the blocks do not fit one.
     fn repeat<'a>(
         &self,
         blocks: &'a [Vec<Vec<f64>>],

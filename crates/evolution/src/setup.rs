@@ -1,5 +1,4 @@
-//! An evolution without an experiment file: any function of genes in \[0, 1\] can
-//! be maximised.
+//! Evolution without an experiment file, which maximises any function of genes in \[0, 1\].
 
 use std::fmt;
 
@@ -7,32 +6,32 @@ use experiment_file::{AlgorithmDescription, Params};
 
 use super::{ALGORITHMS, Algorithm, Digest, Evolution};
 
-/// What to evolve, and by which algorithm.
+/// The algorithm and the shape of an evolution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
     /// Name of the algorithm, as in experiment files.
     pub algorithm: String,
-    /// Its parameters; those that are absent have their defaults.
+    /// Its parameters; absent ones have their defaults.
     pub params: Params,
-    /// Genes of a genotype, at least 1.
+    /// Number of genes of a genotype, at least 1.
     pub n_genes: usize,
-    /// Genotypes per generation.
+    /// Number of genotypes per generation; each algorithm has a minimum.
     pub population_size: u32,
     /// Seed of all random draws.
     pub seed: u64,
 }
 
-/// Everything that is wrong with a [`Setup`], one sentence each; never empty. The
-/// caller has to change the setup.
+/// All mistakes of a [`Setup`], one sentence each; never empty. The caller has to change the
+/// setup.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct SetupError {
-    /// What is wrong, and what would be right.
+    /// Each mistake, and the allowed values.
     pub problems: Vec<String>,
 }
 
 impl Setup {
-    /// `n_genes` genes, evolved by the algorithm of this name with its default
-    /// parameters: 20 individuals per generation, seed 0.
+    /// A setup for `n_genes` genes and the algorithm of this name, with its default parameters,
+    /// 20 individuals per generation and seed 0.
     pub fn new(algorithm: &str, n_genes: usize) -> Self {
         Self {
             algorithm: algorithm.to_owned(),
@@ -43,13 +42,21 @@ impl Setup {
         }
     }
 
-    /// Whether it can start, before anything takes memory.
+    /// Checks the setup, without taking memory for it.
+    ///
+    /// # Errors
+    ///
+    /// If the algorithm or a parameter is unknown, or if a value is not allowed.
     pub fn check(&self) -> Result<(), SetupError> {
         let problems = self.problems();
         if problems.is_empty() { Ok(()) } else { Err(SetupError { problems }) }
     }
 
     /// The evolution before its first generation.
+    ///
+    /// # Errors
+    ///
+    /// As [`check`](Self::check).
     pub fn start(&self) -> Result<Evolution, SetupError> {
         self.check()?;
         let algorithm = Algorithm::new(&self.algorithm, &self.params, self.n_genes);
@@ -58,8 +65,7 @@ impl Setup {
         Ok(Evolution::from_parts(self.seed, size, vec![population], Digest::of_text(&self.text())))
     }
 
-    /// The same rules as the reader's of experiment files, from the same
-    /// descriptions.
+    /// The mistakes of the setup, by the rules of experiment files, from the same descriptions.
     fn problems(&self) -> Vec<String> {
         let Some(algorithm) = AlgorithmDescription::find(ALGORITHMS, &self.algorithm) else {
             let known: Vec<&str> = ALGORITHMS.iter().map(|algorithm| algorithm.name).collect();
@@ -92,7 +98,7 @@ impl Setup {
         problems
     }
 
-    /// All of it as text, for the digest.
+    /// The whole setup as text, for the digest.
     fn text(&self) -> String {
         let Self { algorithm, params, n_genes, population_size, seed } = self;
         let mut text = format!("{algorithm}\n{n_genes}\n{population_size}\n{seed}\n");

@@ -1,21 +1,20 @@
-//! When evolution learns nothing: fitness that tells nobody apart, and distributions that have
-//! become as narrow as a point or far wider than the genes' range.
+//! Detects evolution that learns nothing: equal fitness of all individuals, and distributions
+//! that are as narrow as a point or far wider than the genes' range.
 //!
-//! Nothing of it changes a bit of a run. It is what a run is told in words, and what ends one
-//! that goes on by chance alone.
+//! It changes no bit of a run. It writes notices, and ends a run that continues by chance alone.
 
 use super::{
     Evolution, EvolutionError, Generation, GenerationSummary, Told, algorithms::Strategy as _,
     means,
 };
 
-/// How many of the latest generations told nobody apart. It is no part of the state, so all of
-/// them are equal; whoever restores one counts again, in what the generations were told.
+/// The number of latest generations in which all individuals had equal fitness. It is not part of
+/// the state, so comparisons ignore it; a restored state counts again in the fitness log.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct FlatGenerations(pub u64);
 
 impl FlatGenerations {
-    /// After another generation.
+    /// The number after another generation.
     pub fn next(self, is_flat: bool) -> Self {
         if is_flat { Self(self.0 + 1) } else { Self(0) }
     }
@@ -27,29 +26,31 @@ impl PartialEq for FlatGenerations {
     }
 }
 
-/// So many generations without a difference are worth a word, and so are ten times as many.
+/// After this many generations without a difference there is a notice, and again after ten times
+/// as many.
 const FLAT_MIN: u64 = 10;
 
-/// After so many generations without a difference, a distribution that is wider than
-/// [`DEVIATION_MAX`] ends the run.
+/// After this many generations without a difference, a distribution wider than [`DEVIATION_MAX`]
+/// ends the run.
 const FLAT_MAX: u64 = 100;
 
-/// So many generations are enough to count of those before a state that is restored: more than
-/// decide whether a run ends.
+/// Number of generations before a restored state to look at when counting: more than the number
+/// that ends a run.
 pub const FLAT_COUNTED_MAX: u64 = 10 * FLAT_MAX;
 
-/// Deviations of genes, whose range is 1, of which nothing comes back: individuals are drawn
-/// from all of the range alike, wherever the mean is.
+/// Deviation of genes, whose range is 1, from which evolution cannot recover: individuals are
+/// drawn uniformly from the range, wherever the mean is.
 const DEVIATION_MAX: f64 = 1e6;
 
-/// Deviations that are worth a word because all individuals are alike.
+/// Deviations below this lead to a notice, because all individuals are alike.
 const DEVIATION_NARROW: f64 = 1e-9;
 
-/// Deviations that are worth a word because individuals are drawn from all of the range alike.
+/// Deviations above this lead to a notice, because individuals are drawn uniformly from the
+/// range.
 const DEVIATION_WIDE: f64 = 1e3;
 
-/// Evolution that learns nothing and whose distribution has been driven out of all bounds by
-/// chance.
+/// Evolution learns nothing, and chance has made its distribution far wider than the genes'
+/// range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "all individuals had the same fitness {fitness} in each of the last {n_generations} generations, \
@@ -57,22 +58,22 @@ const DEVIATION_WIDE: f64 = 1e3;
      nothing can be learnt from here: let the task tell individuals apart, and submit it again"
 )]
 pub struct Drifted {
-    /// Fitness of everybody.
+    /// The fitness of all individuals.
     pub fitness: f64,
-    /// Generations without a difference.
+    /// Number of generations without a difference.
     pub n_generations: u64,
     /// The widest of the genes' deviations.
     pub deviation: f64,
 }
 
-/// What came of a generation of a run.
+/// The result of learning from a generation of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learnt {
-    /// Its fitness in short.
+    /// The summary of its fitness.
     pub summary: GenerationSummary,
-    /// What is worth a word.
+    /// Notices for people.
     pub notices: Vec<String>,
-    /// Why it is the last one, if it is; empty: all are done.
+    /// Why it is the last generation, if it is; empty if all generations are done.
     pub completed: Option<String>,
 }
 
@@ -83,8 +84,8 @@ impl Told {
     }
 }
 
-/// Whether a generation of this fitness tells nobody apart. One individual alone is not told apart
-/// from others anyway.
+/// Whether all individuals of a generation have equal fitness. False for a single individual,
+/// which has no others to differ from.
 pub(crate) fn is_flat(fitness: &[f64]) -> bool {
     fitness.len() > 1 && fitness.iter().all(|each| each.is_finite() && *each == fitness[0])
 }
@@ -95,16 +96,19 @@ impl Evolution {
         self.n_flat.0
     }
 
-    /// Sets the number of latest generations without a difference, which no state that is read
-    /// has.
+    /// Sets the number of latest generations without a difference, which restored states lack.
     #[must_use]
     pub fn after_flat(self, n_generations: u64) -> Self {
         Self { n_flat: FlatGenerations(n_generations), ..self }
     }
 
-    /// Learns from a generation as [`tell`](Self::tell) does, for whoever computes a run: with
-    /// what is worth a word, and an error where the run should end because nothing can be learnt
-    /// any more; evolution is of no use after it. `completion`: why the generation is the last one.
+    /// Learns from a generation as [`tell`](Self::tell) does, for programs that compute a run:
+    /// also returns notices. `completion`: returns why the generation is the last one, if it is.
+    ///
+    /// # Errors
+    ///
+    /// As [`tell`](Self::tell), and if the run should end because evolution can no longer learn
+    /// anything. After an error, the evolution is of no use.
     pub fn learn(
         &mut self,
         generation: Generation,
@@ -128,14 +132,14 @@ impl Evolution {
         Ok(Learnt { summary, notices, completed })
     }
 
-    /// The largest of the genes' standard deviations in distributions; none without one.
+    /// The largest standard deviation of a gene in any distribution; `None` without one.
     pub(crate) fn widest(&self) -> Option<f64> {
         let of_each = self.populations.iter().filter_map(|population| population.deviations());
         of_each.flatten().reduce(f64::max)
     }
 
-    /// What is worth a word after a generation. `widest_before`: [`widest`](Self::widest) before
-    /// it; `is_last`: whether it is the last one of the run.
+    /// The notices after a generation. `widest_before`: [`widest`](Self::widest) before it;
+    /// `is_last`: whether it is the last one of the run.
     pub(crate) fn remarks(
         &self,
         widest_before: Option<f64>,
@@ -178,7 +182,7 @@ impl Evolution {
         )
     }
 
-    /// Why a run should end that learns nothing; none if it may go on.
+    /// Why a run that learns nothing should end; `None` if it may continue.
     pub(crate) fn drifted(&self, summary: &GenerationSummary) -> Option<Drifted> {
         let n_generations = summary.n_flat;
         let deviation = self.widest().filter(|&deviation| deviation > DEVIATION_MAX)?;

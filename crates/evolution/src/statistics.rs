@@ -1,12 +1,12 @@
-//! Means and deviations of fitness: of finite values they are finite, however large.
+//! Means and deviations of fitness, which are finite for finite values, however large.
 
 use super::{Real, mean};
 
-/// What values are divided by before sums of their squares, where those overflow: a power of
-/// two, so nothing is rounded but what is too small to count.
+/// Divisor of values before summing squares that would overflow: a power of two, so that only
+/// negligible values lose bits.
 const SCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
-/// Over the individuals whose fitness is finite; there is at least one.
+/// Statistics over the individuals with finite fitness, at least one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Statistics {
     /// Largest fitness.
@@ -24,7 +24,7 @@ impl Statistics {
     ///
     /// # Panics
     ///
-    /// If there is none.
+    /// If no value is finite.
     pub fn from_fitness(fitness: &[f64]) -> Self {
         let finite: Vec<f64> = fitness.iter().copied().filter(|value| value.is_finite()).collect();
         let expected = "a generation without finite fitness fails before";
@@ -46,7 +46,7 @@ pub(crate) fn bounds(values: &[f64]) -> (f64, f64) {
     })
 }
 
-/// The mean; none without values or if one is not finite. Sums run in order.
+/// The mean, summed in order; `None` without values, or if one is not finite.
 pub fn finite_mean(values: &[f64]) -> Option<Real> {
     if values.is_empty() || values.iter().any(|value| !value.is_finite()) {
         return None;
@@ -83,7 +83,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// Every finite number, the extreme ones among them often.
+    /// All finite numbers, extreme ones often.
     pub(crate) fn any_finite() -> impl Strategy<Value = f64> {
         let extreme = [0.0, -0.0, f64::MAX, f64::MIN, 5e-324, -5e-324, 1e308, 1.0, f64::EPSILON];
         prop_oneof![
@@ -95,7 +95,7 @@ pub(crate) mod tests {
         ]
     }
 
-    /// As they were computed before anything was scaled.
+    /// The same statistics without scaling.
     fn plain(values: &[f64]) -> (f64, f64) {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();

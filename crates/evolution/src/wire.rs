@@ -1,24 +1,25 @@
-//! Values as bytes and back: a byte for the version of the format, and the rest as postcard has it.
+//! Encodes values as bytes, and decodes them: a byte for the version of the format, and the rest
+//! in the format of postcard.
 //!
-//! What is read may be anything. A list takes a byte where it is written and 24 where it is
-//! read, so a stranger's few bytes would take the memory of many: the number of such bytes
-//! is bounded. Numbers with a fraction take as many bytes in either place.
+//! The bytes may come from strangers. An empty list takes one byte when encoded, and 24 in
+//! memory, so a few bytes could take much memory: the decoder bounds the number of such bytes.
+//! Floating-point numbers take equally many bytes in both forms.
 
 use postcard::{Deserializer, de_flavors::Flavor};
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::CheckpointError;
 
-/// Most lists, options and whole numbers of a value all together: more than a state of
-/// evolution has with the most individuals that there may be, in forty populations.
+/// Most lists, options and integers in a value: more than a state of evolution has with the
+/// largest number of individuals, in forty populations.
 const SMALL_MAX: usize = 4 << 20;
 
-/// A value in this version of its format.
+/// Encodes a value in this version of its format.
 pub(crate) fn encode(version: u8, value: &impl Serialize) -> Vec<u8> {
     postcard::to_extend(value, vec![version]).expect("numbers and lists serialise")
 }
 
-/// Reads what [`encode`] wrote.
+/// Reads the bytes of [`encode`].
 pub(crate) fn decode<T: DeserializeOwned>(
     supported: u8,
     bytes: &[u8],
@@ -41,7 +42,7 @@ fn decode_at_most<T: DeserializeOwned>(
     }
 }
 
-/// Bytes to be read, of which so many more may be the last ones of a length or a whole number.
+/// Bytes to read, with a budget for the remaining number of lengths and integers.
 struct Metered<'a> {
     rest: &'a [u8],
     n_small: usize,
@@ -54,7 +55,7 @@ impl<'a> Flavor<'a> for Metered<'a> {
     fn pop(&mut self) -> postcard::Result<u8> {
         let (&byte, rest) =
             self.rest.split_first().ok_or(postcard::Error::DeserializeUnexpectedEnd)?;
-        // Of a number's bytes all but the last one have the highest bit.
+        // All bytes of a number except the last one have the highest bit set.
         if byte < 0x80 {
             self.n_small =
                 self.n_small.checked_sub(1).ok_or(postcard::Error::DeserializeBadEncoding)?;
@@ -97,7 +98,7 @@ mod tests {
     fn the_number_of_lists_is_bounded_and_that_of_their_numbers_is_not() {
         let lists = |n_lists: usize, len: usize| encode(1, &vec![vec![0.5; len]; n_lists]);
         let read = |n, bytes: &[u8]| decode_at_most::<Vec<Vec<f64>>>(n, 1, bytes);
-        // The length of the whole list is a number, too.
+        // The length of the whole list counts as a number, too.
         assert_eq!(read(8, &lists(7, 1000)).unwrap().len(), 7);
         assert!(matches!(read(8, &lists(8, 0)), Err(CheckpointError::Malformed(_))));
         let hostile = encode(1, &vec![Vec::<f64>::new(); SMALL_MAX]);

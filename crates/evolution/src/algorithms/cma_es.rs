@@ -20,10 +20,10 @@ use super::{
 
 /// A Gaussian with mean m and covariance sigma^2 C, of points x in all of R^d.
 ///
-/// Bounds: x stands for the genotype into which it is mirrored, so the algorithm
-/// maximises a function on R^d that has none. (If clipped points were learnt
-/// from, C would lose the directions in which they were clipped, and the search
-/// would end on a face of the cube where nothing is optimal.)
+/// Bounds: a point x stands for the genotype into which it is mirrored, so the algorithm
+/// maximises a function on R^d without bounds. (Learning from clipped points would make C lose
+/// the clipped directions, and the search would end on a face of the cube, away from the
+/// optimum.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CmaEs {
     mean: Vec<f64>,
@@ -31,8 +31,7 @@ pub struct CmaEs {
     cumulation: Cumulation,
 }
 
-/// Smallest eigenvalue of C, relative to the largest, that sampling tells from
-/// rounding.
+/// Smallest eigenvalue of C, relative to the largest; smaller ones would vanish in rounding.
 const EIGENVALUE_RATIO_MIN: f64 = 1e-14;
 
 impl Described for CmaEs {

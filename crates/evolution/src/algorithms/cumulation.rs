@@ -1,18 +1,17 @@
-//! What CMA-ES and sep-CMA-ES have in common: evolution paths and the cumulative
-//! adaptation of the step size.
+//! The common part of CMA-ES and sep-CMA-ES: evolution paths and the cumulative adaptation of the
+//! step size.
 //!
 //! Hansen: "The CMA evolution strategy: a tutorial", arXiv 1604.00772; equation
 //! numbers are its own.
 
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of a gene below which no variant goes, so that sampled
-/// genes still differ from the mean by more than rounding. The step size, being
-/// that of a cube of side 1, ends at 1.
+/// Smallest standard deviation of a gene in both variants, so that sampled genes differ from the
+/// mean by more than rounding. The step size is at most 1, the side of the cube.
 pub const DEVIATION_MIN: f64 = 1e-10;
 
-/// Largest variance of C. Beyond it, sums of squares would overflow in the decomposition; selection
-/// that always takes the farthest drives C there.
+/// Largest variance of C, because sums of squares would overflow in the decomposition. Selection
+/// that always takes the farthest individual drives C there.
 pub const VARIANCE_MAX: f64 = 1e150;
 
 /// Learning rates, for d genes and a population of lambda.
@@ -20,15 +19,15 @@ pub const VARIANCE_MAX: f64 = 1e150;
 pub struct Rates {
     /// Variance-effective number of parents.
     pub mu_eff: f64,
-    /// Of the step size's path.
+    /// Learning rate of the step size's path.
     pub c_sigma: f64,
     /// Damping of the step size.
     pub d_sigma: f64,
-    /// Of the covariance's path.
+    /// Learning rate of the covariance's path.
     pub c_c: f64,
-    /// Of the rank-one update.
+    /// Learning rate of the rank-one update.
     pub c_1: f64,
-    /// Of the rank-mu update.
+    /// Learning rate of the rank-mu update.
     pub c_mu: f64,
 }
 
@@ -54,10 +53,10 @@ impl Cumulation {
         }
     }
 
-    /// Eq. 43 to 45, then sigma is put back into its bounds. `y_mean`: the
-    /// weighted mean of the parents' steps in units of sigma; `z_mean`: the same
-    /// multiplied by C^(-1/2). Returns delta(h_sigma), the share of variance that
-    /// a stalled path owes the rank-one update.
+    /// Eq. 43 to 45, with sigma clipped to its bounds. `y_mean`: the weighted mean of the
+    /// parents' steps in units of sigma; `z_mean`: the same multiplied by C^(-1/2). Returns
+    /// delta(h_sigma), the share of variance that the rank-one update lacks while its path is
+    /// stalled.
     pub fn update(&mut self, rates: &Rates, y_mean: &[f64], z_mean: &[f64]) -> f64 {
         self.n_updates += 1;
         let (c_sigma, c_c) = (rates.c_sigma, rates.c_c);

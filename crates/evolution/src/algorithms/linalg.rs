@@ -1,15 +1,15 @@
 //! Matrices: storage of symmetric ones, eigendecomposition, products.
 //!
-//! Every result is the same bits on every machine. Of nalgebra only operations
-//! are used that consist of +, -, *, / and square roots in a fixed order: it is
-//! built without its `matrixmultiply` kernels, which choose instructions by the
-//! processor, and with `libm-force`. Products of matrices are made of products
-//! with vectors, which never reach such kernels, whatever features are on.
+//! Every result has the same bits on every machine. This module uses only those operations of
+//! nalgebra that consist of +, -, *, / and square roots in a fixed order. nalgebra is built
+//! without its `matrixmultiply` kernels, which choose instructions by the processor, and with
+//! `libm-force`. Products of matrices consist of products with vectors, which never reach such
+//! kernels, whatever features are on.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
-/// A symmetric matrix: rows of its lower triangle.
+/// A symmetric matrix, stored as the rows of its lower triangle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Symmetric(Vec<Vec<f64>>);
 
@@ -26,7 +26,7 @@ impl Symmetric {
         identity
     }
 
-    /// Multiplies every entry.
+    /// Multiplies every entry by `factor`.
     pub fn scale(&mut self, factor: f64) {
         self.0.iter_mut().flatten().for_each(|entry| *entry *= factor);
     }
@@ -48,12 +48,12 @@ impl Symmetric {
         }
     }
 
-    /// Whether no entry is larger, with or without its sign.
+    /// Whether the absolute value of every entry is at most `max`.
     pub fn is_within(&self, max: f64) -> bool {
         self.0.iter().flatten().all(|entry| entry.abs() <= max)
     }
 
-    /// All entries.
+    /// The full matrix.
     pub fn to_dense(&self) -> DMatrix<f64> {
         let n = self.0.len();
         DMatrix::from_fn(n, n, |i, j| self.0[i.max(j)][i.min(j)])
@@ -65,30 +65,28 @@ impl Symmetric {
 pub struct Eigen {
     /// V; column k belongs to the k-th eigenvalue.
     pub vectors: DMatrix<f64>,
-    /// In no particular order.
+    /// The eigenvalues, in no particular order.
     pub values: DVector<f64>,
 }
 
-/// Iterations per row before the eigendecomposition gives up; two suffice as a
-/// rule.
+/// Most iterations per row of the eigendecomposition; two usually suffice.
 const ITERATIONS_PER_ROW: usize = 100;
 
 impl Eigen {
     /// Decomposes a symmetric matrix of finite numbers.
     ///
-    /// Absolute error of the eigenvalues: about 1e-15 of the largest. Should the
-    /// iteration not converge, which is not known to happen, the result is the
-    /// matrix's diagonal: worse, but deterministic, and no endless loop.
+    /// The absolute error of the eigenvalues is about 1e-15 of the largest. If the iteration does
+    /// not converge, which has never been seen, the result is the matrix's diagonal: worse, but
+    /// deterministic and finite.
     pub fn new(matrix: &DMatrix<f64>) -> Self {
         Self::within(matrix, ITERATIONS_PER_ROW * matrix.nrows())
     }
 
     fn within(matrix: &DMatrix<f64>, n_iterations_max: usize) -> Self {
         let n = matrix.nrows();
-        // nalgebra iterates until what is left beside the diagonal is small against
-        // the diagonal next to it. Where that is zero it goes on until squares
-        // underflow, and divides zero by zero. The shift makes it compare with the
-        // norm of the matrix.
+        // nalgebra iterates until the off-diagonal entries are small against their neighbours on
+        // the diagonal. If those are zero, it iterates until squares underflow, and divides zero
+        // by zero. The shift makes it compare with the norm of the matrix instead.
         let shift = 2.0 * matrix.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
         let mut shifted = matrix.clone();
         for i in 0..n {
@@ -157,7 +155,7 @@ mod tests {
         }
     }
 
-    /// Without the shift some of these decompose to NaN.
+    /// Without the shift, some of these matrices decompose to NaN.
     #[test]
     fn sparse_matrices_of_low_rank_decompose() {
         let n = 33;
@@ -200,8 +198,8 @@ mod tests {
         assert!((product(&a, &b) - a * b).amax() < 1e-14);
     }
 
-    /// Minted on x86-64 with fused multiply-add, which must not be used; a new
-    /// version of nalgebra that changes them changes runs by xNES and CMA-ES.
+    /// These bits come from an x86-64 machine with fused multiply-add, which the code must not
+    /// use. A version of nalgebra that changes them changes runs by xNES and CMA-ES.
     #[test]
     fn the_bits_of_a_decomposition_are_fixed() {
         let a = random_factor(30, 30);

@@ -1,10 +1,8 @@
-//! The evolutionary algorithms, all behind one interface: draw a generation,
-//! learn from its fitness.
+//! The evolutionary algorithms, behind one interface: draw a generation, learn from its fitness.
 //!
-//! An algorithm is one file, which implements [`Strategy`] and [`Described`], and
-//! one row of the registry at the end of the declarations below. Its names,
-//! parameters and limits in experiment files, in their JSON Schema and in
-//! `docs/algorithms.md` follow from its description.
+//! An algorithm is one file, which implements [`Strategy`] and [`Described`], and one row of the
+//! registry below. Its names, parameters and limits in experiment files, in their JSON Schema and
+//! in `docs/algorithms.md` follow from its description.
 
 mod cma_es;
 mod cumulation;
@@ -38,8 +36,8 @@ macro_rules! registry {
             &[$(<$module::$name as Described>::DESCRIPTION,)*];
 
         impl Algorithm {
-            /// The algorithm of this name at its start; none if there is none.
-            /// `d`: genes of the population, at least 1.
+            /// The algorithm of this name before its first generation; `None` if no algorithm has
+            /// this name. `d`: number of genes of the population, at least 1.
             pub fn new(name: &str, params: &Params, d: usize) -> Option<Self> {
                 $(if name == <$module::$name as Described>::DESCRIPTION.name {
                     return Some(Self::$name(Described::start(params, d)));
@@ -47,7 +45,7 @@ macro_rules! registry {
                 None
             }
 
-            /// The largest of what it keeps between generations.
+            /// The largest part of its state between generations.
             pub fn keeps(&self) -> Keeps {
                 match self {
                     $(Self::$name(_) => <$module::$name as Described>::DESCRIPTION.keeps,)*
@@ -84,16 +82,15 @@ registry! {
     openai_es::OpenAiEs,
 }
 
-/// What an algorithm draws for one generation.
+/// The draws of an algorithm for one generation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
-    /// Genes of each individual, within \[0, 1\].
+    /// Genes of each individual, within \[0, 1\]; shape `[individual][gene]`.
     pub genotypes: Population,
-    /// The standard normal draws behind each individual, for algorithms that
-    /// learn from those; else empty.
+    /// The standard normal draws behind each individual, for algorithms that learn from them;
+    /// otherwise empty.
     pub normals: Vec<Vec<f64>>,
-    /// What correlation makes of the normals, for algorithms that learn from
-    /// both; else empty.
+    /// The correlated normals, for algorithms that learn from both; otherwise empty.
     pub steps: Vec<Vec<f64>>,
 }
 
@@ -104,10 +101,10 @@ impl Sample {
     }
 }
 
-/// An algorithm between two generations. Its state is plain numbers: whoever
-/// restores it draws and learns the same bits.
+/// An algorithm between two generations. Its state is plain numbers; a restored state draws and
+/// learns the same bits.
 pub trait Strategy {
-    /// Genes of an individual.
+    /// Number of genes of an individual.
     fn n_genes(&self) -> usize;
 
     /// The mean of the distribution, if the algorithm has one.
@@ -115,7 +112,7 @@ pub trait Strategy {
         None
     }
 
-    /// The standard deviation of every gene, before it is put back into \[0, 1\], if the
+    /// The standard deviation of every gene, before clipping or mirroring to \[0, 1\], if the
     /// algorithm has a distribution.
     fn deviations(&self) -> Option<Vec<f64>> {
         None
@@ -125,14 +122,14 @@ pub trait Strategy {
     /// the stream.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample;
 
-    /// Whether [`individual`](Self::individual) draws.
+    /// Whether [`individual`](Self::individual) returns individuals.
     fn draws_one_by_one(&self) -> bool {
         false
     }
 
-    /// The individual of this index, below `population_size`, of the sample that
-    /// [`sample`](Self::sample) draws from the same stream; none where one is not drawn
-    /// without the others.
+    /// The individual of this index, below `population_size`, in the sample that
+    /// [`sample`](Self::sample) draws from the same stream; `None` if the algorithm cannot draw
+    /// an individual without the others.
     fn individual(
         &self,
         _index: usize,
@@ -142,8 +139,8 @@ pub trait Strategy {
         None
     }
 
-    /// From whom the individuals come that [`sample`](Self::sample) draws from the same
-    /// stream; none if they have no parents.
+    /// The births of the individuals that [`sample`](Self::sample) draws from the same stream;
+    /// `None` if they have no parents.
     fn births(&self, _population_size: usize, _rng: &mut Stream) -> Option<Vec<Birth>> {
         None
     }
@@ -151,13 +148,13 @@ pub trait Strategy {
     /// Learns from a generation that [`sample`](Self::sample) drew from this
     /// state.
     ///
-    /// `fitness`: one value per individual; at least one is finite. `ranking`:
-    /// indices of the individuals, best first, those whose fitness is not finite
-    /// last (see [`ranking`](super::ranking::ranking)).
+    /// `fitness`: one value per individual; at least one is finite. `ranking`: indices of the
+    /// individuals, best first, those without finite fitness last (see
+    /// [`ranking`](super::ranking::ranking)).
     fn learn(&mut self, sample: &Sample, ranking: &[usize], fitness: &[f64]);
 }
 
-/// What makes an algorithm known to experiment files.
+/// The description of an algorithm for experiment files.
 pub trait Described: Strategy {
     /// Its name, parameters and limits.
     const DESCRIPTION: AlgorithmDescription;

@@ -32,7 +32,8 @@ pub struct OpenAiEs {
 /// Adam's epsilon.
 const EPSILON: f64 = 1e-8;
 
-/// A decay of 1 would never forget, and its correction divides by zero.
+/// Largest decay: with a decay of 1, Adam would never forget, and its correction would divide by
+/// zero.
 const DECAY_MAX: f64 = 1.0 - f64::EPSILON;
 
 const SIGMA: Parameter =
@@ -94,9 +95,9 @@ impl Strategy for OpenAiEs {
         Some(&self.mu)
     }
 
-    /// g_2k = clip(mu + sigma * e_k), g_2k+1 = clip(mu - sigma * e_k),
-    /// e_k ~ N(0, I). The last individual of an odd population is mu itself: it
-    /// takes its place in the ranking and adds nothing to the gradient.
+    /// g_2k = clip(mu + sigma * e_k), g_2k+1 = clip(mu - sigma * e_k), e_k ~ N(0, I). The last
+    /// individual of an odd population is mu itself: it has a rank and adds nothing to the
+    /// gradient.
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let d = self.mu.len();
         let mut normals = Vec::with_capacity(population_size);

@@ -86,9 +86,8 @@ impl Strategy for Snes {
         Some(self.genotype(&draw_normal(index, self.mu.len(), rng)))
     }
 
-    /// mu += eta_mu * sigma * sum_i u_i s_i;
-    /// sigma *= exp(eta_sigma / 2 * sum_i u_i (s_i^2 - 1)).
-    /// The draws enter as they were, not as clipping left them.
+    /// mu += eta_mu * sigma * sum_i u_i s_i; sigma *= exp(eta_sigma / 2 * sum_i u_i (s_i^2 - 1)).
+    /// The draws enter without clipping.
     fn learn(&mut self, sample: &Sample, ranking: &[usize], _fitness: &[f64]) {
         let d = self.mu.len();
         let mut gradient_mu = vec![0.0; d];

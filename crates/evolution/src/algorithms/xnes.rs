@@ -33,8 +33,8 @@ pub struct Xnes {
     eta_b: f64,
 }
 
-/// Largest entry of B. An update that would make an entry larger is left out, so
-/// that genes stay finite; this takes learning rates far above the defaults.
+/// Largest absolute entry of B. An update that would exceed it is skipped, so that genes stay
+/// finite; this happens only with learning rates far above the defaults.
 const SHAPE_MAX: f64 = 1e100;
 
 const ETA_SIGMA: Parameter = Parameter::computed(
@@ -49,9 +49,9 @@ const ETA_B: Parameter = Parameter::computed(
 );
 /// The name of the faster rates.
 const FAST: &str = "fast";
-/// Rates that the paper states for both; a step size that learns as fast as SNES's deviations,
-/// and a shape twice as fast as the paper's. It came later than files without it, so the
-/// canonical form leaves it out where it is absent.
+/// Chooses between the paper's rates and faster ones: a step size that learns as fast as SNES's
+/// deviations, and a shape that learns twice as fast as the paper's. The canonical form omits an
+/// absent key, because older files lack it.
 const RATES: Parameter = Parameter::of(
     "rates",
     Domain::OneOf { names: &["paper", FAST], unsupported: &[] },

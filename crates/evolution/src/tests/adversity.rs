@@ -1,5 +1,5 @@
-//! Fitness that means nothing, or the worst: no algorithm panics, leaves the genes' range or
-//! keeps silent.
+//! Meaningless and adversarial fitness: no algorithm panics, leaves the genes' range or fails
+//! silently.
 
 use super::*;
 
@@ -33,7 +33,7 @@ fn flat(_: u64, genotypes: &[Genotype]) -> Vec<f64> {
     vec![0.25; genotypes.len()]
 }
 
-/// What an algorithm is made for.
+/// The easy case for which algorithms are made.
 fn sphere(_: u64, genotypes: &[Genotype]) -> Vec<f64> {
     of_each(genotypes, |genes| -genes.iter().map(|gene| (gene - 0.3) * (gene - 0.3)).sum::<f64>())
 }
@@ -83,7 +83,7 @@ fn no_fitness_makes_an_algorithm_panic_or_leave_the_range_of_genes() {
     }
 }
 
-/// The remarks of so many generations, and whether the run would have ended.
+/// The notices of a number of generations, and whether the run would have ended.
 fn remarks(
     evolution: &mut Evolution,
     n_generations: u64,
@@ -135,7 +135,7 @@ fn a_distribution_that_chance_has_driven_out_of_all_bounds_ends_the_run() {
     let drifted = drifted.expect("the deviations of xNES grow without bound");
     assert!(drifted.n_generations >= 100 && drifted.deviation > 1e6, "{drifted}");
     assert!(remarks.iter().any(|remark| remark.contains("it is drawn at random")), "{remarks:?}");
-    // The same deviations with fitness that tells individuals apart are no reason to end it.
+    // The same deviations do not end a run whose fitness differs between individuals.
     let mut wide = started("xNES", 6);
     for generation in 0..drifted.n_generations {
         let asked = wide.ask();

@@ -1,20 +1,18 @@
-//! Every algorithm finds the optima that it should, within a budget: the median
-//! of 11 seeds reaches the target. Budgets are about one and a half times what
-//! was measured.
+//! Every algorithm finds the optima that it should, within a budget: the median of 11 seeds
+//! reaches the target. Budgets are about one and a half times the measured numbers.
 
 use super::*;
 
-/// A function to be minimised over the unit cube; its minimum is 0 and not at the
-/// centre.
+/// A function to minimise over the unit cube; its minimum is 0 and not at the centre.
 #[derive(Debug, Clone, Copy)]
 enum Function {
     /// sum x_i^2
     Sphere,
     /// sum 10^(6 i/(d - 1)) x_i^2
     Ellipsoid,
-    /// The ellipsoid along other axes than the genes', its minimum near a corner.
+    /// The ellipsoid along rotated axes, with its minimum near a corner.
     Rotated,
-    /// The ellipsoid, its minimum on faces of the cube.
+    /// The ellipsoid with its minimum on faces of the cube.
     Edge,
     /// sum 100 (x_(i+1) - x_i^2)^2 + (1 - x_i)^2
     Rosenbrock,
@@ -37,7 +35,7 @@ impl Function {
             Sphere => scaled(10.0, 0.7).iter().map(|x| x * x).sum(),
             Ellipsoid => ellipsoid(&scaled(10.0, 0.7)),
             Rotated => {
-                // A reflection turns every axis just as well.
+                // A reflection changes every axis, as a rotation does.
                 let mut x = scaled(10.0, 0.9);
                 let mean = x.iter().sum::<f64>() / x.len() as f64;
                 x.iter_mut().for_each(|x| *x -= 2.0 * mean);
@@ -62,8 +60,8 @@ impl Function {
     }
 }
 
-/// What must be found, by how many individuals per generation, to what distance
-/// from the minimum, in how many evaluations.
+/// A function, the number of individuals per generation, the target distance from the minimum,
+/// and the budget of evaluations.
 struct Case {
     function: Function,
     d: usize,
@@ -102,7 +100,7 @@ fn assert_converges(name: &str, params: &Params, cases: &[Case]) {
     for case in cases {
         let algorithm = Algorithm::new(name, params, case.d).unwrap();
         let start = evolution_of(vec![algorithm], case.population_size);
-        // The median is within the budget as soon as six of the seeds are.
+        // The median is within the budget if six of the eleven seeds are.
         let within = |seed: &u64| n_evaluations(case, &start, *seed) <= case.budget;
         let n_within = (0..11).filter(within).take(6).count();
         assert_eq!(n_within, 6, "{name} on {:?} in {}", case.function, case.d);
@@ -193,8 +191,8 @@ fn sep_cma_es() {
     );
 }
 
-/// Its standard deviation does not shrink; so targets are modest, and the odd
-/// individual at the mean itself counts.
+/// The standard deviation of OpenAI-ES does not shrink. So targets are modest, and the odd
+/// individual at the mean itself matters.
 #[test]
 fn openai_es() {
     let fine = suite::params(&[("sigma", 0.02), ("learning_rate", 0.01)]);

@@ -1,5 +1,5 @@
-//! The tables in `docs/algorithms.md` are generated from the registry. After a
-//! change, write them anew: `UPDATE_DOCS=1 cargo test -p evolution documentation`.
+//! The registry generates the tables in `docs/algorithms.md`. After a change, update them:
+//! `UPDATE_DOCS=1 cargo test -p evolution documentation`.
 
 use std::{env, fmt::Write as _, fs};
 

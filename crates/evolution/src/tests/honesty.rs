@@ -1,5 +1,5 @@
-//! What is said of a champion is right on average, and its interval covers as often as it
-//! says: the small form of `sim-core/examples/champion_figure.rs`.
+//! The judgement of a champion is unbiased, and its interval covers the truth as often as it
+//! claims: a small version of `sim-core/examples/champion_figure.rs`.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ fn skill(genotype: &[f64]) -> f64 {
     (1.0 - genotype.iter().map(|gene| (gene - 0.3) * (gene - 0.3)).sum::<f64>()).max(0.0)
 }
 
-/// The mean of that fitness over all trials that there could be.
+/// The expectation of that fitness over all possible trials.
 fn worth(genotype: &[f64]) -> f64 {
     0.04 * 0.05 / 2.0 + 0.96 * skill(genotype) * (1.0 - 0.3 / 4.0)
 }
@@ -68,6 +68,6 @@ fn champions_are_worth_what_their_judgement_says() {
         (low.get()..=high.get()).contains(&worth(&champion.genotype))
     };
     let n_covered = champions.iter().filter(is_covered).count();
-    // 95 % and two standard errors.
+    // 95 % minus two standard errors.
     assert!((184..=196).contains(&n_covered), "{n_covered} of 200");
 }

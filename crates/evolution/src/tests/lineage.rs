@@ -21,7 +21,7 @@ fn bred(crossover: &str, n_generations: u64) -> (Vec<Population>, Pedigree) {
         let [births]: [_; 1] = evolution.births().unwrap().try_into().unwrap();
         let mut told =
             Told::from_fitness(asked.genotypes.iter().map(|genes| vec![genes[0]]).collect());
-        // Whoever's fitness is not finite is nobody's parent.
+        // An individual without finite fitness never becomes a parent.
         told.trial_fitness[4][0] = f64::NAN;
         genotypes.push(asked.genotypes);
         pedigree.push(births, &told);

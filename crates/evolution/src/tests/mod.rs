@@ -82,8 +82,8 @@ fn the_champion_is_the_best_mean_so_far_and_the_first_of_equals() {
     assert_eq!(evolution.champion(), Some(&champion));
 }
 
-/// Has the candidates meet blocks until one of them is the champion; `fitness[i]`: of
-/// candidate i in every trial, alternately a little more and a little less.
+/// Lets the candidates meet blocks until one of them is the champion; `fitness[i]`: mean fitness
+/// of candidate i, alternately a little more and a little less in its trials.
 fn choose(evolution: &mut Evolution, fitness: &[f64]) {
     let mut round = evolution.reevaluation().unwrap();
     while !round.is_over() {
@@ -119,7 +119,7 @@ fn champions_are_kept_by_their_held_out_fitness() {
     assert_eq!(champion.held_out.unwrap().mean, 5.0);
     assert_eq!(evolution.digest(), digest, "the generations' chain is not touched");
 
-    // A better estimate alone does not make a champion any more.
+    // From now on, a better estimate alone does not make a champion.
     tell(&mut evolution, 99.0);
     assert_eq!(evolution.champion(), Some(&champion));
     let second = evolution.reevaluation().unwrap();
@@ -133,7 +133,8 @@ fn champions_are_kept_by_their_held_out_fitness() {
     assert_eq!((kept.mean.get(), kept.n_trials), (4.0, 4), "5 and 3, of two trials each");
     assert_ne!(other.champion_digest(), evolution.champion_digest());
 
-    // Who has lost once does not come back: the next challenger is of later birth.
+    // A candidate that has lost once does not return: the next challenger is from a later
+    // generation.
     tell(&mut evolution, 1.0);
     let third = evolution.reevaluation().unwrap();
     let challenger = &third.candidates()[1];
@@ -184,7 +185,7 @@ fn a_generation_without_finite_fitness_is_an_error() {
     assert_eq!(error, EvolutionError::NoFiniteFitness { generation: 0 });
 }
 
-/// The value is that of Python's hashlib over the documented bytes.
+/// The value comes from Python's hashlib over the documented bytes.
 #[test]
 fn a_link_of_the_digest_chain_hashes_the_documented_bytes() {
     let start: Digest = "00".repeat(32).parse().unwrap();
@@ -205,7 +206,7 @@ fn every_bit_of_genotypes_and_fitness_enters_the_digest() {
     assert_ne!(start.next(0, &[], &[]), start.next(1, &[], &[]));
 }
 
-/// A configuration as far as evolution looks at it.
+/// A configuration with the parts that evolution reads.
 fn config(name: &str, population_size: u32, populations: &[&str]) -> ExperimentConfig {
     let population = || PopulationConfig {
         objects: Vec::new(),
@@ -286,8 +287,8 @@ fn the_name_in_the_configuration_chooses_the_algorithm() {
     }
 }
 
-/// Databases have keyframes and logs of this format: whoever changes one changes its version,
-/// too, and reads the former.
+/// Databases have keyframes and logs of this format. A change needs a new version, and code that
+/// reads the former one.
 #[test]
 fn the_formats_of_keyframes_and_of_the_log_stay() {
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
@@ -302,7 +303,7 @@ fn the_formats_of_keyframes_and_of_the_log_stay() {
 
     let mut evolution = evolution(3, &[2]);
     evolution.replay(&told).unwrap();
-    // Lengths, and everything that is not drawn.
+    // Lengths, and everything that does not depend on draws.
     let keyframe = evolution.keyframe();
     assert_eq!(keyframe.len(), 248);
     assert_eq!(
@@ -312,7 +313,7 @@ fn the_formats_of_keyframes_and_of_the_log_stay() {
     );
 }
 
-/// Where sums overflowed, older versions wrote an interval that is no number.
+/// Older versions wrote NaN as an interval where sums overflowed.
 #[test]
 fn a_state_of_an_older_version_whose_interval_is_nan_opens() {
     let mut evolution = evolution(3, &[2]);
@@ -362,7 +363,7 @@ fn what_is_no_checkpoint_is_an_error() {
     assert!(matches!(restore(&keyframe[..9], &[]), Err(CheckpointError::Malformed(_))));
     assert!(matches!(restore(&keyframe, &[&entry[..9]]), Err(CheckpointError::Malformed(_))));
     assert!(matches!(restore(&keyframe, &[&[3]]), Err(CheckpointError::Version { found: 3, .. })));
-    // Of two individuals, and without a finite fitness.
+    // Entries with two individuals, and without finite fitness.
     let misfit = restore(&keyframe, &[&[1, 2, 0, 0, 0]]);
     assert!(matches!(misfit, Err(CheckpointError::Misfit { generation: 0 })), "{misfit:?}");
     let hopeless = restore(&keyframe, &[&[1, 3, 0, 0, 0, 0]]);

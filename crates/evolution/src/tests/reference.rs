@@ -1,5 +1,5 @@
-//! Updates, step by step, against independent implementations; the fixtures and
-//! how they were made are in `tests/fixtures`.
+//! Compares updates, step by step, with independent implementations; `tests/fixtures` has the
+//! fixtures and the script that made them.
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -78,7 +78,7 @@ fn openai_es_is_that_of_its_paper() {
     assert_follows(include_str!("../../tests/fixtures/openai_es.json"), 1e-13);
 }
 
-/// The package divides negative weights by a length to which it adds 1e-9.
+/// The package `cma` adds 1e-9 to the length by which it divides negative weights.
 #[test]
 fn cma_es_is_that_of_the_package_cma() {
     assert_follows(include_str!("../../tests/fixtures/cma_es.json"), 1e-8);

@@ -1,4 +1,4 @@
-//! What holds for every algorithm with every operator.
+//! Properties of every algorithm with every operator.
 
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
@@ -23,8 +23,8 @@ fn evolution_strategies() -> Vec<Variant> {
     ["SNES", "xNES", "CMA-ES", "sep-CMA-ES", "openaiES"].map(|name| (name, params(&[]))).to_vec()
 }
 
-/// The genetic algorithm with every combination of operators that
-/// `has_selection` lets through.
+/// The genetic algorithm with every combination of operators whose selection `has_selection`
+/// accepts.
 fn genetic_algorithms(has_selection: impl Fn(&str) -> bool) -> Vec<Variant> {
     let names = |key: &str| -> &'static [&'static str] {
         let description = AlgorithmDescription::find(ALGORITHMS, "GA").unwrap();
@@ -80,7 +80,7 @@ fn assert_state_is_finite(evolution: &Evolution, what: &impl std::fmt::Debug) {
     assert!(!has_null(&state), "{what:?} {state}");
 }
 
-/// An evolution of ten generations with re-evaluations, as it was before and after each, and
+/// The states of an evolution before and after each of ten generations with re-evaluations, and
 /// its fitness log.
 fn recorded(variant: &Variant) -> (Vec<Evolution>, Vec<Told>) {
     let mut states = vec![start(variant, &[14, 13], 5)];
@@ -111,7 +111,7 @@ fn every_generation_comes_back_from_every_keyframe_before_it() {
     for variant in all() {
         let (states, log) = recorded(&variant);
         n_blocks_max = log.iter().map(|told| told.blocks.len()).fold(n_blocks_max, usize::max);
-        // What was evaluated at the end of a run is stored, and changes nothing.
+        // Evaluations at the end of a run are stored, and do not change evolution.
         let end = End { blocks: vec![vec![vec![7.0]]], judgement: vec![8.0] };
         let bytes = |told: &Told| Told { end: end.clone(), ..told.clone() }.to_bytes();
         let log: Vec<Vec<u8>> = log.iter().map(bytes).collect();
@@ -123,7 +123,7 @@ fn every_generation_comes_back_from_every_keyframe_before_it() {
                     log: log[k..g].to_vec(),
                     n_flat: 0,
                 });
-                // Genotypes, champions, digests, and all that follows from them.
+                // Genotypes, champions, digests, and everything that follows from them.
                 assert_eq!(restored.unwrap(), *state, "{variant:?} generation {g} from {k}");
             }
         }
@@ -143,7 +143,7 @@ fn an_individual_drawn_alone_has_the_bits_of_its_generation() {
             let distribution = Distribution::from_bytes(&bytes).unwrap();
             let generation = evolution.ask();
             assert_eq!(distribution.generation(), generation.index);
-            // In no order.
+            // In an arbitrary order.
             for i in (0..population_size).rev() {
                 let bits = |genes: &[f64]| genes.iter().map(|gene| gene.to_bits()).collect();
                 let (drawn, asked): (Vec<u64>, Vec<u64>) =
@@ -185,7 +185,7 @@ fn populations_draw_independently_and_meet_by_index() {
                 let parts = generation.samples.iter().map(|sample| sample.genotypes[i].clone());
                 assert_eq!(*genotype, parts.collect::<Vec<_>>().concat());
             }
-            // The centre of an odd OpenAI-ES is the only individual they may share.
+            // They may share only the centre individual of an odd OpenAI-ES population.
             assert_ne!(
                 generation.samples[0].genotypes, generation.samples[1].genotypes,
                 "{variant:?}"
@@ -287,7 +287,7 @@ fn a_single_individual_with_finite_fitness_is_enough() {
     }
 }
 
-/// An optimum in a corner of the cube, and then nothing to learn any more.
+/// An optimum in a corner of the cube, and then a plateau without anything to learn.
 #[test]
 fn long_runs_into_a_corner_and_on_a_plateau_stay_sound() {
     for variant in all() {
@@ -374,7 +374,7 @@ fn the_smallest_populations_that_are_let_in_evolve() {
     }
 }
 
-/// Mean and covariance that a state stands for.
+/// Mean and covariance of a state's distribution.
 fn moments(state: &Value) -> (Vec<f64>, Vec<Vec<f64>>) {
     let (name, state) = state.as_object().unwrap().iter().next().unwrap();
     let numbers = |value: &Value| -> Vec<f64> { serde_json::from_value(value.clone()).unwrap() };
@@ -452,7 +452,7 @@ fn individuals_have_the_mean_and_covariance_of_the_state() {
     }
 }
 
-/// Minted with the first version of each algorithm. Another value is another run:
+/// These values come from the first version of each algorithm. A change of a value changes runs:
 /// it needs a reason, and a new format of the digest's first link.
 #[test]
 fn the_bits_of_runs_are_fixed() {
@@ -464,7 +464,8 @@ fn the_bits_of_runs_are_fixed() {
         evolution.digest().to_string()[..16].to_owned()
     };
     let mut digests: Vec<String> = evolution_strategies().iter().map(digest).collect();
-    // Operators of the first version, and all that have one of the second.
+    // Variants with operators of the first version only, and those with an operator of the
+    // second.
     let mut operators = [Sha256::new(), Sha256::new()];
     for variant in genetic_algorithms(|_| true) {
         let is_second = variant.1.iter().any(|(_, value)| {

@@ -1,4 +1,4 @@
-//! Crossover: two parents make two children.
+//! Crossover operators, which make two children of two parents.
 
 use determinism::random::Stream;
 use experiment_file::{Parameter, Params};
@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::Genotype;
 
-/// How two parents make two children.
+/// A crossover operator, which makes two children of two parents.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Crossover {
     /// BLX-alpha (Eshelman, Schaffer 1993): each gene of each child uniform on
     /// \[min - alpha |a - b|, max + alpha |a - b|\].
     BlxAlpha {
-        /// Exploration beyond the parents.
+        /// Reach beyond the parents, relative to their distance.
         alpha: f64,
     },
     /// Each gene goes to either child (Syswerda 1989).
     Uniform,
-    /// The parents swap what follows a random cut (Holland 1975).
+    /// The parents swap all genes after a random cut (Holland 1975).
     OnePoint,
     /// The parents swap every other piece between three random cuts (De Jong
     /// 1975).
@@ -26,10 +26,10 @@ pub enum Crossover {
     SimulatedBinary,
 }
 
-/// Cuts of multi-point crossover, if there are so many places.
+/// Number of cuts in multi-point crossover; fewer if there are fewer places.
 const N_CUTS: usize = 3;
-/// Distribution index of simulated binary crossover: the larger, the closer are
-/// children to their parents.
+/// Distribution index of simulated binary crossover; a larger one keeps children closer to their
+/// parents.
 const SBX_INDEX: f64 = 0.5;
 
 /// Chooses among the variants of [`Crossover`], in their order.
@@ -39,14 +39,14 @@ pub const OPERATOR: Parameter = Parameter::one_of(
     &["pcx"],
     "How two parents yield two children",
 );
-/// How far BLX-alpha reaches beyond the parents.
+/// The reach of BLX-alpha beyond the parents.
 pub const ALPHA: Parameter = Parameter::amount("alpha", 0.5, "BLX-alpha's alpha");
 
 impl Crossover {
-    /// As configured.
+    /// The configured operator.
     pub fn new(params: &Params) -> Self {
         match params.of::<String>(&OPERATOR).as_str() {
-            // Two names of one operator in the original.
+            // The original simulator has two names for this operator.
             "blxalpha" | "combination" => Self::BlxAlpha { alpha: params.of(&ALPHA) },
             "uniform" => Self::Uniform,
             "onepoint" => Self::OnePoint,
@@ -136,8 +136,8 @@ mod tests {
         Stream::new(2, 0, 0, Purpose::Evolution, 0)
     }
 
-    /// Largest distance between the values' distribution and `cdf` (Kolmogorov,
-    /// Smirnov), times sqrt(n); above 1.95 once in 1000 times if they agree.
+    /// Largest distance between the values' distribution and `cdf` (Kolmogorov, Smirnov), times
+    /// sqrt(n). If they agree, it exceeds 1.95 once in 1000 times.
     fn ks_statistic(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;

@@ -1,8 +1,7 @@
 //! Genetic algorithm with real genes.
 //!
-//! The thesis's section 2.2.1; Eiben, Smith: "Introduction to evolutionary
-//! computing" (2nd ed., 2015) for the operators in general, each operator's own
-//! source beside it.
+//! Section 2.2.1 of the thesis; Eiben, Smith: "Introduction to evolutionary computing" (2nd ed.,
+//! 2015) for the operators in general. Each operator names its own source.
 
 mod crossover;
 mod mutation;
@@ -18,8 +17,8 @@ use crossover::Crossover;
 use mutation::Mutation;
 use selection::Selection;
 
-/// The operators, and the last generation as far as its fitness is finite: whoever
-/// has none is neither elite nor parent.
+/// The operators, and the individuals of the last generation with finite fitness. Individuals
+/// without finite fitness become neither elite nor parents.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ga {
     d: usize,
@@ -31,11 +30,11 @@ pub struct Ga {
     mutation_prob: f64,
     /// Best first; empty before the first generation.
     ranked: Vec<Genotype>,
-    /// Of `ranked`.
+    /// Fitness of `ranked`.
     fitness: Vec<f64>,
 }
 
-/// Pairs are neighbours of a shuffled list; there is no other way yet.
+/// Pairs are neighbours in a shuffled list, the only operator so far.
 const MATING_OPERATOR: Parameter =
     Parameter::one_of("mating_operator", &["random"], &[], "How parents are paired");
 const CROSSOVER_PROB: Parameter =
@@ -133,9 +132,9 @@ impl Strategy for Ga {
         self.d
     }
 
-    /// The first generation is U(0, 1)^d. Later ones: the elite unchanged, then
-    /// children of selected parents; a pair that does not cross, and an odd parent
-    /// out, is its own children; every child mutates and is clipped to \[0, 1\].
+    /// The first generation is U(0, 1)^d. Later ones: the elite unchanged, then children of
+    /// selected parents; a pair that does not cross, and an unpaired parent, are copied; every
+    /// child mutates and is clipped to \[0, 1\].
     fn sample(&self, population_size: usize, rng: &mut Stream) -> Sample {
         let drawn = self.draw(population_size, rng).into_iter();
         let genotypes = drawn.map(|(genes, _)| genes).collect();

@@ -4,7 +4,7 @@ use determinism::random::Stream;
 use experiment_file::{DefaultValue, Domain, Parameter, ParameterValue, Params};
 use serde::{Deserialize, Serialize};
 
-/// How a gene mutates.
+/// A mutation operator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Mutation {
     /// g + N(0, sigma^2) (Eq. 2.12).
@@ -14,7 +14,7 @@ pub enum Mutation {
     },
     /// U(0, 1), whatever the gene was.
     Uniform,
-    /// 1 - g: of a gene that is 0 or 1, the other one.
+    /// 1 - g, which turns 0 into 1 and 1 into 0.
     BitFlip,
     /// One of 0, 1/n, ..., (n - 1)/n, equally likely, whatever the gene was.
     Categorical {
@@ -37,8 +37,8 @@ pub const SIGMA: Parameter = Parameter::amount(
     "Standard deviation of Gaussian mutation",
 );
 
-/// With bounds that are as far apart as there are categories, the values are whole numbers. The
-/// canonical form leaves the default out: it is younger than the digests of runs.
+/// If the bounds of a parameter differ by the number of categories, its values are whole numbers.
+/// The canonical form omits the default, because digests of older runs lack this key.
 pub const CATEGORIES: Parameter = Parameter::of(
     "mutation_categories",
     Domain::Whole(2, 1_000_000),
@@ -47,7 +47,7 @@ pub const CATEGORIES: Parameter = Parameter::of(
 );
 
 impl Mutation {
-    /// As configured.
+    /// The configured operator.
     pub fn new(params: &Params) -> Self {
         match params.of::<String>(&OPERATOR).as_str() {
             "gaussian" => Self::Gaussian { sigma: params.of(&SIGMA) },
@@ -106,7 +106,7 @@ mod tests {
         let mutations = [
             Mutation::Gaussian { sigma: 0.5 },
             Mutation::Uniform,
-            // An odd number: 0.5 is no category, so that every mutation is seen.
+            // An odd number, so that 0.5 is not a category, and every mutation changes a gene.
             Mutation::Categorical { categories: 7 },
         ];
         for mutation in mutations {
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(genes, [0.0, 1.0, 0.25]);
     }
 
-    /// Bounds 2 and 7 make these the whole numbers from 2 to 6, as in the original.
+    /// Bounds 2 and 7 turn the categories into the whole numbers from 2 to 6, as in the original.
     #[test]
     fn categories_are_equally_likely_and_the_upper_bound_is_none() {
         let genes = mutated(Mutation::Categorical { categories: 5 }, 1.0);

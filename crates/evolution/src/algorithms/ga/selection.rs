@@ -1,15 +1,15 @@
-//! Selection: whose genes get a chance.
+//! Selection operators, which choose parents.
 
 use determinism::random::Stream;
 use experiment_file::{Parameter, Params, limits};
 use serde::{Deserialize, Serialize};
 
-/// How parents are drawn.
+/// A selection operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Selection {
-    /// The best of `size` drawn uniformly with replacement (Algorithm 1).
+    /// The best of `size` individuals, drawn uniformly with replacement (Algorithm 1).
     Tournament {
-        /// Contestants, K.
+        /// Number of contestants K.
         size: usize,
     },
     /// Proportional to fitness, independent draws.
@@ -18,15 +18,15 @@ pub enum Selection {
     LinearRank,
     /// Geometric in rank (Michalewicz 1992), with ratio 0.9.
     NonlinearRank,
-    /// Proportional to fitness, evenly spaced draws with one random offset (Baker
-    /// 1987): everyone is drawn within one of what is expected.
+    /// Proportional to fitness, evenly spaced draws with one random offset (Baker 1987): each
+    /// number of draws differs from its expectation by less than one.
     StochasticUniversal,
 }
 
-/// Expected draws of the best by linear rank, relative to the average.
+/// Expected number of draws of the best individual by linear rank, relative to the average.
 const LINEAR_PRESSURE: f64 = 1.5;
-/// Weight of the best by non-linear rank, before the weights are made to sum
-/// to 1; each further rank has 1 - this of the one before.
+/// Weight q of the best individual by non-linear rank, before normalisation; each further rank
+/// has 1 - q times the weight of the previous one.
 const NONLINEAR_BEST: f64 = 0.1;
 
 /// Chooses among the variants of [`Selection`], in their order.
@@ -36,7 +36,7 @@ pub const OPERATOR: Parameter = Parameter::one_of(
     &[],
     "How parents are chosen",
 );
-/// Contestants of a tournament, K.
+/// Number of contestants of a tournament, K.
 pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
     "tournament_size",
     [1, limits::POPULATION],
@@ -45,7 +45,7 @@ pub const TOURNAMENT_SIZE: Parameter = Parameter::whole(
 );
 
 impl Selection {
-    /// As configured.
+    /// The configured operator.
     pub fn new(params: &Params) -> Self {
         match params.of::<String>(&OPERATOR).as_str() {
             "tournament" => Self::Tournament { size: params.of::<u32>(&TOURNAMENT_SIZE) as usize },
@@ -72,15 +72,15 @@ impl Selection {
     }
 }
 
-/// The best rank is the smallest, so it wins; equals go by rank, too.
+/// The smallest rank wins; ranks also decide between equal fitness.
 fn tournament(size: usize, n: usize, rng: &mut Stream) -> usize {
     (1..size).fold(rng.below(n), |best, _| best.min(rng.below(n)))
 }
 
-/// Fitness itself if none is negative; else fitness minus the smallest. If nothing
-/// is left then, everyone is equal.
+/// Weights proportional to fitness: fitness itself if none is negative, otherwise fitness minus
+/// the smallest. If all weights are 0, all individuals are equal.
 fn proportional(fitness: &[f64]) -> Vec<f64> {
-    // Halves and a common scale: neither a difference nor a sum can overflow.
+    // Halving and a common scale keep differences and sums from overflowing.
     let smallest = fitness[fitness.len() - 1];
     let shift = if smallest < 0.0 { smallest / 2.0 } else { 0.0 };
     let largest = fitness[0] / 2.0 - shift;
@@ -128,7 +128,7 @@ impl Wheel {
     fn at(&self, position: f64) -> usize {
         let circumference = self.ends[self.ends.len() - 1];
         let target = (position * circumference).min(circumference.next_down());
-        // Sectors are open at their ends: one without width is never hit.
+        // Sectors are half-open, so an empty one is never hit.
         self.ends.partition_point(|&end| end <= target)
     }
 

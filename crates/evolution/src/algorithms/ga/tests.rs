@@ -16,7 +16,7 @@ fn rng(generation: u64) -> Stream {
     Stream::new(9, generation, 0, Purpose::Evolution, 0)
 }
 
-/// A generation of `n` whose fitness is that of its index, and the next one.
+/// A generation of `n` individuals whose fitness is their index, and the next generation.
 fn two_generations(params: &Params, n: usize) -> (Population, Population) {
     let mut ga = Ga::start(params, 4);
     let first = ga.sample(n, &mut rng(0));
@@ -68,7 +68,7 @@ fn an_odd_parent_out_passes() {
         params(&[("crossover_prob", 1.0), ("mutation_prob", 0.0)]).with("num_elite", 2_u32);
     let (first, second) = two_generations(&params, 21);
     let unchanged = second[2..].iter().filter(|child| first.contains(child)).count();
-    // Whoever was paired with itself is unchanged, too.
+    // A parent that was paired with itself is unchanged, too.
     let last = &second[20];
     assert!(first.contains(last) && unchanged < 6, "{unchanged}");
 }
