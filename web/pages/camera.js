@@ -1,9 +1,9 @@
-// Which part of the plane is seen. The plane is a torus: every object is drawn at each
+// The visible part of the plane. The plane is a torus: every object is drawn at each
 // of its images within view.
 
 import { shortest } from "swarm/episode.js";
 
-/** Images of a place, to each side of the nearest one, that are drawn at most. */
+/** Maximum number of drawn images of a place to each side of the nearest one. */
 const IMAGES_MAX = 3;
 
 export class Camera {
@@ -13,7 +13,7 @@ export class Camera {
     this.showSwarm();
   }
 
-  /** All places where robots, lights and areas ever are, if that is less than the world. */
+  /** All places that robots, lights and areas ever reach, if they are less than the world. */
   showSwarm() {
     const { episode } = this;
     const first = [episode.at("x", 0, 0), episode.at("y", 0, 0)];
@@ -47,12 +47,12 @@ export class Camera {
     this.look(width / 2, height / 2, width, height);
   }
 
-  /** A centre, and a rectangle around it that has to be in view, cm. */
+  /** A centre, and a rectangle around it that must be in view, cm. */
   look(x, y, across, along) {
     Object.assign(this, { x, y, across, along, zoom: 1 });
   }
 
-  /** What has no size keeps the one that it had: the scale is never 0. */
+  /** A canvas without a size keeps its last one: the scale is never 0. */
   resize(width, height) {
     if (width > 0 && height > 0) Object.assign(this, { width, height });
   }
@@ -85,14 +85,14 @@ export class Camera {
     this.y += y - ny;
   }
 
-  /** Half the width and height of what is drawn, pixels: nothing is seen twice. */
+  /** Half the drawn width and height, pixels: no object appears twice. */
   get halves() {
     const { width, height } = this.episode;
     return [Math.min(this.width, width * this.scale) / 2, Math.min(this.height, height * this.scale) / 2];
   }
 
-  /** Calls `draw` with the pixels of every image of a place that is in view, or so close to
-   *  it that something of `radius` pixels is. They are few whatever the numbers are. */
+  /** Calls `draw` with the pixels of every image of a place that is in view, or at most `radius`
+   *  pixels outside. Their number is always small. */
   eachImage(x, y, radius, draw) {
     const { width, height } = this.episode;
     const { scale } = this;
@@ -112,7 +112,7 @@ export class Camera {
   }
 }
 
-/** Images to each side of the nearest one that can be within so much. */
+/** Number of images to each side of the nearest one within a distance. */
 function reached(half, period) {
   const n = Math.ceil(half / period + 0.5);
   return n < IMAGES_MAX ? n : IMAGES_MAX;

@@ -1,13 +1,13 @@
-// Charts as SVG: lines over bands, with axes, that zoom, are gone through with keys, and are saved.
+// Charts as SVG: lines over bands with axes, with zoom, keys and export.
 
 import { decimals, element } from "swarm/dom.js";
 import { exports, seriesTable } from "swarm/export.js";
 import { extremes, thinned, ticks } from "swarm/scales.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Entries of a legend that are shown while nobody has asked for more. */
+/** Maximum number of entries in a closed legend. */
 const LEGEND_MAX = 14;
-/** Lines whose values are read out. */
+/** Maximum number of lines whose values are read out. */
 const READ_MAX = 4;
 
 export function shape(tag, attributes, ...children) {
@@ -32,13 +32,13 @@ export function path(points) {
   return points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 }
 
-/** Lines and labels of both axes. `inner`: the edges of what is between them; `x` and `y`: the pixel of a
- *  value; `x0` to `x1` and `y0` to `y1`: the values that are seen. */
+/** Lines and labels of both axes. `inner`: the edges of the area between them; `x` and `y`: the
+ *  pixel of a value; `x0` to `x1` and `y0` to `y1`: the visible values. */
 export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {
   const text = (at, content, more = {}) => shape("text", { x: at[0], y: at[1], class: "axis", ...more }, content);
   const heights = ticks(y0, y1, 5);
   const places = ticks(x0, x1, Math.min(8, (inner.right - inner.left) / 90));
-  // As many as tell one from the next.
+  // As many digits as distinguish neighbouring ticks.
   const digits = Math.max(0, Math.ceil(-Math.log10(heights[1] - heights[0] || 1) - 1e-9));
   const middle = (inner.top + inner.bottom) / 2;
   return [
@@ -51,11 +51,11 @@ export function axes({ inner, x0, x1, x }, y0, y1, y, height, xLabel, yLabel) {
   ];
 }
 
-/** A chart. `show({ lines, bands, marks, xLabel, yLabel })`: a line is
- *  `{ name, color, dash, points: [[x, y], ...] }`, a band the same with `[x, low, high]`, a mark a
- *  height with an interval. Dragging zooms along x, a double click shows all again; with the
- *  focus, arrows go through the points, + and - zoom, and Escape shows all. `onZoom(range)`: told
- *  which part is seen, null for all; `zoom(range)` shows one. `empty`: said while there is nothing. */
+/** A chart. `show({ lines, bands, marks, xLabel, yLabel })`: a line is `{ name, color, dash,
+ *  points: [[x, y], ...] }`, a band the same with `[x, low, high]`, a mark a height with an
+ *  interval. Dragging zooms along x, a double click shows all again; with the focus, arrows go
+ *  through the points, + and - zoom, and Escape shows all. `onZoom(range)`: called with the visible
+ *  part, null for all; `zoom(range)` shows a part. `empty`: the text while there are no data. */
 export function chart(label, { onZoom = () => {}, empty = "there is nothing to show yet" } = {}) {
   const node = element("figure", { className: "chart" });
   const legend = element("div", { className: "keys" });
@@ -67,9 +67,9 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
   let zoom = null;
   let held = null;
   let frame = null;
-  /** Where the values are read out; null: nowhere. */
+  /** The position of the readout; null: none. */
   let cursor = null;
-  /** The line that stands out; null: none. */
+  /** The highlighted line; null: none. */
   let marked = null;
   let isLong = false;
 
@@ -128,7 +128,7 @@ export function chart(label, { onZoom = () => {}, empty = "there is nothing to s
     const held = legend.contains(document.activeElement) ? document.activeElement.dataset.name : null;
     const keys = entries.map(({ name, color, dash }) => {
       const swatch = shape("svg", { class: "swatch", viewBox: "0 0 22 8", "aria-hidden": "true" }, shape("line", { x1: 1, x2: 21, y1: 4, y2: 4, stroke: color, "stroke-dasharray": dash || "none" }));
-      const key = element("button", { type: "button", className: "key", title: "let it stand out", "aria-pressed": String(marked === name), onclick: () => {
+      const key = element("button", { type: "button", className: "key", title: "highlight it", "aria-pressed": String(marked === name), onclick: () => {
         marked = marked === name ? null : name;
         draw();
       } }, swatch, name);

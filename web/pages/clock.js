@@ -1,4 +1,4 @@
-// The moment that players show: one clock for all that are side by side.
+// The moment that players show: one clock for all players side by side.
 
 /** Steps per second. */
 const SPEEDS = [2, 5, 10, 20, 40, 80, 160, 320];
@@ -8,11 +8,11 @@ export class Clock {
     Object.assign(this, { step, share: 0, isPlaying: false, steps: 0 });
     this.place = SPEEDS.indexOf(20);
     this.players = [];
-    /** Frames of an earlier start end when this has changed. */
+    /** When this has changed, the frames of an earlier start end. */
     this.starts = 0;
   }
 
-  /** Has a player of so many steps follow; the longest one says where the end is. */
+  /** Adds a player with a number of steps; the longest player determines the end. */
   join(player, steps) {
     this.players.push(player);
     this.steps = Math.max(this.steps, steps);
@@ -49,7 +49,7 @@ export class Clock {
     requestAnimationFrame(frame);
   }
 
-  /** Goes on by so many steps, which need not be whole. */
+  /** Advances by a number of steps, which need not be whole. */
   advance(by) {
     const at = Math.min(this.step + this.share + by, this.steps - 1);
     this.step = Math.floor(at);

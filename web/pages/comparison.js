@@ -1,11 +1,12 @@
-// What the comparison of groups found, and in which keys of their files runs differ.
+// The statistics of a comparison of groups, and the keys in which the files of runs
+// differ.
 
 import { decimals, element } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
 import { askJson, counted } from "swarm/page.js";
 import { sweptValues } from "swarm/swept-values.js";
 
-/** Files that are compared at most. */
+/** Maximum number of compared files. */
 const FILES_MAX = 60;
 
 const span = ({ ci95 }) => (ci95 ? `${decimals(ci95[0], 3)}–${decimals(ci95[1], 3)}` : "–");
@@ -43,12 +44,13 @@ async function fileOf(id) {
   return files.get(id);
 }
 
-/** Runs as rows, with a column for each key in which their files differ; and figures of these keys. */
+/** Runs as rows, with a column for each key in which their files differ; and figures of these keys.
+ *  */
 export async function differences(runs) {
   const shown = runs.slice(0, FILES_MAX);
   const configs = await Promise.all(shown.map((it) => fileOf(it.id)));
   const keys = [...new Set(configs.flatMap((it) => [...it.keys()]))].filter((key) => key !== "seed" && new Set(configs.map((it) => it.get(key))).size > 1);
-  // The last parts of a path say enough, unless two keys have the same.
+  // The last parts of a path suffice, unless two keys share them.
   const short = (key) => key.split(".").slice(-2).join(".");
   const title = (key) => (keys.filter((it) => short(it) === short(key)).length > 1 ? key : short(key));
   const head = ["run", "seed", "champion", ...keys.map(title)];
@@ -58,6 +60,6 @@ export async function differences(runs) {
   const swept = keys.map((key, k) => ({ key, title: head[k + 3], values: configs.map((it) => it.get(key) ?? "–") })).filter(({ key }) => key !== "name");
   const figures = sweptValues(shown, swept, runs.length);
   return element("div", {}, figures, element("section", { className: "panel differences" },
-    element("div", { className: "row" }, element("h2", {}, "Where their files differ"), element("span", { className: "muted small" }, keys.length ? `${counted(keys.length, "key")} beside the seed` : "in nothing but the seed"), save),
+    element("div", { className: "row" }, element("h2", {}, "Where their files differ"), element("span", { className: "muted small" }, keys.length ? `${counted(keys.length, "key")} beside the seed` : "only in the seed"), save),
     table(head, rows)));
 }

@@ -1,14 +1,14 @@
-// What an experiment does at this moment, or what it waits for.
+// The present activity of an experiment, or the reason why it waits.
 
 import { element } from "swarm/dom.js";
 import { counted, span } from "swarm/page.js";
 
-/** Paragraphs that say what the server answers. */
+/** Paragraphs with the server's answer. */
 export function whatItDoes(it) {
   const parts = [];
   for (const trouble of it.troubles) parts.push(element("p", { className: "bad" }, trouble));
   if (it.workers_available === 0) {
-    parts.push(element("p", { className: "bad" }, it.workers_of_others ? `No worker takes it: ${counted(it.workers_of_others, "worker")} of other experiments.` : it.workers ? "No connected worker is given work." : "No worker is connected: start one with `worker`."));
+    parts.push(element("p", { className: "bad" }, it.workers_of_others ? `No worker takes it: ${counted(it.workers_of_others, "worker")} of other experiments.` : it.workers ? "No connected worker gets work." : "No worker is connected: start one with `worker`."));
   }
   if (it.round) {
     const { generation, kind, episodes, episodes_left: left, items_queued: queued, running_ms: running, held } = it.round;

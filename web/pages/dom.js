@@ -1,4 +1,4 @@
-// Elements of a page, made in one line each.
+// Creates elements of a page, each in one line.
 
 /** An element with properties, attributes (data-..., aria-...) and children. */
 export function element(tag, properties = {}, ...children) {
@@ -25,14 +25,14 @@ export function onTheme(changed) {
 const themed = [];
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   for (const changed of themed) changed();
-  // Only those that are shown: what was removed is not kept for this.
+  // Only shown canvases: this keeps no removed ones.
   for (const node of document.querySelectorAll("canvas")) node.redraw?.();
 });
 
-/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes.
- *  While it has no size, as in a hidden frame or after it was removed, nothing is drawn: `draw`
- *  is called with a width and a height of at least one pixel. Without a label, what is around it
- *  says what it shows. */
+/** A canvas that fills its parent, in pixels of the device; draws whenever its size changes. While
+ *  it has no size, as in a hidden frame or after it was removed, nothing is drawn: `draw` is called
+ *  with a width and a height of at least one pixel. Without a label, the surrounding elements must
+ *  describe it. */
 export function canvas(draw, label) {
   const node = element("canvas", label ? { "aria-label": label, role: "img" } : { "aria-hidden": "true" });
   let size = null;
@@ -52,8 +52,8 @@ export function canvas(draw, label) {
   return node;
 }
 
-/** A number with so many decimals, and a true minus sign. What has no use for them, because it is
- *  tiny or huge, is written with a power of ten. */
+/** A number with a number of decimals, and a true minus sign. Tiny and huge numbers get a power of
+ *  ten. */
 export function decimals(value, n) {
   if (!Number.isFinite(value)) return "–";
   const isPlain = n <= 12 && Math.abs(value) < 1e9;

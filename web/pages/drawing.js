@@ -1,4 +1,4 @@
-// Colours and shapes of what is drawn on canvases.
+// Colours and shapes of drawings on canvases.
 
 import { color, onTheme } from "swarm/dom.js";
 

@@ -1,11 +1,11 @@
-// How the distribution of an algorithm moves: generations are gone through again for it, so
-// only when somebody wants to see it.
+// The movement of an algorithm's distribution. The server must repeat the generations for
+// it, so it is loaded on request.
 
 import { chart } from "swarm/charts.js";
 import { element } from "swarm/dom.js";
 import { askJson } from "swarm/page.js";
 
-/** A part of the page that is closed at first; `update(n_generations)`: how many there are. */
+/** A part of the page that is closed at first; `update(n_generations)`: the number of generations. */
 export function dynamicsPanel(id) {
   const rows = [];
   let n_generations = 0;
@@ -16,7 +16,7 @@ export function dynamicsPanel(id) {
   const part = (title, text, it) => element("section", {}, element("h3", {}, title), element("p", { className: "muted small" }, text), it);
   const parts = [
     part("Width", "standard deviations of the genes in the distribution: quartiles in the dark band, least and largest in the light one", width),
-    part("Step", "how far a generation moved the mean of the distribution", step),
+    part("Step", "distance by which a generation moved the mean of the distribution", step),
     part("Agreement", "rank correlation of the individuals\u2019 fitness between trials: 1 if all trials rank them alike, 0 if selection was luck", agreement),
   ];
   const note = element("p", { className: "muted small" });

@@ -1,4 +1,4 @@
-// An episode as a program packed it: web/src/replay/mod.rs has the format.
+// A packed episode; web/src/replay/mod.rs describes the format.
 
 const ARRAYS = { i8: Int8Array, i16: Int16Array, i32: Int32Array, f32: Float32Array };
 
@@ -11,7 +11,7 @@ export async function unpack(packed) {
   return new Episode(header, buffer, 4 + length);
 }
 
-/** What is the same in all steps, as the header says, and the columns. */
+/** The constants of all steps, from the header, and the columns. */
 export class Episode {
   constructor(header, buffer, start) {
     Object.assign(this, header);
@@ -24,10 +24,10 @@ export class Episode {
       }
       this.columns[place.name] = { values, scale: place.scale, n_rows: place.n_rows };
     }
-    // The object that each robot is of.
+    // The object of each robot.
     this.kinds = this.robots.flatMap((robots) => Array(robots.n).fill(robots));
     this.has_targets = this.columns.target.values.some((target) => target >= 0);
-    // Whether a robot ever changes its place.
+    // Whether any robot moves.
     const isStill = (name, robot) => this.row(name, robot).every((value, _, row) => value === row[0]);
     this.moves = this.kinds.map((_, robot) => !(isStill("x", robot) && isStill("y", robot)));
     this.has_radio = this.columns.emitter.values.some((emitter) => emitter >= 0);
@@ -55,8 +55,8 @@ export class Episode {
     return this.columns[name].values.subarray(row * this.steps, (row + 1) * this.steps);
   }
 
-  /** Position and heading of a robot; a share of a step later if it is under way. Asked for every
-   *  robot in every frame. */
+  /** Position and heading of a robot; between steps, at a share of the way. Called for every robot
+   *  in every frame. */
   pose(robot, step, share = 0) {
     const { x: xs, y: ys, heading: headings } = this.columns;
     const at = robot * this.steps + step;
@@ -65,12 +65,12 @@ export class Episode {
     const turn = shortest(headings.values[at + 1] * headings.scale - heading, 2 * Math.PI);
     const dx = shortest(xs.values[at + 1] * xs.scale - x, this.width);
     const dy = shortest(ys.values[at + 1] * ys.scale - y, this.height);
-    // Who is placed elsewhere does not glide there.
+    // A robot that is moved elsewhere does not glide there.
     const part = Math.abs(dx) + Math.abs(dy) > 50 ? 0 : share;
     return { x: x + part * dx, y: y + part * dy, heading: heading + part * turn };
   }
 
-  /** Within which distance a robot is heard, cm; 0 if it does not emit. */
+  /** The distance at which a robot is heard, cm; 0 if it does not emit. */
   reach(robot) {
     const heard = this.robots.map((robots) => robots.hears_within).filter((range) => range !== null);
     const emits = this.kinds[robot].emits_within;
@@ -84,8 +84,8 @@ export class Episode {
     return message.reduce((number, value) => number * levels + Math.round(value * (levels - 1)), 0);
   }
 
-  /** The symbol of the message that a robot hears; null without a lattice. All are worked out
-   *  at the first question, for they are asked for in every frame. */
+  /** The symbol of the message that a robot hears; null without a lattice. The first call computes
+   *  all symbols, because every frame needs them. */
   heardSymbol(robot, step) {
     this.heardSymbols ??= Int32Array.from({ length: this.n_robots * this.steps }, (_, i) => {
       const [robot, step] = [Math.floor(i / this.steps), i % this.steps];
@@ -96,7 +96,7 @@ export class Episode {
     return symbol < 0 ? null : symbol;
   }
 
-  /** How many symbols there are. */
+  /** The number of symbols. */
   get n_symbols() {
     const levels = Math.max(1, ...this.robots.map((robots) => robots.n_levels ?? 1));
     return levels ** this.message_len;

@@ -1,9 +1,9 @@
-// All experiments, kept up to date: the whole list once, and then what has changed.
+// All experiments, kept up to date: the whole list once, and then the changes.
 
 import { askJson, complain, listen, resolve } from "swarm/page.js";
 
-/** Follows the list. `onChange(experiments, changed)`: all of them by id, and the ids of those that
- *  are new, different or gone. */
+/** Follows the list. `onChange(experiments, changed)`: all experiments by id, and the ids of new,
+ *  changed and deleted ones. */
 export async function followExperiments(onChange) {
   const experiments = new Map();
   const take = (news) => {
@@ -33,10 +33,10 @@ export async function followExperiments(onChange) {
   await begin();
 }
 
-/** Time until a list is asked for again that did not come, ms. */
+/** Time until a failed request for the list is repeated, ms. */
 const AGAIN_AFTER = 2000;
 
-/** All experiments as they are now, oldest first. */
+/** All experiments in their present state, oldest first. */
 export async function allExperiments() {
   return (await askJson("/api/experiments")).experiments;
 }

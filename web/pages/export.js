@@ -1,27 +1,27 @@
-// Figures as files: SVG for papers, CSV for whoever wants to draw them anew.
+// Figures as files: SVG for papers, CSV for other drawing programs.
 
 import { element } from "swarm/dom.js";
 
-/** Properties that the style of the pages gives to shapes, and a file has to have itself. */
+/** Properties of shapes from the style of the pages, which a file must contain itself. */
 const STYLED = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linejoin", "opacity", "paint-order", "font-size", "font-family", "font-weight", "text-anchor"];
 
-/** Has a browser save a text, or what is recorded. */
+/** Makes a browser save a text or a recording. */
 export function save(name, kind, content) {
   const url = URL.createObjectURL(new Blob([content], { type: kind }));
   element("a", { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
-/** Buttons that save a figure. `svg()`: the element, if it is one; `table()`: rows of cells, of which the first
- *  has the names; `name()`: that of the files, without their ends. */
+/** Buttons that save a figure. `svg()`: the element, if it is an SVG; `table()`: rows of cells, the
+ *  first with the names; `name()`: the name of the files, without extension. */
 export function exports({ svg, table, name }) {
   const button = (text, title, onclick) => element("button", { type: "button", className: "save", title, onclick }, text);
   return element("span", { className: "saves" },
     ...(svg ? [button("SVG", "save this figure as SVG", () => save(`${name()}.svg`, "image/svg+xml", svgText(svg())))] : []),
-    button("CSV", "save what it shows as a table", () => save(`${name()}.csv`, "text/csv", csvText(table()))));
+    button("CSV", "save its values as a table", () => save(`${name()}.csv`, "text/csv", csvText(table()))));
 }
 
-/** An SVG that looks the same without the pages' style. */
+/** A copy of an SVG that looks the same without the pages' style. */
 function svgText(svg) {
   const copy = svg.cloneNode(true);
   const [shown, copied] = [svg, copy].map((root) => [root, ...root.querySelectorAll("*")]);
@@ -38,7 +38,7 @@ function svgText(svg) {
   return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(copy)}\n`;
 }
 
-/** Cells with commas, quotes or lines within quotes. */
+/** Quotes cells with commas, quotes or line breaks. */
 function csvText(rows) {
   const cell = (value) => {
     const text = value === null || value === undefined || Number.isNaN(value) ? "" : String(value);

@@ -1,5 +1,5 @@
-// Each child beside its parents: how fit it is against how fit they were. Generations are gone
-// through again for it, so only when somebody wants to see it.
+// The fitness of each child over the fitness of its parents. The server must repeat the
+// generations for it, so it is loaded on request.
 
 import { axes, shape } from "swarm/charts.js";
 import { canvas, decimals, element } from "swarm/dom.js";
@@ -8,28 +8,29 @@ import { exports } from "swarm/export.js";
 import { askJson } from "swarm/page.js";
 import { extremes } from "swarm/scales.js";
 
-/** Children that are shown at most; of longer runs, one generation in so many is asked for. */
+/** Maximum number of shown children; for longer runs, the page requests only every n-th generation. */
 const CHILDREN_MAX = 100_000;
-/** Around the points, pixels: as those of the map of individuals. */
+/** Margins around the points, pixels: those of the map of individuals. */
 const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
-/** How far a pointer may be from a point that it is meant for, pixels. */
+/** Maximum distance between a pointer and the point that it selects, pixels. */
 const NEAR = 14;
-/** How a child came about: a name, what it means, and its colour of the style. */
+/** The origin of a child: a name, its meaning, and its colour in the style. */
 const KINDS = [
   { name: "crossover", title: "from two parents, then mutated", color: "line" },
   { name: "copy", title: "from one parent, then mutated", color: "good" },
   { name: "elite", title: "its parent, unchanged: only trials differ", color: "relay" },
 ];
 
-/** A child as a row of the server has it. `x`: the mean fitness of its parents. */
+/** A child from a row of the server. `x`: the mean fitness of its parents. */
 function child([generation, individual, population, operator, fitness, ...of]) {
   const parents = of.length > 2 ? [[of[0], of[1]], [of[2], of[3]]] : [[of[0], of[1]]];
   const x = parents.reduce((sum, [, its]) => sum + its, 0) / parents.length;
   return { generation, individual, population, operator, fitness, parents, x };
 }
 
-/** A part of the page that is closed at first. `update(n_generations, every)`: how many there are, and of
- *  which one in so many is shown; `zoom(range)` shows the children of some generations, null: of all. */
+/** A part of the page that is closed at first. `update(n_generations, every)`: the number of
+ *  generations, and the stride of the shown ones; `zoom(range)` shows the children of some
+ *  generations, null: of all. */
 export function familiesPanel(id) {
   const children = [];
   let populations = [];
@@ -38,9 +39,9 @@ export function familiesPanel(id) {
   let every = 1;
   let isAsking = false;
   let range = null;
-  /** The kind that stands out; null: none. */
+  /** The highlighted kind; null: none. */
   let marked = null;
-  /** Those that are seen, and where; by which one is read out. */
+  /** The visible children and their positions, to find the one to read out. */
   let shown = [];
   let scale = null;
   let cursor = null;
@@ -50,13 +51,13 @@ export function familiesPanel(id) {
   const legend = element("div", { className: "keys small" });
   const picture = canvas((context, width, height) => paint(context, width, height), "");
   const frame = shape("svg", { "aria-hidden": "true" });
-  /** Around the point that is read out: all of them are not painted anew for it. */
+  /** A ring around the point of the readout: moving it repaints no points. */
   const ring = element("i", { className: "ring", hidden: true });
   const stage = element("div", { className: "cells", tabIndex: 0, role: "group", "aria-roledescription": "scatter plot", "aria-label": "fitness of each child against the mean of its parents; arrow keys go through children and generations, Enter plays one" }, frame, picture, ring);
   const files = exports({ svg: () => whole(), table: () => table(), name: () => `families-${id}` });
   const node = element("details", { className: "panel families", hidden: true, ontoggle: () => ask() },
     element("summary", {}, "Parents and children"),
-    element("p", { className: "muted small" }, "Above the dashed line a child is fitter than its parents were on average. An elite is its own parent: its distance from the line is that between trials. A zoom of the curve chooses generations; a click plays a child."),
+    element("p", { className: "muted small" }, "Children above the dashed line are fitter than the mean of their parents. An elite is its own parent: its distance from the line is the difference between trials. A zoom of the curve chooses generations; a click plays a child."),
     legend, stage, element("p", { className: "row small" }, note, readout, files));
 
   const isSeen = ({ generation }) => !range || (generation >= Math.round(range[0]) && generation <= Math.round(range[1]));
@@ -66,7 +67,7 @@ export function familiesPanel(id) {
     cursor = null;
     files.hidden = shown.length === 0;
     node.dataset.children = shown.length;
-    note.textContent = [`${shown.length.toLocaleString("en")} children`, every > 1 && `of one generation in ${every}`, next < n_generations && `generation ${next} of ${n_generations} is gone through`].filter(Boolean).join(", ");
+    note.textContent = [`${shown.length.toLocaleString("en")} children`, every > 1 && `of one generation in ${every}`, next < n_generations && `at generation ${next} of ${n_generations}`].filter(Boolean).join(", ");
     drawLegend();
     drawFrame();
     drawReadout();
@@ -81,7 +82,7 @@ export function familiesPanel(id) {
       const fitter = its.filter((it) => it.fitness > it.x).length;
       const dot = element("i", {});
       dot.style.background = `var(--${color})`;
-      const key = element("button", { type: "button", className: "key", title: `${title}; click to let them stand out`, "aria-pressed": String(marked === name), onclick: () => {
+      const key = element("button", { type: "button", className: "key", title: `${title}; click to highlight them`, "aria-pressed": String(marked === name), onclick: () => {
         marked = marked === name ? null : name;
         draw();
       } }, dot, `${name}: ${its.length.toLocaleString("en")}, ${Math.round((100 * fitter) / its.length)} % fitter than their parents`);
@@ -108,7 +109,7 @@ export function familiesPanel(id) {
     frame.replaceChildren(...axes({ inner, x0, x1, x }, y0, y1, y, height, "mean fitness of the parents", "fitness of the child"), ...diagonal);
   };
 
-  /** How opaque a point of a kind is: many that lie on one another are seen as a cloud. */
+  /** The opacity of the points of a kind: overlapping points form a cloud. */
   const opacity = (name) => (marked !== null && marked !== name ? 0.06 : Math.max(0.25, Math.min(0.85, 30 / Math.sqrt(shown.length))));
   const radius = () => (shown.length > 5000 ? 1.5 : 2.5);
 
@@ -166,7 +167,7 @@ export function familiesPanel(id) {
     const last = shown.length - 1;
     const by = event.shiftKey ? 10 : 1;
     const at = (to) => look(Math.max(0, Math.min(last, to)));
-    /** The same individual in the generation before or after, if it is there. */
+    /** The same individual in the previous or next generation, if shown. */
     const beside = (sign) => {
       const it = shown[cursor ?? 0];
       const isOf = (other) => sign * (other.generation - it.generation) > 0 && other.individual === it.individual && other.population === it.population;
@@ -205,7 +206,7 @@ export function familiesPanel(id) {
       while (next < n_generations && node.open) {
         const page = await askJson(`/api/experiments/${id}/families?from=${next}&every=${every}`);
         ({ populations } = page);
-        // Those that were drawn at random have no parents, and who failed has no fitness.
+        // Random individuals have no parents, and failed individuals have no fitness.
         children.push(...page.children.filter((row) => row.length > 5 && row[4] !== null).map(child));
         if (page.next <= next) break;
         next = page.next;

@@ -1,16 +1,16 @@
-// The fitness of individuals as far as it was asked for: only of as many generations as there is
-// room for, and none of them twice.
+// The loaded fitness of individuals. The page requests only as many generations as fit the
+// picture, and each of them once.
 
 import { ask } from "swarm/page.js";
 import { quantile } from "swarm/scales.js";
 
 /** Generations of a page. */
 const PAGE = 500;
-/** Values that are asked for at most, unless somebody zooms in: some megabytes. */
+/** Maximum number of requested values, except when zooming in: some megabytes. */
 const VALUES_MAX = 2_000_000;
-/** Values by which the scale of the colours is found. */
+/** Number of values that determine the scale of the colours. */
 const SAMPLE = 20_000;
-/** Shares of the values that the colours tell apart: a few outliers do not darken all others. */
+/** Quantiles that limit the scale of the colours, so that a few outliers do not darken all others. */
 const SHARES = [0.005, 0.995];
 
 export class FitnessPages {
@@ -18,7 +18,7 @@ export class FitnessPages {
     Object.assign(this, { id, n_individuals: 0, low: Infinity, high: -Infinity });
     /** Fitness by generation. */
     this.generations = new Map();
-    /** By first generation and step: which generation is asked for next. */
+    /** The next generation to request, by first generation and step. */
     this.next = new Map();
     this.isAsking = false;
   }
@@ -27,13 +27,13 @@ export class FitnessPages {
     return this.generations.get(generation);
   }
 
-  /** The generation that is known next before one, or that one. */
+  /** The nearest known generation at or before one. */
   nearest(generation) {
     for (let it = generation; it > generation - PAGE && it >= 0; it--) if (this.generations.has(it)) return it;
     return generation;
   }
 
-  /** Pages with the generations from `from` to before `to`, one in `every` if more have no room. */
+  /** Pages with the generations from `from` to before `to`, one in `every` if not all fit. */
   needed(from, to, width, n_generations) {
     const n_values = (to - from) * Math.max(1, this.n_individuals);
     const every = 2 ** Math.max(0, Math.floor(Math.log2((to - from) / Math.max(1, width))), Math.ceil(Math.log2(n_values / VALUES_MAX)));
@@ -45,7 +45,7 @@ export class FitnessPages {
     return found;
   }
 
-  /** Asks for what is missing of some pages; whether there is something new. */
+  /** Requests the missing parts of some pages; returns whether new values came. */
   async load(pages, n_generations) {
     if (this.isAsking) return false;
     this.isAsking = true;
@@ -57,10 +57,10 @@ export class FitnessPages {
         if (next >= end) continue;
         const response = await ask(`/api/experiments/${this.id}/fitness?from=${next}&n=${end - next}&every=${every}`);
         const reached = this.take(await response.arrayBuffer(), every);
-        // Of those that the log does not have any more, nothing comes.
+        // The log may have lost these generations: nothing comes.
         this.next.set(key, Math.max(next, reached ?? end));
         isNew = true;
-        // Its size is known now, and so how much there is room for.
+        // Now the size of a generation is known, and so the number that fits.
         if (from === pages[0].from && pages.length > 1 && this.n_individuals * n_generations > VALUES_MAX) break;
       }
     } finally {
@@ -79,7 +79,7 @@ export class FitnessPages {
     return n ? start + n * every : null;
   }
 
-  /** From which fitness to which colours go. */
+  /** The range of fitness that the colours cover. */
   scale() {
     const rows = [...this.generations.values()];
     const step = Math.max(1, Math.floor((rows.length * this.n_individuals) / SAMPLE));

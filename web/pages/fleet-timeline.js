@@ -1,20 +1,20 @@
-// Who computed what lately: a row for each worker, a lane for each of its slots.
+// The latest work of the fleet: a row for each worker, a lane for each of its slots.
 
 import { shape } from "swarm/charts.js";
 import { decimals, element } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
 import { span } from "swarm/page.js";
 
-/** Rows of workers that are drawn at most. */
+/** Maximum number of drawn rows of workers. */
 const WORKERS_MAX = 64;
-/** Lanes of a worker that are drawn at most. */
+/** Maximum number of drawn lanes of a worker. */
 const LANES_MAX = 16;
-/** No look goes back further, ms. */
+/** The longest shown time, ms. */
 const LONGEST = 300_000;
 /** Pixels. */
 const [AXIS, GAP, LETTER] = [22, 6, 7];
 
-/** What is said of each fate; the style has its colour. */
+/** The text of each outcome; the style has its colour. */
 const FATES = {
   computed: "computed",
   unanswered: "no answer yet",
@@ -23,9 +23,9 @@ const FATES = {
   lost: "lost with its worker",
 };
 
-/** Puts the assignments of a worker into lanes. Results say when they were computed; of the
- *  others only when they were given is known, so each takes what is left free before its end,
- *  and those for which nothing is left had not begun. */
+/** Puts the assignments of a worker into lanes. Results state their time of computing. For other
+ *  assignments only the time of sending is known: each takes the free time before its end, and
+ *  those without any had not begun. */
 function inLanes(assignments, n_lanes) {
   const lanes = Array.from({ length: n_lanes }, () => []);
   const placed = [];
@@ -51,27 +51,27 @@ function inLanes(assignments, n_lanes) {
   return placed;
 }
 
-/** The timeline; `show(answer, workers)` draws what the server says. */
+/** The timeline; `show(answer, workers)` draws the server's answer. */
 export function fleetTimeline() {
   let rows = [];
   let now = 0;
   let window = [0, 1];
   let answer = null;
   let slots = new Map();
-  /** What is read out: a row, and an assignment in it if there is one; null: nothing. */
+  /** The readout: a row, and an assignment in it if any; null: none. */
   let cursor = null;
 
   const choice = element("select", { "aria-label": "how far back", onchange: () => arrange() },
-    ...[["", "all that is known"], ["1000", "1 s"], ["10000", "10 s"], ["60000", "1 min"]].map(([value, text]) => element("option", { value }, text)));
+    ...[["", "all known time"], ["1000", "1 s"], ["10000", "10 s"], ["60000", "1 min"]].map(([value, text]) => element("option", { value }, text)));
   const readout = element("p", { className: "muted small readout", role: "status" });
   const more = element("p", { className: "muted small" });
-  const picture = shape("svg", { role: "group", tabindex: "0", "aria-roledescription": "timeline", "aria-label": "who computed what; left and right go through what a worker computed, up and down through workers, Escape goes on" });
+  const picture = shape("svg", { role: "group", tabindex: "0", "aria-roledescription": "timeline", "aria-label": "latest work of the workers; left and right go through the work of a worker, up and down through workers, Escape continues" });
   const files = exports({ svg: () => picture, table: () => table(), name: () => "timeline" });
   const broken = element("ul", { className: "events broken" });
   const keys = Object.entries(FATES).filter(([fate]) => fate !== "failed").map(([fate, text]) =>
     element("span", { className: "key" }, element("i", { className: fate }), fate === "lost" ? "failed, or lost" : text));
   const node = element("section", { className: "panel fleet-timeline" },
-    element("header", { className: "row" }, element("h2", {}, "Who computed what"), element("span", { className: "space" }), choice),
+    element("header", { className: "row" }, element("h2", {}, "Latest work"), element("span", { className: "space" }), choice),
     picture, element("div", { className: "row small muted" }, ...keys, files), readout, more, broken);
 
   const arrange = () => {
@@ -90,7 +90,7 @@ export function fleetTimeline() {
     }).sort((a, b) => a.id - b.id);
     const n_more = Math.max(0, rows.length - WORKERS_MAX);
     rows = rows.slice(0, WORKERS_MAX);
-    more.textContent = n_more ? `${n_more} more workers have no room` : "";
+    more.textContent = n_more ? `${n_more} more workers do not fit` : "";
     cursor = null;
     broken.replaceChildren(...brokenLines(all));
     node.dataset.assignments = all.length;
@@ -109,7 +109,7 @@ export function fleetTimeline() {
     });
   };
 
-  // Few workers have more room each.
+  // With few workers, each gets more room.
   const height = (row) => Math.max(rows.length > 8 ? 14 : 22, row.n_lanes * (row.n_lanes > 4 ? 5 : 9));
   const left = (width) => (width < 600 ? 70 : 130);
   const x = (at, width) => left(width) + ((at - window[0]) / (window[1] - window[0])) * (width - left(width) - 4);
@@ -122,7 +122,7 @@ export function fleetTimeline() {
     picture.setAttribute("viewBox", `0 0 ${width} ${total}`);
     picture.style.height = `${total}px`;
     picture.replaceChildren(...timeAxis(width, total), shape("g", {}, ...bars(width)), shape("g", { class: "cursor" }));
-    if (rows.length === 0) picture.append(text(width / 2, AXIS, "nothing was computed lately", { "text-anchor": "middle" }));
+    if (rows.length === 0) picture.append(text(width / 2, AXIS, "no work lately", { "text-anchor": "middle" }));
     drawCursor();
   };
 
@@ -152,7 +152,7 @@ export function fleetTimeline() {
         shape("line", { x1: begin, x2: width, y1: top + tall + GAP / 2, y2: top + tall + GAP / 2, class: "grid" }));
       for (const it of row.its) {
         const box = boxOf(row, it, width);
-        // One generation is told from the next.
+        // Neighbouring generations differ in colour.
         nodes.push(shape("rect", { ...box, class: it.number % 2 ? `${it.fate} odd` : it.fate }));
         if (it.fate === "lost" || it.fate === "failed") nodes.push(text(box.x + box.width, box.y + box.height / 2 + 4, "✕", { class: "axis lost", "text-anchor": "end" }));
       }
@@ -179,7 +179,7 @@ export function fleetTimeline() {
     return group.replaceChildren(shape("rect", { ...box, x: box.x - 1, y: box.y - 1, width: box.width + 2, height: box.height + 2 }));
   };
 
-  /** What is drawn, as a table. */
+  /** The drawn assignments, as a table. */
   const table = () => [["worker", "lane", "batch", "individual", "first trial", "end of trials", "start, ms", "end, ms", "fate"],
     ...rows.flatMap((row) => row.its.map((it) => [row.name, it.lane, it.batch, it.individual, ...it.trials, it.start, it.end, it.fate]))];
 
@@ -220,7 +220,8 @@ export function fleetTimeline() {
   });
   new ResizeObserver(draw).observe(node);
   node.show = (latest, workers) => {
-    // Who points at something, or goes through it with keys, wants it to stay.
+    // While the user points at an assignment, or goes through them with keys, the picture
+    // stays.
     if (picture.matches(":hover") || cursor) return;
     answer = latest;
     now = Date.now();

@@ -1,16 +1,16 @@
-// Who heard whom, as arrows: those of the last steps, the older the fainter.
+// Received messages as arrows: those of the last steps, older ones fainter.
 
 import { symbolColor } from "swarm/drawing.js";
 import { shortest } from "swarm/episode.js";
 
-/** Steps until an arrow has faded, among few robots and among so many that arrows hide each other. */
+/** Steps until an arrow has faded, for few robots and for many robots, whose arrows overlap. */
 const [FADE, FADE_OF_MANY, MANY] = [4, 2, 200];
-/** Robots whose symbols are written beside the arrows, unless one is followed. */
+/** Maximum number of robots for which symbols appear beside all arrows. */
 const LABELS_MAX = 60;
 /** Length of an arrow's head, pixels. */
 const HEAD = 7;
 
-/** Draws the arrows; those of the same look are one path, for there may be thousands. */
+/** Draws the arrows; arrows of the same look form one path, because there may be thousands. */
 export function drawHearing(context, { camera, colors, episode, poses, radius, view }) {
   const n = episode.n_symbols;
   const hasLabels = view.numbers && (view.robot !== null || episode.n_robots <= LABELS_MAX);
@@ -57,7 +57,7 @@ export function drawHearing(context, { camera, colors, episode, poses, radius, v
   context.globalAlpha = 1;
 }
 
-/** Adds an arrow that is slightly bent, so that both directions are seen; where its label is. */
+/** Adds a slightly bent arrow, so that both directions stay visible; returns the place of its label. */
 function addArrow(path, x, y, dx, dy, length, radius, head) {
   const [ux, uy] = [dx / length, dy / length];
   const bend = Math.min(14, 0.12 * length);

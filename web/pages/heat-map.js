@@ -1,5 +1,5 @@
-// The fitness of every individual of every generation in one picture, that zooms with the curve
-// above it; a click on a cell plays it.
+// The fitness of every individual of every generation in one picture. It zooms with the curve
+// above; a click on a cell plays the individual.
 
 import { canvas, decimals, element } from "swarm/dom.js";
 import { path, shape } from "swarm/charts.js";
@@ -8,22 +8,22 @@ import { FitnessPages } from "swarm/fitness-pages.js";
 import { complain, resolve } from "swarm/page.js";
 import { STOPS, rampColor, ticks } from "swarm/scales.js";
 
-/** Around the cells, pixels; left and right as those of charts, so that generations are below
- *  one another. */
+/** Margins around the cells, pixels; left and right as in charts, so that generations are aligned.
+ *  */
 const EDGE = { left: 58, right: 12, top: 6, bottom: 40 };
-/** Pixels of a cell from which there are lines between cells. */
+/** Minimum size of a cell with lines between cells, pixels. */
 const LINES_FROM = 7;
 
-/** The map of an experiment; `update(n_generations)` shows more of it. `onZoom(range)`: told which
- *  generations are seen, null for all; `zoom(range)` shows some. */
+/** The map of an experiment; `update(n_generations)` shows more of it. `onZoom(range)`: called with
+ *  the visible generations, null for all; `zoom(range)` shows some. */
 export function heatMap(id, onZoom = () => {}) {
   const pages = new FitnessPages(id);
-  /** Pictures of pages, a pixel for each individual, so that few images are drawn and not cells. */
+  /** Pictures of pages with a pixel for each individual, to draw a few images instead of many cells. */
   const pictures = new Map();
   let n_generations = 0;
   let range = null;
   let isSorted = false;
-  /** The cell that is read out: a generation, and a place among its individuals. */
+  /** The cell of the readout: a generation, and a place among its individuals. */
   let cursor = null;
   let held = null;
 
@@ -43,7 +43,7 @@ export function heatMap(id, onZoom = () => {}) {
       element("span", { className: "space" }), scale, element("label", {}, sort, "best on top")),
     stage, element("p", { className: "row small" }, readout, files));
 
-  /** The generations that are seen, as places: the first one's beginning, the last one's end. */
+  /** The visible generations as positions: the beginning of the first one, the end of the last one. */
   const window = () => (range ? [Math.max(0, Math.round(range[0]) - 0.5), Math.min(n_generations - 1, Math.round(range[1])) + 0.5] : [-0.5, n_generations - 0.5]);
 
   /** Individuals of a generation in the order of the rows. */
@@ -52,7 +52,7 @@ export function heatMap(id, onZoom = () => {}) {
     return isSorted ? indices.sort((a, b) => values[b] - values[a]) : indices;
   };
 
-  /** The picture of a page, in which a pixel is a generation that was asked for. */
+  /** The picture of a page, with a column of pixels for each requested generation. */
   const pictureOf = (page) => {
     const key = `${page.from}/${page.every}`;
     const known = pictures.get(key);
@@ -99,7 +99,7 @@ export function heatMap(id, onZoom = () => {}) {
     }
   };
 
-  /** A frame that is seen on every colour. */
+  /** A frame that is visible on every colour. */
   const mark = (context, x, y, width, height) => {
     for (const [style, wide] of [["#000000", 4], ["#ffffff", 2]]) {
       context.strokeStyle = style;
@@ -126,7 +126,7 @@ export function heatMap(id, onZoom = () => {}) {
       text([14, middle], isSorted ? "rank" : "individual", { "text-anchor": "middle", transform: `rotate(-90 14 ${middle})` }));
   };
 
-  /** What the colours mean. */
+  /** The legend of the colours. */
   const drawScale = () => {
     if (!Number.isFinite(pages.low)) return;
     const stops = STOPS.map((color) => `rgb(${color.join(" ")})`).join(", ");
@@ -144,7 +144,7 @@ export function heatMap(id, onZoom = () => {}) {
     picture.redraw();
   };
 
-  /** Asks for what is seen and not known, unless that is under way. */
+  /** Requests visible unknown generations, unless a request is under way. */
   const load = async (needed) => {
     try {
       if (await pages.load(needed, n_generations)) draw();
@@ -248,7 +248,7 @@ export function heatMap(id, onZoom = () => {}) {
     const svg = axes.cloneNode(true);
     const box = { x: EDGE.left, y: EDGE.top, width: picture.clientWidth, height: picture.clientHeight };
     svg.append(shape("image", { ...box, preserveAspectRatio: "none", href: picture.toDataURL() }), shape("path", { d: `${path([[box.x, box.y], [box.x, box.y + box.height], [box.x + box.width, box.y + box.height]])}`, fill: "none" }));
-    // Only what is on a page has a style.
+    // Only elements of a page have a style.
     svg.style.position = "absolute";
     svg.style.visibility = "hidden";
     stage.append(svg);
@@ -256,7 +256,7 @@ export function heatMap(id, onZoom = () => {}) {
     return svg;
   };
 
-  /** What is seen as a table. */
+  /** The visible values as a table. */
   const table = () => {
     const [from, to] = window();
     const rows = [["generation", "individual", "fitness"]];

@@ -4,18 +4,18 @@ import { decimals, element } from "swarm/dom.js";
 import { sparkline } from "swarm/charts.js";
 import { span, stateMark } from "swarm/page.js";
 
-/** What is left of a run at its latest pace, ms; null if it does not run. */
+/** Remaining time of a run at its latest pace, ms; null if it does not run. */
 const left = (it) => (it.state === "running" && it.generation_ms !== null ? it.generation_ms * (it.generations - it.generations_done) : null);
 const number = (value) => decimals(value ?? NaN, 3);
 
 /** The labels of an experiment, each as a mark. */
 const labelMarks = (it) => Object.entries(it.labels).map(([key, value]) => element("span", { className: "tag" }, value ? `${key}=${value}` : key));
 
-/** The worth of a champion leads: it was found on trials that selected nothing. What there is
- *  before a judgement is optimistic, and looks like it. */
+/** The worth of a champion comes first: it is measured on trials that selected nothing. The value
+ *  before a judgement is optimistic, and marked so. */
 function worth(it) {
   if (it.champion !== null) return [element("a", { className: "worth", href: `/replay/${it.id}`, title: "its worth, on trials that selected nothing; click to play" }, number(it.champion))];
-  if (it.selection !== null) return [element("a", { className: "muted", href: `/replay/${it.id}`, title: "on the trials by which it was selected, which is optimistic; click to play" }, `≈ ${number(it.selection)}`)];
+  if (it.selection !== null) return [element("a", { className: "muted", href: `/replay/${it.id}`, title: "on the trials that selected it, which is optimistic; click to play" }, `≈ ${number(it.selection)}`)];
   return [it.generations_done ? element("a", { href: `/replay/${it.id}` }, "play") : "–"];
 }
 
@@ -26,8 +26,9 @@ function progress(it) {
     element("div", { className: "small muted" }, `${it.generations_done} of ${it.generations}${ms === null ? "" : `, ${span(ms)} left`}`)];
 }
 
-/** Each has a name, a title, a width, what it shows of an experiment, and a value that sorts (null: none).
- *  `says`: of what the cell is made, and `saved`: what a table has of it, if that is not the value. */
+/** Each has a name, a title, a width, the cell of an experiment, and a value that sorts (null:
+ *  none). `says`: the data of the cell, and `saved`: the value in a saved table, if they differ
+ *  from that value. */
 export const COLUMNS = [
   { name: "champion", title: "Champion", width: "5.5rem", isUsual: true, isGreatFirst: true, value: (it) => it.champion ?? it.selection, says: (it) => [it.champion, it.selection, it.generations_done > 0], cell: worth },
   { name: "state", title: "State", width: "7.5rem", isUsual: true, value: (it) => it.state, says: (it) => [it.state, it.reason], cell: (it) => [stateMark(it)] },

@@ -1,31 +1,31 @@
-// The list of experiments as a table. Only cells that say something else are made anew, and rows
-// move only while nobody is on them, so focus, clicks and scrolling are not lost.
+// The list of experiments as a table. Only changed cells are replaced, and rows do not move
+// while the user points at them, so focus, clicks and scrolling survive.
 
 import { decimals, element } from "swarm/dom.js";
 import { counted } from "swarm/page.js";
 import { groupings } from "swarm/list-view.js";
 import { quantile } from "swarm/scales.js";
 
-/** Rows are laid out as grids, of which a browser skips those out of sight; what they are is said
- *  again for those who do not see it. */
+/** Rows are grids, so that a browser skips invisible ones; roles describe them to screen readers.
+ *  */
 const td = (properties, ...content) => element("td", { role: "cell", ...properties }, ...content);
 
-/** `onChoose`: called when other rows are ticked. */
+/** `onChoose`: called when the ticked rows change. */
 export function listTable(view, chosen, onChoose) {
   const rows = element("tbody", { role: "rowgroup" });
   const head = element("tr", { role: "row" });
   const node = element("table", { className: "list runs", role: "table" }, element("thead", { role: "rowgroup" }, head), rows);
   const none = element("tr", { className: "whole", role: "row" }, td({ className: "muted" }));
-  /** Rows that exist, by id, and those of groups, by name. */
+  /** The rows of experiments by id, and those of groups by name. */
   let known = new Map();
   let groups = new Map();
   let experiments = new Map();
   let shown = [];
   let weights = 0;
-  /** Those that are seen, in order. */
+  /** The shown rows, in order. */
   let found = [];
 
-  const all = element("input", { type: "checkbox", "aria-label": "choose all that are shown", onchange: () => {
+  const all = element("input", { type: "checkbox", "aria-label": "choose all shown experiments", onchange: () => {
     for (const it of found) choose(it.id, all.checked);
     onChoose();
   } });
@@ -67,7 +67,7 @@ export function listTable(view, chosen, onChoose) {
     return made;
   };
 
-  /** Fills the cells of a row that are to say something else. */
+  /** Fills the changed cells of a row. */
   const fill = (made, it) => {
     const renew = (name, cell, says, content) => {
       const text = JSON.stringify(says);
@@ -110,10 +110,10 @@ export function listTable(view, chosen, onChoose) {
     return made.node;
   };
 
-  /** Whether somebody points at a row, or has the focus in one: it stays where it is. */
+  /** Whether the user points at a row, or has the focus in one: then it stays in place. */
   const isHeld = () => rows.matches(":hover") || rows.contains(document.activeElement);
 
-  /** Keeps those in order that are shown, and puts the new ones between them. */
+  /** Keeps the order of shown rows, and puts new ones between them. */
   const inPlace = (sorted) => {
     const places = new Map([...rows.children].map((it, place) => [Number(it.dataset.id), place]));
     const old = sorted.filter((it) => places.has(it.id)).sort((a, b) => places.get(a.id) - places.get(b.id));
@@ -127,7 +127,7 @@ export function listTable(view, chosen, onChoose) {
 
   let byBefore = null;
 
-  /** `isOrdered`: somebody has asked for another order, which is then there at once. */
+  /** `isOrdered`: the user has chosen another order, which applies at once. */
   const draw = (isOrdered) => {
     const columns = view.shown;
     if (columns.length !== shown.length || columns.some((column, i) => column !== shown[i])) {
@@ -158,7 +158,7 @@ export function listTable(view, chosen, onChoose) {
     all.checked = found.length > 0 && found.every((it) => chosen.has(it.id));
   };
 
-  /** Takes the experiments as they are now; `changed`: ids of those that say something else. */
+  /** Takes the present experiments; `changed`: the ids of changed ones. */
   const update = (now, changed) => {
     experiments = now;
     const before = weights;
@@ -172,10 +172,10 @@ export function listTable(view, chosen, onChoose) {
     }
     draw(false);
   };
-  // What has another place by now goes there when nobody is on it any more.
+  // Rows with a new place move there when the user leaves them.
   rows.addEventListener("pointerleave", () => draw(false));
 
-  /** What is listed, in its order: what each run is known by, and the columns that are shown. */
+  /** The listed runs in order, as a table: the identity of each run, and the shown columns. */
   const rowsToSave = () => {
     const names = ["id", "name", "group", "variant", "seed"];
     const columns = shown.filter((it) => !names.includes(it.name));
@@ -185,14 +185,14 @@ export function listTable(view, chosen, onChoose) {
   return { node, update, redraw: () => draw(true), count: () => found.length, rowsToSave };
 }
 
-/** Has exactly these children in this order, and moves no more than it has to. */
+/** Gives an element exactly these children in this order, with as few moves as possible. */
 function place(parent, wanted) {
   const kept = new Set(wanted);
   for (const child of [...parent.children]) if (!kept.has(child)) child.remove();
   let at = parent.firstChild;
   for (const node of wanted) {
     if (node === at) at = at.nextSibling;
-    // What is moved keeps its focus where a browser can do that.
+    // A moved element keeps its focus if the browser supports that.
     else if (node.isConnected && parent.moveBefore) parent.moveBefore(node, at);
     else parent.insertBefore(node, at);
   }

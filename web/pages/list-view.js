@@ -1,10 +1,10 @@
-// What is seen of a list, and in which order: all of it is in the address.
+// The filter and the order of a list, which are part of the address.
 
-/** What each part of an address is unless it says otherwise. */
+/** The default of each part of an address. */
 const USUAL = { q: "", sort: "-id", by: "", show: "", open: "", archived: "" };
 
 export class ListView {
-  /** `columns`: those that there are. `onChange`: called after every change. */
+  /** `columns`: all columns. `onChange`: called after every change. */
   constructor(columns, onChange) {
     Object.assign(this, { columns, onChange, parts: { ...USUAL } });
     const words = new URLSearchParams(location.search);
@@ -31,31 +31,31 @@ export class ListView {
     if (names.length) this.set({ show: isUsual ? "" : names.join(",") });
   }
 
-  /** The column that sorts, and 1 or -1; by number of the experiment if it is none of them. */
+  /** The column that sorts, and 1 or -1; the number of the experiment if the name is unknown. */
   get order() {
     const name = this.parts.sort.replace("-", "");
     return { name, sign: this.parts.sort.startsWith("-") ? -1 : 1 };
   }
 
-  /** Sorts by a column; once more, the other way; a third time, as at first. */
+  /** Sorts by a column; a second call reverses the order, a third one restores the default. */
   sortBy({ name, isGreatFirst }) {
     const [first, second] = isGreatFirst ? [`-${name}`, name] : [name, `-${name}`];
     this.set({ sort: { [first]: second, [second]: USUAL.sort }[this.parts.sort] ?? first });
   }
 
-  /** Which comes first of two experiments. */
+  /** The order of two experiments. */
   compare = (a, b) => {
     const { name, sign } = this.order;
     const value = this.columns.find((it) => it.name === name)?.value ?? ((it) => it.id);
     const [x, y] = [value(a), value(b)];
-    // What has no value is last, whichever way it is sorted.
+    // Experiments without a value are last in both directions.
     if (x === null || y === null) return (x === null) - (y === null) || b.id - a.id;
     const way = typeof x === "string" ? x.localeCompare(y, undefined, { numeric: true }) : x - y;
     return sign * way || b.id - a.id;
   };
 
-  /** Whether an experiment is to be seen. A word `name=value` is a property or a label of it, any
-   *  other one a part of what is written there; with `-` before it, it must not be so. */
+  /** Whether to show an experiment. A word `name=value` must equal a property or a label; any other
+   *  word must occur in its text. A `-` before a word negates it. */
   filter() {
     const words = this.parts.q.toLowerCase().split(/\s+/).filter(Boolean);
     return (it) => {
@@ -73,7 +73,7 @@ export class ListView {
 
   toggle(group) {
     const open = list(this.parts.open);
-    // A comma within a name does not end it.
+    // A comma within a name does not end the name.
     const name = encodeURIComponent(group);
     this.set({ open: (open.includes(name) ? open.filter((it) => it !== name) : [...open, name]).join(",") });
   }
@@ -81,14 +81,14 @@ export class ListView {
 
 const list = (text) => text.split(",").filter(Boolean);
 
-/** What an experiment is found by. */
+/** The searchable text of an experiment. */
 function wordsOf(it) {
   const properties = { id: it.id, name: it.name, group: it.group, variant: it.variant, algorithm: it.algorithm, state: it.state, seed: it.seed, ...it.labels };
   const pairs = Object.entries(properties).filter(([, value]) => value !== "").map(([name, value]) => `${name}=${value}`);
   return pairs.map((pair) => pair.toLowerCase());
 }
 
-/** By what a list can be grouped: the name of it, and what each experiment has. */
+/** The properties that can group a list: the name of each, and its value for an experiment. */
 export function groupings(experiments) {
   const keys = new Set([...experiments].flatMap((it) => Object.keys(it.labels)));
   return {

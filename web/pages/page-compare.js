@@ -1,4 +1,4 @@
-// Runs over one another, one by one or as the median of a group.
+// Curves of several runs, single or as the median of a group.
 
 import { element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
@@ -7,7 +7,7 @@ import { allExperiments } from "swarm/experiment-list.js";
 import { askJson, bar, complain, main, resolve } from "swarm/page.js";
 import { quantile, seriesStyle } from "swarm/scales.js";
 
-/** What runs are laid along: its name, and its value after each generation. */
+/** The x axes: the name of each, and its value after each generation. */
 const AXES = {
   generation: { label: "generation", values: (rows) => rows.map((row) => row[0]) },
   episodes: { label: "episodes", values: (rows) => sums(rows, 6) },
@@ -51,13 +51,13 @@ async function history(id) {
   return rows;
 }
 
-/** What a run is grouped by. */
+/** The group of a run. */
 const kind = (it) => [it.group || it.name, it.variant].filter(Boolean).join(" ");
 
-/** Whom the latest answers are of. */
+/** The runs of the latest answers. */
 let explained = "";
 
-/** Statistics of the groups, and where the files of runs differ. */
+/** Statistics of the groups, and differences between the files of runs. */
 async function explain(groups, runs) {
   const asked = JSON.stringify(groups.map((it) => [it.name, it.runs.map((run) => run.id)]));
   if (asked === explained) return;
@@ -89,7 +89,8 @@ async function show() {
         const members = curves.filter(({ it }) => kind(it) === name).map(({ points }) => points).filter((points) => points.length);
         const n = Math.min(...members.map((points) => points.length));
         const sorted = (k) => members.map((points) => points[k][1]).sort((a, b) => a - b);
-        // Along episodes and time runs differ in where a generation ends: the median of that.
+        // For episodes and time, the ends of a generation differ between runs: use their
+        // median.
         const at = (k) => quantile(members.map((points) => points[k][0]).sort((a, b) => a - b), 0.5);
         const steps = Array.from({ length: Number.isFinite(n) ? n : 0 }, (_, k) => k);
         const style = seriesStyle(i, groups.length);
@@ -108,7 +109,7 @@ async function show() {
 try {
   experiments = await allExperiments();
   if (chosen.size === 0) for (const it of experiments.slice(-5)) chosen.add(it.id);
-  // Those that are compared are at hand, however many others there are.
+  // The compared runs come first, before any number of others.
   const ordered = experiments.toReversed().sort((a, b) => chosen.has(b.id) - chosen.has(a.id));
   list.replaceChildren(...ordered.map((it) => {
     const box = element("input", { type: "checkbox", checked: chosen.has(it.id), onchange: () => {

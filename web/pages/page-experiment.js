@@ -1,4 +1,4 @@
-// One experiment: its curve, its individuals, its champion, what it does, and its file.
+// One experiment: its curve, its individuals, its champion, its activity, and its file.
 
 import { decimals, element } from "swarm/dom.js";
 import { chart } from "swarm/charts.js";
@@ -8,7 +8,7 @@ import { familiesPanel } from "swarm/families.js";
 import { heatMap } from "swarm/heat-map.js";
 import { askJson, bar, complain, endPage, listen, main, oneByOne, order, remaining, resolve, span, stateMark } from "swarm/page.js";
 
-/** Time between two looks at what does not come with every generation, ms. */
+/** Time between two requests for data that do not come with every generation, ms. */
 const LOOK_EVERY = 2000;
 
 const id = location.pathname.split("/").pop();
@@ -16,7 +16,8 @@ bar(`Experiment ${id}`, "");
 
 const generations = [];
 let experiment = null;
-/** Populations of the experiment, each of which descends on its own; and whether its individuals have parents. */
+/** Populations of the experiment, each with its own descent; and whether its individuals have
+ *  parents. */
 let n_populations = 1;
 let hasParents = false;
 let champion = null;
@@ -25,7 +26,7 @@ const title = element("h1", {});
 const state = element("span", {});
 const facts = element("p", { className: "muted" });
 const actions = element("div", { className: "row actions" });
-/** All figures over generations show the same ones. */
+/** All figures over generations show the same range. */
 const onZoom = (range) => [fitness, spread, map, families].forEach((it) => it.zoom(range));
 const fitness = chart("fitness by generation", { onZoom });
 const spread = chart("standard deviation of fitness by generation", { onZoom });
@@ -36,11 +37,11 @@ const families = familiesPanel(id);
 const doing = element("section", { className: "panel" });
 const eventList = element("ol", { className: "events", tabIndex: 0, "aria-label": "events, the latest first" });
 const file = element("pre", { className: "file", tabIndex: 0, "aria-label": "experiment file" });
-/** Why there is nothing to see, or no more. */
+/** The reason why the page is empty, or does not advance. */
 const standing = element("section", { className: "panel standing", hidden: true });
 const diversity = element("section", { className: "panel" }, element("h2", {}, "Diversity"),
   element("p", { className: "muted small" }, "standard deviation of fitness among the individuals"), spread);
-/** What there is once a generation is complete. */
+/** The parts that need a complete generation. */
 const results = [element("section", { className: "panel" }, element("h2", {}, "Fitness"), fitness), map, championBox, diversity, dynamics];
 for (const part of results) part.hidden = true;
 main.replaceChildren(
@@ -51,16 +52,16 @@ main.replaceChildren(
   dynamics, families,
   element("details", { className: "panel" }, element("summary", {}, "Experiment file"), file));
 
-/** What to do next with an experiment that does not go on, and what there is of it. */
+/** The next step for a stopped experiment, and its stored data. */
 const NEXT = {
   running: () => "The first generation is being computed: the curve and the map of individuals begin when it is complete.",
-  unfinished: () => "No generation is complete, and these files do not say whether anybody computes: `swarmctl run FILE` goes on with it.",
-  paused: () => "It is paused: resume lets it go on, and what was computed is kept.",
-  cancelled: (it) => `It was cancelled${it.generations_done ? ": its generations and its champion stay" : " before a generation was complete"}. To compute it after all, submit its file, which is below, again.`,
-  failed: (it) => `${it.generations_done ? "Its generations stay." : "No generation was complete."} The events say what came before; \`swarmctl explain ${id}\` says more, and \`swarmctl resume ${id}\` lets it go on when the cause is gone.`,
+  unfinished: () => "No generation is complete, and these files do not show whether a program computes the experiment: `swarmctl run FILE` continues it.",
+  paused: () => "It is paused: resume continues it, without a loss of results.",
+  cancelled: (it) => `It was cancelled${it.generations_done ? ": its generations and its champion stay" : " before a generation was complete"}. To compute it after all, submit its file below again.`,
+  failed: (it) => `${it.generations_done ? "Its generations stay." : "No generation was complete."} The events show the cause; \`swarmctl explain ${id}\` tells more. When the cause is gone, \`swarmctl resume ${id}\` continues it.`,
 };
 
-/** Says where the experiment stands, unless the curve does. */
+/** Shows the progress of the experiment, unless the curve does. */
 function drawStanding() {
   const it = experiment;
   const isEmpty = it.generations_done === 0;
@@ -104,7 +105,7 @@ function draw() {
 
 let offered = "";
 
-/** Buttons are made anew only when others are due: focus and clicks are not lost. */
+/** Replaces the buttons only when they change, so that focus and clicks survive. */
 function drawActions() {
   const due = [hasCoordinator, experiment.state, experiment.generations_done > 0].join();
   if (due === offered) return;
@@ -128,9 +129,9 @@ function drawActions() {
   if (hasCoordinator && isUnfinished) {
     buttons.push(experiment.state === "paused"
       ? button("resume", () => act("resume", {}))
-      : button("pause", () => act("pause", {}, `Pause ${name}? Its work is taken back from the workers.`)));
+      : button("pause", () => act("pause", {}, `Pause ${name}? The coordinator takes its work back from the workers.`)));
     buttons.push(button("priority", () => {
-      const answer = prompt(`Weight of ${name} in the sharing of the fleet, 1 to 1000:`, experiment.priority);
+      const answer = prompt(`Share of ${name} in the fleet, relative to other experiments, 1 to 1000:`, experiment.priority);
       if (answer !== null) act("priority", { priority: Number(answer) });
     }));
     buttons.push(button("cancel", () => act("cancel", {}, `End ${name} for good? Its history and champion stay.`)));
@@ -138,7 +139,7 @@ function drawActions() {
   if (hasCoordinator && experiment.generations_done > 0) {
     buttons.push(button("fork", () => {
       const last = experiment.generations_done - 1;
-      const answer = prompt(`Start a new experiment that goes on from ${name} with another seed. After which generation, 0 to ${last}?`, last);
+      const answer = prompt(`Start a new experiment that continues ${name} with another seed. After which generation, 0 to ${last}?`, last);
       if (answer !== null) act("fork", { generation: Number(answer), seed: Math.floor(Math.random() * 2 ** 32) });
     }));
   }
@@ -179,12 +180,12 @@ async function drawEvents() {
   eventsUpTo = experiment.last_sequence;
   eventList.replaceChildren(...events.slice(-30).reverse().map((event) =>
     element("li", {}, element("time", { className: "muted" }, new Date(event.at_ms).toLocaleString()), ` ${event.text}`)));
-  if (events.length === 0) eventList.append(element("li", { className: "muted" }, "none but generations"));
+  if (events.length === 0) eventList.append(element("li", { className: "muted" }, "only generations"));
 }
 
 let hasCoordinator = false;
 
-/** What does not come with every generation. */
+/** Data that do not come with every generation. */
 async function load() {
   const answer = await askJson(`/api/experiments/${id}`);
   ({ experiment, champion } = answer);
@@ -198,7 +199,7 @@ async function load() {
   await Promise.all([drawEvents(), drawDoing()]);
 }
 
-/** It is not there, or not any more. */
+/** The experiment does not exist, or no longer exists. */
 function end(refusal) {
   isOver = true;
   clearTimeout(next);
@@ -210,7 +211,7 @@ let next = null;
 let isOver = false;
 let stopListening = () => {};
 
-/** Looks now, and again and again as long as something happens. */
+/** Requests the data now, and repeatedly as long as they can change. */
 const look = oneByOne(async () => {
   clearTimeout(next);
   try {
@@ -230,7 +231,7 @@ async function start() {
   await look();
   if (isOver) return;
   stopListening = listen(`/api/experiments/${id}/live?from=0`, (news) => {
-    // After a new connection the server may say again what is known.
+    // After a new connection the server may repeat known generations.
     for (const row of news.generations) if (row[0] === generations.length + (generations[0]?.[0] ?? row[0])) generations.push(row);
     const before = experiment;
     experiment = news.experiment;

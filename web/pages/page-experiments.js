@@ -14,7 +14,7 @@ const chosen = new Set();
 const view = new ListView(COLUMNS, () => draw());
 const table = listTable(view, chosen, () => drawActions());
 
-const search = element("input", { type: "search", value: view.parts.q, placeholder: "Words, state=running, KEY=VALUE, -not", title: "words of name, group, algorithm, state and labels; state=failed, seed=3 or a label KEY=VALUE are exact; - before a word: not", "aria-label": "search", oninput: () => view.set({ q: search.value }) });
+const search = element("input", { type: "search", value: view.parts.q, placeholder: "Words, state=running, KEY=VALUE, -not", title: "words in name, group, algorithm, state and labels; state=failed, seed=3 or a label KEY=VALUE match exactly; - before a word excludes", "aria-label": "search", oninput: () => view.set({ q: search.value }) });
 const grouping = element("select", { id: "by", onchange: () => view.set({ by: grouping.value, open: "" }) });
 // Narrow screens have no headings to press.
 const orders = [{ name: "id", title: "Experiment", isGreatFirst: true }, ...COLUMNS.filter((column) => column.value)].flatMap(({ name, title, isGreatFirst }) => {
@@ -40,7 +40,7 @@ main.replaceChildren(
   element("div", { className: "row bar" }, count, exports({ table: () => table.rowsToSave(), name: () => "experiments" }), element("span", { className: "space" }), actions),
   element("div", { className: "panel scroll" }, table.node));
 
-/** Texts and choices around the table; what says the same as before is left alone. */
+/** Texts and choices around the table; unchanged ones are left alone. */
 function drawAround() {
   const all = [...experiments.values()];
   const n_archived = all.filter((it) => it.archived).length;
@@ -78,7 +78,7 @@ function draw() {
 
 let hasCoordinator = false;
 
-/** What can be done with those that are ticked. */
+/** Actions on the ticked experiments. */
 function drawActions() {
   const its = [...chosen].map((id) => experiments.get(id)).filter(Boolean);
   const button = (id, text, onclick) => element("button", { type: "button", id, onclick }, text);
@@ -91,7 +91,7 @@ function drawActions() {
     }
   };
   const label = () => {
-    const answer = prompt("Labels for the ticked experiments, such as `paper draft=2`; `-paper` takes one away:");
+    const answer = prompt("Labels for the ticked experiments, such as `paper draft=2`; `-paper` removes one:");
     if (!answer?.trim()) return;
     const words = answer.trim().split(/\s+/);
     const set = Object.fromEntries(words.filter((it) => !it.startsWith("-")).map((it) => [it.split("=")[0], it.split("=").slice(1).join("=")]));

@@ -1,4 +1,4 @@
-// Who computes.
+// The workers and their work.
 
 import { decimals, element } from "swarm/dom.js";
 import { whatItDoes } from "swarm/doing.js";
@@ -6,9 +6,9 @@ import { followExperiments } from "swarm/experiment-list.js";
 import { fleetTimeline } from "swarm/fleet-timeline.js";
 import { askJson, bar, complain, counted, main, resolve, span } from "swarm/page.js";
 
-/** Between two looks, ms. */
+/** Time between two requests, ms. */
 const LOOK_EVERY = 2000;
-/** Experiments that are explained at most. */
+/** Maximum number of explained experiments. */
 const EXPLAINED_MAX = 6;
 
 bar("Fleet", "/fleet");
@@ -32,12 +32,12 @@ function row(it) {
     cell("Version", it.version), cell("", element("span", { className: "bad" }, it.trouble)));
 }
 
-/** Those that run, and the panels of some of them, by id. */
+/** The running experiments, and the panels of some of them, by id. */
 let running = [];
 const panels = new Map();
 const more = element("p", { className: "muted" });
 
-/** What each experiment does that is not at its end, and why it waits. */
+/** The activity of each unfinished experiment, and the reason why it waits. */
 async function explain() {
   const its = running.slice(0, EXPLAINED_MAX);
   for (const id of panels.keys()) if (!its.some((it) => it.id === id)) panels.delete(id);
@@ -68,7 +68,7 @@ async function look() {
   } catch (error) {
     complain(error, "look");
   }
-  // The next look begins when this one has ended: a slow server gets fewer.
+  // The next request starts when this one has ended, so a slow server gets fewer.
   setTimeout(look, document.hidden ? 5 * LOOK_EVERY : LOOK_EVERY);
 }
 

@@ -3,7 +3,8 @@
 import { element } from "swarm/dom.js";
 import { complain, main } from "swarm/page.js";
 
-// This page stands in for any other one, whose address stays: what somebody was sent is not lost.
+// This page replaces any other page but keeps its address, so that shared links survive the
+// login.
 const isStandIn = location.pathname !== "/login";
 /** The token in the address that a program printed. */
 const printed = isStandIn ? "" : decodeURIComponent(location.hash.slice(1));

@@ -1,4 +1,4 @@
-// What stands at addresses that lead nowhere.
+// The page of unknown addresses.
 
 import { bar, endPage } from "swarm/page.js";
 

@@ -1,5 +1,4 @@
-// Any individual, simulated when the page is opened; and again with something different,
-// side by side.
+// Any individual, simulated when the page opens; and a changed simulation beside it.
 
 import { element } from "swarm/dom.js";
 import { unpack } from "swarm/episode.js";
@@ -20,7 +19,7 @@ const strip = element("div");
 const formPlace = element("div");
 main.replaceChildren(neighbours, loading, stage, strip, formPlace);
 
-/** Links to those before and after an individual, as far as there are any. */
+/** Links to the previous and the next individual, if they exist. */
 function drawNeighbours({ population_size: n_individuals, generations_done: n_generations }) {
   if (!at?.includes("/") || at.endsWith("mean")) return;
   const [generation, individual] = at.split("/").map(Number);
@@ -31,7 +30,7 @@ function drawNeighbours({ population_size: n_individuals, generations_done: n_ge
     element("a", { href: `/replay/${id}` }, "champion"));
 }
 
-/** Says what is waited for, if that takes longer than a moment. */
+/** Shows the reason of a wait that takes longer than a moment. */
 async function waitingFor(text, work) {
   const timer = setTimeout(() => (loading.textContent = text), 300);
   try {
@@ -47,23 +46,23 @@ async function simulated(words) {
   return unpack(await response.arrayBuffer());
 }
 
-/** Those that are shown, with one clock. */
+/** The shown players, with one clock. */
 let players = [];
-/** Counts what was asked for: only the latest answer is shown. */
+/** Counts requests: only the latest answer is shown. */
 let asked = 0;
 let config = null;
 let trials = null;
 let form = null;
-/** The trial of the judgement that is played; null: the one that is played by itself. */
+/** The played trial of the judgement; null: the default one. */
 let judged = new URLSearchParams(location.search).get("judged");
 
-/** The words of an address that choose a world: of the judgement, unless a generation is named. */
+/** The query that chooses a world: of the judgement, unless a generation is named. */
 function withWorld(words) {
   if (judged === null || words.has("generation") || words.has("trial")) return words;
   return new URLSearchParams([["judged", judged], ...words]);
 }
 
-/** Shows the episode of the address: changed, or as it was with the changed one beside it. */
+/** Shows the episode of the address: the changed one, or the original with the changed one beside it. */
 async function show(words, isBeside) {
   const mine = ++asked;
   stage.setAttribute("aria-busy", "true");
@@ -80,7 +79,7 @@ async function show(words, isBeside) {
     stage.replaceChildren(...players.map((player, i) => element("div", {}, heading(player.episode, { suffix: player.suffix, trials, changes: changes[i] }), player.node)));
     stage.classList.toggle("two", isBeside);
     drawStrip(episodes[0]);
-    // Who fills in the form goes on with that.
+    // The user may still be filling in the form: leave it alone.
     if (!form?.node.contains(document.activeElement)) first.node.focus({ preventScroll: true });
     resolve("replay");
   } catch (error) {
@@ -103,13 +102,13 @@ function drawStrip(episode) {
   }));
 }
 
-/** Keeps what is shown in the address. */
+/** Stores the shown episode in the address. */
 function remember(words, isBeside) {
   const shown = new URLSearchParams([...withWorld(words), ...(isBeside ? [["beside", 1]] : [])]);
   history.replaceState(null, "", `${location.pathname}${shown.size ? `?${shown}` : ""}${location.hash}`);
 }
 
-/** Shows what the form says. */
+/** Shows the episode of the form. */
 function go(isBeside) {
   if (!form.node.reportValidity()) return undefined;
   const words = form.query();
@@ -118,13 +117,14 @@ function go(isBeside) {
 }
 
 async function start() {
-  // Somebody clicked an individual to see it move; an address with a step is to be looked at.
+  // After a click on an individual, the user wants to see it move; an address with a step
+  // shows that step.
   const plays = location.hash === "" && !matchMedia("(prefers-reduced-motion: reduce)").matches;
   const words = new URLSearchParams(location.search);
   const isBeside = words.has("beside");
   for (const name of ["beside", "judged"]) words.delete(name);
   const answers = Promise.all([askJson(`/api/experiments/${id}`), askJson(`/api/trials/${where}`)]);
-  const [experiment, known] = await waitingFor("simulating the trials by which it is known …", answers);
+  const [experiment, known] = await waitingFor("simulating its trials …", answers);
   config = experiment.config;
   drawNeighbours(experiment.experiment);
   trials = known;

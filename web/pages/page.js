@@ -1,8 +1,9 @@
-// What all pages of a server have: the bar at the top, questions to the server, and news.
+// The common parts of all pages of a server: the bar at the top, requests to the server,
+// and news.
 
 import { element } from "swarm/dom.js";
 
-/** Where a page puts what it shows. */
+/** The place for the content of a page. */
 export const main = document.getElementById("page");
 
 /** Draws the bar, and sets the title. `current`: the path of this page's link. */
@@ -16,7 +17,7 @@ export function bar(title, current) {
     element("span", { className: "space" }), status));
 }
 
-/** What a server says that cannot do what was asked, and its status; 0: there was no answer. */
+/** The message and the status of a failed request; 0: no answer. */
 class Refusal extends Error {
   constructor(message, status) {
     super(message);
@@ -24,7 +25,7 @@ class Refusal extends Error {
   }
 }
 
-/** Asks the server, and returns its answer. */
+/** Sends a request to the server, and returns its answer. */
 export async function ask(path, options = {}) {
   let response;
   try {
@@ -34,7 +35,7 @@ export async function ask(path, options = {}) {
   }
   if (response.ok) return response;
   const { error } = await response.json().catch(() => ({ error: `${response.status} ${response.statusText}` }));
-  // The server asks for the token in place of this page, whose address stays.
+  // The server shows the login in place of this page, at the same address.
   if (response.status === 401) location.reload();
   throw new Refusal(error, response.status);
 }
@@ -43,17 +44,17 @@ export async function askJson(path) {
   return (await ask(path)).json();
 }
 
-/** Has the server do something. */
+/** Sends an action to the server. */
 export async function order(path, body = {}) {
   const headers = { "Content-Type": "application/json" };
   return ask(path, { method: "POST", headers, body: JSON.stringify(body) });
 }
 
-/** Time until a connection is tried again that the browser has given up, ms. */
+/** Time until the page retries a connection that the browser has given up, ms. */
 const AGAIN_AFTER = 2000;
 
-/** News from the server, whenever there are some; the browser connects again by itself, and
- *  says which event was the last. `onEnd(refusal)`: the server is there, and will not have more. */
+/** News from the server; the browser reconnects by itself, and sends the id of its last event.
+ *  `onEnd(refusal)`: the server refuses to send more. */
 export function listen(path, onData, onEnd = (refusal) => complain(refusal, "news")) {
   let source = null;
   let isOver = false;
@@ -67,7 +68,7 @@ export function listen(path, onData, onEnd = (refusal) => complain(refusal, "new
       if (source.readyState === EventSource.CLOSED) look();
     };
   };
-  // After some answers a browser gives up, without a word on the answer.
+  // After some answers a browser gives up, without telling which answer it was.
   const look = async () => {
     try {
       (await ask(path, { headers: { Accept: "text/event-stream" } })).body.cancel();
@@ -81,7 +82,7 @@ export function listen(path, onData, onEnd = (refusal) => complain(refusal, "new
     }
   };
   connect();
-  // A page that comes back from the history of a browser goes on.
+  // A page that returns from the history of a browser continues.
   addEventListener("pagehide", () => source.close());
   addEventListener("pageshow", (event) => event.persisted && connect());
   return () => {
@@ -95,11 +96,11 @@ function setStatus(text, className) {
   if (status) Object.assign(status, { textContent: `● ${text}`, className: className || "good" });
 }
 
-/** What is wrong, by what has gone wrong. */
+/** The present errors, by failed attempt. */
 const problems = new Map();
 
-/** Shows that something went wrong, with what the server says, until it is resolved or somebody
- *  has read it. `what`: which attempt failed; its next success resolves it. */
+/** Shows an error with the server's message, until it is resolved or the user has read it. `what`:
+ *  the failed attempt; its next success resolves the error. */
 export function complain(error, what = "page") {
   const text = error.message;
   const known = problems.get(what);
@@ -114,20 +115,20 @@ export function complain(error, what = "page") {
   box.append(line);
 }
 
-/** What had gone wrong works again, or somebody has read of it. */
+/** Removes an error that is resolved, or that the user has read. */
 export function resolve(what) {
   problems.get(what)?.remove();
   problems.delete(what);
   if (problems.size === 0) document.getElementById("problem")?.remove();
 }
 
-/** Says in place of the page that what it shows is not there, and where to go on. */
+/** Replaces the page by a message that its subject does not exist, with a link. */
 export function endPage(title, text, ...links) {
   main.replaceChildren(element("section", { className: "panel end" }, element("h1", {}, title), element("p", {}, text),
     element("p", { className: "row" }, ...links.map(([href, name]) => element("a", { className: "play", href }, name)))));
 }
 
-/** Does one thing at a time: what is asked for meanwhile is done once more, after it. */
+/** Does one thing at a time: requests during a run lead to one more run after it. */
 export function oneByOne(work) {
   let running = null;
   let isWanted = false;

@@ -1,4 +1,4 @@
-// Plays an episode: the world, its controls, the robot that is followed, the timeline.
+// Plays an episode: the world, its controls, the followed robot, the timeline.
 
 import { Clock, clamp } from "swarm/clock.js";
 import { decimals, element } from "swarm/dom.js";
@@ -15,15 +15,15 @@ const HELP = [
   ["W", "whole world, or the swarm"],
 ];
 
-/** The player that keys are for: the one that was touched last. */
+/** The player that receives keys: the last one that the user touched. */
 let active = null;
 document.addEventListener("keydown", (event) => {
   if (active?.node.isConnected) active.key(event);
 });
 
 export class Player {
-  /** `place`: where step and robot are remembered, such as the page's address. `clock`: that of
-   *  the player which this one is shown beside. `suffix`: what tells its ids from the other's. */
+  /** `place`: the store of step and robot, such as the page's address. `clock`: the clock of the
+   *  player beside this one. `suffix`: distinguishes its ids from those of the other player. */
   constructor(episode, { place = addressPlace(), clock = null, suffix = "" } = {}) {
     this.episode = episode;
     this.place = place;
@@ -41,7 +41,7 @@ export class Player {
     if (!active?.node.isConnected) active = this;
   }
 
-  /** A robot's number, if there is such a robot. */
+  /** A robot's number, if the robot exists. */
   known(robot) {
     return robot !== null && robot !== undefined && robot < this.episode.n_robots ? robot : null;
   }
@@ -60,7 +60,7 @@ export class Player {
       type: "range", min: 0, max: episode.steps - 1, step: 1, id: id("step-slider"), "aria-label": "step",
       oninput: () => clock.seek(Number(this.slider.value)),
     });
-    // Not an <output>: nobody wants to hear twenty numbers a second.
+    // Not an <output>: a screen reader would read out twenty numbers a second.
     this.stepText = element("span", { id: id("step"), className: "step" });
     this.speedText = element("span", { id: id("speed"), className: "pace", title: "steps per second" });
     const toggle = (name, text, title) => {
@@ -79,9 +79,9 @@ export class Player {
         button("+", "faster (↑)", () => clock.changeSpeed(1))));
     this.recordButton = recordButton(this.world.node, clock, { id: id("record"), className: "record" });
     const options = element("div", { className: "options" },
-      toggle("trails", "trails", "where robots were in the last 60 steps (T)"),
+      toggle("trails", "trails", "trails of the last 60 steps (T)"),
       episode.has_radio ? toggle("radio", "who hears whom", "frames of the last steps; a colour per symbol (R)") : null,
-      episode.has_radio ? toggle("reach", "reach", "how far each robot is heard (A)") : null,
+      episode.has_radio ? toggle("reach", "reach", "radio reach of each robot (A)") : null,
       toggle("numbers", "numbers", "of robots and symbols (N)"),
       button("world", "whole world, or the swarm (W)", () => this.toggleWorld(), "camera"),
       this.recordButton,
@@ -92,7 +92,7 @@ export class Player {
     for (const kind of ["pointerdown", "focusin"]) this.node.addEventListener(kind, () => (active = this));
   }
 
-  /** What the marks in the world mean. */
+  /** The legend of the marks in the world. */
   legend() {
     const { episode } = this;
     const item = (className, text) => element("span", { className: "key" }, element("i", { className }), text);
@@ -106,7 +106,7 @@ export class Player {
       ...this.places("areas", "sees_areas"), ...this.places("lights", "sees_lights"));
   }
 
-  /** What areas and lights there are, and which robots see them, unless all do. */
+  /** The areas and lights, and the robots that see them, unless all do. */
   places(name, sees) {
     const { robots } = this.episode;
     const seeing = robots.filter((it) => it[sees]).map((it) => it.name);
@@ -185,7 +185,7 @@ export class Player {
     this.redraw();
   }
 
-  /** Goes where the address says, which somebody has changed. */
+  /** Follows the address after the user has changed it. */
   goTo({ step, robot }) {
     this.view.robot = this.known(robot);
     if (step !== undefined) this.clock.seek(step);
@@ -210,22 +210,21 @@ export class Player {
   }
 }
 
-/** Whether a key belongs to the element that has the focus: a field that is typed into, or a
- *  button that Space presses. */
+/** Whether a key belongs to the focused element: a text field, or a button that Space presses. */
 function isTyped({ target, key }) {
   const field = target.closest?.("input, select, textarea, [contenteditable]");
   if (field && !["range", "checkbox"].includes(field.type)) return true;
   return key === " " && target.closest?.("button, summary, a, input[type=checkbox]") !== null;
 }
 
-/** Which worlds an episode is of, for people. */
+/** The worlds of an episode, for people. */
 function worlds({ trial_set: set, generation, trial }) {
   const names = { judgement: `trial ${trial} of its judgement`, "held-out": `held-out trial ${trial} after generation ${generation}`, evaluation: `trial ${trial} of evaluations` };
   return names[set] ?? `trial ${trial} of generation ${generation}`;
 }
 
-/** What an episode is, above it. `suffix`: as that of its player; `trials`: those that the
- *  individual is known by; `changes`: what is different from how it evolved. */
+/** The heading of an episode. `suffix`: that of its player; `trials`: the trials that define the
+ *  individual's fitness; `changes`: the differences from its evolution. */
 export function heading(episode, { suffix = "", trials = null, changes = [] } = {}) {
   const measures = Object.entries(episode.measures).map(([name, mean]) => `${name.replaceAll("_", " ")} ${decimals(mean, 3)}`);
   return element("header", { className: "episode" },
@@ -250,7 +249,7 @@ function addressPlace() {
     write({ step, robot }) {
       const words = new URLSearchParams({ step });
       if (robot !== null) words.set("robot", robot);
-      // Browsers take only so many changes of an address a second.
+      // Browsers limit the number of changes of an address per second.
       if (`#${words}` === written) return;
       written = `#${words}`;
       history.replaceState(history.state, "", written);
@@ -258,5 +257,5 @@ function addressPlace() {
   };
 }
 
-/** A player that the address does not know. */
+/** A player without a place in the address. */
 export const NOWHERE = { read: () => ({}), write: () => {} };

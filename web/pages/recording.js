@@ -5,16 +5,16 @@ import { save } from "swarm/export.js";
 
 /** Bits per second: a hundred steps, at twenty a second, have less than 1 MB. */
 const BITS = 1_200_000;
-/** What browsers can write, the most common one first, and how such files end. */
+/** Video formats of browsers, the most common one first, and their file extensions. */
 const KINDS = [["video/webm;codecs=vp9", "webm"], ["video/webm", "webm"], ["video/mp4", "mp4"]];
 
-/** A button that plays and records until the end, or until something pauses it; null where a browser cannot
+/** A button that plays and records until the end, or until a pause; null if the browser cannot
  *  record. `update()`: to be called when the clock may have paused. */
 export function recordButton(canvas, clock, properties) {
   const [kind, end] = KINDS.find(([it]) => globalThis.MediaRecorder?.isTypeSupported(it)) ?? [];
   if (!kind || !canvas.captureStream) return null;
   let recorder = null;
-  const node = element("button", { type: "button", title: "play from here, and save that as a video of the world", ...properties }, "● video");
+  const node = element("button", { type: "button", title: "play from here, and save a video of the world", ...properties }, "● video");
   const stop = () => {
     recorder?.stop();
     recorder = null;

@@ -1,4 +1,4 @@
-// The robot that is followed: what it perceives, what its neurons do, and how it acts.
+// The followed robot: its perception, its neurons, and its actions.
 
 import { decimals, element } from "swarm/dom.js";
 import { palette, pixels, readingColor, symbolColor } from "swarm/drawing.js";
@@ -9,7 +9,7 @@ const ROW = 9;
 
 /** `id`: makes the ids of its parts from their names. */
 export function robotPanel(episode, view, seek, choose, id) {
-  const node = element("aside", { className: "robot-panel", "aria-label": "the robot that is followed" });
+  const node = element("aside", { className: "robot-panel", "aria-label": "the followed robot" });
   let shown = undefined;
   let parts = [];
 
@@ -29,14 +29,14 @@ export function robotPanel(episode, view, seek, choose, id) {
         element("span", { className: "space" }),
         element("button", { onclick: step(-1), title: "the robot before ([)", "aria-label": "the robot before" }, "‹"),
         element("button", { onclick: step(1), title: "the next robot (])", "aria-label": "the next robot" }, "›"),
-        element("button", { onclick: () => choose(null), title: "follow nobody (Esc)", "aria-label": "follow nobody" }, "×")),
+        element("button", { onclick: () => choose(null), title: "follow no robot (Esc)", "aria-label": "follow no robot" }, "×")),
       facts());
     const n_inputs = kind.stimuli.reduce((sum, rows) => sum + rows.n, 0);
     if (n_inputs > 0) node.append(element("h3", {}, "Stimuli"), map("stimuli", kind.stimuli));
     if (kind.has_network) node.append(element("h3", {}, "Neurons"), map("neurons", episode.ensembles));
   };
 
-  /** What it does in this step, as a list. */
+  /** Its actions in this step, as a list. */
   const facts = () => {
     const list = element("dl", {});
     const fact = (name, text, part) => {
@@ -72,7 +72,7 @@ export function robotPanel(episode, view, seek, choose, id) {
     const symbol = episode.symbol(robot, values);
     const text = `(${values.map((value) => decimals(value, 2)).join(", ")})`;
     if (symbol === null) return text;
-    // Not all of these colours can be read as text.
+    // Some of these colours would be unreadable as text.
     const mark = element("i", { className: "symbol" });
     mark.style.background = symbolColor(symbol, episode.n_symbols, palette().isDark);
     return [mark, element("b", {}, `symbol ${symbol} `), text];

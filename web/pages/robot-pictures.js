@@ -1,14 +1,15 @@
-// Robots as small pictures: each look is drawn once, and then copied, for there may be hundreds.
+// Robots as small pictures: each appearance is drawn once and then copied, because there may be
+// hundreds of robots.
 
 import { disc } from "swarm/drawing.js";
 
-/** Pictures that are kept: numbers make one of each robot. */
+/** Maximum number of cached pictures: with numbers, each robot has its own. */
 const KEPT_MAX = 4000;
 /** Half the side of a picture, in radii of a robot. */
 const REACH = 2.4;
 /** Radius up to which a robot has a thin line, pixels. */
 const SMALL = 5;
-/** Least radius of a robot in which a number is read, pixels. */
+/** Minimum radius of a robot with a legible number, pixels. */
 const NUMBERED_FROM = 6;
 
 export class RobotPictures {
@@ -19,7 +20,7 @@ export class RobotPictures {
 
   draw(context, { camera, colors, episode, poses, radius, view }) {
     const ratio = context.getTransform().a;
-    // Sizes that differ by less than is seen share pictures, while somebody zooms.
+    // While the user zooms, sizes with an invisible difference share pictures.
     const size = Math.round(radius * 4) / 4;
     const madeFor = `${size} ${ratio} ${colors.ground} ${colors.robot}`;
     if (madeFor !== this.madeFor || this.pictures.size > KEPT_MAX) this.pictures.clear();
@@ -46,7 +47,8 @@ export class RobotPictures {
       const picture = this.of(look, size, ratio, colors);
       const side = picture.width / ratio;
       const { x, y } = poses[robot];
-      // At whole pixels of the device and in its own size, a picture is copied; elsewhere it is computed anew.
+      // At whole pixels of the device and in its own size, a picture is copied; otherwise the
+      // browser resamples it.
       const place = (at) => Math.round((at - side / 2) * ratio) / ratio;
       camera.eachImage(x, y, 3 * size, (sx, sy) => context.drawImage(picture, place(sx), place(sy), side, side));
     }
@@ -61,7 +63,7 @@ export class RobotPictures {
   }
 }
 
-/** The picture of a look, for the pixels of a device. */
+/** The picture of an appearance, for the pixels of a device. */
 function paint({ led, relays, carries, failed, isTarget, isFollowed, number }, radius, ratio, colors) {
   const side = Math.ceil(2 * REACH * radius * ratio);
   const picture = new OffscreenCanvas(side, side);
@@ -104,7 +106,7 @@ function ring(context, radius, style, dash) {
   context.setLineDash([]);
 }
 
-/** Crosses out what is in the middle. */
+/** Crosses out the centre. */
 function cross(context, radius, style) {
   context.strokeStyle = style;
   context.lineWidth = 2;

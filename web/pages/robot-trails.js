@@ -1,19 +1,19 @@
-// Where robots were in the last steps, as thin lines behind them.
+// The last positions of robots, as thin lines behind them.
 
 /** Steps of a trail. */
 const TRAIL = 60;
-/** What is nearer than this to the point before is not drawn, pixels. */
+/** Points nearer than this to the previous point are not drawn, pixels. */
 const NEAR = 2.5;
-/** Who goes farther than this in a step was placed elsewhere, cm. */
+/** A robot that moves farther than this in a step was placed elsewhere, cm. */
 const JUMP = 50;
 
-/** Draws the trails of all robots; that of a robot which is followed stands out. */
+/** Draws the trails of all robots, and highlights that of the followed robot. */
 export function drawTrails(context, { camera, colors, episode, poses, view }) {
   const first = Math.max(0, view.step - TRAIL);
   // A wider line takes several times as long to draw.
   context.lineWidth = 1;
   context.strokeStyle = colors.trail;
-  /** One path of several robots: to stroke each of 500 takes longer than a frame may. */
+  /** One path for several robots: stroking each of 500 takes too long for a frame. */
   const stroke = (alpha, robots) => {
     context.globalAlpha = alpha;
     context.beginPath();
@@ -26,12 +26,11 @@ export function drawTrails(context, { camera, colors, episode, poses, view }) {
   context.globalAlpha = 1;
 }
 
-/** Points of the trail that is worked out, relative to where the robot is, pixels; and whether a
- *  line leads to each. */
+/** Points of the present trail, relative to the robot, pixels; and whether a line leads to each. */
 const way = new Float32Array(2 * (TRAIL + 2));
 const isLine = new Uint8Array(TRAIL + 2);
 
-/** Adds the way of a robot back to the step `first`, over the seam if it came over it. */
+/** Adds the trail of a robot back to the step `first`, across the seam if the robot crossed it. */
 function addTrail(context, camera, episode, robot, { x, y }, step, first) {
   const { values: xs, scale: unit } = episode.columns.x;
   const { values: ys } = episode.columns.y;

@@ -1,6 +1,6 @@
-// From values to places of a figure, and colours of its series.
+// Maps values to positions in a figure, and series to colours.
 
-/** The least and the greatest of values that may be too many for arguments. */
+/** Minimum and maximum of values; there may be too many of them for arguments of a function. */
 export function extremes(values) {
   return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
 }
@@ -14,8 +14,8 @@ export function ticks(low, high, n) {
   return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, i) => (first + i) * step);
 }
 
-/** At most a few hundred points of a curve, so that ten thousand generations draw at once:
- *  of each piece its first, least and greatest. */
+/** At most a few hundred points of a curve, so that ten thousand generations draw at once: the
+ *  first, smallest and largest value of each piece. */
 export function thinned(points, n) {
   if (points.length <= 3 * n) return points;
   const piece = Math.ceil(points.length / n);
@@ -29,14 +29,14 @@ export function thinned(points, n) {
   return kept;
 }
 
-/** A share of sorted values, between two of them if need be. */
+/** A quantile of sorted values, interpolated between two of them. */
 export function quantile(sorted, share) {
   const at = share * (sorted.length - 1);
   const low = Math.floor(at);
   return sorted[low] + (sorted[Math.min(low + 1, sorted.length - 1)] - sorted[low]) * (at - low);
 }
 
-/** Colours from bad to good: seen by all eyes, and in grey. */
+/** Colours from bad to good, distinguishable for colour-blind people and in grey. */
 export const STOPS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 
 /** Red, green and blue of a share from 0 to 1. */
@@ -46,7 +46,7 @@ export function rampColor(share) {
   return STOPS[low].map((from, i) => Math.round(from + (STOPS[low + 1][i] - from) * (at - low)));
 }
 
-/** Colours that are told apart on light and dark, also by most who see fewer of them. */
+/** Colours that are distinguishable on light and dark, also for most colour-blind people. */
 const FEW = ["#4269d0", "#e0571c", "#2f9a44", "#a463f2", "#b98a00", "#0a9396", "#e0559a", "#9c6b4e", "#6d8fd6", "#7d828c"];
 const DASHES = ["", "7 4", "2 3"];
 const LIGHTNESS = [0.42, 0.58, 0.5];
@@ -54,13 +54,13 @@ const LIGHTNESS = [0.42, 0.58, 0.5];
 /** Colour and dashes of series `i` of `n`: no two of up to hundreds are alike. */
 export function seriesStyle(i, n) {
   if (n <= FEW.length) return { color: FEW[i], dash: "" };
-  // Neighbours have the same hue as seldom as possible, and other dashes then.
+  // Neighbours rarely share a hue, and then have different dashes.
   const n_hues = Math.ceil(n / DASHES.length);
   const turn = Math.floor(i / n_hues);
   return { color: hex(((i % n_hues) + turn / DASHES.length) / n_hues, 0.62, LIGHTNESS[turn]), dash: DASHES[turn] };
 }
 
-/** Hue, saturation and lightness, each from 0 to 1, as programs for drawing read it. */
+/** Hue, saturation and lightness, each from 0 to 1, in a format that drawing programs read. */
 function hex(hue, saturation, lightness) {
   const part = (n) => {
     const k = (n + hue * 12) % 12;

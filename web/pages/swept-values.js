@@ -1,19 +1,20 @@
-// How the worth of champions depends on the values in which the files of runs differ.
+// The dependence of champions' worth on the swept values in the files of runs.
 
 import { shape } from "swarm/charts.js";
 import { decimals, element, onTheme } from "swarm/dom.js";
 import { exports } from "swarm/export.js";
 import { extremes, rampColor, ticks } from "swarm/scales.js";
 
-/** Fewer runs say nothing about a key. */
+/** Minimum number of runs for a statement about a key. */
 const RUNS_MIN = 6;
-/** So many values of a key have evenly spaced places, as those of a grid do not lie evenly. */
+/** Up to this number, the values of a key get evenly spaced positions, because values of a grid are
+ *  uneven. */
 const PLACES_MAX = 8;
-/** Runs with the same value lie so far apart at most, pixels. */
+/** Maximum distance between runs with the same value, pixels. */
 const APART = 16;
 /** Pixels of a letter of the axes. */
 const LETTER = 7;
-/** Which part of the colours is seen on a light, and on a dark ground. */
+/** The part of the colours that is visible on a light and on a dark ground. */
 const SEEN = { light: [0, 0.85], dark: [0.35, 1] };
 
 const isDark = matchMedia("(prefers-color-scheme: dark)");
@@ -25,8 +26,8 @@ function colorOf(share) {
   return `rgb(${rampColor(from + share * (to - from)).join(" ")})`;
 }
 
-/** Share of the variance of `worths` between groups with the same value, and the share that values
- *  without an effect have on average; null if each run has its own value, or all are worth the same. */
+/** Share of the variance of `worths` between groups with the same value, and the expected share of
+ *  values without an effect; null if each run has its own value, or all have the same worth. */
 function etaSquared(values, worths) {
   const mean = (all) => all.reduce((sum, it) => sum + it, 0) / all.length;
   const groups = [...Map.groupBy(worths, (_, i) => values[i]).values()];
@@ -38,7 +39,8 @@ function etaSquared(values, worths) {
 }
 
 /** Parallel coordinates and importance of keys, null with too few runs or keys. `runs`: those with
- *  files; `keys`: key, title, and a value for each run, as text; `n_chosen`: runs that were asked for. */
+ *  files; `keys`: key, title, and a value for each run, as text; `n_chosen`: number of requested
+ *  runs. */
 export function sweptValues(runs, keys, n_chosen) {
   const judged = runs.map((_, i) => i).filter((i) => runs[i].champion !== null).sort((a, b) => runs[a].champion - runs[b].champion);
   const its = judged.map((i) => runs[i]);
@@ -49,7 +51,7 @@ export function sweptValues(runs, keys, n_chosen) {
     element("p", { className: "muted small" }, `${its.length} runs${left_out}`), parallel(its, swept), element("h3", {}, "Importance of each key"), importance(its, swept));
 }
 
-/** Where the values of a key are, as shares of an axis, and the labels of the axis. */
+/** The positions of a key's values, as shares of an axis, and the labels of the axis. */
 function placesOf(values) {
   const distinct = [...new Set(values)];
   const isNumber = distinct.every((it) => it !== "" && Number.isFinite(Number(it)));
@@ -64,7 +66,7 @@ function placesOf(values) {
   return { at, labels: distinct.filter((_, i) => i % step === 0).map((it) => [at(it), it]) };
 }
 
-/** A line for each run through its values, from least to most worth. */
+/** A line for each run through its values, from the least to the greatest worth. */
 function parallel(runs, swept) {
   const worths = runs.map((it) => it.champion);
   const [low, high] = extremes(worths);
@@ -77,7 +79,7 @@ function parallel(runs, swept) {
   const table = () => [["id", "seed", ...swept.map((it) => it.key), "champion"], ...runs.map((it, i) => [it.id, it.seed, ...swept.map(({ values }) => values[i]), it.champion])];
   const node = element("figure", { className: "chart parallel" }, element("div", { className: "scroll" }, svg),
     element("figcaption", {}, element("span", {}, `worth ${decimals(low, 3)} `, ramp, ` ${decimals(high, 3)}`), readout, exports({ svg: () => svg, table, name: () => "swept-values" })));
-  /** The run that is read out; null: none. */
+  /** The run of the readout; null: none. */
   let cursor = null;
   let lines = [];
 
@@ -153,7 +155,7 @@ function importance(runs, swept) {
   const svg = shape("svg", { role: "img", "aria-label": `importance of keys: ${found.map((it) => `${it.title} ${it.eta ? decimals(it.eta.share, 2) : "unknown"}`).join(", ")}` });
   const table = () => [["key", "values", "runs", "eta squared", "eta squared by chance"], ...found.map((it) => [it.key, it.n_values, runs.length, it.eta?.share, it.eta?.byChance])];
   const node = element("figure", { className: "chart importance" }, svg, element("figcaption", {},
-    element("span", { className: "muted" }, "one-way \u03b7\u00b2 of each key by itself: variance of worth between its values, as a share of all; the dashed line is the share on average of values without an effect"),
+    element("span", { className: "muted" }, "one-way \u03b7\u00b2 of each key by itself: variance of worth between its values, as a share of all; the dashed line is the expected share of values without an effect"),
     exports({ svg: () => svg, table, name: () => "importance" })));
   const draw = () => {
     const width = Math.max(260, node.clientWidth);
@@ -163,7 +165,7 @@ function importance(runs, swept) {
     const x = (share) => 12 + share * (width - 24);
     const rows = found.flatMap(({ title, eta }, i) => {
       const y = 34 * i;
-      const says = eta ? decimals(eta.share, 2) : "unknown: each run has its own value, or all are worth the same";
+      const says = eta ? decimals(eta.share, 2) : "unknown: each run has its own value, or all have the same worth";
       const bar = eta ? [shape("rect", { x: x(0), y: y + 18, width: Math.max(1, x(eta.share) - x(0)), height: 12, class: "share" }),
         shape("line", { x1: x(eta.byChance), x2: x(eta.byChance), y1: y + 15, y2: y + 33, class: "chance" })] : [];
       return [text(x(0), y + 13, `${title}: ${says}`, { class: "axis name" }), ...bar];

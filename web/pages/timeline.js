@@ -1,5 +1,5 @@
-// What all robots did over all steps, below the world: the current step is marked, and
-// dragging goes to another one.
+// The states of all robots over all steps, below the world, with a mark at the current
+// step; dragging moves to another step.
 
 import { canvas, decimals, element } from "swarm/dom.js";
 import { palette, pixels, rgb } from "swarm/drawing.js";
@@ -39,7 +39,7 @@ function raster(episode, view, seek, label, height, colorAt) {
   });
 }
 
-/** Values over the steps as a line; greatest and least at its side. */
+/** Values over the steps as a line, with maximum and minimum at its side. */
 function curve(values, view, seek, label) {
   const known = values.filter(Number.isFinite);
   const low = Math.min(0, ...extremes(known));

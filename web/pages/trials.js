@@ -1,4 +1,4 @@
-// The trials that an individual is known by, as a strip: from the worst to the best, each to pick.
+// The trials of an individual as a strip, from the worst to the best; each can be selected.
 
 import { decimals, element } from "swarm/dom.js";
 import { shape } from "swarm/charts.js";
@@ -7,8 +7,8 @@ import { exports } from "swarm/export.js";
 /** Height of the strip, and room around its bars, pixels. */
 const [HEIGHT, EDGE] = [64, 3];
 
-/** `trials`: as the server says them. `shown`: which one is played, null for none of them.
- *  `pick(trial)`: plays another one; without it the strip is only looked at. */
+/** `trials`: the server's answer. `shown`: the played trial, null for none. `pick(trial)`: plays
+ *  another one; without it the strip is read-only. */
 export function trialStrip(trials, shown, pick = null) {
   const { fitness, mean, interval, median, worst, best } = trials;
   const order = [...fitness.keys()].sort((a, b) => fitness[a] - fitness[b]);
@@ -47,7 +47,7 @@ export function trialStrip(trials, shown, pick = null) {
       if (event.key === "Enter") pick(order[at]);
       else if (to === undefined) return;
       else at = Math.max(0, Math.min(n - 1, to));
-      // The player goes through steps with the same keys.
+      // The player uses the same keys for steps.
       event.preventDefault();
       event.stopPropagation();
       svg.setAttribute("aria-valuenow", at + 1);
@@ -65,7 +65,7 @@ export function trialStrip(trials, shown, pick = null) {
       element("span", {}, `line: mean${interval ? ", band: its 95 % interval" : ""}`), element("span", { className: "space" }), element("span", {}, "best")));
 }
 
-/** "this trial 0.81, judged 0.69 (0.66 to 0.72)": what is seen, beside what it is worth. */
+/** "this trial 0.81, judged 0.69 (0.66 to 0.72)": the shown trial beside the judged fitness. */
 export function worthOf(trials) {
   if (!trials || trials.fitness.length < 2) return [];
   const { mean, interval, is_judgement: isJudgement, fitness } = trials;

@@ -1,19 +1,19 @@
-// What may be different when a swarm is simulated again: with today's values, of what its robots
-// have, and with a mark at what was changed.
+// The form of changes for a new simulation of a swarm. It offers the properties of its robots
+// with their present values, and marks changes.
 
 import { element } from "swarm/dom.js";
 
-/** Numbers that may be changed: their names for people, and ranges. */
+/** Numbers that can be changed: their names for people, and ranges. */
 const NUMBERS = [
   ["robots", "robots", { min: 1, max: 10000 }],
   ["steps", "steps", { min: 1, max: 100000 }],
   ["seed", "seed", { min: 0 }],
   ["generation", "worlds of generation", { min: 0 }],
-  ["trial", "trial of it", { min: 0, max: 999 }],
+  ["trial", "trial of that generation", { min: 0, max: 999 }],
 ];
-const PERTURBATIONS = [["leader_failure", "the leader fails", (robot) => "led_actuator" in robot.actuators], ["topology_switch", "places are drawn anew", () => true]];
+const PERTURBATIONS = [["leader_failure", "the leader fails", (robot) => "led_actuator" in robot.actuators], ["topology_switch", "robots get new places", () => true]];
 
-/** What an experiment file has of all that. `played`: generation and trial of the episode. */
+/** The present values, from an experiment file. `played`: generation and trial of the episode. */
 function today(config, played) {
   const robot = config.world.objects[config.algorithm.evolvable_object] ?? { perturbations: {}, actuators: {} };
   const isGeneration = played.trial_set === "generation";
@@ -23,8 +23,8 @@ function today(config, played) {
   };
 }
 
-/** The form. `config`: the experiment's file; `words`: what the address says; `played`: what plays
- *  unless something is changed; `go(isBeside)`: simulates again. */
+/** The form. `config`: the experiment's file; `words`: the query of the address; `played`: the
+ *  unchanged episode; `go(isBeside)`: simulates again. */
 export function whatIf({ config, words, played, go }) {
   const { robot, values } = today(config, played);
   const inputs = {};
@@ -46,7 +46,7 @@ export function whatIf({ config, words, played, go }) {
   const stimuli = Object.entries(config.topology?.stimuli ?? {});
   const readings = [...Map.groupBy(stimuli, ([, it]) => it.sensor)].map(([sensor, its]) => [sensor, its.map(([name]) => name).join(", ")]);
   const troubles = PERTURBATIONS.filter(([name, , has]) => has(robot) && !robot.perturbations[name]).map(([name, text]) => [name, text]);
-  const reset = element("button", { type: "button", id: "reset", title: "as it was", onclick: () => {
+  const reset = element("button", { type: "button", id: "reset", title: "reset to the original", onclick: () => {
     for (const [name, input] of Object.entries(inputs)) input.value = values[name] ?? "";
     drawMarks();
     go(false);
@@ -69,16 +69,16 @@ export function whatIf({ config, words, played, go }) {
 
   return {
     node,
-    /** What is changed, as an address says it. */
+    /** The changes, as the query of an address. */
     query: () => new URLSearchParams(Object.keys(inputs).filter(isChanged).map((name) => [name, inputs[name].value.trim()]).filter(([, value]) => value !== "")),
   };
 }
 
-/** What words of an address change, for people: "9 robots, nobody gets message". */
+/** The changes in the query of an address, for people: "9 robots, no robot gets message". */
 export function changesOf(words, config) {
   const texts = {
     robots: (it) => `${it} robots`, steps: (it) => `${it} steps`, seed: (it) => `seed ${it}`, generation: (it) => `worlds of generation ${it}`,
-    inhibit: (it) => `nobody gets ${Object.entries(config.topology?.stimuli ?? {}).filter(([, its]) => its.sensor === it).map(([name]) => name).join(", ") || it}`,
+    inhibit: (it) => `no robot gets ${Object.entries(config.topology?.stimuli ?? {}).filter(([, its]) => its.sensor === it).map(([name]) => name).join(", ") || it}`,
     perturb: (it) => PERTURBATIONS.find(([name]) => name === it)?.[1] ?? it,
   };
   return [...words].filter(([name]) => texts[name]).map(([name, value]) => texts[name](value));

@@ -1,4 +1,4 @@
-// The world on a canvas: robots, lights, areas, and who heard whom.
+// The world on a canvas: robots, lights, areas, and received messages.
 
 import { canvas } from "swarm/dom.js";
 import { Camera } from "swarm/camera.js";
@@ -7,12 +7,12 @@ import { drawHearing } from "swarm/hearing.js";
 import { RobotPictures } from "swarm/robot-pictures.js";
 import { drawTrails } from "swarm/robot-trails.js";
 
-/** Radius of a robot, cm, and the least one on the screen, pixels. */
+/** Radius of a robot, cm, and its minimum on the screen, pixels. */
 const RADIUS = 5.5;
 const RADIUS_MIN = 4;
 
 export class World {
-  /** `view`: step, share, robot, and what is shown: trails, radio, reach, numbers. */
+  /** `view`: step, share, robot, and the shown layers: trails, radio, reach, numbers. */
   constructor(episode, view, onRobot) {
     this.episode = episode;
     this.view = view;
@@ -20,7 +20,7 @@ export class World {
     this.robots = new RobotPictures();
     this.node = canvas((context, width, height) => this.draw(context, width, height), "the world");
     this.node.className = "world";
-    // All of it is painted: what is below need not be mixed in.
+    // The canvas is opaque, so the browser need not blend it.
     this.node.getContext("2d", { alpha: false });
     this.listen(onRobot);
   }
@@ -34,7 +34,7 @@ export class World {
       const box = node.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
     };
-    /** Where two fingers are, and how far apart. */
+    /** The middle of two fingers, and their distance. */
     const pinch = () => {
       const [[ax, ay], [bx, by]] = [...fingers.values()];
       return { x: (ax + bx) / 2, y: (ay + by) / 2, apart: Math.max(1, Math.hypot(ax - bx, ay - by)) };
@@ -105,7 +105,7 @@ export class World {
       context.fillStyle = colors.page;
       context.fillRect(0, 0, width, height);
     }
-    // Along whole pixels of the device: within other edges, everything takes twice as long to draw.
+    // Clip along whole pixels of the device: other edges double the drawing time.
     const ratio = context.getTransform().a;
     const [left, right, top, bottom] = [width / 2 - halfX, width / 2 + halfX, height / 2 - halfY, height / 2 + halfY].map((edge) => Math.round(edge * ratio) / ratio);
     context.beginPath();
@@ -149,8 +149,8 @@ export class World {
     context.setLineDash([]);
   }
 
-  /** Ground areas and lights. On a torus an image is nearest within half a world around it, and
-   *  there it ends: what is farther belongs to the next image. */
+  /** Ground areas and lights. On a torus an image is the nearest one within half a world around it,
+   *  so it is cut off there: the next image covers places beyond. */
   drawPlaces(context) {
     const { camera, episode, view } = this;
     const [halfX, halfY] = [(episode.width / 2) * camera.scale, (episode.height / 2) * camera.scale];
@@ -183,8 +183,8 @@ export class World {
     });
   }
 
-  /** How far robots are heard: all, or the one that is followed. The circles of the others are
-   *  one path: to fill each of 500 takes longer than a frame may. */
+  /** The radio reach of all robots, or of the followed one. The circles of the others form one
+   *  path: filling each of 500 takes too long for a frame. */
   drawReach(context) {
     const { colors, episode, view } = this;
     context.strokeStyle = colors.accent;
@@ -241,7 +241,7 @@ export class World {
   }
 }
 
-/** A glow that fades with the distance, in any colour that a file names. */
+/** A glow that fades with the distance, in any colour of a file. */
 function glowColor(context, glow, name) {
   context.fillStyle = name;
   const color = context.fillStyle;

@@ -1,14 +1,14 @@
-//! What people see of experiments in a browser: pages, and the replay of episodes.
+//! Experiments in a browser: pages, and the replay of episodes.
 //!
 //! - [`Replay`]: an episode, simulated again and packed for the player
-//! - [`Trials`]: the trials of which a replay shows one
+//! - [`Trials`]: the trials of an individual, one of which a replay shows
 //! - [`replay_file`]: the player with an episode, as one HTML file
-//! - [`Site`]: the pages over HTTP, made of what a [`Reader`](model::queries::Reader) and a
-//!   [`Control`] say
+//! - [`Site`]: the pages over HTTP, with data from a [`Reader`](model::queries::Reader) and
+//!   a [`Control`]
 //! - `modules`: the JavaScript and the style, from the folder `pages`
 //!
-//! The pages are plain HTML, CSS and ES modules. They load nothing from elsewhere, and
-//! everything that decides is on this side of the wire.
+//! The pages are plain HTML, CSS and ES modules. They load nothing from other servers, and
+//! the server makes all decisions.
 
 mod modules;
 mod replay;

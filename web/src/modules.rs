@@ -1,4 +1,4 @@
-//! The files of the folder `pages`, as they are in this program.
+//! The files of the folder `pages`, which are part of this program.
 //!
 //! Modules import each other by bare names, `swarm/NAME`, which a page's import map
 //! resolves: to data within a file of its own, to addresses of a server otherwise.
@@ -60,7 +60,7 @@ modules!(
     "world.js",
 );
 
-/// The import map in which `address` says where each module is.
+/// The import map; `address` maps each module to its address.
 pub fn import_map(address: impl Fn(&str, &str) -> String) -> String {
     let imports: BTreeMap<String, String> =
         MODULES.iter().map(|(name, text)| (format!("swarm/{name}"), address(name, text))).collect();

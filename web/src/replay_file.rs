@@ -7,7 +7,7 @@ use crate::{
     replay::Replay,
 };
 
-/// Nothing is loaded from anywhere: modules are data of this file.
+/// The file loads nothing: its modules are data within it.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' data:; \
                       style-src 'unsafe-inline'; img-src data: blob:";
 

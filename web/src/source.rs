@@ -1,5 +1,5 @@
-//! What pages ask of a running coordinator, in the messages of clients. They read experiments as
-//! clients do, by [`Reader`](model::queries::Reader).
+//! The requests of pages to a running coordinator, in the messages of clients. Pages read
+//! experiments like clients, through a [`Reader`](model::queries::Reader).
 
 use std::{collections::BTreeMap, ops::Range, time::Duration};
 
@@ -7,16 +7,16 @@ use serde::Serialize;
 use swarm_proto::v1::{Experiment, ExplainExperimentResponse, SubmitExperimentRequest, Worker};
 use tonic::{Status, async_trait};
 
-/// The coordinator that runs now; a data directory alone has none.
+/// A running coordinator; a data directory alone has none.
 #[async_trait]
 pub trait Control: Send + Sync + 'static {
     /// The connected workers.
     async fn workers(&self) -> Result<Vec<Worker>, Status>;
 
-    /// Who computed what lately, in no order.
+    /// The latest assignments of the workers, in any order.
     async fn timeline(&self) -> Result<Vec<Assignment>, Status>;
 
-    /// What an experiment does, or waits for.
+    /// The activity of an experiment, or the reason why it waits.
     async fn explain(&self, id: u64) -> Result<ExplainExperimentResponse, Status>;
 
     /// Changes an experiment, and reads it again.
@@ -26,14 +26,14 @@ pub trait Control: Send + Sync + 'static {
     async fn submit(&self, request: SubmitExperimentRequest) -> Result<Experiment, Status>;
 }
 
-/// What can be done with an experiment.
+/// An action on an experiment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
-    /// Until it is resumed.
+    /// Pauses the experiment until it is resumed.
     Pause,
-    /// Goes on.
+    /// Resumes the experiment.
     Resume,
-    /// Ends it.
+    /// Ends the experiment.
     Cancel,
     /// Its weight in the sharing of the fleet, 1 to 1000.
     Priority(u32),
@@ -43,40 +43,41 @@ pub enum Action {
     Label(BTreeMap<String, String>, Vec<String>),
 }
 
-/// Something that a worker was given to compute.
+/// An assignment of a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
     /// The worker's connection.
     pub worker_id: u64,
-    /// What the worker calls itself.
+    /// The name of the worker.
     pub worker_name: String,
-    /// None: it is of an evaluation.
+    /// None for an evaluation.
     pub experiment: Option<u64>,
-    /// What it is a part of, for people.
+    /// The name of its batch, for people.
     pub batch: String,
-    /// Its individual, within that.
+    /// Its individual within the batch.
     pub individual: u32,
     /// The trials of the individual.
     pub trials: Range<u32>,
-    /// Time since the worker was sent it.
+    /// Time since it was sent to the worker.
     pub assigned_for: Duration,
     /// Time since its end; zero if it has not ended.
     pub ended_for: Duration,
-    /// For how long it was computed; zero unless there is a result.
+    /// Time of computing; zero without a result.
     pub busy: Duration,
-    /// What has become of it.
+    /// Its outcome.
     pub fate: Fate,
 }
 
-/// What has become of an assignment.
+/// The outcome of an assignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fate {
-    /// There is no answer yet.
+    /// The worker has not answered yet.
     Unanswered,
-    /// There is a result.
+    /// The worker returned a result.
     Computed,
-    /// It was not needed any more, or another worker was to compute it.
+    /// The coordinator took it back, because it was not needed any more or went to
+    /// another worker.
     TakenBack,
     /// The worker reported a failure.
     Failed,

@@ -1,16 +1,17 @@
-//! The trials of which a replay shows one: the fitness of each, and which of them is the median.
+//! The trials of which a replay shows one: the fitness of each, and the median trial.
 
 use serde::Serialize;
 use sim_core::{EvaluateError, Simulation, TrialSet};
 use swarm_proto::v1::JudgedFitness;
 
-/// The trials that an individual is known by.
+/// The trials that define the fitness of an individual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trials {
-    /// Whether they are those of its judgement, which selected nothing; else its generation's.
+    /// Whether they are the trials of its judgement, which selected nothing; else they are
+    /// those of its generation.
     is_judgement: bool,
     generation: u64,
-    /// Of each trial, in their order.
+    /// The fitness of each trial, in their order.
     fitness: Vec<f64>,
     mean: f64,
     /// Ends of the 95 % confidence interval of the mean, of a judgement.
@@ -21,8 +22,8 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// Those by which a champion was judged, simulated again; none if `keep_going` says no on
-    /// the way.
+    /// The trials of a champion's judgement, simulated again; none if `keep_going` returns
+    /// false on the way.
     pub fn of_judgement(
         simulation: &Simulation,
         genotype: &[f64],
@@ -38,7 +39,7 @@ impl Trials {
         }))
     }
 
-    /// Those of the generation in which an individual took part.
+    /// The trials of an individual's generation.
     pub fn of_generation(generation: u64, fitness: Vec<f64>) -> Self {
         let mut order: Vec<u32> = (0..fitness.len() as u32).collect();
         order.sort_by(|&a, &b| fitness[a as usize].total_cmp(&fitness[b as usize]));
@@ -49,7 +50,7 @@ impl Trials {
             generation,
             mean: fitness.iter().sum::<f64>() / fitness.len().max(1) as f64,
             interval: None,
-            // Of two, the lower one.
+            // Of two middle values, the lower one.
             median: nth(last / 2),
             worst: nth(0),
             best: nth(last),
@@ -57,7 +58,7 @@ impl Trials {
         }
     }
 
-    /// The trial that is the median.
+    /// The median trial.
     pub fn median(&self) -> u32 {
         self.median
     }

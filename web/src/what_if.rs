@@ -1,4 +1,4 @@
-//! What may be different when a swarm is simulated again.
+//! Changes that a new simulation of a swarm can have.
 
 use evolution::ALGORITHMS;
 use experiment_file::{
@@ -8,23 +8,24 @@ use experiment_file::{
 use serde::Deserialize;
 use serde_json::{from_value, json};
 
-/// Changes of an episode; none keeps what the experiment has.
+/// Changes of an episode; `None` keeps the value of the experiment.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WhatIf {
     /// Seed of all randomness.
     pub seed: Option<u64>,
-    /// Whose worlds.
+    /// Generation of the worlds.
     pub generation: Option<u64>,
-    /// Which of them; unless one of these is named, a champion plays a trial of its judgement.
+    /// Trial of that generation. Without generation and trial, a champion plays a trial of its
+    /// judgement.
     pub trial: Option<u32>,
-    /// Which trial of the judgement; the median without a number.
+    /// Trial of the judgement; the median one without a number.
     pub judged: Option<u32>,
     /// Steps of the episode.
     pub steps: Option<u32>,
-    /// Robots of the object that evolves.
+    /// Number of robots of the evolving object.
     pub robots: Option<u32>,
-    /// A reading that none of them gets, such as `wireless_receiver:msg`.
+    /// A reading that all of them lack, such as `wireless_receiver:msg`.
     pub inhibit: Option<String>,
     /// A perturbation with its default parameters: `leader_failure` or `topology_switch`.
     pub perturb: Option<String>,

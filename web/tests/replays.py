@@ -168,7 +168,7 @@ class Replays(BrowserTest):
         self.assertEqual(self.script("return document.querySelector('.changed input').id"), "what-if-robots")
         self.script("document.querySelector('#what-if-inhibit').value = 'wireless_receiver:msg'; document.querySelector('#what-if-inhibit').dispatchEvent(new Event('input', { bubbles: true }))")
         self.find("#again").click()
-        self.wait_for_text("h1", "8 robotsnobody gets message")
+        self.wait_for_text("h1", "8 robotsno robot gets message")
         words = self.browser.current_url
         self.assertIn("robots=8", words)
         self.assertNotIn("steps=", words)

@@ -1,12 +1,12 @@
-//! A value of an episode over its steps, rounded to what can be seen.
+//! A value of an episode over its steps, rounded to a visible precision.
 
 use serde::Serialize;
 
-/// How the values of a column are kept, and packed.
+/// The representation of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
-    /// Multiples of 0.01 in 32 bits, each step as the difference from the one before it,
-    /// which packs better.
+    /// Multiples of 0.01 in 32 bits, each step as the difference from the previous one,
+    /// which compresses better.
     Position,
     /// Multiples of a number in 16 bits.
     Short(f64),
@@ -14,7 +14,7 @@ pub enum Form {
     Byte(f64),
     /// In 8 bits, as a share of the column's greatest value: 0.01 if all lie in \[-1, 1\].
     Reading,
-    /// 32-bit floating point; NaN where there is none.
+    /// 32-bit floating point; NaN for missing values.
     Real,
 }
 
@@ -34,7 +34,7 @@ enum Values {
     Real(Vec<f32>),
 }
 
-/// Where a column is, and what its numbers mean.
+/// The place of a column, and the scale of its numbers.
 #[derive(Debug, Serialize)]
 pub struct Place {
     name: &'static str,
@@ -46,12 +46,12 @@ pub struct Place {
     n_rows: usize,
     /// What a value of 1 stands for.
     scale: f64,
-    /// Whether steps are differences from the one before.
+    /// Whether steps are differences from the previous step.
     is_difference: bool,
 }
 
 impl Form {
-    /// What a value of 1 stands for, where that does not depend on the values.
+    /// The value of the number 1, if it does not depend on the values.
     fn scale(self) -> f64 {
         match self {
             Self::Position => 0.01,
@@ -60,7 +60,7 @@ impl Form {
         }
     }
 
-    /// The range of the type in which it is packed.
+    /// The range of the packed type.
     fn range(self) -> [f64; 2] {
         match self {
             Self::Short(_) => [i16::MIN.into(), i16::MAX.into()],

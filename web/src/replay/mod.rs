@@ -26,41 +26,41 @@ use crate::trials::Trials;
 /// Values of all robots in all steps: some 1,000 steps of 1,000 robots, or 250 MB.
 const VALUES_MAX: usize = 64_000_000;
 
-/// What is simulated.
+/// The simulated experiment, genotype and worlds.
 #[derive(Debug, Clone)]
 pub struct Episode<'a> {
     /// The experiment.
     pub config: &'a ExperimentConfig,
-    /// The same, compiled.
+    /// The compiled experiment.
     pub simulation: &'a Simulation,
     /// Genes in \[0, 1\].
     pub genotype: &'a [f64],
-    /// Who that is, for people.
+    /// The name of the genotype, for people.
     pub name: &'a str,
     /// The worlds.
     pub trial_set: TrialSet,
-    /// Which of them.
+    /// The trial.
     pub trial: u32,
 }
 
-/// Why there is no replay.
+/// The reason why there is no replay.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReplayError {
-    /// It cannot be simulated.
+    /// The simulation fails.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
-    /// Whoever asked for it did not wait.
+    /// The client has gone.
     #[error("it was stopped")]
     Stopped,
-    /// It does not fit into a browser.
+    /// The episode is too large for a browser.
     #[error(
-        "a replay has at most {} million values of robots, this one would have {}; simulate fewer \
-         steps or robots",
+        "a replay has at most {} million values of robots, but this one would have {}; simulate \
+         fewer steps or robots",
         VALUES_MAX / 1_000_000,
         n_values / 1_000_000
     )]
     TooLong {
-        /// Values that it would have: steps times robots times values per robot.
+        /// Its number of values: steps times robots times values per robot.
         n_values: usize,
     },
 }
@@ -73,7 +73,7 @@ pub struct Replay {
     columns: Vec<Column>,
 }
 
-/// What the player reads first.
+/// The header, which the player reads first.
 #[derive(Serialize)]
 struct Header<'a> {
     #[serde(flatten)]
@@ -90,7 +90,7 @@ impl Replay {
         Self::simulate_while(episode, &|| true)
     }
 
-    /// The same, unless `keep_going` says no on the way.
+    /// Like [`Self::simulate`], but stops when `keep_going` returns false.
     pub fn simulate_while(
         episode: &Episode<'_>,
         keep_going: &dyn Fn() -> bool,
@@ -111,21 +111,21 @@ impl Replay {
         Ok(Self { scene, summary, columns: columns.into_vec() })
     }
 
-    /// The same, that says of which trials it shows one.
+    /// The same replay, with the trials of which it shows one.
     #[must_use]
     pub fn of_trials(mut self, trials: Trials) -> Self {
         self.scene.trials = Some(trials);
         self
     }
 
-    /// What the player reads.
+    /// The packed episode for the player.
     pub fn encode(&self) -> Vec<u8> {
         let mut body = Vec::new();
         let places = self.columns.iter().map(|column| column.write(&mut body)).collect();
         let EpisodeSummary { fitness, measures } = &self.summary;
         let header = Header { scene: &self.scene, fitness: *fitness, measures, columns: places };
         let mut header = serde_json::to_vec(&header).expect("plain data serialises");
-        // Columns lie where arrays of four bytes may begin.
+        // Columns are aligned to four bytes.
         header.resize((header.len() + 4).next_multiple_of(8) - 4, b' ');
         let mut packed = GzEncoder::new(Vec::new(), Compression::best());
         let parts = [&(header.len() as u32).to_le_bytes()[..], &header, &body];

@@ -1,4 +1,4 @@
-//! What the player is shown of each robot: one row of the table per column.
+//! The values of each robot that the player shows: one row of the table per column.
 
 use sim_core::{Mode, ReceivedFrame, RobotRecord};
 

@@ -1,4 +1,4 @@
-//! What is the same in all steps of an episode.
+//! The constants of all steps of an episode.
 
 use experiment_file::{
     ExperimentConfig, ObjectConfig, RobotConfig, RobotController, Seed, SensorQuery,
@@ -9,20 +9,20 @@ use sim_core::{MeasureName, TrialSet};
 use super::Episode;
 use crate::trials::Trials;
 
-/// An episode but for its steps.
+/// An episode without its steps.
 #[derive(Debug, Serialize)]
 pub struct Scene {
-    /// Who it is.
+    /// The name of the genotype.
     name: String,
     /// The experiment's name.
     experiment: String,
     seed: Seed,
-    /// Of the worlds, if they are a generation's.
+    /// Generation of the worlds, if they belong to one.
     generation: Option<u64>,
-    /// What the trials are for.
+    /// The purpose of the trials.
     trial_set: &'static str,
     trial: u32,
-    /// All of them, as far as that is known.
+    /// The trials of the individual, if known.
     pub trials: Option<Trials>,
     fitness_function: &'static str,
     pub steps: u32,
@@ -55,13 +55,13 @@ struct Robots {
     /// Levels of a component of a message; none if it is not quantised.
     n_levels: Option<u32>,
     stimuli: Vec<Rows>,
-    /// Whether a network decides.
+    /// Whether a network controls the robots.
     has_network: bool,
     sees_lights: bool,
     sees_areas: bool,
 }
 
-/// Rows that have a name together.
+/// Rows under one name.
 #[derive(Debug, Serialize)]
 struct Rows {
     name: String,

@@ -1,4 +1,4 @@
-//! What the player gets is what the simulation shows.
+//! The player receives the values of the simulation.
 
 use std::{fs, io::Read as _};
 
@@ -141,7 +141,7 @@ fn a_replay_says_who_carries_something_and_who_has_failed() {
     let mut columns = Columns::new(&scene);
     let simulated = simulation.simulate(&genotype, episode.trial_set, 0, &mut |step| {
         let mut step = step.clone();
-        // As a script may say.
+        // Values that a script could set.
         step.robots[1].carries = step.step == 7;
         step.robots[3].failed = step.step >= 39;
         columns.record(&scene, &step);

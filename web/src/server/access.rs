@@ -1,4 +1,5 @@
-//! Who may see the pages: those who know the token, from pages of this address.
+//! Access to the pages: for browsers that know the token, and for requests from pages of
+//! this address.
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
@@ -26,17 +27,17 @@ use super::{
     problem::{Body, Problem},
 };
 
-/// What the cookie is derived for.
+/// The purpose from which the cookie is derived.
 const PURPOSE: &str = "swarmevo web session";
-/// What a wrong token costs, so that nobody tries many.
+/// Delay after a wrong token, which prevents guessing.
 const WRONG_TOKEN_PAUSE: Duration = Duration::from_millis(500);
 
 /// Who may see the pages.
 #[derive(Debug)]
 pub struct Access {
     token: Option<Token>,
-    /// What those who have shown the token send; it says nothing of the token, and holds
-    /// across restarts until the token is another one.
+    /// The cookie of browsers that have shown the token. It does not reveal the token,
+    /// and stays valid across restarts until the token changes.
     cookie: Option<String>,
     /// Browsers share cookies among all ports of a machine, so the name has the port.
     cookie_name: String,
@@ -52,7 +53,7 @@ impl Access {
         Self { token, cookie, cookie_name, is_encrypted, is_loopback }
     }
 
-    /// Whether a request comes from somebody who has shown the token, or none is needed.
+    /// Whether the browser of a request has shown the token, or none is needed.
     fn is_known(&self, headers: &HeaderMap) -> bool {
         let Some(expected) = &self.cookie else { return true };
         let cookies = headers.get_all(COOKIE).iter().filter_map(|value| value.to_str().ok());
@@ -65,8 +66,8 @@ impl Access {
         })
     }
 
-    /// Whether the address bar shows this machine, if pages are for this machine: another
-    /// site's name that leads here is an attack.
+    /// If the pages are for this machine only: whether the address names this machine. A
+    /// request under another site's name is an attack.
     fn is_ours(&self, host: &str) -> bool {
         let name = match host.rsplit_once(':') {
             Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
@@ -97,10 +98,10 @@ pub async fn check(
     let is_public = path == "/login" || path.starts_with(assets::PREFIX);
     if !is_public && !access.is_known(headers) {
         if path.starts_with("/api/") {
-            let why = "log in again: the token is not known any more";
+            let why = "log in again: the token has changed";
             return Err(Problem::new(StatusCode::UNAUTHORIZED, why));
         }
-        // At the same address, which is opened again when the token has been shown.
+        // The login page appears at the same address, which reloads after the login.
         return Ok(secured((StatusCode::UNAUTHORIZED, assets::login()).into_response()));
     }
     if !is_public && let Some(peer) = request.extensions().get::<Peer>() {
@@ -110,7 +111,7 @@ pub async fn check(
     Ok(secured(next.run(request).await))
 }
 
-/// A request with all of its body, which has to be short, and to come in time.
+/// A request with its whole body, which must be short and arrive in time.
 async fn whole(request: Request) -> Result<Request, Problem> {
     let (head, body) = request.into_parts();
     let body = timeout(BODY_TIME, to_bytes(body, BODY_LEN_MAX)).await;
@@ -125,14 +126,14 @@ async fn whole(request: Request) -> Result<Request, Problem> {
     Ok(Request::from_parts(head, body.into()))
 }
 
-/// Browsers say where a request that changes something comes from.
+/// Browsers send the origin of requests that change something.
 fn is_same_origin(origin: Option<&str>, host: &str) -> bool {
     let authority =
         origin.and_then(|origin| origin.split_once("://")).map(|(_, authority)| authority);
     authority == Some(host)
 }
 
-/// Tells browsers to load nothing from elsewhere, and to be shown nowhere else.
+/// Tells browsers to load nothing from other servers, and not to embed the pages.
 fn secured(mut response: Response) -> Response {
     let headers = response.headers_mut();
     let fixed = |text: &'static str| HeaderValue::from_static(text);
@@ -144,7 +145,7 @@ fn secured(mut response: Response) -> Response {
     response
 }
 
-/// What somebody sends who wants to log in.
+/// The body of a login request.
 #[derive(Deserialize)]
 pub struct Login {
     token: String,

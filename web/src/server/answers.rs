@@ -1,4 +1,4 @@
-//! What pages get, as JSON.
+//! The answers to pages, as JSON.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ pub struct ExperimentAnswer {
     mean: Option<f64>,
     /// On trials that selected nothing.
     champion: Option<f64>,
-    /// On the trials by which it was selected.
+    /// On the trials that selected it.
     selection: Option<f64>,
     priority: u32,
     digest: String,
@@ -46,8 +46,8 @@ pub struct ExperimentAnswer {
 }
 
 impl ExperimentAnswer {
-    /// `has_coordinator`: whether one is there that could be computing it. Otherwise only the
-    /// files are known, which call running whatever has not ended.
+    /// `has_coordinator`: whether a coordinator could be computing it. Without one, the files
+    /// call every unfinished experiment running.
     pub fn new(experiment: Experiment, has_coordinator: bool) -> Self {
         Self {
             state: match experiment.state() {
@@ -103,7 +103,7 @@ pub fn generation_row(completed: &CompletedGeneration) -> Option<GenerationRow> 
     ))
 }
 
-/// An event that is no generation.
+/// An event other than a generation.
 #[derive(Debug, Serialize)]
 pub struct EventAnswer {
     sequence: u64,
@@ -111,7 +111,7 @@ pub struct EventAnswer {
     text: String,
 }
 
-/// An event that is no generation.
+/// An event other than a generation.
 pub fn event(event: Event) -> Option<EventAnswer> {
     let text = match event.kind? {
         Kind::GenerationCompleted(_) => return None,

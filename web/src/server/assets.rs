@@ -1,4 +1,4 @@
-//! Pages, modules and the style, as they are in this program.
+//! Pages, modules and the style, which are part of this program.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -17,10 +17,10 @@ use sha2::{Digest as _, Sha256};
 use super::problem::{Path, Problem};
 use crate::modules::{MODULES, STYLE, import_map};
 
-/// Where modules and the style are.
+/// The addresses of modules and the style.
 pub const PREFIX: &str = "/assets/";
 
-/// Modules lead to addresses that change with their content.
+/// The addresses of modules change with their content.
 static IMPORT_MAP: LazyLock<String> =
     LazyLock::new(|| import_map(|name, text| format!("{PREFIX}{}/{name}", version(text))));
 
@@ -35,12 +35,12 @@ static POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
     HeaderValue::from_str(&policy).expect("ASCII is fit for a header")
 });
 
-/// What browsers may load for a page.
+/// The content policy of pages.
 pub fn policy() -> &'static HeaderValue {
     &POLICY
 }
 
-/// Pages by their paths, and what they load.
+/// The pages by their paths, and the module of each.
 pub fn routes() -> Router {
     let page = |module: &'static str| get(move || async move { page(module) });
     Router::new()
@@ -59,7 +59,7 @@ pub fn login() -> Html<String> {
     page("page-login.js")
 }
 
-/// The page of addresses that lead nowhere.
+/// The page of unknown addresses.
 fn missing() -> Html<String> {
     page("page-missing.js")
 }
@@ -100,13 +100,13 @@ async fn asset(Path((_, name)): Path<(String, String)>) -> Response {
     let kind = if name.ends_with(".css") { "text/css" } else { "text/javascript" };
     let headers = [
         (CONTENT_TYPE, format!("{kind}; charset=utf-8")),
-        // Another text has another address.
+        // A changed text gets another address, so browsers may cache it for ever.
         (CACHE_CONTROL, "public, max-age=31536000, immutable".to_owned()),
     ];
     (headers, *text).into_response()
 }
 
-/// Changes with a text.
+/// A digest of a text.
 fn version(text: &str) -> String {
     Sha256::digest(text.as_bytes()).iter().take(6).map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,4 +1,4 @@
-//! Samples of runs against each other, as `swarmctl compare` has them.
+//! The comparison of samples of runs, like that of `swarmctl compare`.
 
 use axum::{Json, extract::State};
 use serde::{Deserialize, Serialize};
@@ -13,19 +13,20 @@ use super::{
     problem::{Problem, Query},
 };
 
-/// Generations at the end of a run that are averaged.
+/// Number of last generations of a run to average.
 const LAST: u64 = 50;
-/// Samples and runs of one question: an interval costs ten thousand draws.
+/// Limits of samples and runs of one request: an interval costs ten thousand draws.
 const SAMPLES_MAX: usize = 12;
 const RUNS_MAX: usize = 300;
 
-/// Numbers of experiments, `2,3,4;5,6,7`: those of a sample with commas between them.
+/// Numbers of experiments, `2,3,4;5,6,7`: semicolons separate samples, commas the runs of
+/// one.
 #[derive(Debug, Deserialize)]
 pub struct Wanted {
     samples: String,
 }
 
-/// What was found, for each number that runs have.
+/// The result for each quantity of the runs.
 #[derive(Debug, Serialize)]
 pub struct Comparison {
     quantities: Vec<Quantity>,
@@ -34,7 +35,7 @@ pub struct Comparison {
 #[derive(Debug, Serialize)]
 struct Quantity {
     title: String,
-    /// None of a sample without such a number.
+    /// None for a sample without such a number.
     samples: Vec<Option<Summary>>,
     pairs: Vec<Pair>,
 }
@@ -51,7 +52,7 @@ struct Summary {
 struct Pair {
     first: usize,
     second: usize,
-    /// That a run of the first is better than one of the second.
+    /// Probability that a run of the first is better than one of the second.
     probability: Interval,
     /// Two-sided, of the Mann-Whitney test.
     p: Option<f64>,

@@ -1,5 +1,5 @@
-//! Answers of some length are sent as gzip to those who take it: lists, curves and modules have
-//! a fraction of their length then.
+//! Compresses long answers with gzip for browsers that accept it: lists, curves and modules
+//! shrink to a fraction.
 
 use std::io::Write as _;
 
@@ -15,10 +15,10 @@ use axum::{
 };
 use flate2::{Compression, write::GzEncoder};
 
-/// What fits into a packet or two is not worth it.
+/// Answers of a packet or two stay uncompressed.
 const LEN_MIN: u64 = 2 << 10;
 
-/// Compresses an answer if that is worth it.
+/// Compresses an answer if that is worthwhile.
 pub async fn compress(request: Request, next: Next) -> Response {
     let is_wanted = takes_gzip(request.headers());
     let mut response = next.run(request).await;
@@ -31,7 +31,7 @@ pub async fn compress(request: Request, next: Next) -> Response {
         return response;
     }
     let (mut head, body) = response.into_parts();
-    // Its length is known, and so it is in memory.
+    // An answer of known length is in memory.
     let whole = to_bytes(body, len as usize).await.unwrap_or_default();
     let packing = tokio::task::spawn_blocking(move || {
         let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
@@ -48,7 +48,7 @@ fn is_text(headers: &HeaderMap) -> bool {
     kind.starts_with("text/") || kind.starts_with("application/json")
 }
 
-/// Whether gzip is among what a browser takes, and not refused with `q=0`.
+/// Whether a browser accepts gzip, and does not refuse it with `q=0`.
 fn takes_gzip(headers: &HeaderMap) -> bool {
     let lists = headers.get_all(ACCEPT_ENCODING).iter().filter_map(|list| list.to_str().ok());
     lists.flat_map(|list| list.split(',')).any(|one| {

@@ -1,4 +1,4 @@
-//! What is stored of experiments.
+//! The stored data of experiments.
 
 use std::num::{NonZeroU64, NonZeroUsize};
 
@@ -21,20 +21,19 @@ use super::{
     problem::{Path, Problem, Query},
 };
 
-/// Events at the end of an experiment that are looked at.
+/// Number of latest events to search.
 const EVENTS: u64 = 1000;
-/// Generations of one answer with the fitness of every individual.
+/// Maximum number of generations in one answer with the fitness of every individual.
 const FITNESS_MAX: u32 = 500;
 
-/// Where a page begins.
+/// The beginning of a page.
 #[derive(Debug, Deserialize)]
 pub struct From {
     #[serde(default)]
     from: u64,
 }
 
-/// One experiment, its file, its champion as far as there is one, and whether its individuals have
-/// parents.
+/// One experiment, its file, its champion if any, and whether its individuals have parents.
 pub async fn one(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -66,7 +65,7 @@ pub async fn one(
     })))
 }
 
-/// A page of generations, and where the next one begins.
+/// A page of generations, and the beginning of the next one.
 pub async fn generations(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -78,9 +77,9 @@ pub async fn generations(
     Ok(Json(json!({ "generations": rows, "next": page.next_generation })))
 }
 
-/// How a page of generations moved the distribution, and where the next one begins. A row is a
-/// generation, the length of the step of the mean, least, quartiles and largest of the genes'
-/// standard deviations (or none), and the rank correlation of trials.
+/// The movement of the distribution in a page of generations, and the beginning of the next
+/// page. A row is a generation, the length of the step of the mean, least, quartiles and
+/// largest of the genes' standard deviations (or none), and the rank correlation of trials.
 pub async fn dynamics(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -100,13 +99,13 @@ pub async fn dynamics(
     Ok(Json(json!({ "generations": rows.collect::<Vec<_>>(), "next": page.next_generation })))
 }
 
-/// From which generation on children are wanted, and of which generations.
+/// The first generation of the requested children, and the stride.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WantedFamilies {
     #[serde(default)]
     from: u64,
-    /// Those whose number it divides.
+    /// Only generations whose number it divides.
     #[serde(default = "all")]
     every: NonZeroU64,
 }
@@ -115,10 +114,10 @@ fn all() -> NonZeroU64 {
     NonZeroU64::MIN
 }
 
-/// Children of a page of generations beside their parents, the names of the populations, and where
-/// the next page begins. A row is a child in one population: generation, individual, population,
-/// operator, fitness, and for each parent its individual and its fitness; null is a fitness that
-/// is not finite.
+/// Children of a page of generations with their parents, the names of the populations, and the
+/// beginning of the next page. A row is a child in one population: generation, individual,
+/// population, operator, fitness, and for each parent its individual and its fitness; null
+/// stands for a fitness that is not finite.
 pub async fn families(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -150,7 +149,7 @@ pub fn children(page: &Families) -> Value {
     json!({ "populations": page.populations, "children": rows, "next": page.next })
 }
 
-/// The name of an operator, as `swarmctl lineage` has it.
+/// The name of an operator, as in `swarmctl lineage`.
 fn operator(operator: Operator) -> &'static str {
     match operator {
         Operator::First => "first",
@@ -160,7 +159,7 @@ fn operator(operator: Operator) -> &'static str {
     }
 }
 
-/// The latest events that are no generations.
+/// The latest events other than generations.
 pub async fn events(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -176,14 +175,14 @@ pub async fn events(
     Ok(Json(json!({ "events": events })))
 }
 
-/// Of which generations the fitness is wanted.
+/// The generations of the requested fitness.
 #[derive(Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Wanted {
     from: u64,
-    /// From there on, at most [`FITNESS_MAX`].
+    /// The number of generations, at most [`FITNESS_MAX`].
     n: u32,
-    /// One in so many.
+    /// The stride.
     every: NonZeroUsize,
 }
 
@@ -195,7 +194,7 @@ impl Default for Wanted {
 
 /// The fitness of every individual of some generations: the first generation (u32), the
 /// number of generations (u32), of individuals (u32), and then `[generation][individual]` as
-/// f32, NaN where there is none; all little-endian.
+/// f32, NaN for missing values; all little-endian.
 pub async fn fitness(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -206,7 +205,7 @@ pub async fn fitness(
     Ok(([(CONTENT_TYPE, "application/octet-stream")], packed(first, &fitness)).into_response())
 }
 
-/// Fitness in the bytes that a page reads.
+/// Fitness in the byte format of pages.
 pub fn packed(first: u64, fitness: &[Vec<f32>]) -> Vec<u8> {
     let n_individuals = fitness.iter().map(Vec::len).max().unwrap_or_default();
     let head = [first as u32, fitness.len() as u32, n_individuals as u32];

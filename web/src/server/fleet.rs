@@ -1,4 +1,4 @@
-//! What the coordinator does at this moment, and having it do something.
+//! The present state of the coordinator, and actions on it.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -22,19 +22,19 @@ use super::{
 };
 use crate::source::{Action, Control};
 
-/// For how long an answer serves all pages.
+/// The time for which an answer serves all pages.
 const FRESH: Duration = Duration::from_secs(1);
 
-/// Experiments whose latest explanation is kept for other pages.
+/// Number of experiments whose latest explanation is cached for other pages.
 const EXPLANATIONS_MAX: usize = 256;
 
-/// The latest answer to a question that many pages ask.
+/// The cached answer to a question of many pages.
 #[derive(Debug, Default)]
 pub struct LatestAnswer(Mutex<Option<(Instant, Bytes)>>);
 
 impl LatestAnswer {
-    /// That answer, or a new one if it is old: the coordinator is asked once a second, whoever
-    /// looks.
+    /// The cached answer, or a new one if it is old: the coordinator is asked once a second,
+    /// for any number of pages.
     async fn get(
         &self,
         ask: impl Future<Output = Result<Value, Problem>>,
@@ -52,7 +52,7 @@ impl LatestAnswer {
     }
 }
 
-/// The latest answer about each of some experiments.
+/// The cached answers about some experiments.
 #[derive(Debug, Default)]
 pub struct Explanations(Mutex<BTreeMap<u64, Arc<LatestAnswer>>>);
 
@@ -66,7 +66,7 @@ impl Explanations {
     }
 }
 
-/// What can be done here.
+/// The possible actions.
 pub async fn session(State(shared): State<Shared>) -> Json<Value> {
     Json(json!({ "has_coordinator": shared.control.is_some() }))
 }
@@ -85,13 +85,13 @@ pub async fn workers(State(shared): State<Shared>) -> Result<Response, Problem> 
     shared.workers.get(ask).await
 }
 
-/// Who computed what lately.
+/// The latest assignments of the workers.
 pub async fn timeline(State(shared): State<Shared>) -> Result<Response, Problem> {
     let control = control(&shared)?;
     shared.timeline.get(async { Ok(answers::timeline(control.timeline().await?)) }).await
 }
 
-/// What an experiment does, or waits for.
+/// The activity of an experiment, or the reason why it waits.
 pub async fn explain(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -132,22 +132,22 @@ fn explanation(response: ExplainExperimentResponse) -> Value {
             .iter()
             .map(|worker| json!([worker.worker_name, worker.reason]))
             .collect::<Vec<_>>(),
-        // Why nothing goes on, if that is so.
+        // The reason why an experiment does not advance, if any.
         "troubles": troubles,
     })
 }
 
-/// What an action needs to know.
+/// The parameters of an action.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Order {
     /// For `priority`.
     priority: Option<u32>,
-    /// For `fork`: the last generation that both have.
+    /// For `fork`: the last shared generation.
     generation: Option<u64>,
     /// For `fork`: another seed.
     seed: Option<Seed>,
-    /// For `label`: what to set.
+    /// For `label`: labels to set.
     set: BTreeMap<String, String>,
     /// For `label`: keys to remove.
     remove: Vec<String>,

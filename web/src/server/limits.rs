@@ -1,4 +1,4 @@
-//! How much of the server strangers and slow readers can take.
+//! Limits on the resources that strangers and slow readers can use.
 
 use std::{sync::Arc, time::Duration};
 
@@ -15,15 +15,16 @@ use tokio::sync::Semaphore;
 
 use super::problem::Problem;
 
-/// Bytes of a request's body: a token, or what to change.
+/// Bytes of a request's body: a token, or a change.
 pub const BODY_LEN_MAX: usize = 16 << 10;
-/// Time for it to arrive.
+/// Time limit for a request to arrive.
 pub const BODY_TIME: Duration = Duration::from_secs(10);
-/// Episodes that are simulated for pages at the same time.
+/// Maximum number of simultaneous simulations for pages.
 pub const REPLAYS_MAX: usize = 2;
 
-/// Connections; a browser has up to six. One more of somebody known ends the one whose last
-/// request is the longest ago. A page whose news that was connects again by itself.
+/// Maximum number of connections; a browser has up to six. At the limit, a new connection
+/// of a known browser ends the one whose last request is the oldest. A page that loses its
+/// news this way reconnects by itself.
 pub const CONNECTIONS: ListenerLimits = ListenerLimits {
     strangers: ROOM,
     admission_time: Duration::from_secs(30),
@@ -43,13 +44,13 @@ pub const REQUESTS: HttpLimits = HttpLimits {
     keep_alive: true,
 };
 
-/// Bytes of long answers that wait for their readers.
+/// Maximum bytes of long answers that wait for their readers.
 const ANSWERS_LEN_MAX: usize = 256 << 20;
-/// Bytes that are counted together; shorter answers are not counted, as there are at most as
-/// many as connections.
+/// The unit of counting, in bytes. Shorter answers are not counted, because there are at
+/// most as many as connections.
 const UNIT: usize = 64 << 10;
 
-/// Room for the answers that are being sent.
+/// The budget for answers that are being sent.
 #[derive(Debug, Clone)]
 pub struct AnswerRoom(Arc<Semaphore>);
 
@@ -59,7 +60,7 @@ impl Default for AnswerRoom {
     }
 }
 
-/// Sends a long answer if there is room for it until it is read.
+/// Sends a long answer if the budget allows, and reserves its bytes until it is read.
 pub async fn hold_answers(
     State(AnswerRoom(room)): State<AnswerRoom>,
     request: Request,

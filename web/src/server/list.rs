@@ -1,7 +1,7 @@
-//! The list of experiments, as pages keep it: all of it once, and from then on what has changed.
+//! The list of experiments for pages: the whole list once, and then only changes.
 //!
-//! Each row has the version of the list that brought it. A page says which version it has, and is
-//! sent the rows of later ones. All pages share what was read.
+//! Each row has the version of the list in which it changed. A page sends its version, and gets
+//! the rows of later versions. All pages share one copy of the list.
 
 use std::{
     collections::BTreeMap,
@@ -27,13 +27,13 @@ use super::{
 
 /// Generations of the small curve of a row.
 const RECENT: u64 = 40;
-/// Least time between two events: nobody reads a list faster.
+/// Minimum time between two events: people do not read a list faster.
 const PAUSE: Duration = Duration::from_secs(1);
 
-/// What was read last.
+/// The list as last read.
 #[derive(Debug)]
 pub struct List {
-    /// Of this server: versions of another one mean nothing.
+    /// An id of this server: versions of another server are meaningless.
     epoch: String,
     known: Mutex<Known>,
 }
@@ -47,7 +47,7 @@ impl Default for List {
 
 #[derive(Debug, Default)]
 struct Known {
-    /// How much had been written when it was read.
+    /// The count of writes at the time of reading.
     count: Option<u64>,
     version: u64,
     rows: BTreeMap<u64, Row>,
@@ -59,11 +59,11 @@ struct Row {
     generations_done: u64,
     /// Best fitness of the latest generations.
     recent: Vec<f32>,
-    /// As JSON; none: it was deleted.
+    /// The row as JSON; none: the experiment was deleted.
     text: Option<String>,
 }
 
-/// What a page that has some version is told.
+/// The answer to a page with some version.
 #[derive(Debug)]
 struct Changes {
     mark: String,
@@ -93,8 +93,8 @@ struct RowAnswer<'a> {
 }
 
 impl List {
-    /// What is newer than the version that `mark` names; everything for one that says nothing
-    /// here.
+    /// The rows that are newer than the version in `mark`; all rows if this server does not
+    /// know that version.
     async fn since(&self, shared: &Shared, mark: &str) -> Result<Changes, Problem> {
         let count = *shared.reader.news().borrow();
         let mut known = self.known.lock().await;
@@ -176,7 +176,7 @@ pub struct Since {
     since: String,
 }
 
-/// All experiments, or those that have changed since a version.
+/// All experiments, or the changes since a version.
 pub async fn all(
     State(shared): State<Shared>,
     Query(Since { since }): Query<Since>,
@@ -185,8 +185,8 @@ pub async fn all(
     Ok(([(CONTENT_TYPE, "application/json")], changes.to_json()).into_response())
 }
 
-/// The same, whenever something is new. The id of an event is the version that it leads to, so a
-/// page that was cut off goes on without a gap.
+/// The same as a stream, with an event at every change. The id of an event is the resulting
+/// version, so a page continues without a gap after it was cut off.
 pub async fn live(
     State(shared): State<Shared>,
     Query(Since { since }): Query<Since>,

@@ -1,5 +1,5 @@
-//! News for pages, as server-sent events. A page that reads slowly gets fewer and longer
-//! ones: each is made when it is asked for, of what is stored then.
+//! News for pages, as server-sent events. A slow page gets fewer and longer events,
+//! because each event is made on demand from the stored state.
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Duration};
 
@@ -23,36 +23,36 @@ use super::{
     problem::{Path, Problem, Query},
 };
 
-/// Least time between two events of a stream.
+/// Minimum time between two events of a stream.
 const PAUSE: Duration = Duration::from_millis(400);
 
-/// Answers that are kept for other pages.
+/// Number of answers that are cached for other pages.
 const LATEST_MAX: usize = 256;
 
-/// What was read last of each experiment: pages that look at the same one share the work.
+/// The cached answers of each experiment: pages of the same experiment share the work.
 #[derive(Debug, Default)]
 pub struct Latest(Mutex<Known>);
 
-/// By the number of the experiment and the first generation that was asked for: how much had
-/// been written then, and the answer.
+/// By the number of the experiment and the first requested generation: the count of writes
+/// at that time, and the answer.
 type Known = BTreeMap<(u64, u64), (u64, Arc<News>)>;
 
-/// What is new of an experiment.
+/// The news of an experiment.
 #[derive(Debug)]
 struct News {
     /// As JSON.
     experiment: String,
-    /// As JSON; none if there are none.
+    /// As JSON; none without new generations.
     generations: Option<String>,
     /// The generation after the last of them.
     next: u64,
-    /// Whether there are more already.
+    /// Whether more generations are already stored.
     is_cut: bool,
 }
 
 impl Latest {
-    /// News of an experiment. `count`: how much has been written; what was read at the same
-    /// count is still true.
+    /// News of an experiment. `count`: the count of writes; an answer from the same count
+    /// is still valid.
     async fn read(&self, shared: &Shared, id: u64, from: u64, count: u64) -> Option<Arc<News>> {
         let mut known = self.0.lock().await;
         if let Some((at, news)) = known.get(&(id, from))
@@ -79,7 +79,7 @@ impl Latest {
     }
 }
 
-/// The first generation that is wanted.
+/// The first requested generation.
 #[derive(Debug, Deserialize)]
 pub struct From {
     #[serde(default)]
@@ -87,7 +87,7 @@ pub struct From {
 }
 
 /// Generations of an experiment from some on, oldest first. The id of an event is the
-/// generation after its last one, so a page that was cut off goes on without a gap.
+/// generation after its last one, so a page continues without a gap after it was cut off.
 pub async fn generations(
     State(shared): State<Shared>,
     Path(id): Path<u64>,
@@ -107,7 +107,8 @@ pub async fn generations(
             let count = *news.borrow_and_update();
             let latest = shared.latest.read(&shared, id, from, count).await?;
             from = latest.next;
-            // There is more at once, or nothing until something is stored.
+            // Either more generations are ready at once, or the stream waits for the next
+            // write.
             step = if latest.is_cut { Step::Read } else { Step::Wait };
             if latest.generations.is_none() && latest.experiment == before {
                 continue;
@@ -122,14 +123,14 @@ pub async fn generations(
     Ok(stream(events))
 }
 
-/// What a stream does next.
+/// The next state of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
     Read,
     Wait,
 }
 
-/// Waits for news, and a moment longer, so that many come as one; none at the end.
+/// Waits for news, and a moment longer, to combine several; none at the end.
 pub async fn wait(shared: &Shared, news: &mut watch::Receiver<u64>) -> Option<()> {
     tokio::select! {
         () = shared.shutdown.cancelled() => return None,
@@ -138,7 +139,7 @@ pub async fn wait(shared: &Shared, news: &mut watch::Receiver<u64>) -> Option<()
     rest(shared, PAUSE).await
 }
 
-/// Waits for so long; none at the end.
+/// Waits for a duration; none at the end.
 pub async fn rest(shared: &Shared, time: Duration) -> Option<()> {
     tokio::select! {
         () = shared.shutdown.cancelled() => None,

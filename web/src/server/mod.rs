@@ -1,5 +1,5 @@
-//! The pages over HTTP: who may see them, what they are made of, and nothing that
-//! decides.
+//! The pages over HTTP: access to them, and their content. All decisions are made
+//! elsewhere.
 
 mod access;
 mod answers;
@@ -50,20 +50,20 @@ use self::{
     replays::Judgements,
 };
 
-/// What is served, and to whom.
+/// The served content, and the access to it.
 #[derive(Clone)]
 pub struct Site {
-    /// Where experiments are read.
+    /// The source of experiments.
     pub reader: Arc<Reader>,
     /// The coordinator, if one runs.
     pub control: Option<Arc<dyn Control>>,
-    /// What people have to know, if anything.
+    /// The token that browsers must show, if any.
     pub token: Option<Token>,
-    /// How the way to them is encrypted, if it is.
+    /// The TLS configuration, if any.
     pub tls: Option<Arc<ServerConfig>>,
 }
 
-/// What all handlers share.
+/// The shared state of all handlers.
 #[derive(Clone)]
 struct Shared {
     reader: Arc<Reader>,

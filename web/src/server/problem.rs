@@ -1,4 +1,4 @@
-//! What went wrong, for pages: a status, and one line for people.
+//! Errors for pages: a status, and one line for people.
 
 use axum::{
     extract::{FromRequest, FromRequestParts, Request},
@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use serde_json::json;
 use tonic::{Code, Status};
 
-/// An answer that is none.
+/// An error as an answer.
 #[derive(Debug)]
 pub struct Problem {
     status: StatusCode,
@@ -21,18 +21,18 @@ impl Problem {
         Self { status, message: message.into() }
     }
 
-    /// What people have asked for makes no sense.
+    /// The error of a request that makes no sense.
     pub fn bad(message: impl Into<String>) -> Self {
         Self::new(StatusCode::BAD_REQUEST, message)
     }
 
-    /// Nothing is asked or done at an address, or not with this method.
+    /// The error of an unknown address, or of a wrong method.
     pub async fn nowhere(uri: Uri) -> Self {
         let path: String = uri.path().chars().take(80).collect();
         Self::new(StatusCode::NOT_FOUND, format!("there is nothing at {path}"))
     }
 
-    /// Only a coordinator can do this.
+    /// The error that only a coordinator can do this.
     pub fn no_coordinator() -> Self {
         let message = "these pages show a data directory; only a coordinator can do this";
         Self::new(StatusCode::CONFLICT, message)
@@ -59,7 +59,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// What an address names, or one line on why it names nothing.
+/// The parameters in an address, or a line on their error.
 #[derive(Debug)]
 pub struct Path<T>(pub T);
 
@@ -75,7 +75,7 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for Path<T>
     }
 }
 
-/// What follows the `?` of an address, or one line on what is wrong with it.
+/// The query after the `?` of an address, or a line on its error.
 #[derive(Debug)]
 pub struct Query<T>(pub T);
 
@@ -88,7 +88,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
     }
 }
 
-/// A body that is JSON, or one line on what is wrong with it.
+/// A JSON body, or a line on its error.
 #[derive(Debug)]
 pub struct Body<T>(pub T);
 

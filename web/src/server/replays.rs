@@ -1,4 +1,4 @@
-//! Episodes for the player, simulated when they are asked for.
+//! Episodes for the player, simulated on request.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -24,14 +24,14 @@ use crate::{
     what_if::WhatIf,
 };
 
-/// Judgements whose trials were simulated again, by experiment and generation.
+/// Cached judgements whose trials were simulated again, by experiment and generation.
 #[derive(Debug, Default)]
 pub struct Judgements(Mutex<BTreeMap<(u64, u64), Judgement>>);
 
-/// Its trials, once somebody has asked for them.
+/// Its trials, once requested.
 type Judgement = Arc<OnceCell<Trials>>;
 
-/// Judgements that are kept for other pages.
+/// Number of judgements that are cached for other pages.
 const JUDGEMENTS_MAX: usize = 64;
 
 impl Judgements {
@@ -44,7 +44,7 @@ impl Judgements {
     }
 }
 
-/// Somebody who can be simulated again.
+/// A genotype that can be simulated again.
 #[derive(Clone)]
 struct Subject {
     experiment: u64,
@@ -57,21 +57,23 @@ impl Subject {
     async fn find(shared: &Shared, address: &str) -> Result<Self, Problem> {
         let experiment = address.split('@').next().and_then(|id| id.parse().ok());
         let experiment =
-            experiment.ok_or_else(|| Problem::bad(format!("`{address}` names nobody")))?;
+            experiment.ok_or_else(|| Problem::bad(format!("`{address}` names no genotype")))?;
         let individual = shared.reader.individual(address).await?;
         let found = shared.experiment(experiment).await?;
         let simulation =
             found.experiment.map(|experiment| experiment.simulation).unwrap_or_default();
         if simulation != FINGERPRINT {
-            let why =
-                format!("it was computed with \"{simulation}\", and this is \"{FINGERPRINT}\"");
+            let why = format!(
+                "the experiment was computed with \"{simulation}\", but this is \
+                 \"{FINGERPRINT}\""
+            );
             return Err(Problem::new(StatusCode::CONFLICT, why));
         }
         let name = name(address, &individual);
         Ok(Self { experiment, config_json: found.config_json, individual, name })
     }
 
-    /// The experiment with what is to be different.
+    /// The experiment with the requested changes.
     fn compile(&self, what_if: &WhatIf) -> Result<(ExperimentConfig, Simulation), Problem> {
         let bad = |error: &dyn std::fmt::Display| Problem::bad(error.to_string());
         let config = ExperimentConfig::from_json(&self.config_json, "", ALGORITHMS);
@@ -106,7 +108,7 @@ fn stopping() -> Problem {
     Problem::new(StatusCode::SERVICE_UNAVAILABLE, "the server stops")
 }
 
-/// Simulates when it is its turn; ends with the server, and when the browser goes away.
+/// Simulates in turn; stops when the server ends or the browser goes away.
 async fn work<T: Send + 'static>(
     shared: &Shared,
     simulate: impl FnOnce(&dyn Fn() -> bool) -> Result<T, Problem> + Send + 'static,
@@ -123,7 +125,7 @@ async fn work<T: Send + 'static>(
     })?
 }
 
-/// The trials of whoever is at an address.
+/// The trials of the genotype at an address.
 pub async fn trials(
     State(shared): State<Shared>,
     Path(address): Path<String>,
@@ -131,7 +133,7 @@ pub async fn trials(
     Ok(Json(Subject::find(&shared, &address).await?.trials(&shared).await?))
 }
 
-/// The episode of the individual at an address, with what is to be different.
+/// The episode of the genotype at an address, with the requested changes.
 pub async fn replay(
     State(shared): State<Shared>,
     Path(address): Path<String>,
@@ -150,7 +152,7 @@ pub async fn replay(
     Ok(([(CONTENT_TYPE, "application/octet-stream")], packed.await?).into_response())
 }
 
-/// In which world it plays: a champion in the median one of those by which it was judged.
+/// The world of the episode: for a champion, the median trial of its judgement.
 async fn world(
     shared: &Shared,
     subject: &Subject,
@@ -179,7 +181,7 @@ async fn world(
     }
 }
 
-/// Who is at an address, for people.
+/// The name of the genotype at an address, for people.
 fn name(address: &str, individual: &GetChampionResponse) -> String {
     let generation = individual.generation;
     match (address.split_once('@'), individual.individual) {

@@ -1,4 +1,4 @@
-//! Who is let in, and what browsers are told.
+//! Access to the pages, and the headers for browsers.
 
 use std::time::Duration;
 
@@ -179,7 +179,7 @@ async fn heads_are_told_what_they_would_get() {
     }
 }
 
-/// A database says of a run that was interrupted that it runs.
+/// A database calls an interrupted run running.
 #[tokio::test]
 async fn only_where_a_coordinator_is_something_runs() {
     let list = text(answer(HERE, None, get("/api/experiments", HERE, "")).await).await;
@@ -212,7 +212,7 @@ fn children_are_beside_their_parents() {
     assert_eq!(families, json!({ "populations": ["p"], "children": children, "next": 5 }));
 }
 
-/// Whatever they leave open, others see the pages.
+/// Open connections of strangers do not keep others from the pages.
 #[tokio::test]
 async fn idle_connections_slow_ones_and_streams_keep_nobody_out() {
     for (token, bytes) in [
@@ -233,7 +233,7 @@ async fn idle_connections_slow_ones_and_streams_keep_nobody_out() {
         let mut open = Vec::new();
         for _ in 0..600 {
             let mut stream = TcpStream::connect(address).await.unwrap();
-            // It may have had to go already.
+            // The connection may already be closed.
             let _ = stream.write_all(bytes.as_bytes()).await;
             open.push(stream);
         }
